@@ -1,0 +1,179 @@
+"""A user's formula, such as ``u*abs(u) + 0.1*v**3``, turned into nodes of a graph.
+
+The text is split by Python's own parser and each piece is held against a whitelist: numbers, known
+names, ``+ - * / **`` and the functions below. Nothing is ever evaluated or executed.
+"""
+
+import ast
+import math
+from collections.abc import Mapping
+
+from study.errors import StudyError
+from study.graph import Graph, Op
+
+LONGEST = 300
+DEEPEST = 40
+LARGEST_EXPONENT = 16.0
+
+FUNCTIONS = {
+    "abs": (Op.ABS, 1),
+    "sgn": (Op.SGN, 1),
+    "sign": (Op.SGN, 1),
+    "sin": (Op.SIN, 1),
+    "cos": (Op.COS, 1),
+    "exp": (Op.EXP, 1),
+    "log": (Op.LOG, 1),
+    "sqrt": (Op.SQRT, 1),
+    "tanh": (Op.TANH, 1),
+    "max": (Op.MAX, 2),
+    "min": (Op.MIN, 2),
+}
+VARIABLES = ("u", "v", "t", "z", "w", "pi")
+
+
+class ExpressionError(StudyError):
+    """A formula that is not of the whitelisted kind."""
+
+
+def parse(text: str) -> ast.expr:
+    """Check the outer form of a formula and return its syntax tree.
+
+    Raises
+    ------
+    ExpressionError
+        If the text is too long, nested too deeply or no formula at all.
+    """
+    if len(text) > LONGEST:
+        raise ExpressionError(f"the expression has {len(text)} characters; at most {LONGEST} are read")
+    if not text.isascii() or "\x00" in text:
+        raise ExpressionError(f"the expression {text!r} has characters outside plain ASCII")
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, MemoryError, RecursionError):
+        raise ExpressionError(f"the expression {text!r} is not a formula such as 'u*abs(u) + 0.1*v**3'") from None
+    if _depth(tree) > DEEPEST:
+        raise ExpressionError(f"the expression {text!r} is nested more than {DEEPEST} deep")
+    return tree
+
+
+def _depth(tree: ast.expr) -> int:
+    deepest, level = 0, [tree]
+    while level:
+        deepest += 1
+        level = [child for node in level for child in ast.iter_child_nodes(node) if isinstance(child, ast.expr)]
+    return deepest
+
+
+def names(text: str) -> list[str]:
+    """The names a formula uses, functions and pi aside, in alphabetical order."""
+    tree = parse(text)
+    functions = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    found = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in functions}
+    return sorted(found - {"pi"})
+
+
+def build(graph: Graph, text: str, known: Mapping[str, int]) -> int:
+    """Add a formula to a graph.
+
+    Parameters
+    ----------
+    graph : Graph
+        Where its nodes go.
+    text : str
+        The formula.
+    known : mapping
+        The node of each name it may use.
+
+    Returns
+    -------
+    int
+        The node of its value.
+
+    Raises
+    ------
+    ExpressionError
+        At the first piece that is not on the whitelist, naming it.
+    """
+    return _Builder(graph, text, known).node(parse(text))
+
+
+class _Builder:
+    def __init__(self, graph: Graph, text: str, known: Mapping[str, int]) -> None:
+        self.graph, self.text, self.known = graph, text, known
+
+    def refuse(self, why: str) -> ExpressionError:
+        return ExpressionError(f"the expression {self.text!r} {why}")
+
+    def node(self, tree: ast.expr) -> int:
+        match tree:
+            case ast.Constant(value=value):
+                return self.number(value)
+            case ast.Name(id=name):
+                return self.name(name)
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                return self.graph.neg(self.node(operand))
+            case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+                return self.node(operand)
+            case ast.BinOp(left=base, op=ast.Pow(), right=exponent):
+                return self.power(base, exponent)
+            case ast.BinOp(left=left, op=op, right=right):
+                return self.arithmetic(op, self.node(left), self.node(right))
+            case ast.Call():
+                return self.call(tree)
+            case _:
+                raise self.refuse(f"holds {ast.unparse(tree)!r}; it may hold numbers, names, + - * / ** and functions")
+
+    def number(self, value: object) -> int:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.refuse(f"holds {value!r}, which is not a real number")
+        if abs(value) > 1e300 or not math.isfinite(value):
+            raise self.refuse(f"holds the number {str(value)[:20]}, outside the range of +-1e300")
+        return self.graph.const(float(value))
+
+    def name(self, name: str) -> int:
+        if name in self.known:
+            return self.known[name]
+        if name == "pi":
+            return self.graph.const(math.pi)
+        raise self.refuse(f"uses the name {name!r}; it may use {', '.join(sorted(self.known))} and pi")
+
+    def power(self, base: ast.expr, exponent: ast.expr) -> int:
+        value = self.graph.constant_value(self.node(exponent))
+        if value is None or abs(value) > LARGEST_EXPONENT:
+            raise self.refuse(
+                f"raises to the power {ast.unparse(exponent)!r}; a power is a number of at most {LARGEST_EXPONENT:g}"
+            )
+        return self.graph.power(self.node(base), value)
+
+    def arithmetic(self, op: ast.operator, left: int, right: int) -> int:
+        match op:
+            case ast.Add():
+                return self.graph.add(left, right)
+            case ast.Sub():
+                return self.graph.sub(left, right)
+            case ast.Mult():
+                return self.graph.mul(left, right)
+            case ast.Div():
+                return self.divide(left, right)
+            case _:
+                raise self.refuse("uses an operator other than + - * / **")
+
+    def divide(self, left: int, right: int) -> int:
+        x, y = self.graph.constant_value(left), self.graph.constant_value(right)
+        if y == 0.0:
+            raise self.refuse("divides by zero")
+        if x is not None and y is not None:
+            return self.graph.const(x / y)
+        return self.graph.div(left, right)
+
+    def call(self, tree: ast.Call) -> int:
+        name = tree.func.id if isinstance(tree.func, ast.Name) else ast.unparse(tree.func)
+        if name not in FUNCTIONS:
+            raise self.refuse(f"calls {name!r}; the functions are {', '.join(sorted(FUNCTIONS))}")
+        op, arity = FUNCTIONS[name]
+        if len(tree.args) != arity or tree.keywords:
+            raise self.refuse(f"calls {name!r} with {len(tree.args)} arguments; it takes {arity}")
+        arguments = [self.node(argument) for argument in tree.args]
+        if arity == 1:
+            return self.graph.unary(op, arguments[0])
+        return self.graph.binary(op, arguments[0], arguments[1])

@@ -1,0 +1,271 @@
+"""Expressions as a graph without repetition, their exact derivatives, and their programs for the kernels.
+
+Every force in a model is a node here. Equal subexpressions share one node (``u*u`` in ``u**3`` and in
+its derivative is computed once), derivatives are exact, and :meth:`Graph.program` writes the nodes
+down as the instructions that ``kernels.py`` runs at compiled speed. No text is ever evaluated.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Op(IntEnum):
+    """Instructions of the kernels; the numbers are what ``kernels.run`` switches on."""
+
+    ADD = 0
+    SUB = 1
+    MUL = 2
+    DIV = 3
+    NEG = 4
+    ABS = 5
+    SGN = 6
+    MAX = 7
+    MIN = 8
+    GT = 9
+    SIN = 10
+    COS = 11
+    EXP = 12
+    LOG = 13
+    SQRT = 14
+    TANH = 15
+    POW = 16
+    INPUT = 100
+    CONST = 101
+
+
+UNARY = {Op.NEG, Op.ABS, Op.SGN, Op.SIN, Op.COS, Op.EXP, Op.LOG, Op.SQRT, Op.TANH}
+
+
+@dataclass(frozen=True)
+class Program:
+    """Straight-line code over one array of registers.
+
+    Attributes
+    ----------
+    code : int64 array, shape (instructions, 3)
+        Operation and the registers of its two operands; instruction i writes register ``first + i``.
+    registers : float64 array
+        Start values: inputs (to be filled in by the caller), constants, then room for results.
+    first : int
+        The register that the first instruction writes.
+    inputs : dict
+        Register of each named input.
+    outputs : int64 array
+        Registers of the results, in the order in which they were asked for.
+    """
+
+    code: NDArray[np.int64]
+    registers: NDArray[np.float64]
+    first: int
+    inputs: dict[str, int]
+    outputs: NDArray[np.int64]
+
+
+@dataclass
+class Graph:
+    """A growing set of nodes ``(op, a, b)``, each of which exists once."""
+
+    nodes: list[tuple[Op, int, int]] = field(default_factory=list[tuple[Op, int, int]])
+    names: list[str] = field(default_factory=list[str])
+    values: list[float] = field(default_factory=list[float])
+    _known: dict[tuple[Op, int, int], int] = field(default_factory=dict[tuple[Op, int, int], int])
+    _derivatives: dict[tuple[int, int], int] = field(default_factory=dict[tuple[int, int], int])
+
+    def _node(self, op: Op, a: int, b: int) -> int:
+        key = (op, a, b)
+        if key not in self._known:
+            self._known[key] = len(self.nodes)
+            self.nodes.append(key)
+        return self._known[key]
+
+    def input(self, name: str) -> int:
+        """Node of a named input (a variable, a coefficient, a shape parameter)."""
+        if name not in self.names:
+            self.names.append(name)
+        return self._node(Op.INPUT, self.names.index(name), 0)
+
+    def const(self, value: float) -> int:
+        """Node of a constant."""
+        if value not in self.values:
+            self.values.append(value)
+        return self._node(Op.CONST, self.values.index(value), 0)
+
+    def constant_value(self, node: int) -> float | None:
+        """The value of a constant node, None for any other."""
+        op, a, _ = self.nodes[node]
+        return self.values[a] if op is Op.CONST else None
+
+    def add(self, a: int, b: int) -> int:
+        """a + b."""
+        x, y = self.constant_value(a), self.constant_value(b)
+        if x is not None and y is not None:
+            return self.const(x + y)
+        if x == 0.0:
+            return b
+        return a if y == 0.0 else self._node(Op.ADD, min(a, b), max(a, b))
+
+    def sub(self, a: int, b: int) -> int:
+        """a - b."""
+        x, y = self.constant_value(a), self.constant_value(b)
+        if x is not None and y is not None:
+            return self.const(x - y)
+        if y == 0.0:
+            return a
+        return self.neg(b) if x == 0.0 else self._node(Op.SUB, a, b)
+
+    def neg(self, a: int) -> int:
+        """-a."""
+        x = self.constant_value(a)
+        return self.const(-x) if x is not None else self._node(Op.NEG, a, a)
+
+    def mul(self, a: int, b: int) -> int:
+        """a b."""
+        x, y = self.constant_value(a), self.constant_value(b)
+        if x is not None and y is not None:
+            return self.const(x * y)
+        if x == 0.0 or y == 0.0:
+            return self.const(0.0)
+        if x == 1.0:
+            return b
+        return a if y == 1.0 else self._node(Op.MUL, min(a, b), max(a, b))
+
+    def div(self, a: int, b: int) -> int:
+        """a / b."""
+        if self.constant_value(a) == 0.0:
+            return a
+        return a if self.constant_value(b) == 1.0 else self._node(Op.DIV, a, b)
+
+    def unary(self, op: Op, a: int) -> int:
+        """A function of one argument."""
+        return self._node(op, a, a)
+
+    def binary(self, op: Op, a: int, b: int) -> int:
+        """MAX, MIN, GT (1 where a > b, else 0) or POW."""
+        return self._node(op, a, b)
+
+    def power(self, a: int, exponent: float) -> int:
+        """a to a constant power; small whole powers become products."""
+        if exponent == int(exponent) and abs(exponent) <= 16:
+            return self._whole_power(a, int(exponent))
+        return self._node(Op.POW, a, self.const(exponent))
+
+    def _whole_power(self, a: int, n: int) -> int:
+        if n < 0:
+            return self.div(self.const(1.0), self._whole_power(a, -n))
+        if n == 0:
+            return self.const(1.0)
+        half = self._whole_power(a, n // 2)
+        square = self.mul(half, half) if n > 1 else self.const(1.0)
+        return self.mul(square, a) if n % 2 else square
+
+    def derivative(self, node: int, wrt: int) -> int:
+        """The exact partial derivative of one node with respect to another (an input).
+
+        The derivative of ``sgn`` is taken as zero: it is so everywhere but on the switching line.
+        """
+        if node == wrt:
+            return self.const(1.0)
+        key = (node, wrt)
+        if key not in self._derivatives:
+            self._derivatives[key] = self._differentiate(node, wrt)
+        return self._derivatives[key]
+
+    def _differentiate(self, node: int, wrt: int) -> int:
+        op, a, b = self.nodes[node]
+        if op in (Op.INPUT, Op.CONST, Op.SGN, Op.GT):
+            return self.const(0.0)
+        da = self.derivative(a, wrt)
+        if op in UNARY:
+            return self._unary_rule(op, node, a, da)
+        return self._binary_rule(op, node, (a, b), (da, self.derivative(b, wrt)))
+
+    def _unary_rule(self, op: Op, node: int, a: int, da: int) -> int:
+        if self.constant_value(da) == 0.0:
+            return da
+        match op:
+            case Op.NEG:
+                return self.neg(da)
+            case Op.ABS:
+                return self.mul(self.unary(Op.SGN, a), da)
+            case Op.SIN:
+                return self.mul(self.unary(Op.COS, a), da)
+            case Op.COS:
+                return self.neg(self.mul(self.unary(Op.SIN, a), da))
+            case Op.EXP:
+                return self.mul(node, da)
+            case Op.LOG:
+                return self.div(da, a)
+            case Op.SQRT:
+                return self.div(da, self.mul(self.const(2.0), node))
+            case _:  # TANH
+                return self.mul(self.sub(self.const(1.0), self.mul(node, node)), da)
+
+    def _binary_rule(self, op: Op, node: int, arguments: tuple[int, int], slopes: tuple[int, int]) -> int:
+        (a, b), (da, db) = arguments, slopes
+        match op:
+            case Op.ADD:
+                return self.add(da, db)
+            case Op.SUB:
+                return self.sub(da, db)
+            case Op.MUL:
+                return self.add(self.mul(da, b), self.mul(a, db))
+            case Op.DIV:
+                return self.div(self.sub(da, self.mul(node, db)), b)
+            case Op.MAX:
+                return self._choose(self.binary(Op.GT, a, b), da, db)
+            case Op.MIN:
+                return self._choose(self.binary(Op.GT, b, a), da, db)
+            case _:  # POW, whose exponent is a constant
+                exponent = self.constant_value(b)
+                assert exponent is not None, "the parser admits constant exponents only"
+                slope = self.mul(self.const(exponent), self.power(a, exponent - 1.0))
+                return self.mul(slope, da)
+
+    def _choose(self, gate: int, yes: int, no: int) -> int:
+        if yes == no:
+            return yes
+        return self.add(self.mul(gate, yes), self.mul(self.sub(self.const(1.0), gate), no))
+
+    def program(self, outputs: Sequence[int]) -> Program:
+        """Instructions that compute ``outputs`` and nothing else, inputs first, then constants."""
+        needed = self._needed(outputs)
+        count = len(self.names)
+        inputs = {name: index for index, name in enumerate(self.names)}
+        constants = [n for n in needed if self.nodes[n][0] is Op.CONST]
+        first = count + len(constants)
+        register = {n: count + i for i, n in enumerate(constants)}
+        code: list[tuple[int, int, int]] = []
+        for n in needed:
+            op, a, b = self.nodes[n]
+            if op is Op.INPUT:
+                register[n] = a
+            elif op is not Op.CONST:
+                register[n] = first + len(code)
+                code.append((int(op), register[a], register[b]))
+        registers = np.zeros(first + len(code))
+        registers[count:first] = [self.values[self.nodes[n][1]] for n in constants]
+        return Program(
+            code=np.array(code, dtype=np.int64).reshape(-1, 3),
+            registers=registers,
+            first=first,
+            inputs=inputs,
+            outputs=np.array([register[n] for n in outputs], dtype=np.int64),
+        )
+
+    def _needed(self, outputs: Sequence[int]) -> list[int]:
+        """Every node that the outputs rest on, in an order in which each comes after what it needs."""
+        wanted: set[int] = set()
+        todo = list(outputs)
+        while todo:
+            n = todo.pop()
+            if n in wanted:
+                continue
+            wanted.add(n)
+            op, a, b = self.nodes[n]
+            if op not in (Op.INPUT, Op.CONST):
+                todo += [a, b]
+        return sorted(wanted)  # a node is only ever made after its operands

@@ -1,0 +1,127 @@
+"""From a model and a record to the inputs of the reverse system (the report's Figure 14).
+
+Components with the same shape are one input: u carries stiffness, damping and mass, u^3 carries the
+cubic stiffness and Van der Pol's damping. The output is always the force.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study import expression, kernels
+from study.errors import StudyError
+from study.graph import Graph
+from study.model import Model, ModelTerm, with_registers
+from study.record import Record
+from study.terms import Component
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A coefficient's place in an input's frequency response function."""
+
+    symbol: str
+    order: int
+    factor: float
+
+
+@dataclass(frozen=True)
+class Input:
+    """One input of the reverse system.
+
+    Attributes
+    ----------
+    shape : str
+        Formula of its time history g(u, v, t).
+    parts : tuple of Part
+        ``A(f) = sum of coefficient * factor * (j 2 pi f)^order``.
+    terms : tuple of str
+        Names of the terms it carries.
+    parameters : tuple of (str, float)
+        Shape parameters in the formula.
+    """
+
+    shape: str
+    parts: tuple[Part, ...]
+    terms: tuple[str, ...]
+    parameters: tuple[tuple[str, float], ...]
+
+    def powers(self, frequency: Floats) -> Complexes:
+        """``factor (j 2 pi f)^order`` of each part, shape (lines, parts)."""
+        omega = 2j * np.pi * frequency
+        return np.stack([p.factor * omega**p.order for p in self.parts], axis=1).astype(np.complex128)
+
+    def response(self, frequency: Floats, values: dict[str, float]) -> Complexes:
+        """The exact A(f) for coefficients of these values, shape (lines,)."""
+        return self.powers(frequency) @ np.array([values.get(p.symbol, 0.0) for p in self.parts])
+
+
+def reverse_inputs(model: Model) -> tuple[Input, ...]:
+    """Inputs of a model, in the order in which its terms first need them.
+
+    Raises
+    ------
+    StudyError
+        If a shape parameter is still unknown.
+    """
+    found: dict[tuple[str, tuple[tuple[str, float], ...]], Input] = {}
+    for entry in model.terms:
+        parameters = _known_parameters(entry)
+        for component in entry.term.components:
+            key = (component.shape, parameters)
+            known = found.get(key, Input(component.shape, (), (), parameters))
+            found[key] = _joined(known, entry, component)
+    return tuple(found.values())
+
+
+def _known_parameters(entry: ModelTerm) -> tuple[tuple[str, float], ...]:
+    pairs: list[tuple[str, float]] = []
+    for parameter, value in zip(entry.term.parameters, entry.parameters, strict=True):
+        if value is None:
+            raise StudyError(f"{entry.name} has no value for {parameter.name}; it must be given or estimated first")
+        pairs.append((parameter.name, value))
+    return tuple(pairs)
+
+
+def _joined(known: Input, entry: ModelTerm, component: Component) -> Input:
+    part = Part(component.symbol, component.order, component.factor)
+    terms = known.terms if entry.name in known.terms else (*known.terms, entry.name)
+    return Input(known.shape, (*known.parts, part), terms, known.parameters)
+
+
+def histories(inputs: Sequence[Input], record: Record) -> list[Floats]:
+    """Time history of each input, each of shape (n,).
+
+    Raises
+    ------
+    StudyError
+        If a formula needs a channel that the record lacks.
+    """
+    return [record["displacement"] if i.shape == "u" else history(i, record) for i in inputs]
+
+
+def history(item: Input, record: Record) -> Floats:
+    """g(u, v, t) of one input along a record, shape (n,)."""
+    columns = {"u": "displacement", "v": "velocity"}
+    wanted = [n for n in expression.names(item.shape) if n not in dict(item.parameters)]
+    data: list[Floats] = []
+    for name in wanted:
+        channel = columns.get(name, name)
+        if name != "t" and channel not in record:
+            raise StudyError(f"the formula {item.shape!r} needs the channel {channel!r}, which {record.name} lacks")
+        data.append(record.time if name == "t" else record[channel])
+    graph = Graph()
+    known = {name: graph.input(name) for name in (*wanted, *dict(item.parameters))}
+    program = with_registers(graph.program([expression.build(graph, item.shape, known)]), dict(item.parameters))
+    table = np.column_stack(data) if data else np.zeros((len(record), 0))
+    out = np.empty((len(record), 1))
+    positions = np.array([program.inputs[n] for n in wanted], dtype=np.int64)
+    kernels.evaluate(
+        program.code, program.first, program.registers.copy(), positions, table, program.outputs, out
+    )  # fmt: skip
+    return out[:, 0]

@@ -1,0 +1,190 @@
+"""The compiled loops: running a program, and integrating an equation of motion with it.
+
+All kernels stand in this one file, because Numba's disk cache notices a change of the file that holds
+a function but not of one it calls. A state is ``(u, v, z...)``; the program computes its derivatives
+``(v, a, dz...)`` from the registers ``u, v, t, force, z..., channels...``, which stand first.
+
+Layout of the registers (see ``study.model.forward_program``): 0 u, 1 v, 2 t, 3 force,
+then the extra channels, then the states z, then coefficients and shape parameters.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.jit import compiled
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@compiled
+def run(code: Ints, first: int, r: Floats) -> None:
+    """Run a program: one instruction after the other, each into the next register."""
+    for i in range(code.shape[0]):
+        op = code[i, 0]
+        a = r[code[i, 1]]
+        b = r[code[i, 2]]
+        if op == 2:
+            y = a * b
+        elif op == 0:
+            y = a + b
+        elif op == 1:
+            y = a - b
+        elif op == 3:
+            y = a / b
+        elif op == 4:
+            y = -a
+        elif op == 5:
+            y = abs(a)
+        elif op == 6:
+            y = 1.0 if a > 0.0 else (-1.0 if a < 0.0 else 0.0)
+        elif op == 7:
+            y = a if a > b else b
+        elif op == 8:
+            y = a if a < b else b
+        elif op == 9:
+            y = 1.0 if a > b else 0.0
+        elif op == 10:
+            y = math.sin(a)
+        elif op == 11:
+            y = math.cos(a)
+        elif op == 12:
+            y = np.exp(a)
+        elif op == 13:
+            y = np.log(a)
+        elif op == 14:
+            y = np.sqrt(a)
+        elif op == 15:
+            y = math.tanh(a)
+        else:
+            y = np.power(a, b)
+        r[first + i] = y
+
+
+@compiled
+def evaluate(code: Ints, first: int, r: Floats, columns: Ints, data: Floats, outputs: Ints, out: Floats) -> None:
+    """Run a program for every sample: ``data[i]`` into registers ``columns``, results into ``out[i]``."""
+    for i in range(data.shape[0]):
+        for c in range(columns.shape[0]):
+            r[columns[c]] = data[i, c]
+        run(code, first, r)
+        for k in range(outputs.shape[0]):
+            out[i, k] = r[outputs[k]]
+
+
+@compiled
+def _slope(
+    code: Ints, first: int, r: Floats, outputs: Ints, time: float,
+    drive: Floats, j: int, x: Floats, k: Floats, row: int,
+) -> None:  # fmt: skip
+    """Derivative of the state into k[row]: outputs[0] is the acceleration, the rest those of z.
+
+    Rows are passed by number, not as views: making a view costs as much as three instructions.
+    """
+    channels = drive.shape[1]
+    r[0] = x[0]
+    r[1] = x[1]
+    r[2] = time
+    for c in range(channels):
+        r[3 + c] = drive[j, c]
+    for i in range(2, x.shape[0]):
+        r[1 + channels + i] = x[i]
+    run(code, first, r)
+    k[row, 0] = x[1]
+    for i in range(1, x.shape[0]):
+        k[row, i] = r[outputs[i - 1]]
+
+
+@compiled
+def _rk4_step(
+    code: Ints, first: int, r: Floats, outputs: Ints, time: float, h: float,
+    drive: Floats, j: int, x: Floats, k: Floats, trial: Floats,
+) -> None:  # fmt: skip
+    """One classical Runge-Kutta step in place; drive[j], drive[j+1], drive[j+2] stand half a step apart."""
+    n = x.shape[0]
+    _slope(code, first, r, outputs, time, drive, j, x, k, 0)
+    for i in range(n):
+        trial[i] = x[i] + 0.5 * h * k[0, i]
+    _slope(code, first, r, outputs, time + 0.5 * h, drive, j + 1, trial, k, 1)
+    for i in range(n):
+        trial[i] = x[i] + 0.5 * h * k[1, i]
+    _slope(code, first, r, outputs, time + 0.5 * h, drive, j + 1, trial, k, 2)
+    for i in range(n):
+        trial[i] = x[i] + h * k[2, i]
+    _slope(code, first, r, outputs, time + h, drive, j + 2, trial, k, 3)
+    for i in range(n):
+        x[i] += h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
+
+
+@compiled
+def integrate_rk4(
+    code: Ints, first: int, r: Floats, outputs: Ints, start: float, dt: float,
+    steps: int, drive: Floats, x: Floats, out: Floats,
+) -> int:  # fmt: skip
+    """Classical Runge-Kutta, ``steps`` steps a sample; ``drive`` has 2 steps rows a sample.
+
+    ``out`` gets (u, v, a, z...) of each sample. Returns the first non-finite sample, or -1.
+    """
+    n = x.shape[0]
+    h = dt / steps
+    k = np.zeros((4, n))
+    trial = np.zeros(n)
+    for sample in range(out.shape[0]):
+        j = 2 * steps * sample
+        _slope(code, first, r, outputs, start + sample * dt, drive, j, x, k, 0)
+        if not _write(x, k[0, 1], out, sample):
+            return sample
+        if sample + 1 < out.shape[0]:
+            for s in range(steps):
+                time = start + sample * dt + s * h
+                _rk4_step(code, first, r, outputs, time, h, drive, j + 2 * s, x, k, trial)
+    return -1
+
+
+@compiled
+def _write(x: Floats, acceleration: float, out: Floats, sample: int) -> bool:
+    """Keep one sample; False where it is not finite (1e150 squared still is, its cube is not)."""
+    out[sample, 0] = x[0]
+    out[sample, 1] = x[1]
+    out[sample, 2] = acceleration
+    for i in range(2, x.shape[0]):
+        out[sample, i + 1] = x[i]
+    return bool(abs(x[0]) < 1e150 and abs(x[1]) < 1e150 and math.isfinite(acceleration))
+
+
+@compiled
+def integrate_abm4(
+    code: Ints, first: int, r: Floats, outputs: Ints, start: float, dt: float,
+    steps: int, drive: Floats, x: Floats, out: Floats,
+) -> int:  # fmt: skip
+    """Adams-Bashforth predictor, Adams-Moulton corrector of order 4 (PECE), started by Runge-Kutta.
+
+    Arguments and result as in :func:`integrate_rk4`.
+    """
+    n = x.shape[0]
+    h = dt / steps
+    history = np.zeros((4, n))  # slopes at this step and the three before it, a ring
+    k = np.zeros((4, n))
+    trial = np.zeros(n)
+    total = (out.shape[0] - 1) * steps
+    for step in range(total + 1):
+        time = start + step * h
+        f0, f1, f2, f3 = step & 3, (step + 3) & 3, (step + 2) & 3, (step + 1) & 3
+        _slope(code, first, r, outputs, time, drive, 2 * step, x, history, f0)
+        if step % steps == 0 and not _write(x, history[f0, 1], out, step // steps):
+            return step // steps
+        if step == total:
+            break
+        if step < 3:
+            _rk4_step(code, first, r, outputs, time, h, drive, 2 * step, x, k, trial)
+            continue
+        for i in range(n):
+            past = -59.0 * history[f1, i] + 37.0 * history[f2, i] - 9.0 * history[f3, i]
+            trial[i] = x[i] + h / 24.0 * (55.0 * history[f0, i] + past)
+        _slope(code, first, r, outputs, time + h, drive, 2 * step + 2, trial, k, 0)
+        for i in range(n):
+            past = 19.0 * history[f0, i] - 5.0 * history[f1, i] + history[f2, i]
+            x[i] += h / 24.0 * (9.0 * k[0, i] + past)
+    return -1

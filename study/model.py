@@ -1,0 +1,225 @@
+"""A model: terms and how much of each.
+
+The equation of motion is ``sum over terms = F(t)``. A coefficient or shape parameter is a number, or
+None where it is to be estimated. Models are immutable; ``with_term`` and ``with_values`` give new ones.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study import expression
+from study.errors import StudyError
+from study.graph import Graph, Program
+from study.terms import Component, Term
+
+FIXED_INPUTS = ("u", "v", "t", "force")  # the registers that every forward program begins with
+
+
+@dataclass(frozen=True)
+class ModelTerm:
+    """A term in a model.
+
+    Attributes
+    ----------
+    term : Term
+        The physical effect.
+    coefficients : tuple of float or None
+        One a component, in the order of ``term.symbols``; None where it is to be fitted.
+    parameters : tuple of float or None
+        One a shape parameter; None where it is to be estimated.
+    """
+
+    term: Term
+    coefficients: tuple[float | None, ...]
+    parameters: tuple[float | None, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the term."""
+        return self.term.name
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Names of its coefficients, then of its shape parameters as ``term.parameter``."""
+        return self.term.symbols + tuple(f"{self.name}.{p.name}" for p in self.term.parameters)
+
+    @property
+    def values(self) -> dict[str, float | None]:
+        """Coefficients and shape parameters by key."""
+        return dict(zip(self.keys, self.coefficients + self.parameters, strict=True))
+
+    def with_values(self, values: Mapping[str, float | None]) -> "ModelTerm":
+        """The same term with those of the given values that are its own."""
+        new = {key: values.get(key, old) for key, old in self.values.items()}
+        numbers = tuple(new.values())
+        split = len(self.coefficients)
+        return replace(self, coefficients=numbers[:split], parameters=numbers[split:])
+
+
+def free(term: Term) -> ModelTerm:
+    """A term of which nothing is known yet."""
+    return ModelTerm(term, (None,) * len(term.components), (None,) * len(term.parameters))
+
+
+@dataclass(frozen=True)
+class Model:
+    """An equation of motion.
+
+    Attributes
+    ----------
+    name : str
+        What it is called in tables and messages.
+    terms : tuple of ModelTerm
+        Its terms, each at most once.
+    """
+
+    name: str
+    terms: tuple[ModelTerm, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse the same term twice."""
+        names = [t.name for t in self.terms]
+        for name in names:
+            if names.count(name) > 1:
+                raise StudyError(f"model {self.name!r} lists the term {name!r} twice; once is right")
+
+    def __contains__(self, name: str) -> bool:
+        """Whether a term of this name is in the model."""
+        return any(t.name == name for t in self.terms)
+
+    @property
+    def values(self) -> dict[str, float | None]:
+        """Every coefficient and shape parameter by key."""
+        return {key: value for t in self.terms for key, value in t.values.items()}
+
+    @property
+    def states(self) -> tuple[ModelTerm, ...]:
+        """The terms that carry a state of their own."""
+        return tuple(t for t in self.terms if t.term.state is not None)
+
+    def with_term(self, term: Term | ModelTerm) -> "Model":
+        """The model and one term more."""
+        return replace(self, terms=(*self.terms, term if isinstance(term, ModelTerm) else free(term)))
+
+    def without_term(self, name: str) -> "Model":
+        """The model and one term less."""
+        return replace(self, terms=tuple(t for t in self.terms if t.name != name))
+
+    def with_values(self, values: Mapping[str, float | None]) -> "Model":
+        """The same terms with other coefficients or shape parameters."""
+        return replace(self, terms=tuple(t.with_values(values) for t in self.terms))
+
+    def equation(self) -> str:
+        """The equation of motion in one line, with symbols."""
+        parts = [f"{' , '.join(t.term.symbols)} [{t.term.formula}]" for t in self.terms]
+        return " + ".join(parts) + " = F(t)"
+
+    def numbers(self) -> dict[str, float]:
+        """Every value, all known.
+
+        Raises
+        ------
+        StudyError
+            If one is still to be estimated, or there is no positive mass.
+        """
+        known = {key: value for key, value in self.values.items() if value is not None}
+        missing = [key for key in self.values if key not in known]
+        if missing:
+            raise StudyError(f"model {self.name!r} gives no value for {', '.join(missing)}; a simulation needs all")
+        if not known.get("m", 0.0) > 0.0:
+            raise StudyError(f"model {self.name!r} has the mass {known.get('m', 0.0):g}; it must be above zero")
+        return known
+
+
+@dataclass(frozen=True)
+class ForwardGraph:
+    """A model's equation of motion solved for its acceleration.
+
+    Attributes
+    ----------
+    graph : Graph
+        The nodes; inputs are ``u, v, t, force``, extra channels, states ``z:term``, then every key.
+    slopes : tuple of int
+        Nodes of the acceleration and of each state's derivative.
+    states : tuple of int
+        Nodes of u, v and each state z: what ``slopes`` (after v) are the derivatives of.
+    """
+
+    graph: Graph
+    slopes: tuple[int, ...]
+    states: tuple[int, ...]
+
+
+def forward_graph(model: Model, channels: tuple[str, ...] = ()) -> ForwardGraph:
+    """The equation of motion of a model as nodes.
+
+    Parameters
+    ----------
+    model : Model
+        Its values need not be known: coefficients and shape parameters are inputs of the graph.
+    channels : tuple of str
+        Extra measured channels which the user's own terms may name.
+
+    Raises
+    ------
+    StudyError
+        If the model has no inertia, or a formula uses a name it may not.
+    """
+    if "inertia" not in model:
+        raise StudyError(f"model {model.name!r} has no inertia; a free run needs it")
+    graph = Graph()
+    fixed = {name: graph.input(name) for name in (*FIXED_INPUTS, *channels)}
+    states = {t.name: graph.input(f"z:{t.name}") for t in model.states}
+    keys = {key: graph.input(key) for key in model.values}
+    force, rates = graph.const(0.0), list[int]()
+    for entry in model.terms:
+        names = {n: fixed[n] for n in ("u", "v", "t", *channels)}
+        names |= {p.name: keys[f"{entry.name}.{p.name}"] for p in entry.term.parameters}
+        rate = None
+        if entry.term.state is not None:
+            names["z"] = states[entry.name]
+            rate = expression.build(graph, entry.term.state, names)
+            rates.append(rate)
+        for component in entry.term.components:
+            if component.order < 2:
+                unit = _unit_force(graph, component, names, rate)
+                force = graph.add(force, graph.mul(keys[component.symbol], unit))
+    acceleration = graph.div(graph.sub(fixed["force"], force), keys["m"])
+    return ForwardGraph(graph, (acceleration, *rates), (fixed["u"], fixed["v"], *states.values()))
+
+
+def _unit_force(graph: Graph, component: Component, names: Mapping[str, int], rate: int | None) -> int:
+    """Force of a component with a unit coefficient: its shape, or the shape's derivative by the chain rule."""
+    shape = expression.build(graph, component.shape, names)
+    if component.order == 1:
+        total = graph.mul(graph.derivative(shape, names["u"]), names["v"])
+        total = graph.add(total, graph.derivative(shape, names["t"]))
+        if rate is not None:
+            total = graph.add(total, graph.mul(graph.derivative(shape, names["z"]), rate))
+        shape = total
+    return graph.mul(graph.const(component.factor), shape)
+
+
+def forward_program(model: Model, channels: tuple[str, ...] = ()) -> Program:
+    """The program of a model whose values are all known, with the values in their registers.
+
+    Raises
+    ------
+    StudyError
+        As :func:`forward_graph` and :meth:`Model.numbers`.
+    """
+    values = model.numbers()
+    forward = forward_graph(model, channels)
+    program = forward.graph.program(forward.slopes)
+    return with_registers(program, values)
+
+
+def with_registers(program: Program, values: Mapping[str, float]) -> Program:
+    """The program with named inputs set."""
+    registers: NDArray[np.float64] = program.registers.copy()
+    for name, value in values.items():
+        registers[program.inputs[name]] = value
+    return replace(program, registers=registers)

@@ -1,0 +1,98 @@
+"""From frequency response functions A_j(f) to coefficients with standard errors."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.inputs import Input
+from study.miso import MisoResult
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Coefficients of a model, estimated together.
+
+    Attributes
+    ----------
+    symbols : tuple of str
+        Their names.
+    values : array, shape (p,)
+        Estimates.
+    covariance : array, shape (p, p)
+        Their random-error covariance.
+    """
+
+    symbols: tuple[str, ...]
+    values: Floats
+    covariance: Floats
+
+    def __getitem__(self, symbol: str) -> float:
+        """One estimate."""
+        return float(self.values[self.symbols.index(symbol)])
+
+    def __contains__(self, symbol: str) -> bool:
+        """Whether this coefficient was estimated."""
+        return symbol in self.symbols
+
+    def error(self, symbol: str) -> float:
+        """Standard error of one estimate."""
+        i = self.symbols.index(symbol)
+        return float(np.sqrt(self.covariance[i, i]))
+
+    def derived_error(self, gradient: dict[str, float]) -> float:
+        """Standard error of a function of the coefficients with these partial derivatives."""
+        g = np.array([gradient.get(s, 0.0) for s in self.symbols])
+        return float(np.sqrt(max(g @ self.covariance @ g, 0.0)))
+
+
+def fit(result: MisoResult, inputs: Sequence[Input], band: tuple[float, float], line_inflation: float) -> Estimate:
+    """Weighted least squares of A_j(f) on powers of j 2 pi f.
+
+    Each input is fitted by itself, every line weighted by the inverse of its random-error variance
+    (Bendat and Piersol). Real and imaginary part are fitted together, the coefficients being real.
+
+    Parameters
+    ----------
+    result : MisoResult
+        Estimates of A_j(f) with their covariance.
+    inputs : sequence of Input
+        What each A_j is made of, in the order of ``result.response``.
+    band : pair of float
+        Lines from the first to the second frequency (Hz) are used.
+    line_inflation : float
+        ``Segments.line_inflation``: neighbouring lines of a windowed spectrum are not independent.
+
+    Returns
+    -------
+    Estimate
+        Coefficients of all inputs; estimates from different inputs keep their covariance.
+    """
+    keep = (result.frequency >= band[0]) & (result.frequency <= band[1])
+    frequency = result.frequency[keep]
+    covariance = result.covariance[keep]
+    maps = [_map(item.powers(frequency), covariance[:, j, j].real) for j, item in enumerate(inputs)]
+    values = [(maps[j] @ result.response[j][keep]).real for j in range(len(inputs))]
+    symbols = tuple(p.symbol for item in inputs for p in item.parts)
+    return Estimate(symbols, np.concatenate(values), _joint_covariance(maps, covariance) * line_inflation)
+
+
+def _map(powers: Complexes, variance: Floats) -> Complexes:
+    """The linear map from A(f) to its real coefficients, shape (parts, lines); weights 1 / variance."""
+    scale = np.sqrt(np.mean(np.abs(powers) ** 2, axis=0))
+    design = powers / scale
+    weighted = (design / np.maximum(variance, np.finfo(float).tiny)[:, None]).conj().T
+    inverse = np.linalg.pinv((weighted @ design).real, hermitian=True)
+    return np.asarray((inverse @ weighted) / scale[:, None], dtype=np.complex128)
+
+
+def _joint_covariance(maps: Sequence[Complexes], covariance: Complexes) -> Floats:
+    """Covariance of ``Re(map_i A_i)`` and ``Re(map_j A_j)`` for circular errors of A."""
+    blocks = [
+        [((a * covariance[:, i, j]) @ b.conj().T).real / 2.0 for j, b in enumerate(maps)] for i, a in enumerate(maps)
+    ]
+    return np.block(blocks)

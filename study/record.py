@@ -1,0 +1,84 @@
+"""A record: what was measured or simulated, with its units."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+MOTIONS = ("displacement", "velocity", "acceleration")
+SI_UNITS = {"time": "s", "force": "N", "displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+
+
+@dataclass(frozen=True)
+class Record:
+    """Evenly sampled channels.
+
+    Attributes
+    ----------
+    dt : float
+        Sampling interval in seconds.
+    channels : dict of float64 arrays, shape (n,)
+        ``force`` and at least one of ``displacement, velocity, acceleration``; any further ones.
+    units : dict of str
+        Unit of each channel; SI where nothing else is said.
+    name : str
+        What it is called in tables and file names.
+    start : float
+        Time of the first sample in seconds.
+    """
+
+    dt: float
+    channels: Mapping[str, Floats]
+    units: Mapping[str, str] = field(default_factory=lambda: dict(SI_UNITS))
+    name: str = "record"
+    start: float = 0.0
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self.channels["force"])
+
+    def __getitem__(self, channel: str) -> Floats:
+        """One channel."""
+        return self.channels[channel]
+
+    def __contains__(self, channel: str) -> bool:
+        """Whether the record has this channel."""
+        return channel in self.channels
+
+    @property
+    def time(self) -> Floats:
+        """Time of each sample in seconds, shape (n,)."""
+        return self.start + self.dt * np.arange(len(self), dtype=np.float64)
+
+    @property
+    def extra(self) -> tuple[str, ...]:
+        """Names of channels beside force and motion."""
+        return tuple(c for c in self.channels if c != "force" and c not in MOTIONS)
+
+    def part(self, first: int, last: int) -> "Record":
+        """Samples ``first`` to ``last`` (exclusive), with the time they were taken at."""
+        channels = {name: values[first:last] for name, values in self.channels.items()}
+        return replace(self, channels=channels, start=self.start + first * self.dt)
+
+    def with_channels(self, channels: Mapping[str, Floats]) -> "Record":
+        """The same record with channels replaced or added."""
+        return replace(self, channels={**self.channels, **channels})
+
+
+def write_csv(record: Record, path: Path) -> None:
+    """Write time and channels with as many digits as a double has."""
+    columns: dict[str, Floats] = {"time": record.time, **record.channels}
+    pd.DataFrame(columns).to_csv(path, index=False, float_format="%.17g", lineterminator="\n")
+
+
+def read_csv(path: Path) -> Record:
+    """Read what :func:`write_csv` wrote. ``study.readers`` reads every other kind of file."""
+    table = pd.read_csv(path, float_precision="round_trip")
+    time = table["time"].to_numpy(dtype=np.float64)
+    dt = round(float(time[-1] - time[0]) / (len(time) - 1), 15)
+    channels = {str(c): table[c].to_numpy(dtype=np.float64) for c in table.columns if c != "time"}
+    return Record(dt=dt, channels=channels, name=path.parent.name, start=float(time[0]))

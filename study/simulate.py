@@ -1,0 +1,116 @@
+"""Model and force in, record out.
+
+The report integrates with an Adams-Bashforth predictor-corrector of order 4 at one step a sample
+(Section 2.2). Here the steps per sample are a setting, a classical Runge-Kutta stands beside it, and
+the force between the samples is its band-limited interpolation.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study import kernels
+from study.errors import DivergenceError, StudyError
+from study.interpolation import between_samples
+from study.model import Model, forward_program
+from study.record import SI_UNITS, Record
+
+Floats = NDArray[np.float64]
+METHODS = {"abm4": kernels.integrate_abm4, "rk4": kernels.integrate_rk4}
+
+
+@dataclass(frozen=True)
+class Integrator:
+    """How to integrate.
+
+    Attributes
+    ----------
+    method : str
+        ``abm4`` (the report's) or ``rk4``.
+    steps_per_sample : int
+        Steps in each sampling interval; the report took one.
+    """
+
+    method: str = "abm4"
+    steps_per_sample: int = 8
+
+    def __post_init__(self) -> None:
+        """Refuse what no integrator can do."""
+        if self.method not in METHODS:
+            raise StudyError(f"there is no integrator {self.method!r}; known are {', '.join(METHODS)}")
+        if self.steps_per_sample < 1:
+            raise StudyError(f"steps_per_sample is {self.steps_per_sample}; at least 1 is needed")
+
+
+def simulate(
+    model: Model,
+    force: Floats,
+    dt: float,
+    integrator: Integrator | None = None,
+    *,
+    initial: Sequence[float] = (0.0, 0.0),
+    start: float = 0.0,
+    extra: Mapping[str, Floats] | None = None,
+    units: Mapping[str, str] | None = None,
+) -> Record:
+    """Response of a model to a force.
+
+    Parameters
+    ----------
+    model : Model
+        Every value known.
+    force : array, shape (n,)
+        Samples of the force.
+    dt : float
+        Sampling interval in seconds.
+    integrator : Integrator, optional
+        Default: the report's method with eight steps a sample.
+    initial : sequence of float
+        Displacement, velocity and, if given, the terms' own states at the first sample.
+    start : float
+        Time of the first sample (matters to terms that depend on time).
+    extra : mapping of arrays, optional
+        Further channels that the user's own terms name.
+    units : mapping of str, optional
+        Units of the channels; SI where left out.
+
+    Returns
+    -------
+    Record
+        Channels force, displacement, velocity, acceleration, and the extra ones.
+
+    Raises
+    ------
+    DivergenceError
+        If the response leaves the range of finite numbers; names model, time and level.
+    StudyError
+        If the model is not complete.
+    """
+    settings = integrator or Integrator()
+    extra = extra or {}
+    program = forward_program(model, tuple(extra))
+    factor = 2 * settings.steps_per_sample
+    drive = np.column_stack([between_samples(x, factor) for x in (force, *extra.values())])
+    drive = np.vstack([drive, drive[-1:], drive[-1:]])  # read, never used, by the last sample's start-up
+    state = np.zeros(2 + len(model.states))
+    state[: len(initial)] = initial
+    out = np.empty((len(force), 1 + len(state)))
+    failed = METHODS[settings.method](
+        program.code, program.first, program.registers.copy(), program.outputs,
+        start, dt, settings.steps_per_sample, drive, state, out,
+    )  # fmt: skip
+    if failed >= 0:
+        _diverged(model, force, dt, start + failed * dt)
+    channels = {"force": force, "displacement": out[:, 0], "velocity": out[:, 1], "acceleration": out[:, 2]}
+    return Record(dt, {**channels, **extra}, {**SI_UNITS, **(units or {})}, model.name, start)
+
+
+def _diverged(model: Model, force: Floats, dt: float, time: float) -> None:
+    level = float(np.var(force))
+    raise DivergenceError(
+        f"the simulation of {model.name!r} diverged at t = {time:.4g} s under a force of mean square {level:.4g}; "
+        f"take more steps per sample than one in {dt:g} s, a lower level, or check the signs of the coefficients",
+        time,
+    )

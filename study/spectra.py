@@ -1,0 +1,162 @@
+"""One-sided cross-spectral density matrices from overlapped, windowed segments.
+
+Conventions, kept in this one place: ``G_xy(f) = 2/T E[X* Y]`` (the first index is conjugated, as in
+Bendat and Piersol and in ``scipy.signal.csd``), densities in units^2/Hz, the window's power corrected
+for, zero and Nyquist frequency not doubled.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import rfft, rfftfreq
+from scipy.signal import get_window
+
+from study.errors import StudyError
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+CHUNK = 256  # segments transformed at a time: memory does not grow with the record
+
+
+@dataclass(frozen=True)
+class Segments:
+    """How a record is cut.
+
+    Attributes
+    ----------
+    length : int
+        Samples in a segment (the report: 512).
+    overlap : float
+        Fraction that neighbours share (the report: a half).
+    window : str
+        Any window ``scipy.signal.get_window`` knows (the report: Hanning).
+    """
+
+    length: int = 512
+    overlap: float = 0.5
+    window: str = "hann"
+
+    def __post_init__(self) -> None:
+        """Refuse lengths and overlaps that cut nothing."""
+        if self.length < 4:
+            raise StudyError(f"segment length is {self.length}; at least 4 samples are needed")
+        if not 0.0 <= self.overlap < 1.0:
+            raise StudyError(f"overlap is {self.overlap:g}; it must be at least 0 and below 1")
+
+    @property
+    def hop(self) -> int:
+        """Samples from the start of one segment to the start of the next."""
+        return max(1, round(self.length * (1.0 - self.overlap)))
+
+    def taper(self) -> Floats:
+        """The window's samples, shape (length,)."""
+        return np.asarray(get_window(self.window, self.length), dtype=np.float64)
+
+    def count(self, samples: int) -> int:
+        """Number of whole segments in a record.
+
+        Raises
+        ------
+        StudyError
+            If the record is shorter than one segment.
+        """
+        if samples < self.length:
+            raise StudyError(f"the record has {samples} samples, fewer than the segment length {self.length}")
+        return 1 + (samples - self.length) // self.hop
+
+    def effective_averages(self, samples: int) -> float:
+        """Number of independent averages that the overlapped segments are worth.
+
+        Segments k hops apart share ``rho_k`` of their window's power, and the variance of an average
+        of n is ``(1 + 2 sum_k (1 - k/n) rho_k^2) / n`` (Welch, 1967, eq. 19).
+        """
+        n, taper = self.count(samples), self.taper()
+        spread = 1.0
+        for k in range(1, min(n, -(-self.length // self.hop))):
+            shift = k * self.hop
+            rho = np.sum(taper[shift:] * taper[: self.length - shift]) / np.sum(taper**2)
+            spread += 2.0 * (1.0 - k / n) * float(rho) ** 2
+        return n / spread
+
+    def line_inflation(self) -> float:
+        """Factor on the variance of a sum over neighbouring frequency lines.
+
+        A window correlates lines l bins apart by ``rho_l``; the errors of two frequency response
+        estimates there correlate by ``|rho_l|^2``. For Hann this is 1 + 2 (4/9 + 1/36) = 1.94.
+        """
+        power = self.taper() ** 2
+        rho = np.abs(np.fft.fft(power)) / np.sum(power)
+        return float(np.sum(rho**2))
+
+
+@dataclass(frozen=True)
+class SpectralMatrix:
+    """Cross-spectral densities of several channels.
+
+    Attributes
+    ----------
+    frequency : array, shape (lines,)
+        In hertz.
+    density : complex array, shape (lines, channels, channels)
+        ``density[:, i, j] = G_ij``, in units_i units_j / Hz.
+    averages : float
+        Effective number of independent averages.
+    """
+
+    frequency: Floats
+    density: Complexes
+    averages: float
+    segments: Segments
+
+    def band(self, low: float, high: float) -> "SpectralMatrix":
+        """The lines from ``low`` to ``high`` hertz."""
+        keep = (self.frequency >= low) & (self.frequency <= high)
+        return SpectralMatrix(self.frequency[keep], self.density[keep], self.averages, self.segments)
+
+
+def cross_spectra(channels: Sequence[Floats], dt: float, segments: Segments | None = None) -> SpectralMatrix:
+    """Cross-spectral density matrix of all channels.
+
+    Parameters
+    ----------
+    channels : sequence of arrays, each of shape (n,)
+        Inputs first, output last, by the project's habit.
+    dt : float
+        Sampling interval in seconds.
+    segments : Segments, optional
+        Default: the report's 512-point Hann segments with half overlap.
+
+    Returns
+    -------
+    SpectralMatrix
+
+    Raises
+    ------
+    StudyError
+        If channels differ in length or are shorter than a segment.
+    """
+    cut = segments or Segments()
+    samples = len(channels[0])
+    if any(len(c) != samples for c in channels):
+        raise StudyError(f"channels have {[len(c) for c in channels]} samples; all must have the same number")
+    count, taper = cut.count(samples), cut.taper()
+    total = np.zeros((cut.length // 2 + 1, len(channels), len(channels)), dtype=np.complex128)
+    views = [np.lib.stride_tricks.sliding_window_view(c, cut.length)[:: cut.hop] for c in channels]
+    for first in range(0, count, CHUNK):
+        last = min(first + CHUNK, count)
+        lines = np.stack([np.asarray(rfft(v[first:last] * taper)).T for v in views], axis=1)
+        total += lines.conj() @ lines.transpose(0, 2, 1)
+    scale = np.full(total.shape[0], 2.0 * dt / (count * np.sum(taper**2)))
+    scale[0] /= 2.0
+    if cut.length % 2 == 0:
+        scale[-1] /= 2.0
+    frequency = np.asarray(rfftfreq(cut.length, dt), dtype=np.float64)
+    return SpectralMatrix(frequency, total * scale[:, None, None], cut.effective_averages(samples), cut)
+
+
+def autospectrum(values: Floats, dt: float, segments: Segments | None = None) -> tuple[Floats, Floats]:
+    """Frequency in hertz and one-sided autospectral density in units^2/Hz, both of shape (lines,)."""
+    matrix = cross_spectra([values], dt, segments)
+    return matrix.frequency, matrix.density[:, 0, 0].real
