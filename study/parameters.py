@@ -86,7 +86,7 @@ def _map(powers: Complexes, variance: Floats) -> Complexes:
     scale = np.sqrt(np.mean(np.abs(powers) ** 2, axis=0))
     design = powers / scale
     weighted = (design / np.maximum(variance, np.finfo(float).tiny)[:, None]).conj().T
-    inverse = np.linalg.pinv((weighted @ design).real, hermitian=True)
+    inverse: Floats = np.linalg.pinv((weighted @ design).real, hermitian=True)
     return np.asarray((inverse @ weighted) / scale[:, None], dtype=np.complex128)
 
 
