@@ -1,0 +1,319 @@
+"""Seeded force histories, their theoretical autospectra, and the noise on the response.
+
+Every history closes on itself (``periods`` times in the record, swept sines aside) and has nothing
+above its cut-off, so that its band-limited interpolation between the samples is exact. Force and noise
+draw from two streams of one seed and never share a number.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, rfft
+
+from study.errors import StudyError
+
+Floats = NDArray[np.float64]
+FORCE_STREAM, NOISE_STREAM = 0, 1
+READINGS = ("raw", "filtered")
+SWEEPS = ("linear", "logarithmic")
+ROUNDING = 1e-9  # relative: a cut-off that stands on a line of the record keeps that line
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """What the force is like; the force itself is :func:`force`.
+
+    Attributes
+    ----------
+    kind : str
+        ``gaussian_lowpass`` (the report's, Section 2.1), ``pierson_moskowitz``,
+        ``random_phase_multisine`` or ``swept_sine``.
+    level : float
+        Mean square of the force in N^2.
+    reading : str
+        What ``level`` is the variance of, for ``gaussian_lowpass``: the ``raw`` white sequence before
+        its low-pass, of which twice the cut-off over the sampling rate is left, or the ``filtered``
+        force. Both hold in expectation: a record scatters about them as a random process does.
+    cutoff : float
+        Frequency in Hz above which the two random kinds have nothing.
+    peak_frequency : float
+        Where the Pierson-Moskowitz autospectrum has its peak, in Hz.
+    start_frequency, stop_frequency : float
+        Band of the multisine; first and last frequency of the sweep, which may fall. In Hz.
+    odd_only : bool
+        Whether the multisine leaves out the even harmonics of its period.
+    sweep : str
+        ``linear`` or ``logarithmic`` in frequency.
+    periods : int
+        How often the same history is repeated in the record.
+
+    Raises
+    ------
+    StudyError
+        At a setting that no force can have, naming it.
+    """
+
+    kind: str = "gaussian_lowpass"
+    level: float = 1.0
+    reading: str = "raw"
+    cutoff: float = 12.5
+    peak_frequency: float = 3.0
+    start_frequency: float = 0.1
+    stop_frequency: float = 12.5
+    odd_only: bool = False
+    sweep: str = "linear"
+    periods: int = 1
+
+    def __post_init__(self) -> None:
+        """Refuse settings that no force can have."""
+        for name, known in (("kind", tuple(_HISTORIES)), ("reading", READINGS), ("sweep", SWEEPS)):
+            if getattr(self, name) not in known:
+                raise StudyError(f"{name} of the excitation is {getattr(self, name)!r}; it may be {', '.join(known)}")
+        if not (np.isfinite(self.level) and self.level >= 0.0):
+            raise StudyError(f"level of the excitation is {self.level:g}; a mean square is finite and not negative")
+        for name in ("cutoff", "peak_frequency", "start_frequency", "stop_frequency"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise StudyError(f"{name} of the excitation is {value:g} Hz; it must be above zero")
+        if self.periods < 1:
+            raise StudyError(f"periods of the excitation is {self.periods}; at least 1 is needed")
+        if self.start_frequency == self.stop_frequency:
+            raise StudyError(
+                f"start_frequency and stop_frequency are both {self.stop_frequency:g} Hz; they must differ"
+            )
+        if self.kind == "random_phase_multisine" and self.start_frequency > self.stop_frequency:
+            raise StudyError(
+                f"start_frequency {self.start_frequency:g} Hz lies above stop_frequency {self.stop_frequency:g} Hz; "
+                "the band of a multisine runs from the lower to the higher"
+            )
+
+    @property
+    def highest(self) -> float:
+        """Highest frequency in Hz that the force holds."""
+        if self.kind in ("gaussian_lowpass", "pierson_moskowitz"):
+            return self.cutoff
+        return max(self.start_frequency, self.stop_frequency)
+
+
+def force(excitation: Excitation, samples: int, dt: float, seed: int) -> Floats:
+    """A force history.
+
+    Parameters
+    ----------
+    excitation : Excitation
+        What it is like.
+    samples : int
+        Its length, a multiple of ``excitation.periods``.
+    dt : float
+        Sampling interval in seconds.
+    seed : int
+        The same seed gives the same bytes. A swept sine has nothing random and is the same for all.
+
+    Returns
+    -------
+    array, shape (samples,)
+        In newtons.
+
+    Raises
+    ------
+    StudyError
+        If the force does not fit under the Nyquist frequency or into the record.
+    """
+    length = _checked_period(excitation, samples, dt)
+    period = _HISTORIES[excitation.kind](excitation, length, dt, _generator(seed, FORCE_STREAM))
+    return np.tile(period, excitation.periods)
+
+
+def theoretical_autospectrum(excitation: Excitation, frequency: Floats, samples: int, dt: float) -> Floats:
+    """One-sided autospectral density that the force has in expectation.
+
+    A multisine's lines are spread over the band, and a sweep's density is that of stationary phase
+    (mean square over the time spent at each frequency): what an estimate of lower resolution shows.
+
+    Parameters
+    ----------
+    excitation : Excitation
+        What the force is like.
+    frequency : array
+        In hertz.
+    samples, dt : int, float
+        As given to :func:`force`.
+
+    Returns
+    -------
+    array of the shape of ``frequency``
+        In N^2/Hz.
+
+    Raises
+    ------
+    StudyError
+        As :func:`force`.
+    """
+    length = _checked_period(excitation, samples, dt)
+    return _DENSITIES[excitation.kind](excitation, np.asarray(frequency, dtype=np.float64), length, dt)
+
+
+def displacement_noise(displacement: Floats, fraction: float, seed: int) -> Floats:
+    """White Gaussian noise to be added to a displacement (Section 5.4).
+
+    Parameters
+    ----------
+    displacement : array, shape (n,)
+        The noise-free response.
+    fraction : float
+        Mean square of the noise, in expectation, over that of the displacement.
+    seed : int
+        That of the force may be given again: the streams are apart.
+
+    Returns
+    -------
+    array, shape (n,)
+        In the unit of the displacement.
+
+    Raises
+    ------
+    StudyError
+        If the fraction is negative or not finite.
+    """
+    if not (np.isfinite(fraction) and fraction >= 0.0):
+        raise StudyError(f"noise fraction is {fraction:g}; a ratio of mean squares is finite and not negative")
+    scale = np.sqrt(fraction * np.mean(displacement**2))
+    return scale * _generator(seed, NOISE_STREAM).standard_normal(len(displacement))
+
+
+def _generator(seed: int, stream: int) -> np.random.Generator:
+    if seed < 0:
+        raise StudyError(f"seed is {seed}; it must be a whole number of at least 0")
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(stream,))))
+
+
+def _checked_period(excitation: Excitation, samples: int, dt: float) -> int:
+    """Samples of one period, when the settings suit the record."""
+    if not (np.isfinite(dt) and dt > 0.0):
+        raise StudyError(f"sampling interval is {dt:g} s; it must be above zero")
+    if samples < 2 * excitation.periods or samples % excitation.periods:
+        raise StudyError(
+            f"{samples} samples do not hold {excitation.periods} whole periods of at least 2 samples; "
+            "take a multiple of the number of periods"
+        )
+    nyquist = 0.5 / dt
+    if excitation.highest > nyquist * (1.0 + ROUNDING):
+        raise StudyError(
+            f"the excitation reaches {excitation.highest:g} Hz, above the Nyquist frequency of {nyquist:g} Hz "
+            f"at a sampling interval of {dt:g} s; take a lower frequency or a shorter interval"
+        )
+    return samples // excitation.periods
+
+
+def _passed(excitation: Excitation, length: int, dt: float) -> int:
+    """Number of lines of a real FFT from zero up to and with the cut-off."""
+    return min(int(excitation.cutoff * length * dt * (1.0 + ROUNDING)), length // 2) + 1
+
+
+def _raw_variance(excitation: Excitation, length: int, dt: float) -> float:
+    """Variance of the white sequence before the low-pass."""
+    if excitation.reading == "raw":
+        return excitation.level
+    passed = _passed(excitation, length, dt)
+    whole = length % 2 == 0 and passed == length // 2 + 1  # zero and Nyquist line stand for one dimension each
+    return excitation.level * length / (2 * passed - 1 - int(whole))
+
+
+def _gaussian_lowpass(excitation: Excitation, length: int, dt: float, generator: np.random.Generator) -> Floats:
+    spectrum = rfft(generator.standard_normal(length))
+    spectrum[_passed(excitation, length, dt) :] = 0.0
+    return np.sqrt(_raw_variance(excitation, length, dt)) * irfft(spectrum, length)
+
+
+def _gaussian_lowpass_density(excitation: Excitation, frequency: Floats, length: int, dt: float) -> Floats:
+    density = 2.0 * dt * _raw_variance(excitation, length, dt)
+    return np.where(np.abs(frequency) <= excitation.cutoff * (1.0 + ROUNDING), density, 0.0)
+
+
+def _pierson_moskowitz(excitation: Excitation, length: int, dt: float, generator: np.random.Generator) -> Floats:
+    """A Gaussian process: both quadratures of every line are random, hence its amplitude too."""
+    frequency = np.arange(length // 2 + 1) / (length * dt)
+    variance = _pierson_moskowitz_density(excitation, frequency, length, dt) / (length * dt)
+    normal = generator.standard_normal((2, len(frequency)))
+    spectrum = 0.5 * length * np.sqrt(variance) * (normal[0] + 1j * normal[1])
+    if length % 2 == 0:
+        spectrum[-1] = np.sqrt(2.0) * spectrum[-1].real  # one quadrature carries what two carry elsewhere
+    return irfft(spectrum, length)
+
+
+def _pierson_moskowitz_density(excitation: Excitation, frequency: Floats, _length: int, _dt: float) -> Floats:
+    """``5 level f_p^4 f^-5 exp(-5/4 (f_p/f)^4)``, whose integral over all frequencies is ``level``.
+
+    The significant level, four root mean squares, is ``4 sqrt(level)``. What lies above the cut-off is
+    left out and not made up for.
+    """
+    inside = (frequency > 0.0) & (frequency <= excitation.cutoff * (1.0 + ROUNDING))
+    f = np.where(inside, frequency, excitation.cutoff)
+    ratio = (excitation.peak_frequency / f) ** 4
+    return np.where(inside, 5.0 * excitation.level * ratio / f * np.exp(-1.25 * ratio), 0.0)
+
+
+def _lines(excitation: Excitation, length: int, dt: float) -> NDArray[np.int64]:
+    """Harmonics of the period which a multisine holds."""
+    span = length * dt
+    first = max(1, int(np.ceil(excitation.start_frequency * span * (1.0 - ROUNDING))))
+    last = min(int(excitation.stop_frequency * span * (1.0 + ROUNDING)), (length - 1) // 2)
+    lines = np.arange(first, last + 1)
+    lines = lines[lines % 2 == 1] if excitation.odd_only else lines
+    if len(lines) == 0:
+        raise StudyError(
+            f"no line of a period of {span:g} s lies from {excitation.start_frequency:g} to "
+            f"{excitation.stop_frequency:g} Hz; take a wider band or a longer period"
+        )
+    return lines
+
+
+def _random_phase_multisine(excitation: Excitation, length: int, dt: float, generator: np.random.Generator) -> Floats:
+    """Equal amplitudes, random phases: the mean square is ``level`` exactly."""
+    lines = _lines(excitation, length, dt)
+    spectrum = np.zeros(length // 2 + 1, dtype=np.complex128)
+    amplitude = np.sqrt(2.0 * excitation.level / len(lines))
+    spectrum[lines] = 0.5 * length * amplitude * np.exp(2j * np.pi * generator.random(len(lines)))
+    return irfft(spectrum, length)
+
+
+def _multisine_density(excitation: Excitation, frequency: Floats, length: int, dt: float) -> Floats:
+    lines = _lines(excitation, length, dt)
+    spacing = (2.0 if excitation.odd_only else 1.0) / (length * dt)
+    low, high = lines[0] / (length * dt) - spacing / 2.0, lines[-1] / (length * dt) + spacing / 2.0
+    return np.where((frequency >= low) & (frequency <= high), excitation.level / (len(lines) * spacing), 0.0)
+
+
+def _swept_sine(excitation: Excitation, length: int, dt: float, _random: np.random.Generator) -> Floats:
+    first, last, span = excitation.start_frequency, excitation.stop_frequency, length * dt
+    time = np.arange(length) * dt
+    if excitation.sweep == "linear":
+        cycles = first * time + 0.5 * (last - first) * time**2 / span
+    else:
+        rate = np.log(last / first) / span
+        cycles = first * np.expm1(rate * time) / rate
+    return np.asarray(np.sqrt(2.0 * excitation.level) * np.sin(2.0 * np.pi * cycles), dtype=np.float64)
+
+
+def _swept_sine_density(excitation: Excitation, frequency: Floats, _length: int, _dt: float) -> Floats:
+    low, high = sorted((excitation.start_frequency, excitation.stop_frequency))
+    inside = (frequency >= low) & (frequency <= high)
+    if excitation.sweep == "linear":
+        return np.where(inside, excitation.level / (high - low), 0.0)
+    return np.where(inside, excitation.level / (np.where(inside, frequency, low) * np.log(high / low)), 0.0)
+
+
+_HISTORIES: dict[str, Callable[[Excitation, int, float, np.random.Generator], Floats]] = {
+    "gaussian_lowpass": _gaussian_lowpass,
+    "pierson_moskowitz": _pierson_moskowitz,
+    "random_phase_multisine": _random_phase_multisine,
+    "swept_sine": _swept_sine,
+}
+_DENSITIES: dict[str, Callable[[Excitation, Floats, int, float], Floats]] = {
+    "gaussian_lowpass": _gaussian_lowpass_density,
+    "pierson_moskowitz": _pierson_moskowitz_density,
+    "random_phase_multisine": _multisine_density,
+    "swept_sine": _swept_sine_density,
+}
