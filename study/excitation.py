@@ -237,10 +237,10 @@ def _pierson_moskowitz(excitation: Excitation, length: int, dt: float, generator
     frequency = np.arange(length // 2 + 1) / (length * dt)
     variance = _pierson_moskowitz_density(excitation, frequency, length, dt) / (length * dt)
     normal = generator.standard_normal((2, len(frequency)))
-    spectrum = 0.5 * length * np.sqrt(variance) * (normal[0] + 1j * normal[1])
+    spectrum: NDArray[np.complex128] = 0.5 * length * np.sqrt(variance) * (normal[0] + 1j * normal[1])
     if length % 2 == 0:
         spectrum[-1] = np.sqrt(2.0) * spectrum[-1].real  # one quadrature carries what two carry elsewhere
-    return irfft(spectrum, length)
+    return np.asarray(irfft(spectrum, length), dtype=np.float64)
 
 
 def _pierson_moskowitz_density(excitation: Excitation, frequency: Floats, _length: int, _dt: float) -> Floats:
