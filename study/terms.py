@@ -38,11 +38,15 @@ class Component:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A shape parameter: what it is, and in which unit (``length``, ``frequency``, ``time``, ``1/length``)."""
+    """A shape parameter: what it is, in which unit (``length``, ``frequency``, ``time``, ``1/length``), which sign.
+
+    ``signed`` ones may be zero or negative, all others are above zero.
+    """
 
     name: str
     quantity: str
     meaning: str
+    signed: bool = False
 
 
 @dataclass(frozen=True)
@@ -173,7 +177,7 @@ _TERMS = (
     _single(
         "one_sided_contact", "kc", "max(u - gap, 0)",
         meaning="stop that is touched beyond a gap", cause="fenders, snubbers, end stops",
-        parameters=(Parameter("gap", "length", "displacement at which contact begins"),),
+        parameters=(Parameter("gap", "length", "displacement at which contact begins", signed=True),),
     ),
     Term(
         "periodic_stiffness",
@@ -195,8 +199,8 @@ _TERMS = (
         meaning="force that depends on the path by which a displacement was reached (Bouc-Wen)",
         cause="bolted and riveted joints, wire-rope isolators, yielding metal",
         parameters=(
-            Parameter("beta", "1/length", "rate at which the loop closes"),
-            Parameter("gamma", "1/length", "roundness of the loop"),
+            Parameter("beta", "1/length", "rate at which the loop closes", signed=True),
+            Parameter("gamma", "1/length", "roundness of the loop", signed=True),
         ),
     ),
     _single(
