@@ -1,0 +1,208 @@
+"""A model running free under a measured force, with the exact derivatives of its response.
+
+State and sensitivities are integrated together by the classical Runge-Kutta method. Runge-Kutta applied
+to the variational equations gives exactly the derivative of the Runge-Kutta map, so the Jacobian is that
+of the numbers which the simulation yields, not of an idealisation of them.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study import kernels
+from study.errors import DivergenceError, StudyError
+from study.graph import Program
+from study.interpolation import between_samples
+from study.model import Model, forward_graph, with_registers
+from study.record import MOTIONS, Record
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class FreeRun:
+    """A model and a stretch of a record, made ready to run as often as a fit needs.
+
+    Attributes
+    ----------
+    program : Program
+        Slopes of the states, then their partial derivatives; values that are held are in its registers.
+    partials : int array, shape (states - 1, states + keys)
+        Registers of each slope's partial derivatives by the states and by the keys.
+    keys : tuple of str
+        The coefficients and shape parameters to differentiate by.
+    states : int
+        Number of states: displacement, velocity and the terms' own.
+    drive : array, shape (2 steps (samples - 1) + 3, 1 + extra channels)
+        Force and extra channels at every half step.
+    dt : float
+        Sampling interval in seconds.
+    steps : int
+        Steps in each sampling interval.
+    start : float
+        Time of the first sample in seconds.
+    samples : int
+        Samples in the stretch.
+    row : int
+        Which motion is the response: its place in ``MOTIONS``.
+    """
+
+    program: Program
+    partials: Ints
+    keys: tuple[str, ...]
+    states: int
+    drive: Floats
+    dt: float
+    steps: int
+    start: float
+    samples: int
+    row: int
+
+    def respond(
+        self, values: Mapping[str, float], initial: Sequence[float] | Floats, free_states: int = 0
+    ) -> tuple[Floats, Floats]:
+        """Response and its derivatives.
+
+        Parameters
+        ----------
+        values : mapping of float
+            Value of each key.
+        initial : sequence of float
+            Displacement, velocity and, if given, the terms' own states at the first sample.
+        free_states : int
+            How many of the initial states to differentiate by, after the keys.
+
+        Returns
+        -------
+        response : array, shape (samples,)
+        jacobian : array, shape (samples, keys + free_states)
+
+        Raises
+        ------
+        DivergenceError
+            If the response leaves the range of finite numbers.
+        """
+        program = with_registers(self.program, {key: values[key] for key in self.keys})
+        state, columns = np.zeros(self.states), len(self.keys) + free_states
+        state[: len(initial)] = initial
+        sensitivity = np.zeros((self.states, columns))
+        sensitivity[range(free_states), range(len(self.keys), columns)] = 1.0
+        response, jacobian = np.empty(self.samples), np.empty((self.samples, columns))
+        failed = kernels.integrate_variation(
+            program.code, program.first, program.registers, program.outputs[: self.states - 1], self.partials,
+            self.start, self.dt, self.steps, self.drive, state, sensitivity, self.row, response, jacobian,
+        )  # fmt: skip
+        if failed >= 0:
+            time = self.start + failed * self.dt
+            raise DivergenceError(f"the free run diverged at t = {time:.4g} s", time)
+        return response, jacobian
+
+
+def prepare(
+    model: Model,
+    record: Record,
+    keys: Sequence[str] = (),
+    *,
+    response: str = "displacement",
+    steps_per_sample: int = 2,
+    span: tuple[int, int] | None = None,
+) -> FreeRun:
+    """Make a model ready to run under the force of a record.
+
+    Parameters
+    ----------
+    model : Model
+        Every value known but those of ``keys``.
+    record : Record
+        Gives the force, and the extra channels which the user's own terms name.
+    keys : sequence of str
+        The coefficients and shape parameters to differentiate by.
+    response : str
+        ``displacement``, ``velocity`` or ``acceleration``.
+    steps_per_sample : int
+        Runge-Kutta steps in each sampling interval.
+    span : pair of int, optional
+        First sample, and the one after the last; the whole record if left out.
+
+    Raises
+    ------
+    StudyError
+        If a value, a channel or the span is not what it has to be.
+    """
+    first, last = _checked_span(record, span)
+    if response not in MOTIONS:
+        raise StudyError(f"there is no response {response!r}; a free run yields {', '.join(MOTIONS)}")
+    if steps_per_sample < 1:
+        raise StudyError(f"steps_per_sample is {steps_per_sample}; at least 1 is needed")
+    program, partials, states = _differentiated(model, record.extra, tuple(keys))
+    factor = 2 * steps_per_sample
+    columns = [between_samples(record[name], factor) for name in ("force", *record.extra)]
+    drive = np.column_stack(columns)[factor * first : factor * (last - 1) + 1]
+    return FreeRun(
+        program, partials, tuple(keys), states, drive, record.dt, steps_per_sample,
+        record.start + first * record.dt, last - first, MOTIONS.index(response),
+    )  # fmt: skip
+
+
+def _checked_span(record: Record, span: tuple[int, int] | None) -> tuple[int, int]:
+    first, last = span or (0, len(record))
+    if not 0 <= first < last - 1 < len(record):
+        raise StudyError(
+            f"the span {first} to {last} does not lie in the {len(record)} samples of {record.name!r}; "
+            "it must begin at 0 or later, end by the last sample and hold two at least"
+        )
+    return first, last
+
+
+def _differentiated(model: Model, channels: tuple[str, ...], keys: tuple[str, ...]) -> tuple[Program, Ints, int]:
+    """Program of slopes and partial derivatives, the latter's registers, and the number of states."""
+    held = {key: value for key, value in model.values.items() if key not in keys}
+    missing = [key for key, value in held.items() if value is None]
+    if missing:
+        raise StudyError(f"model {model.name!r} gives no value for {', '.join(missing)}; a free run needs all")
+    unknown = [key for key in keys if key not in model.values]
+    if unknown:
+        raise StudyError(f"model {model.name!r} has no {', '.join(unknown)}; it has {', '.join(model.values)}")
+    forward = forward_graph(model, channels)
+    graph = forward.graph
+    by = (*forward.states, *(graph.input(key) for key in keys))
+    partials = [graph.derivative(slope, node) for slope in forward.slopes for node in by]
+    program = graph.program([*forward.slopes, *partials])
+    registers = program.outputs[len(forward.slopes) :].reshape(len(forward.slopes), len(by))
+    values = {key: value for key, value in held.items() if value is not None}
+    return with_registers(program, values), registers, len(forward.states)
+
+
+def predict(
+    model: Model,
+    record: Record,
+    *,
+    response: str = "displacement",
+    steps_per_sample: int = 2,
+    span: tuple[int, int] | None = None,
+    initial: Sequence[float] = (0.0, 0.0),
+) -> Floats:
+    """Free run of a complete model under a record's force, shape (samples of the span,).
+
+    Parameters
+    ----------
+    model : Model
+        Every value known.
+    record, response, steps_per_sample, span
+        As :func:`prepare`.
+    initial : sequence of float
+        Displacement, velocity and, if given, the terms' own states at the first sample of the span.
+
+    Raises
+    ------
+    DivergenceError
+        If the response leaves the range of finite numbers.
+    StudyError
+        If the model is not complete, or a channel or the span is not what it has to be.
+    """
+    model.numbers()
+    run = prepare(model, record, response=response, steps_per_sample=steps_per_sample, span=span)
+    return run.respond({}, initial)[0]
