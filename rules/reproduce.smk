@@ -1,0 +1,39 @@
+# Records, identification, figures of each case of config/cases.tsv.
+wildcard_constraints:
+    case="|".join(re.escape(case) for case in STUDY.cases),
+
+
+rule record:
+    input:
+        model=model_of,
+        code=CODE["record"],
+    output:
+        record="results/{case}/record.csv",
+    params:
+        settings=record_settings,
+    script:
+        "../scripts/make_record.py"
+
+
+rule identify:
+    input:
+        model=model_of,
+        record="results/{case}/record.csv",
+        code=CODE["identify"],
+    output:
+        responses="results/{case}/frequency_response.csv",
+        coherences="results/{case}/coherence.csv",
+        parameters="results/{case}/parameters.csv",
+    params:
+        settings=identification_settings,
+    script:
+        "../scripts/identify.py"
+
+
+for _case in STUDY.cases:
+
+    rule:
+        name:
+            _case
+        input:
+            f"results/{_case}/parameters.csv",

@@ -1,0 +1,22 @@
+"""Snakemake step: record -> frequency response functions, coherences and parameters."""
+
+from pathlib import Path
+from typing import Any
+
+from study import tables
+from study.case import identify_case
+from study.modelfile import read_model
+from study.record import read_csv
+
+
+def main(model: str, record: str, outputs: dict[str, str], settings: dict[str, Any]) -> None:
+    system = read_model(Path(model))
+    found = identify_case(system, read_csv(Path(record)), settings)
+    tables.write_csv(tables.frequency_responses(system, found), Path(outputs["responses"]))
+    tables.write_csv(tables.coherences(found), Path(outputs["coherences"]))
+    tables.write_csv(tables.parameters(settings["case"], system, found, settings), Path(outputs["parameters"]))
+
+
+if "snakemake" in globals():
+    step = globals()["snakemake"]
+    main(step.input.model, step.input.record, dict(step.output.items()), step.params.settings)

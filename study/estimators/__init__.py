@@ -1,0 +1,33 @@
+"""Ways to get coefficients from a record. Each is one file with one function, entered in ``ESTIMATORS``."""
+
+from importlib import import_module
+from typing import cast
+
+from study.errors import StudyError
+from study.estimators.base import Estimator, Identified, Settings
+from study.model import Model
+from study.record import Record
+
+ESTIMATORS = {
+    "siso": "study.estimators.siso",
+    "miso": "study.estimators.miso",
+    "miso_hand_read": "study.estimators.hand_read",
+}
+
+
+def get(name: str) -> Estimator:
+    """The estimator of this name, its module imported only now.
+
+    Raises
+    ------
+    StudyError
+        If there is none.
+    """
+    if name not in ESTIMATORS:
+        raise StudyError(f"there is no estimator {name!r}; known are {', '.join(ESTIMATORS)}")
+    return cast(Estimator, import_module(ESTIMATORS[name]).identify)
+
+
+def identify(name: str, model: Model, record: Record, settings: Settings) -> Identified:
+    """Identify a record with the estimator of this name."""
+    return get(name)(model, record, settings)

@@ -1,0 +1,112 @@
+"""What every estimator takes and gives."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from study.inputs import Input
+from study.miso import MisoResult
+from study.model import Model
+from study.parameters import Estimate
+from study.record import Record
+from study.spectra import Segments
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the estimators may be told.
+
+    Attributes
+    ----------
+    segments : Segments
+        How the record is cut, for those that cut it.
+    band : pair of float
+        Lines that the parameters are fitted to, in hertz.
+    """
+
+    segments: Segments
+    band: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number an engineer asks for; ``error`` is its standard error, nan where the recipe gives none."""
+
+    name: str
+    value: float
+    error: float
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What an estimator found.
+
+    Attributes
+    ----------
+    inputs : tuple of Input
+        Inputs of the reverse system.
+    responses : MisoResult or None
+        Frequency response functions and coherences, for estimators that have them.
+    parameters : tuple of Parameter
+        Named parameters.
+    """
+
+    inputs: tuple[Input, ...]
+    responses: MisoResult | None
+    parameters: tuple[Parameter, ...]
+
+
+class Estimator(Protocol):
+    """A function from model and record to parameters."""
+
+    def __call__(self, model: Model, record: Record, settings: Settings) -> Identified:
+        """Identify; coefficients of the model are ignored, its shape parameters are used."""
+        ...
+
+
+def named_parameters(estimate: Estimate) -> tuple[Parameter, ...]:
+    """Coefficients and what follows from them, under the report's names.
+
+    ``f_n`` and ``zeta`` by (4.4) and (4.5), ``k_m`` and ``phase`` by (4.9), ``k_dead_band`` by (4.10);
+    their standard errors to first order from the covariance of the coefficients.
+    """
+    plain = {s: Parameter(s, estimate[s], estimate.error(s)) for s in estimate.symbols}
+    found = {s: plain.pop(s) for s in ("m", "c", "k") if s in plain}
+    if {"m", "c", "k"} <= set(found) and found["k"].value > 0.0 and found["m"].value > 0.0:
+        found |= {p.name: p for p in _modal(estimate)}
+    if "km_cos" in plain:
+        found |= {p.name: p for p in _periodic(estimate)}
+        del plain["km_cos"], plain["km_sin"]
+    if "kg" in plain:
+        kg = plain.pop("kg")
+        found["k_dead_band"] = Parameter("k_dead_band", -kg.value, kg.error)
+    return (*found.values(), *plain.values())
+
+
+def true_parameters(values: Mapping[str, float | None]) -> dict[str, float]:
+    """The same names for a model's own values."""
+    known = {key: value for key, value in values.items() if value is not None and "." not in key}
+    estimate = Estimate(tuple(known), np.array(list(known.values())), np.zeros((len(known), len(known))))
+    return {p.name: p.value for p in named_parameters(estimate)}
+
+
+def _modal(e: Estimate) -> tuple[Parameter, Parameter]:
+    m, c, k = e["m"], e["c"], e["k"]
+    f_n = math.sqrt(k / m) / (2.0 * math.pi)
+    zeta = c / (4.0 * math.pi * f_n * m)
+    f_n_error = e.derived_error({"k": f_n / (2.0 * k), "m": -f_n / (2.0 * m)})
+    zeta_error = e.derived_error({"c": 0.5 / math.sqrt(k * m), "k": -zeta / (2.0 * k), "m": -zeta / (2.0 * m)})
+    return Parameter("f_n", f_n, f_n_error), Parameter("zeta", zeta, zeta_error)
+
+
+def _periodic(e: Estimate) -> tuple[Parameter, Parameter]:
+    a, b = e["km_cos"], e["km_sin"]
+    size = math.hypot(a, b)
+    if size == 0.0:
+        return Parameter("k_m", 0.0, e.error("km_cos")), Parameter("phase", 0.0, math.inf)
+    amplitude = Parameter("k_m", size, e.derived_error({"km_cos": a / size, "km_sin": b / size}))
+    turn = e.derived_error({"km_cos": b / size**2, "km_sin": -a / size**2})
+    return amplitude, Parameter("phase", math.atan2(-b, a), turn)

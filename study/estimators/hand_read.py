@@ -1,0 +1,79 @@
+"""The report's own recipes for reading parameters off the curves (Section 5.2.1)."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.estimators import miso
+from study.estimators.base import Identified, Parameter, Settings
+from study.inputs import Input
+from study.miso import MisoResult
+from study.model import Model
+from study.record import Record
+
+LOWEST_LINES = 3  # "the asymptotic behavior of A_1 for f -> 0": the first lines of the band
+
+
+def identify(model: Model, record: Record, settings: Settings) -> Identified:
+    """Read k, f_n, m, c, zeta off A_1 and the plateaus off the other A_j, as a hand would."""
+    found = miso.identify(model, record, settings)
+    assert found.responses is not None
+    responses, band = found.responses, settings.band
+    keep = (responses.frequency >= band[0]) & (responses.frequency <= band[1])
+    frequency = responses.frequency[keep]
+    values: list[tuple[str, float]] = []
+    for item, response in zip(found.inputs, responses.response[:, keep], strict=True):
+        values += read_linear(frequency, response) if item.shape == "u" else _plateaus(item, frequency, response)
+    return Identified(found.inputs, responses, tuple(Parameter(n, v, math.nan) for n, v in _renamed(values)))
+
+
+def read_linear(frequency: NDArray[np.float64], response: NDArray[np.complex128]) -> list[tuple[str, float]]:
+    """k as f -> 0, f_n at the minimum of abs(A_1), m = k / (2 pi f_n)^2, c = abs(A_1(f_n)) / (2 pi f_n).
+
+    Only k is read where abs(A_1) has no minimum inside the band (a system without a resonance).
+    """
+    k = float(np.mean(response[:LOWEST_LINES].real))
+    size = np.abs(response)
+    i = int(np.argmin(size))
+    if i in (0, len(size) - 1):
+        return [("k", k)]
+    f_n, lowest = _vertex(frequency[i - 1 : i + 2], size[i - 1 : i + 2])
+    omega = 2.0 * math.pi * f_n
+    m, c = k / omega**2, lowest / omega
+    return [("m", m), ("c", c), ("k", k), ("f_n", f_n), ("zeta", c / (2.0 * omega * m))]
+
+
+def read_curve(result: MisoResult, band: tuple[float, float]) -> dict[str, float]:
+    """The same for the first response function of any analysis, the SI/SO curve included."""
+    keep = (result.frequency >= band[0]) & (result.frequency <= band[1])
+    return dict(read_linear(result.frequency[keep], result.response[0][keep]))
+
+
+def _vertex(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
+    """Lowest point of the parabola through three points, as the eye puts it between the lines."""
+    step = float(x[1] - x[0])
+    bend = float(y[0] - 2.0 * y[1] + y[2])
+    slope = float(y[2] - y[0]) / 2.0
+    shift = -slope / bend if bend > 0.0 else 0.0
+    return float(x[1]) + shift * step, float(y[1]) + slope * shift / 2.0
+
+
+def _plateaus(item: Input, frequency: NDArray[np.float64], response: NDArray[np.complex128]) -> list[tuple[str, float]]:
+    """Each coefficient as the mean height of its own part of A_j: real for order 0, imaginary for order 1."""
+    powers = item.powers(frequency)
+    return [
+        (part.symbol, float(np.mean((response / powers[:, p]).real)))
+        for p, part in enumerate(item.parts)
+    ]  # fmt: skip
+
+
+def _renamed(values: list[tuple[str, float]]) -> list[tuple[str, float]]:
+    """Periodic and dead-band coefficients under the report's names, (4.9) and (4.10)."""
+    found = dict(values)
+    if "km_cos" in found:
+        a, b = found.pop("km_cos"), found.pop("km_sin")
+        found |= {"k_m": math.hypot(a, b), "phase": math.atan2(-b, a)}
+    if "kg" in found:
+        found["k_dead_band"] = -found.pop("kg")
+    return list(found.items())

@@ -1,0 +1,16 @@
+"""Single input, single output: the best linear fit, what the report's dashed curves show."""
+
+from study import miso, parameters, spectra
+from study.estimators.base import Identified, Settings, named_parameters
+from study.inputs import histories, reverse_inputs
+from study.model import Model
+from study.record import Record
+
+
+def identify(model: Model, record: Record, settings: Settings) -> Identified:
+    """Fit L_1(f) = G_1y / G_11, (4.23), as if the system were linear."""
+    inputs = tuple(i for i in reverse_inputs(model) if i.shape == "u")
+    matrix = spectra.cross_spectra([*histories(inputs, record), record["force"]], record.dt, settings.segments)
+    result = miso.analyse(matrix)
+    estimate = parameters.fit(result, inputs, settings.band, settings.segments.line_inflation())
+    return Identified(inputs, result, named_parameters(estimate))

@@ -1,0 +1,114 @@
+"""Tables: what was estimated beside what is true, the tolerance, and the verdict."""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from study.estimators.base import Identified, true_parameters
+from study.inputs import Input
+from study.model import Model
+
+Table = Mapping[str, Any]
+PARAMETER_COLUMNS = [
+    "case", "estimator", "parameter", "true", "estimate", "standard_error",
+    "relative_error", "tolerance", "within_tolerance",
+]  # fmt: skip
+
+
+def parameters(case: str, model: Model, found: Mapping[str, Identified], settings: Table) -> pd.DataFrame:
+    """Every parameter of every estimator, one row each (``PARAMETER_COLUMNS``).
+
+    ``tolerance`` is relative where the true value is not zero; where it is zero there is no relative
+    error, and ``tolerance`` is absolute, in the parameter's own unit.
+    """
+    truth = true_parameters(model.values)
+    rows: list[dict[str, Any]] = []
+    for estimator, identified in found.items():
+        for parameter in identified.parameters:
+            true = truth.get(parameter.name, 0.0)
+            if parameter.name in ("f_n", "zeta") and parameter.name not in truth:
+                continue  # a system without stiffness has neither
+            judged = judge(parameter.name, true, parameter.value, settings)
+            rows.append(
+                {"case": case, "estimator": estimator, "parameter": parameter.name, "true": true,
+                 "estimate": parameter.value, "standard_error": parameter.error, **judged}
+            )  # fmt: skip
+    return pd.DataFrame(rows, columns=PARAMETER_COLUMNS)
+
+
+def judge(name: str, true: float, estimate: float, settings: Table) -> dict[str, Any]:
+    """Relative error, tolerance and verdict of one estimate."""
+    if true != 0.0:
+        error, tolerance = (estimate - true) / true, settings["relative"].get(name, math.nan)
+        return {"relative_error": error, "tolerance": tolerance, "within_tolerance": abs(error) <= tolerance}
+    tolerance = settings["absolute"].get(name, math.nan)
+    return {"relative_error": math.nan, "tolerance": tolerance, "within_tolerance": abs(estimate) <= tolerance}
+
+
+def frequency_responses(model: Model, found: Mapping[str, Identified]) -> pd.DataFrame:
+    """A_j(f) of each estimator with its standard error and the exact function, in long form."""
+    values = {key: value for key, value in model.values.items() if value is not None}
+    frames: list[pd.DataFrame] = []
+    for estimator, identified in found.items():
+        result = identified.responses
+        if result is None or estimator == "miso_hand_read":
+            continue
+        for j, item in enumerate(identified.inputs):
+            exact = item.response(result.frequency, values)
+            frames.append(
+                pd.DataFrame(
+                    {
+                        "frequency": result.frequency,
+                        "estimator": estimator,
+                        "input": j + 1,
+                        "shape": item.shape,
+                        "real": result.response[j].real,
+                        "imag": result.response[j].imag,
+                        "standard_error": np.sqrt(result.covariance[:, j, j].real),
+                        "exact_real": exact.real,
+                        "exact_imag": exact.imag,
+                    }
+                )
+            )
+    return pd.concat(frames, ignore_index=True)
+
+
+def coherences(found: Mapping[str, Identified]) -> pd.DataFrame:
+    """Ordinary, partial, nonlinear and cumulative coherence of each input, in long form."""
+    frames: list[pd.DataFrame] = []
+    for estimator, identified in found.items():
+        result = identified.responses
+        if result is None or estimator == "miso_hand_read":
+            continue
+        for j, item in enumerate(identified.inputs):
+            frames.append(
+                pd.DataFrame(
+                    {
+                        "frequency": result.frequency,
+                        "estimator": estimator,
+                        "input": j + 1,
+                        "shape": item.shape,
+                        "terms": label(item),
+                        "ordinary": result.ordinary[j],
+                        "partial": result.partial[j],
+                        "contribution": result.contribution[j],
+                        "cumulative": result.cumulative[j],
+                    }
+                )
+            )
+    return pd.concat(frames, ignore_index=True)
+
+
+def label(item: Input) -> str:
+    """The terms that an input carries, in words."""
+    return " + ".join(name.replace("_", " ") for name in item.terms)
+
+
+def write_csv(table: pd.DataFrame, path: Path) -> None:
+    """Write a table with twelve significant digits: more than any estimate has, fewer than rounding has."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    table.to_csv(path, index=False, float_format="%.12g", lineterminator="\n")
