@@ -1,0 +1,85 @@
+"""Files that a user names: read with bounds, replaced in one step."""
+
+import errno
+import os
+import stat
+import tempfile
+from contextlib import suppress
+from pathlib import Path
+
+from study.errors import StudyError
+
+LARGEST = 1_000_000  # bytes; the longest sensible text file of a user has a few kilobytes
+NEW_FILE = 0o644  # permission bits of a file that was not there
+
+
+def read_text(path: Path, wanted: str) -> str:
+    """The text of a file that may be anything.
+
+    Parameters
+    ----------
+    path : Path
+        What the user gave.
+    wanted : str
+        What would be right, for messages.
+
+    Raises
+    ------
+    StudyError
+        If it is missing, no regular file, unreadable, over 1 MB, or not UTF-8.
+    """
+    try:
+        kind = path.stat().st_mode
+        if not stat.S_ISREG(kind):
+            what = "a folder" if stat.S_ISDIR(kind) else "not a regular file"
+            raise StudyError(f"{path}: this is {what}; {wanted} is right")
+        with path.open("rb") as stream:
+            data = stream.read(LARGEST + 1)
+    except FileNotFoundError:
+        raise StudyError(f"{path}: there is no such file; {wanted} is right") from None
+    except (OSError, ValueError) as error:  # ValueError: a path with a null byte
+        raise StudyError(f"{path}: cannot be read ({reason(error)}); {wanted} is right") from None
+    if len(data) > LARGEST:
+        raise StudyError(f"{path}: the file has more than {LARGEST} bytes; {wanted} is right")
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        byte = f"byte {error.start} is {data[error.start]:#04x}"
+        raise StudyError(f"{path}: this is no UTF-8 text ({byte}); {wanted} is right") from None
+
+
+def replace_file(path: Path, data: bytes) -> None:
+    """Write a file in one step: readers see the old content or the new, and a failure leaves the old.
+
+    Permission bits are kept; a symbolic link stays one.
+
+    Raises
+    ------
+    StudyError
+        If it cannot be written (no permission, no space); what was there is still there.
+    """
+    target = Path(os.path.realpath(path))
+    try:
+        if target.exists() and not os.access(target, os.W_OK):
+            raise PermissionError(errno.EACCES, "it is write-protected")
+        mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else NEW_FILE
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+        try:
+            with os.fdopen(handle, "wb") as stream:
+                stream.write(data)
+                stream.flush()
+                os.fsync(stream.fileno())
+            Path(name).chmod(mode)
+            Path(name).replace(target)
+        finally:
+            with suppress(FileNotFoundError):
+                Path(name).unlink()
+    except OSError as error:
+        raise StudyError(
+            f"{path}: cannot be written ({reason(error)}), so it is as it was; a writable folder with free space is right"
+        ) from None
+
+
+def reason(error: Exception) -> str:
+    """What the operating system says went wrong."""
+    return getattr(error, "strerror", None) or str(error) or type(error).__name__

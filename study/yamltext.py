@@ -1,0 +1,133 @@
+"""YAML text from users: bounded, plain data out of it, and a place in it for one list entry more.
+
+Nothing in the text is trusted: its size in events and its depth are checked before anything is built,
+and aliases (which can grow without bound) and tags (which call for Python objects) are refused.
+"""
+
+import json
+from collections.abc import Iterator
+from typing import Any, cast
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError
+
+from study.errors import StudyError
+
+MOST_EVENTS = 10_000  # names, numbers and brackets in one text
+DEEPEST = 8
+RIGHT = "a mapping such as 'name: rig' is right"
+
+
+def _yaml() -> Any:
+    """A parser of YAML 1.2, in which ``2e7`` is a number and ``no`` is a word; the compiled one reads 1.1."""
+    return YAML(typ="safe", pure=True)
+
+
+def read_plain(text: str) -> object:
+    """The dicts, lists, texts and numbers of a YAML text.
+
+    Raises
+    ------
+    StudyError
+        If it is not YAML, is too large or too deep, or uses aliases or tags.
+    """
+    try:
+        _screen(text)
+        return _yaml().load(text)
+    except StudyError:
+        raise
+    except MarkedYAMLError as error:
+        raise StudyError(f"is not YAML ({_problem(error)}); {RIGHT}") from None
+    except Exception as error:  # whatever else a parser trips over in hostile text means the same to the user
+        problem = (str(error) or type(error).__name__).splitlines()[0]
+        raise StudyError(f"is not YAML ({short(problem)}); {RIGHT}") from None
+
+
+def _problem(error: Any) -> str:
+    line = f" in line {error.problem_mark.line + 1}" if error.problem_mark else ""
+    return short(str(error.problem or error.context).splitlines()[0]) + line
+
+
+def _screen(text: str) -> None:
+    """Refuse what could grow when built, or call for Python objects, before anything is built."""
+    depth = 0
+    for count, event in enumerate(_events(text)):
+        kind, line = type(event).__name__, event.start_mark.line + 1
+        depth += kind in ("SequenceStartEvent", "MappingStartEvent")
+        depth -= kind in ("SequenceEndEvent", "MappingEndEvent")
+        if depth > DEEPEST or count > MOST_EVENTS:
+            raise StudyError(f"is too large or too deeply nested (line {line}); a short list is right")
+        if getattr(event, "anchor", None) is not None:  # an alias has one too: the name it repeats
+            raise StudyError(f"uses the YAML anchor or alias {event.anchor!r} in line {line}; write the value itself")
+        if getattr(event, "tag", None) is not None:
+            tag = short(repr(str(event.tag)))
+            raise StudyError(f"uses the YAML tag {tag} in line {line}; plain names and numbers are right")
+        if getattr(event, "version", None) not in (None, (1, 2)):
+            raise StudyError(f"asks for another YAML version before line {line}; leave the %YAML line out")
+
+
+def _events(text: str) -> Iterator[Any]:
+    yield from _yaml().parse(text)
+
+
+def as_mapping(value: object) -> dict[object, object] | None:
+    """The value if it is a mapping."""
+    return cast("dict[object, object]", value) if isinstance(value, dict) else None
+
+
+def as_list(value: object) -> list[object] | None:
+    """The value if it is a list."""
+    return cast("list[object]", value) if isinstance(value, list) else None
+
+
+def shown(value: object) -> str:
+    """A value from a file as a message shows it."""
+    try:
+        return short(repr(value))
+    except ValueError:  # Python does not print a number of thousands of digits
+        return "a number of too many digits"
+
+
+def short(text: str) -> str:
+    """A text that fits in a message."""
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def scalar(text: str) -> str:
+    """A text as YAML: plain where it reads back as itself, otherwise in double quotes."""
+    plain = text.isidentifier() and text.isascii() and _yaml().load(text) == text
+    return text if plain else json.dumps(text, ensure_ascii=False)
+
+
+def with_entry(text: str, key: str, entry: str) -> str:
+    """The text with one entry more at the end of the top-level list ``key``; nothing else changes.
+
+    Parameters
+    ----------
+    text : str
+        YAML that :func:`read_plain` accepts, whose ``key`` is a list of at least one entry.
+    key : str
+        Name of the list.
+    entry : str
+        YAML on one line.
+    """
+    root = _yaml().compose(text)
+    sequence = next(value for name, value in root.value if name.value == key)
+    if sequence.flow_style:
+        end = sequence.value[-1].end_mark.index
+        return f"{text[:end]}, {entry}{text[end:]}"
+    last = len(text[: _last_leaf(sequence).end_mark.index].rstrip())
+    end = text.find("\n", last)
+    newline = "\r\n" if "\r\n" in text else "\n"
+    line = " " * sequence.start_mark.column + f"- {entry}"
+    if end < 0:
+        return f"{text}{newline}{line}"
+    return f"{text[: end + 1]}{line}{newline}{text[end + 1 :]}"
+
+
+def _last_leaf(node: Any) -> Any:
+    """The node at the very end of a block, whose end mark is exact (a block's own lies behind its comments)."""
+    if node.id == "scalar" or node.flow_style or not node.value:
+        return node
+    last = node.value[-1]
+    return _last_leaf(last[1] if node.id == "mapping" else last)
