@@ -1,0 +1,84 @@
+"""Many seeds of one case at once, on every core."""
+
+import math
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
+
+import numpy as np
+import pandas as pd
+
+from study import tables
+from study.case import identify_case, make_record
+from study.errors import DivergenceError
+from study.model import Model
+
+Table = Mapping[str, Any]
+T = TypeVar("T")
+S = TypeVar("S")
+NOISE_OFFSET = 1_000_000  # noise seeds stand apart from force seeds
+
+
+def threaded(work: Callable[[S], T], items: Sequence[S], progress: Callable[[int], None] | None = None) -> list[T]:
+    """Results of ``work`` for each item, in order; the kernels and the FFT release the interpreter lock."""
+    done: list[T] = []
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for result in pool.map(work, items):
+            done.append(result)
+            if progress is not None:
+                progress(len(done))
+    return done
+
+
+def estimates(model: Model, record: Table, identification: Table, seeds: Iterable[int]) -> pd.DataFrame:
+    """Every parameter of every estimator for every seed, as ``tables.parameters`` with a column ``seed``.
+
+    A seed whose run diverges leaves one row with the parameter ``diverged`` and the time as its estimate.
+    """
+
+    def one(seed: int) -> pd.DataFrame:
+        try:
+            measured = make_record(model, record, seed=seed, noise_seed=NOISE_OFFSET + seed)
+        except DivergenceError as error:
+            lost = {"case": record["case"], "parameter": "diverged", "estimate": error.time}
+            return pd.DataFrame([lost], columns=tables.PARAMETER_COLUMNS).assign(seed=seed)
+        found = identify_case(model, measured, identification)
+        return tables.parameters(record["case"], model, found, identification).assign(seed=seed)
+
+    return pd.concat([f for f in threaded(one, list(seeds)) if len(f)], ignore_index=True)
+
+
+def rates(table: pd.DataFrame) -> pd.DataFrame:
+    """How often each tolerance is met, with the mean and scatter of each estimate.
+
+    ``rate_error`` is the binomial standard error of the rate; ``error_to_scatter`` is the mean
+    standard error over the scatter that the seeds show.
+    """
+    rows: list[dict[str, Any]] = []
+    for (case, estimator, parameter), group in table.groupby(["case", "estimator", "parameter"], sort=False):
+        rate = float(group["within_tolerance"].mean())
+        scatter = float(group["estimate"].std(ddof=1))
+        error = float(group["standard_error"].mean())
+        rows.append(
+            {
+                "case": case,
+                "estimator": estimator,
+                "parameter": parameter,
+                "true": float(group["true"].iloc[0]),
+                "mean": float(group["estimate"].mean()),
+                "scatter": scatter,
+                "error_to_scatter": error / scatter if scatter > 0.0 else math.nan,
+                "tolerance": float(group["tolerance"].iloc[0]),
+                "seeds": len(group),
+                "within_tolerance": rate,
+                "rate_error": math.sqrt(rate * (1.0 - rate) / len(group)),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def averages(values: Sequence[float]) -> tuple[float, float]:
+    """Mean and standard error of the mean."""
+    x = np.asarray(values, dtype=np.float64)
+    return float(np.mean(x)), float(np.std(x, ddof=1) / math.sqrt(len(x)))
