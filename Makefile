@@ -1,0 +1,30 @@
+# The two commands: `make study` and `make test`. Both set themselves up in .venv first.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+.PHONY: study test lint clean
+
+study: $(READY)
+	$(BIN)/snakemake -j2
+
+test: lint
+	$(BIN)/pytest
+
+lint: $(READY)
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/pyright
+
+$(READY): requirements.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+	  || { echo "study: $(PYTHON) is older than 3.11; name a newer one: make PYTHON=python3.12 study"; exit 2; }
+	@$(PYTHON) -m venv $(VENV) \
+	  || { echo "study: $(PYTHON) cannot make a virtual environment; on Debian, install python3-venv"; exit 2; }
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
+	@touch $@
+
+clean:
+	rm -rf results figures .snakemake
