@@ -30,12 +30,10 @@ class FreeRun:
     ----------
     program : Program
         Slopes of the states, then their partial derivatives; values that are held are in its registers.
-    partials : int array, shape (states - 1, states + keys)
-        Registers of each slope's partial derivatives by the states and by the keys.
+    slots : int array, shape (states - 1, 1 + states + keys)
+        Registers of each slope (but velocity), of its partial derivatives by the states and by the keys.
     keys : tuple of str
         The coefficients and shape parameters to differentiate by.
-    states : int
-        Number of states: displacement, velocity and the terms' own.
     drive : array, shape (2 steps (samples - 1) + 3, 1 + extra channels)
         Force and extra channels at every half step.
     dt : float
@@ -51,9 +49,8 @@ class FreeRun:
     """
 
     program: Program
-    partials: Ints
+    slots: Ints
     keys: tuple[str, ...]
-    states: int
     drive: Floats
     dt: float
     steps: int
@@ -86,19 +83,19 @@ class FreeRun:
             If the response leaves the range of finite numbers.
         """
         program = with_registers(self.program, {key: values[key] for key in self.keys})
-        state, columns = np.zeros(self.states), len(self.keys) + free_states
-        state[: len(initial)] = initial
-        sensitivity = np.zeros((self.states, columns))
-        sensitivity[range(free_states), range(len(self.keys), columns)] = 1.0
-        response, jacobian = np.empty(self.samples), np.empty((self.samples, columns))
+        first_free = 1 + len(self.keys)
+        state = np.zeros((len(self.slots) + 1, first_free + free_states))
+        state[: len(initial), 0] = initial
+        state[range(free_states), range(first_free, first_free + free_states)] = 1.0
+        out = np.empty((self.samples, state.shape[1]))
         failed = kernels.integrate_variation(
-            program.code, program.first, program.registers, program.outputs[: self.states - 1], self.partials,
-            self.start, self.dt, self.steps, self.drive, state, sensitivity, self.row, response, jacobian,
+            program.code, program.first, program.registers, self.slots,
+            self.start, self.dt, self.steps, self.drive, state, self.row, out,
         )  # fmt: skip
         if failed >= 0:
             time = self.start + failed * self.dt
             raise DivergenceError(f"the free run diverged at t = {time:.4g} s", time)
-        return response, jacobian
+        return out[:, 0], out[:, 1:]
 
 
 def prepare(
@@ -137,12 +134,12 @@ def prepare(
         raise StudyError(f"there is no response {response!r}; a free run yields {', '.join(MOTIONS)}")
     if steps_per_sample < 1:
         raise StudyError(f"steps_per_sample is {steps_per_sample}; at least 1 is needed")
-    program, partials, states = _differentiated(model, record.extra, tuple(keys))
+    program, slots = _differentiated(model, record.extra, tuple(keys))
     factor = 2 * steps_per_sample
     columns = [between_samples(record[name], factor) for name in ("force", *record.extra)]
     drive = np.column_stack(columns)[factor * first : factor * (last - 1) + 1]
     return FreeRun(
-        program, partials, tuple(keys), states, drive, record.dt, steps_per_sample,
+        program, slots, tuple(keys), drive, record.dt, steps_per_sample,
         record.start + first * record.dt, last - first, MOTIONS.index(response),
     )  # fmt: skip
 
@@ -157,8 +154,8 @@ def _checked_span(record: Record, span: tuple[int, int] | None) -> tuple[int, in
     return first, last
 
 
-def _differentiated(model: Model, channels: tuple[str, ...], keys: tuple[str, ...]) -> tuple[Program, Ints, int]:
-    """Program of slopes and partial derivatives, the latter's registers, and the number of states."""
+def _differentiated(model: Model, channels: tuple[str, ...], keys: tuple[str, ...]) -> tuple[Program, Ints]:
+    """Program of slopes and partial derivatives, and their registers."""
     held = {key: value for key, value in model.values.items() if key not in keys}
     missing = [key for key, value in held.items() if value is None]
     if missing:
@@ -169,11 +166,10 @@ def _differentiated(model: Model, channels: tuple[str, ...], keys: tuple[str, ..
     forward = forward_graph(model, channels)
     graph = forward.graph
     by = (*forward.states, *(graph.input(key) for key in keys))
-    partials = [graph.derivative(slope, node) for slope in forward.slopes for node in by]
-    program = graph.program([*forward.slopes, *partials])
-    registers = program.outputs[len(forward.slopes) :].reshape(len(forward.slopes), len(by))
+    rows = [[slope, *(graph.derivative(slope, node) for node in by)] for slope in forward.slopes]
+    program = graph.program([node for row in rows for node in row])
     values = {key: value for key, value in held.items() if value is not None}
-    return with_registers(program, values), registers, len(forward.states)
+    return with_registers(program, values), program.outputs.reshape(len(rows), 1 + len(by))
 
 
 def predict(

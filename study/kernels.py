@@ -191,81 +191,79 @@ def integrate_abm4(
 
 
 @compiled
-def _variation(
-    code: Ints, first: int, r: Floats, outputs: Ints, partials: Ints, time: float, drive: Floats, j: int,
-    x: Floats, s: Floats, k: Floats, ks: Floats, row: int,
-) -> None:  # fmt: skip
-    """Derivatives of the state into k[row], of its sensitivities s into ks[row].
+def _variation(code: Ints, first: int, r: Floats, slots: Ints, time: float, drive: Floats, j: int, w: Floats) -> None:
+    """Derivatives of ``w[1]`` into ``w[2]``: state in the first column, its sensitivities s in the others.
 
-    The variational equations are ``ds/dt = (df/dx) s + df/dp``; ``partials[i]`` names the registers of
-    ``df_i/dx`` and then of ``df_i/dp``. Columns of s beyond the p's are those of the initial state.
+    The variational equations are ``ds/dt = (df/dx) s + df/dp``; row i of ``slots`` names the registers of
+    ``f_i``, ``df_i/dx`` and ``df_i/dp``. Columns of s beyond the p's are those of the initial state.
     """
-    _slope(code, first, r, outputs, time, drive, j, x, k, row)
-    n = x.shape[0]
-    own = partials.shape[1] - n
-    for c in range(s.shape[1]):
-        ks[row, 0, c] = s[1, c]
+    n, columns = w.shape[1], w.shape[2]
+    channels = drive.shape[1]
+    r[0] = w[1, 0, 0]
+    r[1] = w[1, 1, 0]
+    r[2] = time
+    for c in range(channels):
+        r[3 + c] = drive[j, c]
+    for i in range(2, n):
+        r[1 + channels + i] = w[1, i, 0]
+    run(code, first, r)
+    for c in range(columns):
+        w[2, 0, c] = w[1, 1, c]
     for i in range(1, n):
-        for c in range(s.shape[1]):
-            ks[row, i, c] = r[partials[i - 1, n + c]] if c < own else 0.0
+        w[2, i, 0] = r[slots[i - 1, 0]]
+        for c in range(1, columns):
+            w[2, i, c] = r[slots[i - 1, n + c]] if n + c < slots.shape[1] else 0.0
         for m in range(n):
-            slope = r[partials[i - 1, m]]
-            for c in range(s.shape[1]):
-                ks[row, i, c] += slope * s[m, c]
+            partial = r[slots[i - 1, 1 + m]]
+            if partial != 0.0:
+                for c in range(1, columns):
+                    w[2, i, c] += partial * w[1, m, c]
 
 
 @compiled
 def _rk4_variation_step(
-    code: Ints, first: int, r: Floats, outputs: Ints, partials: Ints, time: float, h: float, drive: Floats, j: int,
-    x: Floats, s: Floats, k: Floats, ks: Floats, trial: Floats, strial: Floats,
+    code: Ints, first: int, r: Floats, slots: Ints, time: float, h: float, drive: Floats, j: int, w: Floats
 ) -> None:  # fmt: skip
-    """One Runge-Kutta step of state and sensitivities together: the exact derivative of :func:`_rk4_step`."""
-    n, p = s.shape
+    """One Runge-Kutta step of ``w[0]`` in place; ``w[1]`` to ``w[3]`` are room for trial, slope and their sum."""
+    w[1] = w[0]
+    w[3] = 0.0
     for stage in range(4):
-        _variation(
-            code, first, r, outputs, partials, time + 0.5 * h * ((stage + 1) // 2), drive, j + (stage + 1) // 2,
-            x if stage == 0 else trial, s if stage == 0 else strial, k, ks, stage,
-        )  # fmt: skip
-        if stage < 3:
-            ahead = h if stage == 2 else 0.5 * h
-            for i in range(n):
-                trial[i] = x[i] + ahead * k[stage, i]
-                for c in range(p):
-                    strial[i, c] = s[i, c] + ahead * ks[stage, i, c]
-    for i in range(n):
-        x[i] += h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
-        for c in range(p):
-            s[i, c] += h / 6.0 * (ks[0, i, c] + 2.0 * ks[1, i, c] + 2.0 * ks[2, i, c] + ks[3, i, c])
+        late = (stage + 1) // 2
+        _variation(code, first, r, slots, time + 0.5 * h * late, drive, j + late, w)
+        weight = h / 3.0 if late == 1 else h / 6.0
+        ahead = h if stage == 2 else 0.5 * h
+        for i in range(w.shape[1]):
+            for c in range(w.shape[2]):
+                w[3, i, c] += weight * w[2, i, c]
+                w[1, i, c] = w[0, i, c] + ahead * w[2, i, c]
+    for i in range(w.shape[1]):
+        for c in range(w.shape[2]):
+            w[0, i, c] += w[3, i, c]
 
 
 @compiled
 def integrate_variation(
-    code: Ints, first: int, r: Floats, outputs: Ints, partials: Ints, start: float, dt: float,
-    steps: int, drive: Floats, x: Floats, s: Floats, row: int, out: Floats, jacobian: Floats,
+    code: Ints, first: int, r: Floats, slots: Ints, start: float, dt: float,
+    steps: int, drive: Floats, y: Floats, row: int, out: Floats,
 ) -> int:  # fmt: skip
-    """A free run with its exact derivatives; arguments as in :func:`integrate_rk4`.
+    """A free run with its exact derivatives by Runge-Kutta; ``y`` is the state beside its sensitivities.
 
-    ``out`` gets response ``row`` (0 displacement, 1 velocity, 2 acceleration) of each sample, and
-    ``jacobian`` its derivative by each column of ``s``. Returns the first non-finite sample, or -1.
+    ``out`` gets response ``row`` (0 displacement, 1 velocity, 2 acceleration) of each sample beside its
+    derivatives. Other arguments and result as in :func:`integrate_rk4` and :func:`_variation`.
     """
-    n, p = s.shape
     h = dt / steps
-    k = np.zeros((4, n))
-    ks = np.zeros((4, n, p))
-    trial = np.zeros(n)
-    strial = np.zeros((n, p))
+    w = np.zeros((4, y.shape[0], y.shape[1]))
+    w[0] = y
     for sample in range(out.shape[0]):
         j = 2 * steps * sample
-        _variation(code, first, r, outputs, partials, start + sample * dt, drive, j, x, s, k, ks, 0)
-        if not (abs(x[0]) < 1e150 and abs(x[1]) < 1e150 and math.isfinite(k[0, 1])):
+        w[1] = w[0]
+        _variation(code, first, r, slots, start + sample * dt, drive, j, w)
+        if not (abs(w[0, 0, 0]) < 1e150 and abs(w[0, 1, 0]) < 1e150 and math.isfinite(w[2, 1, 0])):
             return sample
-        out[sample] = x[row] if row < 2 else k[0, 1]
-        for c in range(p):
-            jacobian[sample, c] = s[row, c] if row < 2 else ks[0, 1, c]
+        for c in range(y.shape[1]):
+            out[sample, c] = w[0, row, c] if row < 2 else w[2, 1, c]
         if sample + 1 < out.shape[0]:
             for m in range(steps):
                 time = start + sample * dt + m * h
-                _rk4_variation_step(
-                    code, first, r, outputs, partials, time, h, drive, j + 2 * m, x, s, k, ks, trial, strial
-                )  # fmt: skip
+                _rk4_variation_step(code, first, r, slots, time, h, drive, j + 2 * m, w)
     return -1

@@ -252,7 +252,7 @@ def _result(model: Model, problem: _Problem, end: _End) -> FreeRunFit:
     names = [key for key, unclear in zip(keys, blurred, strict=False) if unclear]
     if names:
         message += f"; this record cannot tell apart or does not show {', '.join(names)}"
-    initial = np.zeros(problem.run.states)
+    initial = np.zeros(len(problem.run.slots) + 1)
     initial[: problem.free_states] = point.x[p:]
     estimates = point.x[:p]
     filled = model.with_values(dict(zip(keys, (float(v) for v in estimates), strict=True)))
