@@ -94,7 +94,11 @@ def build(graph: Graph, text: str, known: Mapping[str, int]) -> int:
     ExpressionError
         At the first piece that is not on the whitelist, naming it.
     """
-    return _Builder(graph, text, known).node(parse(text))
+    builder = _Builder(graph, text, known)
+    node = builder.node(parse(text))
+    if not all(map(math.isfinite, graph.values)):
+        raise builder.refuse("holds a constant part that is not a finite number")
+    return node
 
 
 class _Builder:
@@ -105,6 +109,13 @@ class _Builder:
         return ExpressionError(f"the expression {self.text!r} {why}")
 
     def node(self, tree: ast.expr) -> int:
+        made = self.piece(tree)
+        value = self.graph.constant_value(made)
+        if value is not None and not math.isfinite(value):
+            raise self.refuse(f"holds {ast.unparse(tree)!r}, which is too large a number")
+        return made
+
+    def piece(self, tree: ast.expr) -> int:
         match tree:
             case ast.Constant(value=value):
                 return self.number(value)
@@ -139,11 +150,20 @@ class _Builder:
 
     def power(self, base: ast.expr, exponent: ast.expr) -> int:
         value = self.graph.constant_value(self.node(exponent))
-        if value is None or abs(value) > LARGEST_EXPONENT:
+        if value is None or not abs(value) <= LARGEST_EXPONENT:
             raise self.refuse(
                 f"raises to the power {ast.unparse(exponent)!r}; a power is a number of at most {LARGEST_EXPONENT:g}"
             )
-        return self.graph.power(self.node(base), value)
+        node = self.node(base)
+        number = self.graph.constant_value(node)
+        return self.graph.power(node, value) if number is None else self.constant_power(number, value)
+
+    def constant_power(self, base: float, exponent: float) -> int:
+        try:
+            value = base**exponent
+        except (OverflowError, ZeroDivisionError):
+            value = math.nan
+        return self.number(value)
 
     def arithmetic(self, op: ast.operator, left: int, right: int) -> int:
         match op:

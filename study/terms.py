@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 from study import expression, units
 from study.errors import StudyError
+from study.graph import Graph
 
 
 @dataclass(frozen=True)
@@ -248,5 +249,6 @@ def custom(name: str, force: str) -> Term:
         raise StudyError(f"the name {name!r} belongs to the library; give your own term another name")
     if not name.isidentifier() or not name.isascii():
         raise StudyError(f"{name!r} is not a name for a term; use letters, digits and underscores")
-    expression.parse(force)
+    graph = Graph()
+    expression.build(graph, force, {n: graph.input(n) for n in expression.names(force)})  # refuses all but a formula
     return _single(name, f"q_{name}", force, meaning=f"the user's own force {force}", cause="as the user knows")

@@ -1,0 +1,81 @@
+"""What several test modules share: the report's Table 1, written out a second time, and its records."""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from study import expression, kernels
+from study.excitation import Excitation, force
+from study.graph import Graph
+from study.model import Model, free, with_registers
+from study.record import Record
+from study.simulate import Integrator, simulate
+from study.terms import get
+
+Floats = NDArray[np.float64]
+DT = 0.02
+TABLE_1: dict[str, dict[str, dict[str, float]]] = {
+    "linear": {},
+    "duffing": {"cubic_stiffness": {"k3": 2.0e7}},
+    "van_der_pol": {"van_der_pol_damping": {"c3": 2.0e6}},
+    "duffing_van_der_pol": {"cubic_stiffness": {"k3": 2.0e7}, "van_der_pol_damping": {"c3": 2.0e6}},
+    "mathieu": {"periodic_stiffness": {"km_cos": 177.7, "km_sin": 0.0, "periodic_stiffness.f_m": 1.0}},
+    "dead_band": {"linear_damping": {"c": 1.89}, "dead_band": {"kg": -355.3, "dead_band.u_g": 0.0025}},
+    "extreme": {
+        "linear_damping": {"c": 0.0},
+        "linear_stiffness": {"k": 0.0},
+        "cubic_stiffness": {"k3": 2.0e7},
+        "van_der_pol_damping": {"c3": 2.0e6},
+    },
+}
+LINEAR = {"inertia": {"m": 1.0}, "linear_damping": {"c": 3.77}, "linear_stiffness": {"k": 355.3}}
+
+
+def build_model(name: str, terms: Mapping[str, Mapping[str, float]]) -> Model:
+    """A model from the library's names and their values."""
+    return Model(name, tuple(free(get(term)).with_values(values) for term, values in terms.items()))
+
+
+@pytest.fixture(scope="session")
+def systems() -> dict[str, Model]:
+    """The systems of Table 1."""
+    return {name: build_model(name, {**LINEAR, **terms}) for name, terms in TABLE_1.items()}
+
+
+@pytest.fixture(scope="session")
+def make_model() -> Callable[[str, Mapping[str, Mapping[str, float]]], Model]:
+    """``make_model(name, {term: values})``."""
+    return build_model
+
+
+@pytest.fixture(scope="session")
+def report_force() -> Floats:
+    """The report's force at full length: 8 192 samples, raw variance 1."""
+    return force(Excitation(), 8192, DT, seed=1)
+
+
+@pytest.fixture(scope="session")
+def records(systems: dict[str, Model], report_force: Floats) -> dict[str, Record]:
+    """One record of each system, free of visible integration error."""
+    return {name: simulate(model, report_force, DT, Integrator("rk4", 8)) for name, model in systems.items()}
+
+
+@pytest.fixture(scope="session")
+def value_of() -> Callable[..., Floats]:
+    """``value_of(text, u=..., v=...)``: a formula's values as the compiled kernel computes them."""
+
+    def value(text: str, **columns: Floats | float) -> Floats:
+        graph = Graph()
+        known = {name: graph.input(name) for name in columns}
+        program = with_registers(graph.program([expression.build(graph, text, known)]), {})
+        data = np.column_stack([np.atleast_1d(np.asarray(c, dtype=float)) for c in columns.values()])
+        out = np.empty((len(data), 1))
+        positions = np.array([program.inputs[name] for name in columns], dtype=np.int64)
+        kernels.evaluate(
+            program.code, program.first, program.registers.copy(), positions, data, program.outputs, out
+        )  # fmt: skip
+        return out[:, 0]
+
+    return value
