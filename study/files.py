@@ -2,15 +2,15 @@
 
 import errno
 import os
+import secrets
 import stat
-import tempfile
-from contextlib import suppress
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 
 from study.errors import StudyError
 
 LARGEST = 1_000_000  # bytes; the longest sensible text file of a user has a few kilobytes
-NEW_FILE = 0o644  # permission bits of a file that was not there
 
 
 def read_text(path: Path, wanted: str) -> str:
@@ -49,35 +49,47 @@ def read_text(path: Path, wanted: str) -> str:
 
 
 def replace_file(path: Path, data: bytes) -> None:
-    """Write a file in one step: readers see the old content or the new, and a failure leaves the old.
-
-    Permission bits are kept; a symbolic link stays one.
+    """Write a file in one step, as :func:`replacing` does.
 
     Raises
     ------
     StudyError
-        If it cannot be written (no permission, no space); what was there is still there.
+        If it cannot be written.
+    """
+    with replacing(path) as beside:
+        beside.write_bytes(data)
+
+
+@contextmanager
+def replacing(path: Path) -> Generator[Path, None, None]:
+    """A new file beside ``path`` to write to, which takes its place if the block ends well.
+
+    Readers see the old content or the new one, and any failure leaves the old one. Permission bits are
+    kept; a symbolic link stays one.
+
+    Raises
+    ------
+    StudyError
+        If it cannot be written (no permission, no space).
     """
     target = Path(os.path.realpath(path))
+    beside = target.with_name(f".study-{secrets.token_hex(8)}{target.suffix}")
     try:
-        if target.exists() and not os.access(target, os.W_OK):
+        mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
+        if mode is not None and not os.access(target, os.W_OK):
             raise PermissionError(errno.EACCES, "it is write-protected")
-        mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else NEW_FILE
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
         try:
-            with os.fdopen(handle, "wb") as stream:
-                stream.write(data)
-                stream.flush()
-                os.fsync(stream.fileno())
-            Path(name).chmod(mode)
-            Path(name).replace(target)
+            yield beside
+            with beside.open("rb") as written:
+                os.fsync(written.fileno())
+            if mode is not None:
+                beside.chmod(mode)
+            beside.replace(target)
         finally:
-            with suppress(FileNotFoundError):
-                Path(name).unlink()
+            beside.unlink(missing_ok=True)
     except OSError as error:
-        raise StudyError(
-            f"{path}: cannot be written ({reason(error)}), so it is as it was; a writable folder with free space is right"
-        ) from None
+        why = f"cannot be written ({reason(error)}) and is as it was"
+        raise StudyError(f"{path}: {why}; a writable folder with free space is right") from None
 
 
 def reason(error: Exception) -> str:

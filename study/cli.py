@@ -1,0 +1,115 @@
+"""The command line: find the command, run it, and turn whatever goes wrong into one sentence.
+
+A new command is one module in ``study/commands`` and one entry in :data:`COMMANDS`.
+"""
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import NoReturn
+
+from study import __doc__ as summary
+from study import __version__
+from study.commands import simulate, terms
+from study.commands.command import Command
+from study.errors import StudyError
+
+COMMANDS: tuple[Command, ...] = (terms.COMMAND, simulate.COMMAND)
+
+BAD_INPUT, FAULT, INTERRUPTED, PIPE_CLOSED = 2, 1, 130, 141  # the last two as shells report SIGINT and SIGPIPE
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose complaints are one sentence, like all others."""
+
+    def error(self, message: str) -> NoReturn:
+        raise StudyError(f"{message}; see '{self.prog} --help'")
+
+
+def parser() -> argparse.ArgumentParser:
+    """The parser of the command line with every command of the table."""
+    root = _Parser(
+        "study", description=summary, epilog="example: study simulate --help",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    root.add_argument("--version", action="version", version=f"study {__version__}")
+    commands = root.add_subparsers(title="commands", metavar="COMMAND", required=True, dest="command")
+    for command in COMMANDS:
+        child = commands.add_parser(
+            command.name, help=command.summary, description=command.summary,
+            epilog=f"example:\n  {command.example}", formatter_class=argparse.RawDescriptionHelpFormatter,
+        )  # fmt: skip
+        command.arguments(child)
+        child.set_defaults(run=command.run)
+    return root
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Its words; those of the process if left out.
+
+    Returns
+    -------
+    int
+        0; 2 for input or files that cannot be used; 130 when interrupted; 141 when the reader of the
+        output went away; 1 for a fault in this program.
+    """
+    try:
+        _run(argv)
+        sys.stdout.flush()
+        return 0
+    except StudyError as error:
+        return _end(BAD_INPUT, str(error))
+    except KeyboardInterrupt:
+        return _end(INTERRUPTED, "interrupted")
+    except BrokenPipeError:
+        return _end(PIPE_CLOSED)
+    except OSError as error:
+        return _end(BAD_INPUT, _file_trouble(error))
+    except MemoryError:
+        return _end(BAD_INPUT, "there is not enough memory for this; ask for fewer samples")
+    except Exception as error:  # a user is never shown a traceback
+        return _end(FAULT, f"a fault in the program, not in your input ({_place(error)}); please report it")
+
+
+def _run(argv: Sequence[str] | None) -> None:
+    try:
+        arguments = parser().parse_args(argv)
+    except SystemExit:  # --help and --version have printed what was asked
+        return
+    arguments.run(arguments)
+
+
+def _file_trouble(error: OSError) -> str:
+    where = f"{error.filename}: " if error.filename is not None else ""
+    why = error.strerror or str(error)
+    return f"{where}{why}; a readable file, and a writable folder with free space, are right"
+
+
+def _place(error: Exception) -> str:
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    where = f", {Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}" if trace else ""
+    return f"{type(error).__name__}: {error}{where}"
+
+
+def _end(code: int, message: str = "") -> int:
+    """Say the message in one line on stderr, and leave stdout so that the interpreter's own flush is quiet."""
+    if message:
+        line = " ".join(message.split())
+        with suppress(OSError):
+            print("study:", "".join(c if c.isprintable() else "?" for c in line), file=sys.stderr)
+    try:
+        sys.stdout.flush()
+    except OSError:
+        with suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return code

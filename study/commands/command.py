@@ -1,0 +1,60 @@
+"""What a command is, and the kinds of numbers its options take."""
+
+import argparse
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Command:
+    """An entry in the table of commands.
+
+    Attributes
+    ----------
+    name, summary : str
+        What the user types, and what it does in a few words.
+    example : str
+        Shown by its ``--help``.
+    arguments : callable
+        Adds its arguments to a parser.
+    run : callable
+        Does it; a user's mistakes are raised as ``StudyError``.
+    """
+
+    name: str
+    summary: str
+    example: str
+    arguments: Callable[[argparse.ArgumentParser], None]
+    run: Callable[[argparse.Namespace], None]
+
+
+def number(above: float = -math.inf, least: float = -math.inf) -> Callable[[str], float]:
+    """A reader of finite numbers above one limit and not below the other."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not (math.isfinite(value) and value > above and value >= least):
+            limit = f" above {above:g}" if above > -math.inf else f" of at least {least:g}" if least > -math.inf else ""
+            raise argparse.ArgumentTypeError(f"{text!r} is not a finite number{limit}")
+        return value
+
+    return read
+
+
+def whole(least: int, most: int) -> Callable[[str], int]:
+    """A reader of whole numbers within limits."""
+
+    def read(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            value = least - 1
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from {least} to {most}")
+        return value
+
+    return read

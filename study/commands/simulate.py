@@ -1,0 +1,48 @@
+"""``study simulate``: the response of a model to a seeded random force, as a record."""
+
+import argparse
+from pathlib import Path
+
+from study.commands.command import Command, number, whole
+
+MOST_SAMPLES = 100_000_000
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("model", type=Path, help="model file (YAML) with every value given")
+    parser.add_argument(
+        "--level", type=number(least=0.0), default=1.0,
+        help="mean square of the white force in N^2, before its low-pass (default %(default)s)",
+    )  # fmt: skip
+    parser.add_argument("--cutoff", type=number(above=0.0), default=12.5, help="low-pass in Hz (default %(default)s)")
+    parser.add_argument("--seed", type=whole(0, 2**63 - 1), default=1, help="the same seed gives the same bytes")
+    parser.add_argument("--samples", type=whole(16, MOST_SAMPLES), default=8192, help="default %(default)s")
+    parser.add_argument(
+        "--dt", type=number(above=0.0), default=0.02, help="sampling interval in s (default %(default)s)"
+    )
+    parser.add_argument("--steps", type=whole(1, 10_000), default=8, help="steps per sample (default %(default)s)")
+    parser.add_argument("--out", type=Path, default=Path("record.csv"), help="where to (default %(default)s)")
+
+
+def _run(arguments: argparse.Namespace) -> None:
+    from study.excitation import Excitation, force
+    from study.files import replacing
+    from study.modelfile import read_model
+    from study.record import write_csv
+    from study.simulate import Integrator, simulate
+
+    model = read_model(arguments.model)
+    excitation = Excitation(level=arguments.level, cutoff=arguments.cutoff)
+    history = force(excitation, arguments.samples, arguments.dt, arguments.seed)
+    record = simulate(model, history, arguments.dt, Integrator(steps_per_sample=arguments.steps))
+    with replacing(arguments.out) as beside:
+        write_csv(record, beside)
+    seconds = arguments.samples * arguments.dt
+    print(f"{arguments.out}: {len(record)} samples, {seconds:g} s of {model.name}, force of rms {history.std():.4g} N")
+
+
+COMMAND = Command(
+    "simulate", "write the record of a model under a random force",
+    "study simulate models/duffing.yaml --level 1.0 --seed 1 --samples 8192 --dt 0.02 --out record.csv",
+    _arguments, _run,
+)  # fmt: skip

@@ -1,0 +1,78 @@
+"""``study terms``: the library of terms, or one of them in detail."""
+
+import argparse
+import shutil
+from typing import TYPE_CHECKING
+
+from study.commands.command import Command
+
+if TYPE_CHECKING:
+    from study.terms import Term
+
+PARAMETER_UNITS = {"length": "m", "time": "s", "frequency": "Hz", "1/length": "1/m"}
+WIDTH_WITHOUT_TERMINAL = 160
+NARROWEST = 24
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("name", nargs="?", help="a term to show in detail; all of them if left out")
+
+
+def _run(arguments: argparse.Namespace) -> None:
+    from study import terms
+
+    print(details(terms.get(arguments.name)) if arguments.name else table(tuple(terms.LIBRARY.values())))
+
+
+def table(library: "tuple[Term, ...]", width: int | None = None) -> str:
+    """The terms as a table, the two columns of prose wrapped so that it fits the width in characters."""
+    from tabulate import tabulate
+
+    rows = [[t.name, t.formula, ", ".join(p.name for p in t.parameters), t.meaning, t.cause] for t in library]
+    head = ["term", "formula", "shape parameters", "meaning", "common cause"]
+    width = width or shutil.get_terminal_size((WIDTH_WITHOUT_TERMINAL, 24)).columns
+    fixed = sum(max(len(row[column]) for row in (head, *rows)) + 2 for column in range(3))
+    prose = max(NARROWEST, (width - fixed - 2) // 2)
+    text = tabulate(rows, head, tablefmt="simple", maxcolwidths=[None, None, None, prose, prose])
+    return (
+        f"{text}\n\nu displacement, v velocity, t time. 'study terms NAME' shows one with its coefficients and units."
+    )
+
+
+def details(term: "Term") -> str:
+    """One term: formula, physics, coefficients and shape parameters with their SI units, its line in a model."""
+    from tabulate import tabulate
+
+    rows = [["coefficient", s, term.unit(s, "N", "m"), _shape(term, s)] for s in term.symbols]
+    rows += [["shape parameter", p.name, PARAMETER_UNITS[p.quantity], p.meaning] for p in term.parameters]
+    lines = [
+        f"{term.name}: {term.formula}",
+        f"  meaning       {term.meaning}",
+        f"  common cause  {term.cause}",
+        "",
+        tabulate(rows, ["", "symbol", "SI unit", "stands before, or is"], tablefmt="simple", disable_numparse=True),
+        "",
+        "In a model file:",
+        f"  - {term.name}",
+        f"  - {{term: {term.name}, {', '.join(_given(term))}}}",
+    ]
+    return "\n".join(lines)
+
+
+def _shape(term: "Term", symbol: str) -> str:
+    component = next(c for c in term.components if c.symbol == symbol)
+    derivative = {0: "", 1: "d/dt ", 2: "d2/dt2 "}[component.order]
+    factor = "" if component.factor == 1.0 else f"{component.factor:.6g} "
+    return f"{factor}{derivative}{component.shape}"
+
+
+def _given(term: "Term") -> list[str]:
+    parameters = [f"{p.name}: ..." for p in term.parameters]
+    if len(term.symbols) == 1:
+        return [*parameters, "value: ..."]
+    return [*parameters, "amplitude: ...", "phase: ..."]
+
+
+COMMAND = Command(
+    "terms", "list the effects a model may hold", "study terms\n  study terms cubic_stiffness", _arguments, _run
+)
