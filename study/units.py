@@ -28,13 +28,25 @@ def _dimensions(tree: ast.expr, known: dict[str, Dimensions]) -> Dimensions | No
             return known.get(name, NONE if name == "pi" else None)
         case ast.UnaryOp(operand=operand):
             return _dimensions(operand, known)
-        case ast.BinOp(left=left, op=ast.Pow(), right=ast.Constant(value=int(n) | float(n))):
-            base = _dimensions(left, known)
-            return None if base is None else (base[0] * Fraction(n), base[1] * Fraction(n))
+        case ast.BinOp(left=left, op=ast.Pow(), right=right):
+            base, n = _dimensions(left, known), _exponent(right)
+            return None if base is None or n is None else (base[0] * n, base[1] * n)
         case ast.BinOp(left=left, op=op, right=right):
             return _combine(op, _dimensions(left, known), _dimensions(right, known))
         case ast.Call(func=ast.Name(id=name), args=arguments):
             return _function(name, [_dimensions(a, known) for a in arguments])
+        case _:
+            return None
+
+
+def _exponent(tree: ast.expr) -> Fraction | None:
+    """A plain number, with or without a sign, as the fraction it was meant to be."""
+    match tree:
+        case ast.Constant(value=int(n) | float(n)):
+            return Fraction(n).limit_denominator(1000)
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            inner = _exponent(operand)
+            return None if inner is None else -inner
         case _:
             return None
 
@@ -51,7 +63,8 @@ def _combine(op: ast.operator, a: Dimensions | None, b: Dimensions | None) -> Di
 
 def _function(name: str, arguments: list[Dimensions | None]) -> Dimensions | None:
     if name in ("abs", "max", "min"):
-        return next((a for a in arguments if a not in (NONE, None)), arguments[0])
+        found = set(arguments) - {NONE}  # a bare number, as in max(u, 0), takes the other's unit
+        return NONE if not found else found.pop() if len(found) == 1 else None
     if name == "sqrt":
         a = arguments[0]
         return None if a is None else (a[0] / 2, a[1] / 2)
@@ -84,4 +97,4 @@ def _power(unit: str, power: Fraction) -> str:
 
 def pretty(text: str) -> str:
     """A unit or formula with powers as Matplotlib's mathtext superscripts."""
-    return re.sub(r"\^(-?[0-9./]+)", r"$^{\1}$", text)
+    return re.sub(r"\^(-?[0-9]+(?:[./][0-9]+)?)", r"$^{\1}$", text)

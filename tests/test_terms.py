@@ -1,0 +1,209 @@
+"""Every effect of the library, one row each: forward, reverse, derivative and unit.
+
+A new term needs one row in ``ROWS``; ``test_every_term_has_a_row`` says so when it is missing.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from study import expression, kernels
+from study.errors import StudyError
+from study.excitation import Excitation, force
+from study.graph import Graph
+from study.inputs import histories, reverse_inputs
+from study.model import Model, forward_graph, free, with_registers
+from study.simulate import Integrator, simulate
+from study.terms import LIBRARY, custom, get
+
+PERIOD = 10.24  # seconds; the frequencies below are whole multiples of 1/PERIOD, so that time-varying terms close too
+F_M, F_H = 10 / PERIOD, 21 / PERIOD
+SMOOTH, KINK, JUMP = 1e-6, 1e-3, 2e-2  # a shape's lines fall off at once, with f^-2 or f^-3, with 1/f
+Force = Callable[[SimpleNamespace], np.ndarray]  # of u, v, t and the state z
+
+
+@dataclass(frozen=True)
+class Row:
+    """Values of a term, its force by NumPy for these, its units, and how well it can be seen through aliasing."""
+
+    values: dict[str, float]
+    force: Force
+    units: tuple[str, ...]
+    tolerance: float = SMOOTH
+
+
+ROWS: dict[str, Row] = {
+    "inertia": Row({"m": 1.0}, lambda s: 0.0 * s.u, ("N s^2/m",)),
+    "linear_damping": Row({"c": 3.77}, lambda s: 3.77 * s.v, ("N s/m",)),
+    "linear_stiffness": Row({"k": 355.3}, lambda s: 355.3 * s.u, ("N/m",)),
+    "quadratic_stiffness": Row({"k2": 3e3}, lambda s: 3e3 * s.u**2, ("N/m^2",)),
+    "signed_quadratic_stiffness": Row({"k2s": 3e4}, lambda s: 3e4 * s.u * np.abs(s.u), ("N/m^2",), KINK),
+    "cubic_stiffness": Row({"k3": 2e7}, lambda s: 2e7 * s.u**3, ("N/m^3",)),
+    "quintic_stiffness": Row({"k5": 1e12}, lambda s: 1e12 * s.u**5, ("N/m^5",)),
+    "van_der_pol_damping": Row({"c3": 2e6}, lambda s: 2e6 * s.u**2 * s.v, ("N s/m^3",)),
+    "displacement_damping": Row({"cu": 2e3}, lambda s: 2e3 * np.abs(s.u) * s.v, ("N s/m^2",), KINK),
+    "quadratic_damping": Row({"c2": 80.0}, lambda s: 80.0 * s.v * np.abs(s.v), ("N s^2/m^2",), KINK),
+    "cubic_damping": Row({"cv3": 900.0}, lambda s: 900.0 * s.v**3, ("N s^3/m^3",)),
+    "coulomb_friction": Row({"fc": 0.1}, lambda s: 0.1 * np.sign(s.v), ("N",), JUMP),
+    "dead_band": Row(
+        {"kg": -355.3, "dead_band.u_g": 0.0025},
+        lambda s: -355.3 * np.where(np.abs(s.u) <= 0.0025, s.u, 0.0025 * np.sign(s.u)),
+        ("N/m",), KINK,
+    ),
+    "bilinear_stiffness": Row({"kb": 200.0}, lambda s: 200.0 * np.where(s.u > 0, s.u, 0.0), ("N/m",), KINK),
+    "one_sided_contact": Row(
+        {"kc": 500.0, "one_sided_contact.gap": 0.001},
+        lambda s: 500.0 * np.where(s.u > 0.001, s.u - 0.001, 0.0),
+        ("N/m",), KINK,
+    ),
+    "periodic_stiffness": Row(
+        {"km_cos": 100.0, "km_sin": -60.0, "periodic_stiffness.f_m": F_M},
+        lambda s: (100.0 * np.cos(2 * np.pi * F_M * s.t) - 60.0 * np.sin(2 * np.pi * F_M * s.t)) * s.u,
+        ("N/m", "N/m"),
+    ),
+    "relaxation": Row({"kr": 200.0, "relaxation.tau": 0.1}, lambda s: 200.0 * s.z, ("N/m",)),
+    "hysteresis": Row(
+        {"kz": 200.0, "hysteresis.beta": 300.0, "hysteresis.gamma": 100.0},
+        lambda s: 200.0 * s.z,
+        ("N/m",), KINK,
+    ),
+    "constant_force": Row({"f0": 0.3}, lambda s: 0.3 + 0.0 * s.u, ("N",)),
+    "harmonic_force": Row(
+        {"fh_cos": 0.4, "fh_sin": 0.2, "harmonic_force.f": F_H},
+        lambda s: 0.4 * np.cos(2 * np.pi * F_H * s.t) + 0.2 * np.sin(2 * np.pi * F_H * s.t),
+        ("N", "N"),
+    ),
+}  # fmt: skip
+MEMORY = {"relaxation", "hysteresis"}
+LINEAR = ("inertia", "linear_damping", "linear_stiffness")
+
+
+def model_with(name: str) -> Model:
+    """The linear system and one term."""
+    terms = tuple(free(get(n)).with_values(ROWS[n].values) for n in dict.fromkeys((*LINEAR, name)))
+    return Model(name, terms)
+
+
+def test_every_term_has_a_row() -> None:
+    assert set(ROWS) == set(LIBRARY)
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_forward_force_agrees_with_an_independent_formula(name: str) -> None:
+    model = model_with(name)
+    generator = np.random.default_rng(7)
+    u, v = generator.normal(0, 0.003, 200), generator.normal(0, 0.05, 200)
+    t, z, applied = generator.uniform(0, 20, 200), generator.normal(0, 0.002, 200), generator.normal(0, 1, 200)
+    forward = forward_graph(model)
+    program = with_registers(forward.graph.program(forward.slopes), model.numbers())
+    columns = {"u": u, "v": v, "t": t, "force": applied} | ({f"z:{name}": z} if name in MEMORY else {})
+    out = np.empty((200, len(forward.slopes)))
+    kernels.evaluate(
+        program.code, program.first, program.registers.copy(),
+        np.array([program.inputs[c] for c in columns]), np.column_stack(list(columns.values())), program.outputs, out,
+    )  # fmt: skip
+    extra = ROWS[name].force(SimpleNamespace(u=u, v=v, t=t, z=z)) if name not in LINEAR else 0.0
+    np.testing.assert_allclose(out[:, 0], applied - 3.77 * v - 355.3 * u - extra, rtol=1e-12, atol=1e-13)
+    if name == "relaxation":
+        np.testing.assert_allclose(out[:, 1], v - z / 0.1, rtol=1e-13)
+    if name == "hysteresis":
+        np.testing.assert_allclose(out[:, 1], v - 300.0 * np.abs(v) * z - 100.0 * v * np.abs(z), rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", [n for n in LIBRARY if n not in MEMORY])
+def test_reverse_inputs_reproduce_the_force(name: str) -> None:
+    """In a periodic steady state ``F(f) = sum A_j(f) X_j(f)`` line by line, with nothing estimated.
+
+    Only aliasing of what a shape makes above the Nyquist frequency is left, hence the three tolerances.
+    """
+    dt, periods = 0.005, 3
+    per = round(PERIOD / dt)
+    applied = force(Excitation(periods=periods), periods * per, dt, seed=3) * 2.0
+    model = model_with(name)
+    last = simulate(model, applied, dt, Integrator("rk4", 8)).part((periods - 1) * per, periods * per)
+    frequency = np.fft.rfftfreq(per, dt)
+    band = (frequency > 0.2) & (frequency < 12.5)
+    inputs = reverse_inputs(model)
+    lines = np.array([np.fft.rfft(h) for h in histories(inputs, last)])
+    values = {k: v for k, v in model.values.items() if v is not None}
+    total = sum(i.response(frequency, values) * x for i, x in zip(inputs, lines, strict=True))
+    expected = np.fft.rfft(last["force"])
+    error = np.linalg.norm((total - expected)[band]) / np.linalg.norm(expected[band])
+    assert error < ROWS[name].tolerance
+    without = sum(
+        i.response(frequency, {**values, **dict.fromkeys(get(name).symbols, 0.0)}) * x
+        for i, x in zip(inputs, lines, strict=True)
+    )
+    if name != "constant_force":  # its line is at zero frequency, out of the band
+        assert np.linalg.norm((without - expected)[band]) > 10.0 * np.linalg.norm((total - expected)[band])
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_derivatives_of_shapes_are_exact(name: str, value_of: Callable[..., np.ndarray]) -> None:
+    """Against central differences, at points that no kink lies within the step of."""
+    term = get(name)
+    columns = {"u": np.array([0.31, -0.47, 0.83, -1.2]), "v": np.array([0.7, -0.2, -0.9, 1.1])}
+    columns |= {"t": np.array([0.1, 0.5, 1.3, 2.2]), "z": np.array([0.4, -0.6, 0.2, -0.3])}
+    columns |= {p.name: np.full(4, 0.6) for p in term.parameters}
+    for text in [c.shape for c in term.components] + ([term.state] if term.state else []):
+        for wrt in columns:
+            graph = Graph()
+            known = {n: graph.input(n) for n in columns}
+            slope = graph.derivative(expression.build(graph, text, known), known[wrt])
+            program, out = graph.program([slope]), np.empty((4, 1))
+            kernels.evaluate(
+                program.code, program.first, program.registers.copy(),
+                np.array([program.inputs[n] for n in columns]), np.column_stack(list(columns.values())),
+                program.outputs, out,
+            )  # fmt: skip
+            h = 1e-6
+            above, below = {**columns, wrt: columns[wrt] + h}, {**columns, wrt: columns[wrt] - h}
+            difference = (value_of(text, **above) - value_of(text, **below)) / (2 * h)
+            np.testing.assert_allclose(out[:, 0], difference, rtol=1e-6, atol=1e-8, err_msg=f"d({text})/d{wrt}")
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_units(name: str) -> None:
+    term = get(name)
+    assert tuple(term.unit(s, "N", "m") for s in term.symbols) == ROWS[name].units
+    assert tuple(term.unit(s, "kN", "mm") for s in term.symbols) == tuple(
+        u.replace("N", "kN").replace("m", "mm") for u in ROWS[name].units
+    )
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_words(name: str) -> None:
+    term = get(name)
+    assert term.name == name
+    assert term.meaning
+    assert term.cause
+    assert term.formula
+    assert all(p.meaning for p in term.parameters)
+
+
+def test_symbols_are_unique() -> None:
+    symbols = [s for term in LIBRARY.values() for s in term.symbols]
+    assert len(symbols) == len(set(symbols))
+
+
+def test_unknown_term_names_the_nearest() -> None:
+    with pytest.raises(StudyError, match="did you mean 'cubic_stiffness'"):
+        get("cubic_stifness")
+    with pytest.raises(StudyError, match="known are inertia"):
+        get("qqqq")
+
+
+@pytest.mark.parametrize("name", ["inertia", "2nd", "a b", "a-b", "", "größe", "x\n"])
+def test_a_users_term_needs_a_name_of_its_own(name: str) -> None:
+    with pytest.raises(StudyError, match="name"):
+        custom(name, "u**2")
+
+
+def test_a_users_term_is_a_term_like_any_other() -> None:
+    term = custom("bracket", "u*abs(u) + 0.1*v**3")
+    assert term.symbols == ("q_bracket",)
+    assert term.unit("q_bracket", "N", "m") == "N per unit of the formula"
+    assert custom("drag", "v*abs(v)").unit("q_drag", "N", "m") == "N s^2/m^2"
