@@ -94,11 +94,7 @@ def build(graph: Graph, text: str, known: Mapping[str, int]) -> int:
     ExpressionError
         At the first piece that is not on the whitelist, naming it.
     """
-    builder = _Builder(graph, text, known)
-    node = builder.node(parse(text))
-    if not all(map(math.isfinite, graph.values)):
-        raise builder.refuse("holds a constant part that is not a finite number")
-    return node
+    return _Builder(graph, text, known).node(parse(text))
 
 
 class _Builder:
@@ -150,7 +146,7 @@ class _Builder:
 
     def power(self, base: ast.expr, exponent: ast.expr) -> int:
         value = self.graph.constant_value(self.node(exponent))
-        if value is None or not abs(value) <= LARGEST_EXPONENT:
+        if value is None or abs(value) > LARGEST_EXPONENT:
             raise self.refuse(
                 f"raises to the power {ast.unparse(exponent)!r}; a power is a number of at most {LARGEST_EXPONENT:g}"
             )

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from study.commands.command import Command, number, whole
 
-MOST_SAMPLES = 100_000_000
+MOST_SAMPLES = 10_000_000
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:

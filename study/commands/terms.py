@@ -31,7 +31,7 @@ def table(library: "tuple[Term, ...]", width: int | None = None) -> str:
     rows = [[t.name, t.formula, ", ".join(p.name for p in t.parameters), t.meaning, t.cause] for t in library]
     head = ["term", "formula", "shape parameters", "meaning", "common cause"]
     width = width or shutil.get_terminal_size((WIDTH_WITHOUT_TERMINAL, 24)).columns
-    fixed = sum(max(len(row[column]) for row in (head, *rows)) + 2 for column in range(3))
+    fixed = sum(max(len(head[column]) + 2, *(len(row[column]) for row in rows)) + 2 for column in range(3))
     prose = max(NARROWEST, (width - fixed - 2) // 2)
     text = tabulate(rows, head, tablefmt="simple", maxcolwidths=[None, None, None, prose, prose])
     return (
