@@ -30,9 +30,9 @@ def between_samples(values: Floats, factor: int) -> Floats:
     array, shape (factor (n - 1) + 1,)
         Its every ``factor``-th value is the sample itself.
     """
-    if factor == 1:
-        return values.copy()
     n = len(values)
+    if factor == 1 or n == 1:
+        return values.copy()
     step = float(np.sqrt(np.mean(np.diff(values) ** 2)))
     if abs(values[-1] - values[0]) <= 3.0 * step:
         return _periodic(values, factor)[: factor * (n - 1) + 1]

@@ -86,14 +86,14 @@ def simulate(
     DivergenceError
         If the response leaves the range of finite numbers; names model, time and level.
     StudyError
-        If the model is not complete.
+        If the model is not complete, a channel is not finite, or there are more initial values than states.
     """
     settings = integrator or Integrator()
     extra = extra or {}
+    _check(model, {"force": force, **extra}, initial)
     program = forward_program(model, tuple(extra))
     factor = 2 * settings.steps_per_sample
     drive = np.column_stack([between_samples(x, factor) for x in (force, *extra.values())])
-    drive = np.vstack([drive, drive[-1:], drive[-1:]])  # read, never used, by the last sample's start-up
     state = np.zeros(2 + len(model.states))
     state[: len(initial)] = initial
     out = np.empty((len(force), 1 + len(state)))
@@ -107,8 +107,19 @@ def simulate(
     return Record(dt, {**channels, **extra}, {**SI_UNITS, **(units or {})}, model.name, start)
 
 
+def _check(model: Model, channels: Mapping[str, Floats], initial: Sequence[float]) -> None:
+    """Refuse what would only show as a divergence."""
+    for name, values in channels.items():
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            raise StudyError(f"the channel {name!r} is {values[bad[0]]} at sample {bad[0]}; a simulation needs numbers")
+    states = 2 + len(model.states)
+    if len(initial) > states:
+        raise StudyError(f"{len(initial)} initial values were given; model {model.name!r} has {states} states")
+
+
 def _diverged(model: Model, force: Floats, dt: float, time: float) -> None:
-    level = float(np.var(force))
+    level = float(np.mean(force**2))
     raise DivergenceError(
         f"the simulation of {model.name!r} diverged at t = {time:.4g} s under a force of mean square {level:.4g}; "
         f"take more steps per sample than one in {dt:g} s, a lower level, or check the signs of the coefficients",

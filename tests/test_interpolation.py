@@ -1,0 +1,69 @@
+"""Band-limited values between the samples."""
+
+import numpy as np
+import pytest
+
+from study.excitation import Excitation, force
+from study.interpolation import between_samples
+
+
+@pytest.mark.parametrize("samples", [256, 257])
+@pytest.mark.parametrize("factor", [2, 3, 16])
+def test_exact_for_a_periodic_band_limited_signal(samples: int, factor: int) -> None:
+    generator = np.random.default_rng(0)
+    lines = np.arange(0, (samples - 1) // 2 + 1)
+    amplitude, phase = generator.normal(size=len(lines)), generator.uniform(0, 2 * np.pi, len(lines))
+
+    def signal(position: np.ndarray) -> np.ndarray:
+        angle = 2 * np.pi * np.outer(position, lines) / samples + phase
+        return np.cos(angle) @ amplitude
+
+    fine = between_samples(signal(np.arange(samples)), factor)
+    np.testing.assert_allclose(fine, signal(np.arange(factor * (samples - 1) + 1) / factor), atol=1e-11)
+
+
+def test_the_reports_force_is_interpolated_exactly() -> None:
+    """The same lines on a grid eight times as fine are the same force."""
+    coarse = force(Excitation(), 1024, 0.02, seed=3)
+    spectrum = np.fft.rfft(coarse)
+    exact = np.fft.irfft(spectrum, 8 * 1024) * 8
+    np.testing.assert_allclose(between_samples(coarse, 8), exact[: 8 * 1023 + 1], atol=1e-12)
+
+
+@pytest.mark.parametrize("factor", [1, 2, 7])
+@pytest.mark.parametrize("kind", ["closing", "open", "short", "constant"])
+def test_samples_themselves_are_kept(factor: int, kind: str) -> None:
+    x = {
+        "closing": force(Excitation(), 500, 0.02, seed=1),
+        "open": np.linspace(0.0, 3.0, 500) ** 2,
+        "short": np.array([0.0, 1.0]),
+        "constant": np.full(50, 2.5),
+    }[kind]
+    fine = between_samples(x, factor)
+    assert len(fine) == factor * (len(x) - 1) + 1
+    np.testing.assert_allclose(fine[::factor], x, atol=1e-12)
+
+
+@pytest.mark.parametrize("cycles", [10.3, 40.7, 77.7])
+def test_small_error_inside_a_record_that_does_not_close(cycles: float) -> None:
+    """Of a ramp and a sine of a broken number of cycles; the ends are left out, the inside is not."""
+    samples, factor = 2048, 8
+
+    def signal(position: np.ndarray) -> np.ndarray:
+        return np.sin(2 * np.pi * cycles * position / samples + 0.3) + 5.0 * position / samples
+
+    fine = between_samples(signal(np.arange(samples)), factor)
+    error = np.abs(fine - signal(np.arange(len(fine)) / factor))
+    assert error[factor * 100 : -factor * 100].max() < 1e-3
+    assert error.max() < 0.5
+
+
+def test_beats_straight_lines_near_the_nyquist_frequency() -> None:
+    samples, factor = 1000, 8
+    grid = np.arange(factor * (samples - 1) + 1) / factor
+    exact = np.sin(2 * np.pi * 0.4 * grid)
+    x = exact[::factor]
+    inside = slice(100 * factor, -100 * factor)
+    ours = np.abs(between_samples(x, factor) - exact)[inside].max()
+    lines = np.abs(np.interp(grid, np.arange(samples), x) - exact)[inside].max()
+    assert ours < 0.01 * lines

@@ -1,0 +1,86 @@
+"""Models: immutable, complete before they run, and solved for the right acceleration."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from study.errors import StudyError
+from study.expression import ExpressionError
+from study.model import Model, forward_graph, forward_program, free
+from study.terms import custom, get
+
+
+def test_the_same_term_twice_is_refused() -> None:
+    with pytest.raises(StudyError, match="'inertia' twice"):
+        Model("double", (free(get("inertia")), free(get("inertia"))))
+
+
+def test_changes_make_new_models(systems: dict[str, Model]) -> None:
+    linear = systems["linear"]
+    grown = linear.with_term(get("cubic_stiffness"))
+    assert "cubic_stiffness" in grown
+    assert "cubic_stiffness" not in linear
+    assert grown.without_term("cubic_stiffness") == linear
+    assert grown.with_values({"k3": 2.0}).values["k3"] == 2.0
+    assert grown.values["k3"] is None
+    assert linear.with_values({"unknown": 1.0}) == linear
+
+
+def test_values_are_keyed_by_symbol_and_term(systems: dict[str, Model]) -> None:
+    assert systems["dead_band"].values == {"m": 1.0, "c": 1.89, "k": 355.3, "kg": -355.3, "dead_band.u_g": 0.0025}
+    assert systems["mathieu"].numbers()["periodic_stiffness.f_m"] == 1.0
+
+
+def test_missing_values_are_named(systems: dict[str, Model]) -> None:
+    grown = systems["linear"].with_term(get("dead_band"))
+    with pytest.raises(StudyError, match=r"'linear' gives no value for kg, dead_band.u_g"):
+        forward_program(grown)
+
+
+@pytest.mark.parametrize("mass", [0.0, -1.0, float("nan")])
+def test_a_mass_is_above_zero(systems: dict[str, Model], mass: float) -> None:
+    with pytest.raises(StudyError, match="mass"):
+        forward_program(systems["linear"].with_values({"m": mass}))
+
+
+def test_a_free_run_needs_inertia() -> None:
+    with pytest.raises(StudyError, match="no inertia"):
+        forward_graph(Model("massless", (free(get("linear_stiffness")),)))
+
+
+def test_equation_shows_every_symbol(systems: dict[str, Model]) -> None:
+    equation = systems["mathieu"].equation()
+    assert all(symbol in equation for symbol in ("m", "c", "k", "km_cos", "km_sin", "= F(t)"))
+
+
+def test_states_are_those_with_a_memory(make_model: Callable[..., Model]) -> None:
+    model = make_model(
+        "both",
+        {
+            "inertia": {"m": 1.0},
+            "relaxation": {"kr": 1.0, "relaxation.tau": 1.0},
+            "hysteresis": {"kz": 1.0, "hysteresis.beta": 1.0, "hysteresis.gamma": 1.0},
+        },
+    )
+    assert [t.name for t in model.states] == ["relaxation", "hysteresis"]
+    forward = forward_graph(model)
+    assert len(forward.slopes) == 3
+    assert len(forward.states) == 4
+
+
+def test_a_users_term_sees_only_its_channels(systems: dict[str, Model]) -> None:
+    model = systems["linear"].with_term(custom("wind", "wind**2")).with_values({"q_wind": 1.0})
+    with pytest.raises(ExpressionError, match="'wind'"):
+        forward_program(model)
+    program = forward_program(model, ("wind",))
+    assert program.registers[program.inputs["q_wind"]] == 1.0
+
+
+def test_registers_of_the_kernels_stand_first(make_model: Callable[..., Model]) -> None:
+    """The integrators write into registers by position; this is the layout they rely on."""
+    relaxing = {"inertia": {"m": 2.0}, "relaxation": {"kr": 1.0, "relaxation.tau": 0.5}}
+    program = forward_program(make_model("maxwell", relaxing), ("a", "b"))
+    assert [program.inputs[n] for n in ("u", "v", "t", "force", "a", "b", "z:relaxation")] == list(range(7))
+    assert program.registers[program.inputs["m"]] == 2.0
+    assert np.count_nonzero(program.registers[:7]) == 0
