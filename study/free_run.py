@@ -6,20 +6,21 @@ of the numbers which the simulation yields, not of an idealisation of them.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study import kernels
 from study.errors import DivergenceError, StudyError
-from study.graph import Program
+from study.graph import Op, Program
 from study.interpolation import between_samples
 from study.model import Model, forward_graph, with_registers
 from study.record import MOTIONS, Record
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+SIDE = "side of v"  # the input that stands for sgn v while a step lasts
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,8 @@ class FreeRun:
         Slopes of the states, then their partial derivatives; values that are held are in its registers.
     slots : int array, shape (states - 1, 1 + states + keys)
         Registers of each slope (but velocity), of its partial derivatives by the states and by the keys.
+    side : int
+        Register that stands for sgn v, -1 if no force of the model jumps with it.
     keys : tuple of str
         The coefficients and shape parameters to differentiate by.
     drive : array, shape (2 steps (samples - 1) + 3, 1 + extra channels)
@@ -50,6 +53,7 @@ class FreeRun:
 
     program: Program
     slots: Ints
+    side: int
     keys: tuple[str, ...]
     drive: Floats
     dt: float
@@ -89,7 +93,7 @@ class FreeRun:
         state[range(free_states), range(first_free, first_free + free_states)] = 1.0
         out = np.empty((self.samples, state.shape[1]))
         failed = kernels.integrate_variation(
-            program.code, program.first, program.registers, self.slots,
+            program.code, program.first, program.registers, self.slots, self.side,
             self.start, self.dt, self.steps, self.drive, state, self.row, out,
         )  # fmt: skip
         if failed >= 0:
@@ -134,12 +138,12 @@ def prepare(
         raise StudyError(f"there is no response {response!r}; a free run yields {', '.join(MOTIONS)}")
     if steps_per_sample < 1:
         raise StudyError(f"steps_per_sample is {steps_per_sample}; at least 1 is needed")
-    program, slots = _differentiated(model, record.extra, tuple(keys))
+    program, slots, side = _differentiated(model, record.extra, tuple(keys))
     factor = 2 * steps_per_sample
     columns = [between_samples(record[name], factor) for name in ("force", *record.extra)]
     drive = np.column_stack(columns)[factor * first : factor * (last - 1) + 1]
     return FreeRun(
-        program, slots, tuple(keys), drive, record.dt, steps_per_sample,
+        program, slots, side, tuple(keys), drive, record.dt, steps_per_sample,
         record.start + first * record.dt, last - first, MOTIONS.index(response),
     )  # fmt: skip
 
@@ -154,8 +158,8 @@ def _checked_span(record: Record, span: tuple[int, int] | None) -> tuple[int, in
     return first, last
 
 
-def _differentiated(model: Model, channels: tuple[str, ...], keys: tuple[str, ...]) -> tuple[Program, Ints]:
-    """Program of slopes and partial derivatives, and their registers."""
+def _differentiated(model: Model, channels: tuple[str, ...], keys: tuple[str, ...]) -> tuple[Program, Ints, int]:
+    """Program of slopes and partial derivatives, their registers, and that of sgn v."""
     held = {key: value for key, value in model.values.items() if key not in keys}
     missing = [key for key, value in held.items() if value is None]
     if missing:
@@ -167,9 +171,24 @@ def _differentiated(model: Model, channels: tuple[str, ...], keys: tuple[str, ..
     graph = forward.graph
     by = (*forward.states, *(graph.input(key) for key in keys))
     rows = [[slope, *(graph.derivative(slope, node) for node in by)] for slope in forward.slopes]
-    program = graph.program([node for row in rows for node in row])
+    graph.input(SIDE)
+    program, side = _with_side(graph.program([node for row in rows for node in row]), graph.program(forward.slopes))
     values = {key: value for key, value in held.items() if value is not None}
-    return with_registers(program, values), program.outputs.reshape(len(rows), 1 + len(by))
+    return with_registers(program, values), program.outputs.reshape(len(rows), 1 + len(by)), side
+
+
+def _with_side(program: Program, slopes: Program) -> tuple[Program, int]:
+    """The program with sgn v read from a register, if the slopes jump with it, and that register, else -1.
+
+    The integrator sets the register, so that no step runs across the jump.
+    """
+    sgn_v = np.array([Op.SGN, 1, 1])
+    if not np.any(np.all(slopes.code == sgn_v, axis=1)):
+        return program, -1
+    side = program.inputs[SIDE]
+    code = program.code.copy()
+    code[np.all(code == sgn_v, axis=1)] = (Op.MAX, side, side)
+    return replace(program, code=code), side
 
 
 def predict(

@@ -191,7 +191,9 @@ def integrate_abm4(
 
 
 @compiled
-def _variation(code: Ints, first: int, r: Floats, slots: Ints, time: float, drive: Floats, j: int, w: Floats) -> None:
+def _variation(
+    code: Ints, first: int, r: Floats, slots: Ints, side: int, time: float, drive: Floats, j: int, w: Floats
+) -> None:  # fmt: skip
     """Derivatives of ``w[1]`` into ``w[2]``: state in the first column, its sensitivities s in the others.
 
     The variational equations are ``ds/dt = (df/dx) s + df/dp``; row i of ``slots`` names the registers of
@@ -218,18 +220,21 @@ def _variation(code: Ints, first: int, r: Floats, slots: Ints, time: float, driv
             if partial != 0.0:
                 for c in range(1, columns):
                     w[2, i, c] += partial * w[1, m, c]
+    if side >= 0 and r[side] == 0.0:  # friction holds the mass
+        for c in range(columns):
+            w[2, 1, c] = 0.0
 
 
 @compiled
 def _rk4_variation_step(
-    code: Ints, first: int, r: Floats, slots: Ints, time: float, h: float, drive: Floats, j: int, w: Floats
+    code: Ints, first: int, r: Floats, slots: Ints, side: int, time: float, h: float, drive: Floats, j: int, w: Floats
 ) -> None:  # fmt: skip
     """One Runge-Kutta step of ``w[0]`` in place; ``w[1]`` to ``w[3]`` are room for trial, slope and their sum."""
     w[1] = w[0]
     w[3] = 0.0
     for stage in range(4):
         late = (stage + 1) // 2
-        _variation(code, first, r, slots, time + 0.5 * h * late, drive, j + late, w)
+        _variation(code, first, r, slots, side, time + 0.5 * h * late, drive, j + late, w)
         weight = h / 3.0 if late == 1 else h / 6.0
         ahead = h if stage == 2 else 0.5 * h
         for i in range(w.shape[1]):
@@ -242,22 +247,155 @@ def _rk4_variation_step(
 
 
 @compiled
+def _pull(
+    code: Ints, first: int, r: Floats, slots: Ints, side: int, sign: float,
+    time: float, drive: Floats, j: int, w: Floats, row: int,
+) -> float:  # fmt: skip
+    """Acceleration at the state ``w[row]`` if sgn v is ``sign``, which the register of the side then holds."""
+    r[side] = sign
+    w[1] = w[row]
+    _variation(code, first, r, slots, side, time, drive, j, w)
+    return float(w[2, 1, 0])
+
+
+@compiled
+def _substep(
+    code: Ints, first: int, r: Floats, slots: Ints, side: int, time: float, h: float,
+    begin: float, end: float, drive: Floats, j: int, local: Floats, w: Floats,
+) -> None:  # fmt: skip
+    """From ``w[4]`` into ``w[0]``: the part of a step between two fractions of it, sgn v held.
+
+    ``local`` gets the drive at both and between, from the parabola through the step's three points.
+    """
+    for i in range(3):
+        x = begin + 0.5 * i * (end - begin)
+        for c in range(drive.shape[1]):
+            outer = (1.0 - x) * drive[j, c] - x * drive[j + 2, c]
+            local[i, c] = (1.0 - 2.0 * x) * outer + 4.0 * x * (1.0 - x) * drive[j + 1, c]
+    w[0] = w[4]
+    _rk4_variation_step(code, first, r, slots, side, time + begin * h, (end - begin) * h, local, 0, w)
+
+
+@compiled
+def _zero(v0: float, v1: float, mean: float) -> float:
+    """First zero in (0, 1) of the parabola with these ends and mean, v0 >= 0; 2 if it has none."""
+    c = 3.0 * (v0 + v1) - 6.0 * mean
+    b = v1 - v0 - c
+    square = b * b - 4.0 * c * v0
+    dips = v0 > 0.0 and c > 0.0 and -2.0 * c < b < 0.0 and square > 0.0
+    if v1 > 0.0 and not dips:
+        return 2.0
+    root = math.sqrt(max(square, 0.0))
+    return 2.0 * v0 / (root - b) if b < 0.0 else (b + root) / (-2.0 * c)
+
+
+@compiled
+def _to_crossing(
+    code: Ints, first: int, r: Floats, slots: Ints, side: int, time: float, h: float,
+    begin: float, x: float, drive: Floats, j: int, local: Floats, w: Floats,
+) -> float:  # fmt: skip
+    """Step to where v vanishes and switch there; returns that fraction of the step.
+
+    The guess x, a fraction of what is left of the step, is corrected by Newton. Where v passes through zero, the time at which it
+    does so depends on the parameters, and the derivative of v jumps with the acceleration (saltation):
+    ``s_v+ = s_v- a+ / a-``. Where friction holds the mass from then on, v = 0 whatever the parameters.
+    """
+    sign = r[side]
+    span = (1.0 - begin) * h
+    before = 0.0
+    for _ in range(3):
+        x = min(max(x, 0.0), 1.0)
+        end = begin + x * (1.0 - begin)
+        _substep(code, first, r, slots, side, time, h, begin, end, drive, j, local, w)
+        before = _pull(code, first, r, slots, side, sign, time + end * h, local, 2, w, 0)
+        if before * sign >= 0.0:
+            break
+        x -= w[0, 1, 0] / (before * span)
+    after = _pull(code, first, r, slots, side, -sign, time + end * h, local, 2, w, 0)
+    through = after * sign < 0.0
+    r[side] = -sign if through else 0.0
+    w[0, 1, 0] = 0.0
+    for i in range(1, w.shape[2]):
+        w[0, 1, i] = w[0, 1, i] * after / before if through and before != 0.0 else 0.0
+    return end
+
+
+@compiled
+def _to_release(
+    code: Ints, first: int, r: Floats, slots: Ints, side: int, time: float, h: float,
+    begin: float, drive: Floats, j: int, local: Floats, w: Floats,
+) -> float:  # fmt: skip
+    """Step to where the other forces overcome friction; returns that fraction of the step, 1 if they do not."""
+    sign = 1.0
+    late = _pull(code, first, r, slots, side, sign, time + h, local, 2, w, 0)
+    if late <= 0.0:
+        sign = -1.0
+        late = _pull(code, first, r, slots, side, sign, time + h, local, 2, w, 0)
+    if sign * late <= 0.0:
+        r[side] = 0.0
+        return 1.0
+    early = _pull(code, first, r, slots, side, sign, time + begin * h, local, 0, w, 4)
+    x = min(max(early / (early - late), 0.0), 1.0)
+    r[side] = 0.0
+    end = begin + x * (1.0 - begin)
+    _substep(code, first, r, slots, side, time, h, begin, end, drive, j, local, w)
+    r[side] = sign
+    return end
+
+
+@compiled
+def _switching_step(
+    code: Ints, first: int, r: Floats, slots: Ints, side: int, time: float, h: float,
+    drive: Floats, j: int, local: Floats, w: Floats,
+) -> None:  # fmt: skip
+    """One step of a model with sgn v in it, cut where v changes sign, stops, or sets off again.
+
+    Register ``side`` stands for sgn v: 1 or -1 while the mass moves, 0 while friction holds it. A step
+    across the switch would be of order 1 only, and its derivative without the jump that the true one has.
+    """
+    begin = 0.0
+    for _ in range(6):
+        w[4] = w[0]
+        _substep(code, first, r, slots, side, time, h, begin, 1.0, drive, j, local, w)
+        if r[side] == 0.0:
+            begin = _to_release(code, first, r, slots, side, time, h, begin, drive, j, local, w)
+        else:  # the mean velocity is the change of displacement: it shows a dip below zero between two steps
+            mean = (w[0, 0, 0] - w[4, 0, 0]) / ((1.0 - begin) * h)
+            x = _zero(r[side] * w[4, 1, 0], r[side] * w[0, 1, 0], r[side] * mean)
+            if x > 1.0:
+                return
+            begin = _to_crossing(code, first, r, slots, side, time, h, begin, x, drive, j, local, w)
+        if begin >= 1.0:
+            return
+    if r[side] * w[0, 1, 0] < 0.0:
+        r[side] = -r[side]
+
+
+@compiled
 def integrate_variation(
-    code: Ints, first: int, r: Floats, slots: Ints, start: float, dt: float,
+    code: Ints, first: int, r: Floats, slots: Ints, side: int, start: float, dt: float,
     steps: int, drive: Floats, y: Floats, row: int, out: Floats,
 ) -> int:  # fmt: skip
     """A free run with its exact derivatives by Runge-Kutta; ``y`` is the state beside its sensitivities.
 
     ``out`` gets response ``row`` (0 displacement, 1 velocity, 2 acceleration) of each sample beside its
-    derivatives. Other arguments and result as in :func:`integrate_rk4` and :func:`_variation`.
+    derivatives. ``side`` is the register that stands for sgn v, -1 if the model has none. Other arguments
+    and result as in :func:`integrate_rk4` and :func:`_variation`.
     """
     h = dt / steps
-    w = np.zeros((4, y.shape[0], y.shape[1]))
+    w = np.zeros((5, y.shape[0], y.shape[1]))
+    local = np.zeros((3, drive.shape[1]))
     w[0] = y
+    if side >= 0:
+        if y[1, 0] != 0.0:
+            r[side] = math.copysign(1.0, y[1, 0])
+        elif _pull(code, first, r, slots, side, 1.0, start, drive, 0, w, 0) <= 0.0:
+            held = _pull(code, first, r, slots, side, -1.0, start, drive, 0, w, 0) >= 0.0
+            r[side] = 0.0 if held else -1.0
     for sample in range(out.shape[0]):
         j = 2 * steps * sample
         w[1] = w[0]
-        _variation(code, first, r, slots, start + sample * dt, drive, j, w)
+        _variation(code, first, r, slots, side, start + sample * dt, drive, j, w)
         if not (abs(w[0, 0, 0]) < 1e150 and abs(w[0, 1, 0]) < 1e150 and math.isfinite(w[2, 1, 0])):
             return sample
         for c in range(y.shape[1]):
@@ -265,5 +403,36 @@ def integrate_variation(
         if sample + 1 < out.shape[0]:
             for m in range(steps):
                 time = start + sample * dt + m * h
-                _rk4_variation_step(code, first, r, slots, time, h, drive, j + 2 * m, w)
+                if side < 0:
+                    _rk4_variation_step(code, first, r, slots, side, time, h, drive, j + 2 * m, w)
+                else:
+                    _switching_step(code, first, r, slots, side, time, h, drive, j + 2 * m, local, w)
     return -1
+
+
+@compiled
+def integrate_state(
+    code: Ints, first: int, r: Floats, columns: Ints, state: int, output: int, h: float,
+    steps: int, data: Floats, out: Floats,
+) -> None:  # fmt: skip
+    """State z of a term under a known motion by Runge-Kutta, from rest; ``data`` has 2 steps rows a sample.
+
+    ``columns`` are the registers of the data, ``state`` and ``output`` those of z and dz/dt.
+    """
+    z = 0.0
+    slopes = np.zeros(4)
+    shift = np.array([0.0, 0.5, 0.5, 1.0])
+    for sample in range(out.shape[0]):
+        out[sample] = z
+        if sample + 1 == out.shape[0]:
+            break
+        for s in range(steps):
+            j = 2 * (steps * sample + s)
+            for stage in range(4):
+                row = j + (stage + 1) // 2
+                for c in range(columns.shape[0]):
+                    r[columns[c]] = data[row, c]
+                r[state] = z + shift[stage] * h * slopes[stage - 1] if stage > 0 else z
+                run(code, first, r)
+                slopes[stage] = r[output]
+            z += h / 6.0 * (slopes[0] + 2.0 * slopes[1] + 2.0 * slopes[2] + slopes[3])
