@@ -16,6 +16,7 @@ from study.spectra import SpectralMatrix
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 COLLINEAR = 1e-13  # an input of which less than this share is left after conditioning brings nothing new
+SILENT = 1e-13  # a line below this fraction of an input's largest amplitude is the rounding of the others
 
 
 @dataclass(frozen=True)
@@ -105,9 +106,15 @@ def analyse(matrix: SpectralMatrix) -> MisoResult:
 
 
 def _scale(density: Complexes) -> Floats:
-    """Root of each autospectrum, shape (lines, channels); one where a channel is silent."""
+    """Root of each autospectrum, shape (lines, channels); infinite where an input is silent, so that it scales to nil.
+
+    A constant has power at its lowest lines only. Beyond them stands rounding, which is the same in every
+    segment and, scaled to unit power, would pass for an input.
+    """
     power = np.sqrt(np.clip(np.einsum("fii->fi", density).real, 0.0, None))
-    return np.where(power > 0.0, power, 1.0)
+    scale = np.where(power > SILENT * power.max(axis=0), power, np.inf)
+    scale[:, -1] = np.where(power[:, -1] > 0.0, power[:, -1], 1.0)
+    return scale
 
 
 def _condition(density: Complexes) -> tuple[Complexes, Complexes, Floats]:
@@ -168,4 +175,4 @@ def _covariance(density: Complexes, noise: Floats, averages: float) -> Complexes
     """
     inputs = density.shape[1] - 1
     inverse = np.linalg.pinv(density[:, :-1, :-1], rcond=COLLINEAR, hermitian=True)
-    return inverse.conj() * (noise / (averages - inputs))[:, None, None]
+    return inverse * (noise / (averages - inputs))[:, None, None]

@@ -11,6 +11,7 @@ from study.miso import MisoResult
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+EXACT = 1e-12  # variances below this fraction of the largest are rounding
 
 
 @dataclass(frozen=True)
@@ -75,17 +76,30 @@ def fit(result: MisoResult, inputs: Sequence[Input], band: tuple[float, float], 
     keep = (result.frequency >= band[0]) & (result.frequency <= band[1])
     frequency = result.frequency[keep]
     covariance = result.covariance[keep]
-    maps = [_map(item.powers(frequency), covariance[:, j, j].real) for j, item in enumerate(inputs)]
-    values = [(maps[j] @ result.response[j][keep]).real for j in range(len(inputs))]
+    responses = result.response[:, keep]
+    weights = [_weights(covariance[:, j, j].real, responses[j]) for j in range(len(inputs))]
+    maps = [_map(item.powers(frequency), weights[j]) for j, item in enumerate(inputs)]
+    values = [(maps[j] @ responses[j]).real for j in range(len(inputs))]
     symbols = tuple(p.symbol for item in inputs for p in item.parts)
     return Estimate(symbols, np.concatenate(values), _joint_covariance(maps, covariance) * line_inflation)
 
 
-def _map(powers: Complexes, variance: Floats) -> Complexes:
-    """The linear map from A(f) to its real coefficients, shape (parts, lines); weights 1 / variance."""
+def _weights(variance: Floats, response: Complexes) -> Floats:
+    """Inverse variances, to a common factor.
+
+    A line where the input brings nothing has a response of exactly zero and counts for nothing; lines without
+    any error (a model that explains all to the last digit) count alike.
+    """
+    largest = float(np.max(variance, initial=0.0))
+    weights = largest / np.maximum(variance, EXACT * largest) if largest > 0.0 else np.ones_like(variance)
+    return np.where(response == 0.0, 0.0, weights)
+
+
+def _map(powers: Complexes, weights: Floats) -> Complexes:
+    """The linear map from A(f) to its real coefficients, shape (parts, lines)."""
     scale = np.sqrt(np.mean(np.abs(powers) ** 2, axis=0))
     design = powers / scale
-    weighted = (design / np.maximum(variance, np.finfo(float).tiny)[:, None]).conj().T
+    weighted: Complexes = (design * weights[:, None]).conj().T
     inverse: Floats = np.linalg.pinv((weighted @ design).real, hermitian=True)
     return np.asarray((inverse @ weighted) / scale[:, None], dtype=np.complex128)
 
