@@ -29,6 +29,8 @@ class Record:
         What it is called in tables and file names.
     start : float
         Time of the first sample in seconds.
+    period : int, optional
+        Samples in one period, where the excitation is periodic.
     """
 
     dt: float
@@ -36,6 +38,7 @@ class Record:
     units: Mapping[str, str] = field(default_factory=lambda: dict(SI_UNITS))
     name: str = "record"
     start: float = 0.0
+    period: int | None = None
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -70,13 +73,19 @@ class Record:
 
 
 def write_csv(record: Record, path: Path) -> None:
-    """Write time and channels with as many digits as a double has."""
-    columns: dict[str, Floats] = {"time": record.time, **record.channels}
+    """Write time and channels with as many digits as a double has; units other than SI stand behind the names."""
+    named = {heading(name, record.units.get(name, "")): values for name, values in record.channels.items()}
+    columns: dict[str, Floats] = {"time": record.time, **named}
     pd.DataFrame(columns).to_csv(path, index=False, float_format="%.17g", lineterminator="\n")
 
 
+def heading(channel: str, unit: str) -> str:
+    """A column's heading: the channel's name, and its unit if that is not the SI one."""
+    return channel if unit in ("", SI_UNITS.get(channel, "")) else f"{channel} [{unit}]"
+
+
 def read_csv(path: Path) -> Record:
-    """Read what :func:`write_csv` wrote. ``study.readers`` reads every other kind of file."""
+    """Read what :func:`write_csv` wrote of a record in SI units. ``study.readers`` reads every other kind of file."""
     table = pd.read_csv(path)  # from pandas 3.1 on, the default parser returns the very doubles that were written
     time = table["time"].to_numpy(dtype=np.float64)
     dt = round(float(time[-1] - time[0]) / (len(time) - 1), 15)
