@@ -1,0 +1,118 @@
+"""Snakemake step: products of a case -> its figures: A_1, A_2 (and A_3), coherence, histogram."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+from matplotlib import style as styles
+from matplotlib.figure import Figure
+
+from study import preliminary
+from study.errors import StudyError
+from study.figures import coherence, curves, distribution, labels, page, response
+from study.record import read_csv
+
+HIGHEST = 10.0  # hertz: the report's systems have their dynamics below it (Section 2.2)
+PARTS = ("real part", "imaginary part")
+
+
+def linear(response_csv: Path, title: str, highest: float = HIGHEST) -> Figure:
+    """Magnitude and phase of A_1."""
+    first = curves.responses(pd.read_csv(response_csv), highest)[0]
+    figure, axes = page.page(
+        title, "Linear frequency response function $A_1(f)$", rows=2,
+        legend_rows=page.rows_for(len(first.curves) + 2),
+    )  # fmt: skip
+    response.magnitude(axes[0], first, labels.response_unit(first.shape))
+    response.phase(axes[1], first)
+    page.letter(axes, ("magnitude", "phase"))
+    page.legend(figure, axes, bands=True)
+    return figure
+
+
+def nonlinear(response_csv: Path, title: str, highest: float = HIGHEST) -> Figure:
+    """Real and imaginary part of A_2 and every further one, side by side."""
+    shown = curves.responses(pd.read_csv(response_csv), highest)[1:]
+    if not shown:
+        figure, axes = page.page(title, "No nonlinear input is assumed")
+        axes[0].set_axis_off()
+        return figure
+    count = len(shown)
+    names, s = ", ".join(f"$A_{r.number}(f)$" for r in shown), "s" if count > 1 else ""
+    figure, axes = page.page(
+        title, f"Nonlinear frequency response function{s} {names}", rows=2, columns=count,
+        width=page.width(count), legend_rows=page.rows_for(len(shown[0].curves) + 3),
+    )  # fmt: skip
+    for item, real, imaginary in zip(shown, axes[:count], axes[count:], strict=True):
+        unit = labels.response_unit(item.shape)
+        alike = [other for other in shown if labels.response_unit(other.shape) == unit]
+        response.real_and_imaginary(real, imaginary, item, unit, response.common_span(alike))
+    page.letter(axes, [f"{part} of $A_{r.number}$, input {labels.formula(r.shape)}" for part in PARTS for r in shown])
+    page.legend(figure, axes, bands=True)
+    return figure
+
+
+def cumulative(coherence_csv: Path, title: str, highest: float = HIGHEST) -> Figure:
+    """Cumulative coherences."""
+    shares = curves.coherences(pd.read_csv(coherence_csv), highest)
+    figure, axes = page.page(title, "Cumulative coherence", panel=2.7, legend_rows=len(shares), headed=False)
+    coherence.cumulative(axes[0], shares)
+    page.legend(figure, axes, columns=1)
+    return figure
+
+
+def histogram(record_csv: Path, title: str, channel: str = "displacement") -> Figure:
+    """Histogram of a channel of a record."""
+    record = read_csv(record_csv)
+    figure, axes = page.page(title, f"Histogram of the {channel}", panel=2.7)
+    distribution.histogram(axes[0], preliminary.histogram(record[channel]), channel, record.units[channel])
+    page.legend(figure, axes)
+    return figure
+
+
+def draw(
+    record_csv: Path, response_csv: Path, coherence_csv: Path, outputs: Mapping[str, Sequence[Path]],
+    *, title: str, style: Path, highest: float = HIGHEST,
+) -> None:  # fmt: skip
+    """Draw the wanted kinds of picture of a case.
+
+    Parameters
+    ----------
+    record_csv, response_csv, coherence_csv : Path
+        The case's products.
+    outputs : mapping
+        For each of ``linear, nonlinear, coherence, histogram`` the files to write, PNG or SVG.
+    title : str
+        Name of the system or case.
+    style : Path
+        The style sheet.
+    highest : float
+        Where the frequency axis ends, in hertz.
+
+    Raises
+    ------
+    StudyError
+        If a kind of picture is asked for that there is not.
+    """
+    kinds = {
+        "linear": lambda: linear(response_csv, title, highest),
+        "nonlinear": lambda: nonlinear(response_csv, title, highest),
+        "coherence": lambda: cumulative(coherence_csv, title, highest),
+        "histogram": lambda: histogram(record_csv, title),
+    }
+    with styles.context(style):
+        for kind, paths in outputs.items():
+            if kind not in kinds:
+                raise StudyError(f"there is no kind of figure {kind!r}; known are {', '.join(kinds)}")
+            figure = kinds[kind]()
+            for path in paths:
+                path.write_bytes(page.rendered(figure, path.suffix[1:]))
+
+
+if "snakemake" in globals():
+    step = globals()["snakemake"]
+    draw(
+        Path(step.input.record), Path(step.input.responses), Path(step.input.coherences),
+        {kind: [Path(p) for p in paths] for kind, paths in step.output.items()},
+        title=step.params.title, style=Path(step.input.style),
+    )  # fmt: skip

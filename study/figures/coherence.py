@@ -1,0 +1,42 @@
+"""Cumulative coherence: what share of the force each term explains, line by line."""
+
+# Matplotlib leaves the **kwargs of its methods untyped.
+# pyright: reportUnknownMemberType=false
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from study.figures import labels
+from study.figures.curves import InputCoherence
+
+LOOKS = (("C1", (0, (5.0, 2.0))), ("C2", (0, (1.5, 1.2))), ("C3", (0, (7.0, 1.5, 1.5, 1.5))), ("C5", "-."))
+ALL = ("C0", "-")  # the last curve is the multiple coherence: what the whole model explains
+
+
+def cumulative(axes: Axes, shares: Sequence[InputCoherence]) -> Axes:
+    """Cumulative coherences (4.29) to (4.38): each curve adds one conditioned input to those below it.
+
+    The area under a curve, down to the one below, is what its input adds.
+    """
+    below = np.zeros(len(shares[0].frequency))
+    for index, share in enumerate(shares):
+        whole = index == len(shares) - 1
+        colour, dash = ALL if whole else LOOKS[index % len(LOOKS)]
+        axes.fill_between(share.frequency, below, share.cumulative, color=colour, alpha=0.16, linewidth=0.0)
+        axes.plot(
+            share.frequency, share.cumulative, color=colour, linestyle=dash, linewidth=2.6 if whole else 1.6,
+            label=_label(share, index), zorder=2.9 if whole else 3.0,
+        )  # fmt: skip
+        below = share.cumulative
+    axes.set_ylim(0.0, 1.03)
+    axes.set_xlim(0.0, float(np.ceil(shares[0].frequency[-1])))
+    axes.set_xlabel("frequency (Hz)")
+    axes.set_ylabel("cumulative coherence (dimensionless)")
+    return axes
+
+
+def _label(share: InputCoherence, index: int) -> str:
+    plus = "+ " if index else ""
+    return f"{plus}{labels.formula(share.shape)}: {labels.term_names(share.terms)}"

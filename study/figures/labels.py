@@ -1,0 +1,109 @@
+"""Words on the axes: formulas as mathtext, units of frequency response functions, scaled units."""
+
+import ast
+import math
+from fractions import Fraction
+
+from study import expression, terms, units
+
+DIMENSIONS: dict[str, units.Dimensions] = {
+    "length": (Fraction(1), Fraction(0)),
+    "1/length": (Fraction(-1), Fraction(0)),
+    "time": (Fraction(0), Fraction(1)),
+    "frequency": (Fraction(0), Fraction(-1)),
+}
+PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+LOOSE = (ast.Add, ast.Sub)  # operators whose operands a product must put in brackets
+
+
+def formula(text: str) -> str:
+    r"""A shape such as ``u*cos(2*pi*f_m*t)`` as Matplotlib mathtext, such as ``$u\,\cos(2\,\pi\,f_{m}\,t)$``."""
+    return f"${_math(expression.parse(text))}$"
+
+
+def _math(tree: ast.expr) -> str:
+    match tree:
+        case ast.Constant(value=value):
+            return f"{value:g}" if isinstance(value, int | float) else str(value)
+        case ast.Name(id=name):
+            return _symbol(name)
+        case ast.UnaryOp(op=op, operand=operand):
+            return f"{'-' if isinstance(op, ast.USub) else ''}{_bracketed(operand)}"
+        case ast.BinOp(left=left, op=op, right=right):
+            return _operation(left, op, right)
+        case ast.Call(func=ast.Name(id="abs"), args=[argument]):
+            return f"|{_math(argument)}|"
+        case ast.Call(func=ast.Name(id=name), args=arguments):
+            inside = r",\,".join(_math(a) for a in arguments)
+            return rf"\mathrm{{{name}}}({inside})"
+        case _:
+            return ast.unparse(tree)
+
+
+def _symbol(name: str) -> str:
+    if name == "pi":
+        return r"\pi"
+    stem, _, index = name.partition("_")
+    word = stem if len(stem) == 1 else rf"\mathrm{{{stem}}}"
+    return f"{word}_{{{index.replace('_', ',')}}}" if index else word
+
+
+def _operation(left: ast.expr, op: ast.operator, right: ast.expr) -> str:
+    match op:
+        case ast.Pow():
+            base = _math(left) if isinstance(left, ast.Name | ast.Call) else f"({_math(left)})"
+            return f"{base}^{{{_math(right)}}}"
+        case ast.Mult():
+            return rf"{_bracketed(left)}\,{_bracketed(right)}"
+        case ast.Div():
+            return f"{_bracketed(left)}/{_bracketed(right, ast.Mult, ast.Div)}"
+        case ast.Sub():
+            return f"{_math(left)} - {_bracketed(right)}"
+        case _:
+            return f"{_math(left)} + {_math(right)}"
+
+
+def _bracketed(tree: ast.expr, *more: type[ast.operator]) -> str:
+    inner = _math(tree)
+    return f"({inner})" if isinstance(tree, ast.BinOp) and isinstance(tree.op, (*LOOSE, *more)) else inner
+
+
+def response_unit(shape: str, force: str = "N", length: str = "m") -> str:
+    """Unit of A_j, the force over an input's shape: ``N/m^3`` for ``u**3``."""
+    known = {p.name: DIMENSIONS[p.quantity] for t in terms.LIBRARY.values() for p in t.parameters}
+    try:
+        powers = units.dimensions(shape, known)
+    except expression.ExpressionError:
+        powers = None
+    return units.compose(force, length, powers)
+
+
+def power_of_ten(largest: float) -> tuple[float, str]:
+    """A power of 1000 to divide an axis by, and what to write before its unit, as in ``10^6 N/m^3``."""
+    if not largest > 0.0 or not math.isfinite(largest):
+        return 1.0, ""
+    exponent = 3 * math.floor(math.log10(largest) / 3.0)
+    return (1.0, "") if exponent == 0 else (10.0**exponent, f"10^{exponent} ")
+
+
+def prefixed(unit: str, largest: float) -> tuple[float, str]:
+    """Divisor and unit in which values up to ``largest`` are easy to read: metres become mm.
+
+    Units other than the metre are left alone: a user's record may be in volts or counts.
+    """
+    if unit != "m" or not largest > 0.0:
+        return 1.0, unit
+    scale, prefix = next((p for p in PREFIXES if largest >= p[0]), PREFIXES[-1])
+    return scale, prefix + unit
+
+
+def quantity(value: float, unit: str) -> str:
+    """A value with its unit, three digits: ``6.64 mm``."""
+    factor, shown = prefixed(unit, abs(value))
+    return f"{value / factor:.3g} {units.pretty(shown)}"
+
+
+def term_names(text: str) -> str:
+    """Names of terms in words: ``van_der_pol_damping`` becomes ``Van der Pol damping``."""
+    words = text.replace("_", " ")
+    return words.replace("van der pol", "Van der Pol").replace("coulomb", "Coulomb")

@@ -1,0 +1,107 @@
+"""A figure's page: its size, its panels, a title and a legend that never cover a curve, and its bytes.
+
+Figures are made without pyplot: no global state, nothing to close. Margins are fixed in inches; a layout
+engine would measure every text on every page, which costs more than drawing it.
+"""
+
+# Matplotlib leaves the **kwargs of its methods untyped.
+# pyright: reportUnknownMemberType=false
+
+from collections.abc import Sequence
+from io import BytesIO
+
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+LEFT, RIGHT, BOTTOM = 0.88, 0.16, 0.55  # inches
+TITLE, LEGEND_ROW, GAP = 0.58, 0.21, 0.34
+WIDTH = 6.4
+METADATA = {"svg": {"Date": None}, "png": {"Software": None}}  # neither the hour nor the version: same bytes
+
+
+def width(columns: int) -> float:
+    """Width of a page with so many panels side by side, in inches."""
+    return WIDTH if columns == 1 else 0.7 * WIDTH * columns
+
+
+def page(
+    title: str, subtitle: str, rows: int = 1, columns: int = 1, *,
+    width: float = WIDTH, panel: float = 2.1, legend_rows: int = 1,
+    headed: bool = True, share: bool = True,
+) -> tuple[Figure, list[Axes]]:  # fmt: skip
+    """An empty page.
+
+    Parameters
+    ----------
+    title, subtitle : str
+        Stand at the top left, the system in bold and what is shown of it below.
+    rows, columns : int
+        Panels.
+    width, panel : float
+        Width of the page and height of a panel in inches.
+    legend_rows : int
+        Room to leave between title and panels.
+    headed : bool
+        Whether the first panels have headings of their own, which need room.
+    share : bool
+        Whether the panels of a column share their abscissa.
+
+    Returns
+    -------
+    Figure, list of Axes
+        The panels from left to right, then down.
+    """
+    top = TITLE + LEGEND_ROW * legend_rows + (GAP if headed else GAP / 2.0)
+    between = GAP if share else GAP + BOTTOM - 0.1
+    height = top + rows * panel + (rows - 1) * between + BOTTOM
+    figure = Figure(figsize=(width, height))
+    figure.subplots_adjust(
+        left=LEFT / width, right=1.0 - RIGHT / width, bottom=BOTTOM / height, top=1.0 - top / height,
+        hspace=between / panel, wspace=0.24,
+    )  # fmt: skip
+    grid = figure.subplots(rows, columns, sharex="col" if share else False, squeeze=False)
+    left = LEFT / width
+    figure.text(left, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold", fontsize=11)
+    figure.text(left, 1.0 - 0.33 / height, subtitle, ha="left", va="top", fontsize=10)
+    return figure, list(grid.flat)
+
+
+def rows_for(entries: int) -> int:
+    """Rows of a legend of so many entries: four fit in one row, of more there are three in each."""
+    return 1 if entries <= 4 else -(-entries // 3)
+
+
+def legend(figure: Figure, axes: Sequence[Axes], columns: int | None = None, *, bands: bool = False) -> None:
+    """One legend for all panels, between the title and the first of them; equal labels stand once.
+
+    With ``bands`` it says what a shade about a curve means.
+    """
+    entries: dict[str, Artist] = {}
+    for panel in axes:
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            entries.setdefault(str(label), handle)
+    if bands:
+        entries["95 % band"] = Patch(facecolor="0.8", edgecolor="none")
+    width, height = figure.get_size_inches()
+    anchor = ((LEFT - 0.04) / width, 1.0 - TITLE / height)
+    shown = figure.legend(
+        list(entries.values()), list(entries), loc="upper left", bbox_to_anchor=anchor,
+        ncols=columns or -(-len(entries) // rows_for(len(entries))), borderaxespad=0.0, borderpad=0.0, labelspacing=0.3,
+    )  # fmt: skip
+    for line in shown.get_lines():
+        line.set_linewidth(max(line.get_linewidth(), 1.0))  # a hair of a line is not found in a legend
+
+
+def letter(axes: Sequence[Axes], names: Sequence[str]) -> None:
+    """Name the panels (a), (b), ... as the report does."""
+    for index, (panel, name) in enumerate(zip(axes, names, strict=True)):
+        panel.set_title(f"({chr(ord('a') + index)}) {name}")
+
+
+def rendered(figure: Figure, kind: str) -> bytes:
+    """A figure as the bytes of a file, the same bytes each time; ``kind`` is ``png`` or ``svg``."""
+    target = BytesIO()
+    figure.savefig(target, format=kind, metadata=METADATA[kind])
+    return target.getvalue()

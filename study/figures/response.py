@@ -1,0 +1,177 @@
+"""Frequency response functions A_j(f): magnitude and phase, real and imaginary part."""
+
+# Matplotlib leaves the **kwargs of its methods untyped.
+# pyright: reportUnknownMemberType=false
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from study import units
+from study.figures import labels
+from study.figures.curves import Curve, InputResponse
+from study.figures.styles import EXACT, look
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+BAND: dict[str, Any] = {"alpha": 0.22, "linewidth": 0.0}
+OPPOSITE = "opposite sign"
+Part = Callable[[Complexes], Floats]
+
+
+def magnitude(axes: Axes, response: InputResponse, unit: str) -> Axes:
+    """|A_j(f)| of every estimator on a logarithmic scale, with 95 % bands and the exact function."""
+    for curve in response.curves:
+        size = np.abs(curve.values)
+        _band(axes, curve, np.maximum(size - curve.half_width, 1e-2 * size), size + curve.half_width)
+        axes.plot(curve.frequency, size, **look(curve.estimator).line)
+    sizes = [np.abs(c.values) for c in response.curves]
+    if response.exact is not None:
+        axes.plot(response.frequency, np.abs(response.exact), **EXACT.line)
+        sizes.append(np.abs(response.exact))
+    axes.set_yscale("log")
+    _decades(axes, sizes)
+    axes.set_ylabel(f"$|A_{response.number}|$ ({units.pretty(unit)})")
+    return _frequency_axis(axes, response)
+
+
+def phase(axes: Axes, response: InputResponse) -> Axes:
+    """Phase of A_j(f) in degrees, from -90 to 270: neither 0 nor 180 is where it would wrap."""
+    turns: list[Floats] = []
+    for curve in response.curves:
+        angle = _degrees(curve.values)
+        width = np.degrees(np.minimum(curve.half_width / np.maximum(np.abs(curve.values), 1e-300), np.pi))
+        _band(axes, curve, angle - width, angle + width)
+        axes.plot(curve.frequency, _broken(angle), **look(curve.estimator).line)
+        turns.append(angle)
+    if response.exact is not None:
+        turns.append(_degrees(response.exact))
+        axes.plot(response.frequency, _broken(turns[-1]), **EXACT.line)
+    inside = all(np.all((t > -45.0) & (t < 225.0)) for t in turns)
+    axes.set_ylim((-45.0, 225.0) if inside else (-90.0, 270.0))
+    axes.set_yticks([0, 90, 180] if inside else [-90, 0, 90, 180, 270])
+    axes.set_ylabel(f"phase of $A_{response.number}$ (deg)")
+    return _frequency_axis(axes, response)
+
+
+def real_and_imaginary(real: Axes, imaginary: Axes, response: InputResponse, unit: str, span: float) -> None:
+    """Real and imaginary part of A_j(f) with 95 % bands and the exact values.
+
+    Parameters
+    ----------
+    real, imaginary : Axes
+        Where to draw.
+    response : InputResponse
+        What to draw.
+    unit : str
+        Of A_j.
+    span : float
+        Height of every linear scale, in that unit (see :func:`common_span`): a part which is zero is
+        then seen to be small. An imaginary part that grows with frequency (a damping term) has a
+        logarithmic scale, as in Figure 26b.
+    """
+    factor, power = labels.power_of_ten(span)
+    label, name = units.pretty(f"{power}{unit}"), f"A_{response.number}"
+    _linear(real, response, np.real, factor, span)
+    real.set_ylabel(rf"Re ${name}$ ({label})")
+    if _grows(response):
+        _logarithmic(imaginary, response)
+        imaginary.set_ylabel(rf"|Im ${name}$| ({units.pretty(unit)})")
+    else:
+        _linear(imaginary, response, np.imag, factor, span)
+        imaginary.set_ylabel(rf"Im ${name}$ ({label})")
+    _frequency_axis(real, response)
+    _frequency_axis(imaginary, response)
+
+
+def common_span(responses: Sequence[InputResponse]) -> float:
+    """Height of a linear scale that holds both parts of every response, and its typical size if known."""
+    heights = [float(np.median(np.abs(r.exact))) for r in responses if r.exact is not None]
+    for item in responses:
+        for part in (np.real,) if _grows(item) else (np.real, np.imag):
+            low, high = _limits(item, part)
+            heights.append(high - low)
+    return 1.5 * max(heights) or 1.0
+
+
+def _grows(response: InputResponse) -> bool:
+    """Whether the imaginary part is truly other than zero at every line, as a damping term's is."""
+    return response.exact is not None and bool(np.all(response.exact.imag != 0.0))
+
+
+def _linear(axes: Axes, response: InputResponse, part: Part, factor: float, span: float) -> None:
+    for curve in response.curves:
+        values, width = part(curve.values) / factor, curve.half_width / factor
+        _band(axes, curve, values - width, values + width)
+        axes.plot(curve.frequency, values, **look(curve.estimator).line)
+    if response.exact is not None:
+        axes.plot(response.frequency, part(response.exact) / factor, **EXACT.line)
+    middle = sum(_limits(response, part)) / 2.0
+    axes.set_ylim((middle - span / 2.0) / factor, (middle + span / 2.0) / factor)
+
+
+def _limits(response: InputResponse, part: Part) -> tuple[float, float]:
+    """What a scale must hold: zero, what is true, and the middle 80 % of each estimate.
+
+    Where the input has little power an estimate scatters widely; those lines may leave the panel.
+    """
+    exact = [] if response.exact is None else [part(response.exact)]
+    middle = [np.quantile(part(c.values), [0.1, 0.9]) for c in response.curves]
+    values = np.concatenate([np.zeros(1), *exact, *middle])
+    return float(values.min()), float(values.max())
+
+
+def _logarithmic(axes: Axes, response: InputResponse) -> None:
+    """|Im A_j|; where its sign is not that of the exact function, crosses say so."""
+    assert response.exact is not None, "the scale is logarithmic only where the exact function says so"
+    for curve in response.curves:
+        style, size = look(curve.estimator), np.abs(curve.values.imag)
+        _band(axes, curve, np.maximum(size - curve.half_width, 1e-2 * size), size + curve.half_width)
+        axes.plot(curve.frequency, size, **style.line)
+        wrong = np.sign(curve.values.imag) != np.sign(_at(curve.frequency, response).imag)
+        if np.any(wrong):
+            axes.plot(curve.frequency[wrong], size[wrong], "x", color=style.colour, ms=5, zorder=6.0, label=OPPOSITE)
+    exact = np.abs(response.exact.imag)
+    axes.plot(response.frequency, exact, **EXACT.line)
+    axes.set_yscale("log")
+    middle = [np.quantile(np.abs(c.values.imag), [0.05, 0.95]) for c in response.curves]
+    _decades(axes, [*middle, exact])
+
+
+def _at(frequency: Floats, response: InputResponse) -> Complexes:
+    """The exact function at the lines of an estimator, which may be other lines."""
+    assert response.exact is not None
+    real = np.interp(frequency, response.frequency, response.exact.real)
+    return real + 1j * np.interp(frequency, response.frequency, response.exact.imag)
+
+
+def _band(axes: Axes, curve: Curve, low: Floats, high: Floats) -> None:
+    style = look(curve.estimator)
+    axes.fill_between(curve.frequency, low, high, color=style.colour, zorder=style.level - 1.0, **BAND)
+
+
+def _degrees(values: Complexes) -> Floats:
+    return np.mod(np.degrees(np.angle(values)) + 90.0, 360.0) - 90.0
+
+
+def _broken(angle: Floats) -> Floats:
+    """The angle with a gap where it wraps: a stroke across the panel would be no data."""
+    gaps = np.concatenate([[False], np.abs(np.diff(angle)) > 180.0])
+    return np.where(gaps, np.nan, angle)
+
+
+def _decades(axes: Axes, sizes: Sequence[Floats]) -> None:
+    values = np.concatenate(sizes)
+    values = values[values > 0.0]
+    axes.set_ylim(float(values.min()) / 1.6, float(values.max()) * 1.6)
+
+
+def _frequency_axis(axes: Axes, response: InputResponse) -> Axes:
+    axes.set_xlim(0.0, float(np.ceil(response.frequency[-1])))
+    place = axes.get_subplotspec()
+    if place is None or place.is_last_row():
+        axes.set_xlabel("frequency (Hz)")
+    return axes

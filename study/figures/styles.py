@@ -1,0 +1,62 @@
+"""One look for each estimator, the same in every figure: colour, dash and width, so that grey suffices."""
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class LineLook:
+    """How a curve is drawn.
+
+    Attributes
+    ----------
+    label : str
+        What the legend calls it.
+    colour : str
+        A place in the style sheet's colour cycle.
+    dash : str or tuple
+        Line style as Matplotlib knows it.
+    width : float
+        In points.
+    level : float
+        Which curve covers which: the higher lies on top.
+    """
+
+    label: str
+    colour: str
+    dash: str | tuple[int, tuple[float, ...]]
+    width: float
+    level: float
+
+    @property
+    def line(self) -> dict[str, Any]:
+        """Keyword arguments for ``Axes.plot``."""
+        return {
+            "color": self.colour,
+            "linestyle": self.dash,
+            "linewidth": self.width,
+            "zorder": self.level,
+            "label": self.label,
+        }
+
+
+EXACT = LineLook("exact", "black", "-", 0.8, 5.0)
+ESTIMATORS = {
+    "miso": LineLook("MI/SO", "C0", "-", 2.0, 3.0),
+    "siso": LineLook("SI/SO", "C1", (0, (5.0, 2.0)), 1.7, 2.5),
+    "local_polynomial": LineLook("local polynomial", "C2", (0, (7.0, 1.5, 1.5, 1.5)), 1.6, 3.5),
+    "instrumental": LineLook("instrumental", "C3", (0, (2.5, 1.2)), 2.0, 3.6),
+    "output_error": LineLook("output error", "C5", (0, (1.0, 1.0)), 2.2, 3.7),
+}
+
+
+def look(estimator: str) -> LineLook:
+    """The look of an estimator; one that the table does not know is drawn dash-dotted in sky blue."""
+    fallback = LineLook(estimator.replace("_", " "), "C4", "-.", 1.6, 3.8)
+    return ESTIMATORS.get(estimator, fallback)
+
+
+def rank(estimator: str) -> int:
+    """Place of an estimator in legends: as in the table above, unknown ones last."""
+    names = list(ESTIMATORS)
+    return names.index(estimator) if estimator in names else len(names)

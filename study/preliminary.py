@@ -1,0 +1,198 @@
+"""Preliminary analysis of measured data (the report's Section 3).
+
+Restoring force from force and acceleration, its patterns over displacement, the lines of a Mathieu
+system's response, and histograms beside the Gaussian.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.errors import StudyError
+from study.model import Model, forward_program
+from study.record import Record
+
+Floats = NDArray[np.float64]
+POINTS_A_CYCLE = 256
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Restoring force over displacement, in the order in which time runs; arrays of shape (n,)."""
+
+    displacement: Floats
+    force: Floats
+
+
+@dataclass(frozen=True)
+class Histogram:
+    """How a quantity is distributed, beside a Gaussian of the same mean and variance.
+
+    Attributes
+    ----------
+    edges : array, shape (bins + 1,)
+        In the quantity's unit.
+    density : array, shape (bins,)
+        Probability density, one over that unit; its integral is one.
+    points, gaussian : arrays, shape (n,)
+        The Gaussian's density.
+    mean, deviation : float
+        In the quantity's unit.
+    skewness, kurtosis : float
+        Third and fourth standardised moment; 0 and 3 for a Gaussian.
+    """
+
+    edges: Floats
+    density: Floats
+    points: Floats
+    gaussian: Floats
+    mean: float
+    deviation: float
+    skewness: float
+    kurtosis: float
+
+
+def restoring_force(record: Record, mass: float) -> Floats:
+    """``F - m d2u/dt2`` along a record, (2.2); shape (n,), in the record's unit of force.
+
+    Raises
+    ------
+    StudyError
+        If the record holds no acceleration or the mass is not above zero.
+    """
+    if "acceleration" not in record:
+        raise StudyError(f"{record.name} has no channel 'acceleration'; the restoring force F - m a needs one")
+    if not mass > 0.0:
+        raise StudyError(f"the mass is {mass:g}; the restoring force F - m a needs one above zero")
+    return record["force"] - mass * record["acceleration"]
+
+
+def random_pattern(record: Record, mass: float) -> Pattern:
+    """Restoring force over displacement under the force of a record (Figures 2b to 7b).
+
+    Raises
+    ------
+    StudyError
+        As :func:`restoring_force`, or if the record holds no displacement.
+    """
+    if "displacement" not in record:
+        raise StudyError(f"{record.name} has no channel 'displacement'; a force/displacement pattern needs one")
+    return Pattern(record["displacement"], restoring_force(record, mass))
+
+
+def model_restoring_force(model: Model, displacement: Floats, velocity: Floats, time: Floats) -> Floats:
+    """Restoring force (2.3) of a model that is made to follow a motion, shape (n,).
+
+    It is what the model's own equation of motion gives: ``-m`` times the acceleration under no force.
+
+    Raises
+    ------
+    StudyError
+        If a value is missing, or a term remembers the past (its force is no function of this motion alone).
+    """
+    from study import kernels  # the compiled loops are slow to load; those who draw histograms need none
+
+    if model.states:
+        names = ", ".join(t.name for t in model.states)
+        raise StudyError(f"model {model.name!r} holds {names}, which remembers the past; simulate it instead")
+    program = forward_program(model)
+    columns = np.array([program.inputs[name] for name in ("u", "v", "t")], dtype=np.int64)
+    out = np.empty((len(time), 1))
+    kernels.evaluate(
+        program.code, program.first, program.registers.copy(), columns,
+        np.column_stack([displacement, velocity, time]), program.outputs, out,
+    )  # fmt: skip
+    return -model.numbers()["m"] * out[:, 0]
+
+
+def harmonic_pattern(model: Model, amplitude: float, frequency: float, cycles: int = 1) -> Pattern:
+    """Restoring force over displacement for ``u = U sin(2 pi f_0 t)``, (3.1) and (3.2).
+
+    Parameters
+    ----------
+    model : Model
+        Every value known.
+    amplitude, frequency : float
+        U, in the model's unit of length, and f_0 in hertz.
+    cycles : int
+        Periods of the motion. A stiffness that varies with time closes its pattern only after several.
+
+    Raises
+    ------
+    StudyError
+        If amplitude or frequency is not above zero, and as :func:`model_restoring_force`.
+    """
+    for name, value in (("amplitude", amplitude), ("frequency", frequency)):
+        if not value > 0.0:
+            raise StudyError(f"the {name} of the harmonic motion is {value:g}; it must be above zero")
+    time = np.arange(cycles * POINTS_A_CYCLE + 1) / (POINTS_A_CYCLE * frequency)
+    omega = 2.0 * math.pi * frequency
+    displacement = amplitude * np.sin(omega * time)
+    velocity = omega * amplitude * np.cos(omega * time)
+    return Pattern(displacement, model_restoring_force(model, displacement, velocity, time))
+
+
+def closing_cycles(model: Model, frequency: float) -> int:
+    """Cycles of a harmonic motion (``frequency`` in hertz) that span a period of the model's periodic stiffness."""
+    slow = model.values.get("periodic_stiffness.f_m")
+    return 1 if slow is None or not slow > 0.0 else max(1, math.ceil(frequency / slow - 1e-3))
+
+
+def natural_frequency(values: Mapping[str, float | None]) -> float:
+    """``sqrt(k/m) / (2 pi)`` in hertz, (4.4), from a model's ``values``.
+
+    Raises
+    ------
+    StudyError
+        If there is no positive mass and linear stiffness.
+    """
+    mass, stiffness = values.get("m"), values.get("k")
+    if mass is None or stiffness is None or not mass > 0.0 or not stiffness > 0.0:
+        raise StudyError(f"m = {mass} and k = {stiffness} give no natural frequency; both must be above zero")
+    return math.sqrt(stiffness / mass) / (2.0 * math.pi)
+
+
+def mathieu_lines(natural: float, modulation: float) -> dict[str, float]:
+    """Frequencies (Hz) at which a Mathieu system's response is strong, by their formulas (Section 3.3).
+
+    Parameters
+    ----------
+    natural, modulation : float
+        f_n of the mean stiffness and f_m of the stiffness, in hertz.
+    """
+    return {
+        "|f_n - f_m|": abs(natural - modulation),
+        "f_n": natural,
+        "|f_n + f_m|": natural + modulation,
+    }
+
+
+def histogram(values: Floats, bins: int = 51) -> Histogram:
+    """Distribution of a quantity, shape (n,), over evenly spaced bins that reach its largest excursion.
+
+    Raises
+    ------
+    StudyError
+        If the quantity never changes.
+    """
+    mean, deviation = float(np.mean(values)), float(np.std(values))
+    if not deviation > 0.0:
+        raise StudyError(f"all {len(values)} values are {mean:g}; a histogram needs values that differ")
+    reach = float(np.abs(values - mean).max())
+    density, edges = np.histogram(values, bins=bins, range=(mean - reach, mean + reach), density=True)
+    points = np.linspace(mean - max(reach, 3.5 * deviation), mean + max(reach, 3.5 * deviation), 201)
+    z = (points - mean) / deviation
+    scaled = (values - mean) / deviation
+    return Histogram(
+        edges=edges,
+        density=density.astype(np.float64),
+        points=points,
+        gaussian=np.exp(-0.5 * z**2) / (deviation * math.sqrt(2.0 * math.pi)),
+        mean=mean,
+        deviation=deviation,
+        skewness=float(np.mean(scaled**3)),
+        kurtosis=float(np.mean(scaled**4)),
+    )

@@ -1,0 +1,403 @@
+"""Figures: what they draw is what they were given, in looks that hold in grey, with room for every word."""
+
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib import style
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from matplotlib.mathtext import MathTextParser
+
+from study.errors import StudyError
+from study.figures import coherence, curves, distribution, labels, motion, page, response, styles
+from study.preliminary import Pattern, histogram
+from study.record import SI_UNITS, Record, write_csv
+from study.terms import LIBRARY
+
+ROOT = Path(__file__).parent.parent
+SHEET = ROOT / "config" / "study.mplstyle"
+FREQUENCY = np.arange(0.0, 12.5, 0.1)
+OMEGA = 2j * np.pi * FREQUENCY
+LINEAR = OMEGA**2 + 3.77 * OMEGA + 355.3
+SYSTEMS = {
+    "duffing": [("u", LINEAR), ("u**3", 2e7 + 0 * OMEGA)],
+    "duffing_van_der_pol": [("u", LINEAR), ("u**3", 2e7 + 2e6 / 3.0 * OMEGA)],
+    "mathieu": [("u", LINEAR), ("u*cos(2*pi*f_m*t)", 177.7 + 0 * OMEGA), ("u*sin(2*pi*f_m*t)", 0 * OMEGA)],
+    "plain": [("u", LINEAR)],
+}
+COLUMNS = ("frequency", "estimator", "input", "shape", "real", "imag", "standard_error", "exact_real", "exact_imag")
+KINDS = ("linear", "nonlinear", "coherence", "histogram")
+
+
+def script(name):
+    spec = importlib.util.spec_from_file_location(name, ROOT / "scripts" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses look their module up
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def draw_case():
+    return script("draw_case")
+
+
+@pytest.fixture(scope="module")
+def draw_preliminary():
+    return script("draw_preliminary")
+
+
+@pytest.fixture(autouse=True)
+def _sheet():
+    with style.context(SHEET):
+        yield
+
+
+def response_table(system, spread=0.05, exact=True, estimators=("siso", "miso")):
+    rng = np.random.default_rng(8)
+    frames = []
+    for name in estimators:
+        for j, (shape, true) in enumerate(SYSTEMS[system][: 1 if name == "siso" else None]):
+            error = spread * np.maximum(np.abs(true), 50.0)
+            values = true + error * (rng.standard_normal((2, len(true))).T @ [1.0, 1j]) / np.sqrt(2.0)
+            known = true if exact else np.full_like(true, np.nan)
+            columns = (FREQUENCY, name, j + 1, shape, values.real, values.imag, error, known.real, known.imag)
+            frames.append(pd.DataFrame(dict(zip(COLUMNS, columns, strict=True))))
+    return pd.concat(frames)
+
+
+def coherence_table(system):
+    count = len(SYSTEMS[system])
+    frames = [
+        pd.DataFrame({"frequency": FREQUENCY, "estimator": "miso", "input": j + 1, "shape": shape,
+                      "terms": "linear_damping + van_der_pol_damping", "cumulative": (j + 1) / count})
+        for j, (shape, _) in enumerate(SYSTEMS[system])
+    ]  # fmt: skip
+    return pd.concat(frames)
+
+
+def one(system="duffing", number=1, **kwargs):
+    return curves.responses(response_table(system, **kwargs), 10.0)[number - 1]
+
+
+def axes():
+    return Figure().subplots()
+
+
+@pytest.fixture
+def products(tmp_path):
+    """Writes the three products of a case."""
+
+    def write(system, **kwargs):
+        record, responses, coherences = (tmp_path / f"{n}.csv" for n in ("record", "responses", "coherences"))
+        force, displacement = np.random.default_rng(2).standard_normal((2, 2048))
+        channels = {"force": force, "displacement": 0.002 * displacement, "acceleration": force}
+        write_csv(Record(0.02, channels), record)
+        response_table(system, **kwargs).to_csv(responses, index=False)
+        coherence_table(system).to_csv(coherences, index=False)
+        return record, responses, coherences
+
+    return write
+
+
+# ---- words
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("u**3", "$u^{3}$"),
+        ("u*cos(2*pi*f_m*t)", r"$u\,\mathrm{cos}(2\,\pi\,f_{m}\,t)$"),
+        ("u*abs(u)", r"$u\,|u|$"),
+        ("max(u - gap, 0)", r"$\mathrm{max}(u - \mathrm{gap},\,0)$"),
+        ("(u + v)*-v", r"$(u + v)\,-v$"),
+        ("(u + 1)**2/(2*v)", r"$(u + 1)^{2}/(2\,v)$"),
+        ("u - (v - 1)", "$u - (v - 1)$"),
+    ],
+)
+def test_formula_reads_as_it_is_meant(text, expected):
+    assert labels.formula(text) == expected
+
+
+@pytest.mark.parametrize("shape", sorted({c.shape for t in LIBRARY.values() for c in t.components}))
+def test_every_shape_of_the_library_can_be_set_and_has_a_unit(shape):
+    MathTextParser("agg").parse(labels.formula(shape))
+    assert labels.response_unit(shape).startswith("N")
+
+
+@pytest.mark.parametrize(
+    ("shape", "unit"),
+    [("u", "N/m"), ("u**3", "N/m^3"), ("v*abs(v)", "N s^2/m^2"), ("max(u - gap, 0)", "N/m"), ("sgn(v)", "N"),
+     ("u*cos(2*pi*f_m*t)", "N/m"), ("max(min(u, u_g), -u_g)", "N/m"), ("u + v", "N per unit of the formula")],
+)  # fmt: skip
+def test_unit_of_a_frequency_response_function(shape, unit):
+    assert labels.response_unit(shape) == unit
+
+
+def test_scaled_units():
+    assert labels.prefixed("m", 0.004) == (1e-3, "mm")
+    assert labels.prefixed("m", 2.0) == (1.0, "m")
+    assert labels.prefixed("V", 0.004) == (1.0, "V")
+    assert labels.prefixed("m", 0.0) == (1.0, "m")
+    assert labels.power_of_ten(2.5e7) == (1e6, "10^6 ")
+    assert labels.power_of_ten(355.0) == (1.0, "")
+    assert labels.power_of_ten(0.0) == (1.0, "")
+    assert labels.quantity(0.00664, "m") == "6.64 mm"
+    assert labels.term_names("van_der_pol_damping + coulomb friction") == "Van der Pol damping + Coulomb friction"
+
+
+# ---- looks
+
+
+def test_no_two_estimators_look_alike_in_grey():
+    looks = [*styles.ESTIMATORS.values(), styles.look("something_new")]
+    assert len({str(look.dash) for look in looks}) == len(looks)
+    assert styles.look("something_new").label == "something new"
+    assert styles.rank("miso") < styles.rank("siso") < styles.rank("something_new")
+
+
+def test_figures_need_no_pyplot():
+    code = "import sys, study.figures.response, study.figures.page; sys.exit('matplotlib.pyplot' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+# ---- curves
+
+
+def test_responses_are_sorted_by_input_and_estimator_and_leave_out_zero_frequency():
+    first, second = curves.responses(response_table("duffing"), 10.0)
+    assert [c.estimator for c in first.curves] == ["miso", "siso"]
+    assert [c.estimator for c in second.curves] == ["miso"]
+    assert (first.number, second.shape) == (1, "u**3")
+    assert first.frequency[0] == pytest.approx(0.1)
+    assert first.frequency[-1] == pytest.approx(10.0)
+    np.testing.assert_allclose(first.exact, LINEAR[1:101])
+    assert one(exact=False).exact is None
+
+
+def test_the_band_holds_95_percent_of_real_parts_and_of_magnitudes():
+    rng = np.random.default_rng(11)
+    noise = (rng.standard_normal((2, 200_000)).T @ [1.0, 1j]) * 3.0 / np.sqrt(2.0)
+    curve = curves.Curve("miso", np.ones(len(noise)), 400.0 + noise, np.full(len(noise), 3.0))
+    assert np.mean(np.abs(curve.values.real - 400.0) < curve.half_width) == pytest.approx(0.95, abs=0.003)
+    assert np.mean(np.abs(np.abs(curve.values) - 400.0) < curve.half_width) == pytest.approx(0.95, abs=0.003)
+
+
+def test_coherences_of_an_estimator_that_is_not_there():
+    with pytest.raises(StudyError, match="nothing of the estimator 'other'; they are of miso"):
+        curves.coherences(coherence_table("duffing"), 10.0, "other")
+
+
+# ---- axes
+
+
+def drawn(panel):
+    return {line.get_label(): line for line in panel.lines}
+
+
+def test_magnitude_draws_each_estimate_in_its_look():
+    item = one()
+    lines = drawn(response.magnitude(axes(), item, "N/m"))
+    assert list(lines) == ["MI/SO", "SI/SO", "exact"]
+    np.testing.assert_allclose(lines["MI/SO"].get_ydata(), np.abs(item.curves[0].values))
+    np.testing.assert_allclose(lines["exact"].get_ydata(), np.abs(LINEAR[1:101]))
+    assert lines["MI/SO"].get_linestyle() == "-"
+    assert lines["SI/SO"].get_linestyle() == "--"
+    assert lines["exact"].get_linewidth() < lines["SI/SO"].get_linewidth() < lines["MI/SO"].get_linewidth()
+
+
+def test_magnitude_without_an_exact_function_is_that_of_a_measured_record():
+    assert list(drawn(response.magnitude(axes(), one(exact=False), "N/m"))) == ["MI/SO", "SI/SO"]
+
+
+def test_magnitude_band_is_about_the_curve():
+    panel, item = axes(), one(spread=0.1)
+    response.magnitude(panel, item, "N/m")
+    edges = panel.collections[0].get_paths()[0].vertices
+    at = np.isclose(edges[:, 0], item.frequency[50])
+    size, half = abs(item.curves[0].values[50]), item.curves[0].half_width[50]
+    assert edges[at, 1].min() == pytest.approx(size - half)
+    assert edges[at, 1].max() == pytest.approx(size + half)
+
+
+@pytest.mark.parametrize(("angle", "shown"), [(179.0, 179.0), (-179.0, 181.0), (-10.0, -10.0), (0.0, 0.0)])
+def test_phase_does_not_wrap_at_180_degrees(angle, shown):
+    frequency = np.array([1.0, 2.0])
+    curve = curves.Curve("miso", frequency, np.full(2, np.exp(1j * np.radians(angle))), np.zeros(2))
+    item = curves.InputResponse(1, "u", (curve,), frequency, None)
+    np.testing.assert_allclose(drawn(response.phase(axes(), item))["MI/SO"].get_ydata(), shown)
+
+
+def test_phase_leaves_a_gap_where_it_wraps():
+    frequency = np.arange(1.0, 4.0)
+    curve = curves.Curve("miso", frequency, np.exp(1j * np.radians([-80.0, -100.0, -100.0])), np.zeros(3))
+    item = curves.InputResponse(1, "u", (curve,), frequency, None)
+    np.testing.assert_allclose(drawn(response.phase(axes(), item))["MI/SO"].get_ydata(), [-80.0, np.nan, 260.0])
+
+
+def test_real_and_imaginary_part_share_a_scale_and_carry_their_power_of_ten():
+    real, imaginary, item = axes(), axes(), one(number=2)
+    response.real_and_imaginary(real, imaginary, item, "N/m^3", response.common_span([item]))
+    np.testing.assert_allclose(drawn(real)["exact"].get_ydata(), 20.0)
+    np.testing.assert_allclose(drawn(imaginary)["MI/SO"].get_ydata(), item.curves[0].values.imag / 1e6)
+    assert real.get_ylabel() == "Re $A_2$ (10$^{6}$ N/m$^{3}$)"
+    assert np.diff(real.get_ylim()) == pytest.approx(np.diff(imaginary.get_ylim()))
+    assert real.get_ylim()[0] < 0.0 < 20.0 < real.get_ylim()[1]
+
+
+def test_imaginary_part_of_a_damping_term_is_logarithmic_and_marks_wrong_signs():
+    table = response_table("duffing_van_der_pol")
+    line = (table["input"] == 2) & np.isclose(table["frequency"], 5.0)
+    table.loc[line, "imag"] *= -1.0
+    item = curves.responses(table, 10.0)[1]
+    real, imaginary = axes(), axes()
+    response.real_and_imaginary(real, imaginary, item, "N/m^3", response.common_span([item]))
+    assert (real.get_yscale(), imaginary.get_yscale()) == ("linear", "log")
+    crosses = drawn(imaginary)["opposite sign"]
+    wrong = np.sign(item.curves[0].values.imag) < 0.0
+    np.testing.assert_allclose(crosses.get_xdata(), item.frequency[wrong])
+    assert np.any(np.isclose(crosses.get_xdata(), 5.0))
+    np.testing.assert_allclose(drawn(imaginary)["exact"].get_ydata(), np.abs(item.exact.imag))
+
+
+def test_real_part_that_is_zero_is_seen_to_be_small_beside_the_function():
+    table = response_table("duffing_van_der_pol")
+    table[["real", "exact_real"]] -= 2e7 * (table["input"] == 2).to_numpy()[:, None]
+    item = curves.responses(table, 10.0)[1]
+    assert response.common_span([item]) >= 1.5 * np.median(np.abs(item.exact))
+
+
+def test_one_scale_for_inputs_of_one_unit():
+    second, third = curves.responses(response_table("mathieu"), 10.0)[1:]
+    assert response.common_span([second, third]) > 2.0 * response.common_span([third])
+
+
+def test_cumulative_coherence_names_what_each_curve_adds():
+    shares = curves.coherences(coherence_table("mathieu"), 10.0)
+    lines = drawn(coherence.cumulative(axes(), shares))
+    first, second, _ = lines
+    assert first.startswith("$u$: linear damping + Van der Pol")
+    assert second.startswith(r"+ $u\,\mathrm{cos}")
+    *others, last = lines.values()
+    np.testing.assert_allclose(last.get_ydata(), 1.0)
+    assert last.get_linestyle() == "-"
+    assert all(line.get_linestyle() != "-" for line in others)
+
+
+def test_histogram_is_in_the_unit_of_its_axis():
+    counts = histogram(0.002 * np.random.default_rng(1).standard_normal(4000))
+    panel = distribution.histogram(axes(), counts, "displacement", "m")
+    assert panel.get_xlabel() == "displacement (mm)"
+    bars = panel.patches[0].get_data()
+    assert np.sum(bars.values * np.diff(bars.edges)) == pytest.approx(1.0)
+    assert drawn(panel)["Gaussian of the same variance"].get_ydata().max() == pytest.approx(
+        1.0 / (counts.deviation * 1e3 * np.sqrt(2.0 * np.pi)), rel=1e-3
+    )
+    assert "-0.00" not in panel.get_title("left")
+
+
+def test_patterns_share_their_scales():
+    left, right = axes(), axes()
+    grid = np.linspace(-1.0, 1.0, 9)
+    motion.patterns(left, right, Pattern(0.01 * grid, grid), Pattern(0.02 * grid, 3.0 * grid), SI_UNITS)
+    assert left.get_xlim() == right.get_xlim()
+    assert left.get_ylim() == right.get_ylim()
+    assert left.get_ylim()[1] > 3.0
+    np.testing.assert_allclose(drawn(right)["random excitation"].get_xdata(), 20.0 * grid)
+
+
+# ---- pages
+
+
+def test_same_bytes_each_time_and_a_look_that_the_sheet_decides():
+    def made():
+        figure, panels = page.page("Title", "what is shown")
+        response.magnitude(panels[0], one(), "N/m")
+        page.legend(figure, panels, bands=True)
+        return figure
+
+    for kind in ("png", "svg"):
+        assert page.rendered(made(), kind) == page.rendered(made(), kind)
+    assert b"<dc:date>" not in page.rendered(made(), "svg")
+    assert made().axes[0].lines[0].get_color() == "C0"
+    with style.context({"axes.prop_cycle": "cycler('color', ['ff0000'])"}):
+        assert to_rgba("C0") == (1.0, 0.0, 0.0, 1.0)
+
+
+def check_layout(figure):
+    """Every word within the page, the legend and the titles clear of the panels, a unit on every axis."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    extent, size = figure.get_tightbbox(canvas.get_renderer()), figure.get_size_inches()
+    assert min(extent.p0) > 0.0, "something leaves the page at the left or below"
+    assert np.all(extent.p1 < size), "something leaves the page at the right or above"
+    for panel in figure.axes:
+        frame = panel.get_window_extent()
+        heads = [panel.title, panel._left_title, *figure.texts, *figure.legends]
+        boxes = {str(h): h.get_window_extent(canvas.get_renderer()) for h in heads}
+        for name, box in boxes.items():
+            assert not (box.width > 0 and box.overlaps(frame)), f"{name} covers a panel"
+        others = [b for n, b in boxes.items() if n != str(panel._left_title) and b.width > 0]
+        title = panel._left_title.get_window_extent(canvas.get_renderer())
+        assert not any(title.width > 0 and title.overlaps(b) for b in others), "a heading is covered"
+        if panel.axison:
+            assert panel.get_ylabel() == "" or panel.get_ylabel().endswith(")")
+            assert panel.get_xlabel() == "" or panel.get_xlabel().endswith(")")
+    shown = [p for p in figure.axes if p.axison]
+    assert not shown or (any(p.get_ylabel() for p in shown) and any(p.get_xlabel() for p in shown))
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_overlaps_on_any_page(draw_case, products, system, kind, monkeypatch, tmp_path):
+    seen = []
+    monkeypatch.setattr(page, "rendered", lambda figure, _: seen.append(figure) or b"")
+    title = "Extreme Duffing-Van der Pol system, input variance 0.2"
+    draw_case.draw(*products(system), {kind: [tmp_path / "a.png"]}, title=title, style=SHEET)
+    check_layout(seen[0])
+
+
+def test_there_is_room_for_many_estimators(draw_case, products, monkeypatch, tmp_path):
+    seen = []
+    monkeypatch.setattr(page, "rendered", lambda figure, _: seen.append(figure) or b"")
+    names = (*styles.ESTIMATORS, "another_one")
+    paths = products("duffing_van_der_pol", spread=0.5, estimators=names)
+    draw_case.draw(*paths, {k: [tmp_path / k] for k in ("linear", "nonlinear")}, title="Noise", style=SHEET)
+    for figure in seen:
+        check_layout(figure)
+    assert {"local polynomial", "95 % band"} <= {t.get_text() for t in seen[0].legends[0].get_texts()}
+
+
+def test_draw_writes_each_kind_twice(draw_case, products, tmp_path):
+    outputs = {kind: [tmp_path / f"{kind}.{ending}" for ending in ("png", "svg")] for kind in KINDS}
+    draw_case.draw(*products("duffing"), outputs, title="Duffing system", style=SHEET)
+    for png, svg in outputs.values():
+        assert png.read_bytes().startswith(b"\x89PNG")
+        assert b"</svg>" in svg.read_bytes()
+
+
+def test_draw_refuses_an_unknown_kind(draw_case, products, tmp_path):
+    with pytest.raises(StudyError, match="no kind of figure 'other'; known are linear"):
+        draw_case.draw(*products("duffing"), {"other": [tmp_path / "a.png"]}, title="", style=SHEET)
+
+
+@pytest.mark.parametrize("kind", ["duffing", "mathieu", "autospectrum", "force_history", "force_histogram"])
+def test_preliminary_figures(draw_preliminary, products, tmp_path, kind, monkeypatch):
+    record = products("plain")[0]
+    sources = {
+        name: draw_preliminary.Source(record, ROOT / "models" / f"{name}.yaml", f"{name} system")
+        for name in ("linear", "duffing", "mathieu")
+    }
+    seen, real = [], page.rendered
+    monkeypatch.setattr(page, "rendered", lambda figure, ending: seen.append(figure) or real(figure, ending))
+    output = tmp_path / "a.svg"
+    draw_preliminary.draw(sources, {kind: [output]}, style=SHEET, segments={"length": 256})
+    assert b"</svg>" in output.read_bytes()
+    check_layout(seen[0])
