@@ -100,7 +100,8 @@ def _map(powers: Complexes, weights: Floats) -> Complexes:
     scale = np.sqrt(np.mean(np.abs(powers) ** 2, axis=0))
     design = powers / scale
     weighted: Complexes = (design * weights[:, None]).conj().T
-    inverse: Floats = np.linalg.pinv((weighted @ design).real, hermitian=True)
+    normal: Floats = np.asarray((weighted @ design).real, dtype=np.float64)
+    inverse = np.linalg.pinv(normal, hermitian=True)
     return np.asarray((inverse @ weighted) / scale[:, None], dtype=np.complex128)
 
 

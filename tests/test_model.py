@@ -1,6 +1,7 @@
 """Models: immutable, complete before they run, and solved for the right acceleration."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,7 +9,10 @@ import pytest
 from study.errors import StudyError
 from study.expression import ExpressionError
 from study.model import Model, forward_graph, forward_program, free
+from study.modelfile import read_model
 from study.terms import custom, get
+
+MODELS = Path(__file__).parents[1] / "models"
 
 
 def test_the_same_term_twice_is_refused() -> None:
@@ -84,3 +88,14 @@ def test_registers_of_the_kernels_stand_first(make_model: Callable[..., Model]) 
     assert [program.inputs[n] for n in ("u", "v", "t", "force", "a", "b", "z:relaxation")] == list(range(7))
     assert program.registers[program.inputs["m"]] == 2.0
     assert np.count_nonzero(program.registers[:7]) == 0
+
+
+@pytest.mark.parametrize(
+    "name", ["linear", "duffing", "van_der_pol", "duffing_van_der_pol", "mathieu", "dead_band", "extreme"]
+)
+def test_model_files_hold_table_1(name: str, systems: dict[str, Model]) -> None:
+    """The files that the study runs are the systems that these tests hold against SciPy."""
+    read = read_model(MODELS / f"{name}.yaml")
+    assert read.name == name
+    assert read.values == pytest.approx(systems[name].values)
+    assert [t.name for t in read.terms] == [t.name for t in systems[name].terms]
