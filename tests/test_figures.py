@@ -1,6 +1,7 @@
 """Figures: what they draw is what they were given, in looks that hold in grey, with room for every word."""
 
 import importlib.util
+import itertools
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib import style
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.mathtext import MathTextParser
@@ -330,26 +332,22 @@ def test_same_bytes_each_time_and_a_look_that_the_sheet_decides():
 
 
 def check_layout(figure):
-    """Every word within the page, the legend and the titles clear of the panels, a unit on every axis."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
+    """Every word within the page, none over another or over a panel, a unit on every axis."""
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
-    extent, size = figure.get_tightbbox(canvas.get_renderer()), figure.get_size_inches()
+    renderer = canvas.get_renderer()
+    extent, size = figure.get_tightbbox(renderer), figure.get_size_inches()
     assert min(extent.p0) > 0.0, "something leaves the page at the left or below"
     assert np.all(extent.p1 < size), "something leaves the page at the right or above"
-    for panel in figure.axes:
+    heads = [*figure.texts, *figure.legends, *(a for p in figure.axes for a in (p._left_title, *p.texts))]
+    boxes = [(head, head.get_window_extent(renderer)) for head in heads]
+    boxes = [(head, box) for head, box in boxes if box.width > 0]
+    for (one_head, box), (other_head, other) in itertools.combinations(boxes, 2):
+        assert not box.overlaps(other), f"{one_head} covers {other_head}"
+    for panel in (p for p in figure.axes if p.axison):
         frame = panel.get_window_extent()
-        heads = [panel.title, panel._left_title, *figure.texts, *figure.legends]
-        boxes = {str(h): h.get_window_extent(canvas.get_renderer()) for h in heads}
-        for name, box in boxes.items():
-            assert not (box.width > 0 and box.overlaps(frame)), f"{name} covers a panel"
-        others = [b for n, b in boxes.items() if n != str(panel._left_title) and b.width > 0]
-        title = panel._left_title.get_window_extent(canvas.get_renderer())
-        assert not any(title.width > 0 and title.overlaps(b) for b in others), "a heading is covered"
-        if panel.axison:
-            assert panel.get_ylabel() == "" or panel.get_ylabel().endswith(")")
-            assert panel.get_xlabel() == "" or panel.get_xlabel().endswith(")")
+        assert not any(box.overlaps(frame) for _, box in boxes), "a heading or the legend covers a panel"
+        assert all(label == "" or label.endswith(")") for label in (panel.get_xlabel(), panel.get_ylabel()))
     shown = [p for p in figure.axes if p.axison]
     assert not shown or (any(p.get_ylabel() for p in shown) and any(p.get_xlabel() for p in shown))
 
