@@ -63,7 +63,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     try:
         _run(argv)
-        sys.stdout.flush()
+        _flush()
         return 0
     except StudyError as error:
         return _end(BAD_INPUT, str(error))
@@ -101,15 +101,19 @@ def _place(error: Exception) -> str:
     return f"{type(error).__name__}: {error}{where}"
 
 
+def _flush() -> None:
+    print(end="", flush=True)  # unlike sys.stdout.flush(), also where the shell has closed stdout
+
+
 def _end(code: int, message: str = "") -> int:
-    """Say the message in one line on stderr, and leave stdout so that the interpreter's own flush is quiet."""
+    """Say the message in one line on stderr, and leave nothing for the interpreter's own flush to complain of."""
     if message:
         line = " ".join(message.split())
         with suppress(OSError):
             print("study:", "".join(c if c.isprintable() else "?" for c in line), file=sys.stderr)
     try:
-        sys.stdout.flush()
-    except OSError:
+        _flush()
+    except OSError:  # what could not be written is tried again at exit, and complained of, unless it goes nowhere
         with suppress(OSError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return code

@@ -43,6 +43,7 @@ def _said(capsys: pytest.CaptureFixture[str]) -> str:
 @pytest.fixture(autouse=True)
 def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("PYTHONUNBUFFERED", raising=False)  # users' output is buffered, and so fails late
 
 
 def test_help_starts_at_once() -> None:
@@ -154,7 +155,7 @@ BAD = {
     "no_folder": (["simulate", DUFFING, "--samples", "64", "--out", "none/a.csv"], "none/a.csv: cannot be written"),
     "out_is_folder": (["simulate", DUFFING, "--samples", "64", "--out", "."], "cannot be written"),
     "out_in_file": (["simulate", DUFFING, "--samples", "64", "--out", f"{DUFFING}/a.csv"], "Not a directory"),
-    "control_characters": (["terms", "\x1b[31m\n\nred"], "red"),
+    "control_characters": (["simulate", "\x1b[31m\n\nred"], "?[31m red: there is no such file"),
 }
 
 
@@ -227,21 +228,43 @@ def test_whatever_goes_wrong_is_one_line(
     assert err.count("\n") == (1 if names else 0)
 
 
-def test_a_closed_pipe_is_quiet() -> None:
+@pytest.mark.parametrize("words", [["terms"], ["terms", "inertia"]])
+def test_a_closed_pipe_is_quiet(words: list[str]) -> None:
     read, write = os.pipe()
     os.close(read)
     try:
-        done = subprocess.run([*STUDY, "terms"], stdout=write, stderr=subprocess.PIPE, text=True, check=False)
+        done = subprocess.run([*STUDY, *words], stdout=write, stderr=subprocess.PIPE, text=True, check=False)
     finally:
         os.close(write)
     assert done.returncode == 141
     assert done.stderr == ""
 
 
+def test_an_error_after_output_to_a_closed_pipe_is_still_one_line() -> None:
+    code = ENDLESS.replace("time.sleep(60)", "raise cli.StudyError('too late')").replace(", flush=True", "")
+    read, write = os.pipe()
+    os.close(read)
+    try:
+        words = [sys.executable, "-c", code]
+        done = subprocess.run(words, stdout=write, stderr=subprocess.PIPE, text=True, check=False)
+    finally:
+        os.close(write)
+    assert done.returncode == 2
+    assert done.stderr == "study: too late\n"
+
+
+def test_a_closed_stdout_is_no_trouble() -> None:
+    command = f"'{sys.executable}' -m study terms >&-"
+    done = subprocess.run(["sh", "-c", command], stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 0
+    assert done.stderr == ""
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a device that is always full")
-def test_a_full_disk_behind_stdout_is_one_sentence() -> None:
+@pytest.mark.parametrize("words", [["terms"], ["terms", "inertia"], ["--version"]])
+def test_a_full_disk_behind_stdout_is_one_sentence(words: list[str]) -> None:
     with Path("/dev/full").open("w") as full:
-        done = subprocess.run([*STUDY, "terms"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        done = subprocess.run([*STUDY, *words], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert done.returncode == 2
     assert "No space left on device" in done.stderr
     assert done.stderr.count("\n") == 1

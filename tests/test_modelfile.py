@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study import files, modelfile
@@ -129,6 +129,7 @@ BROKEN: dict[str, tuple[bytes, str]] = {
     "unknown_term_mapping": (b"terms: [{term: quadratic_dampin, value: 1}]\n", "did you mean 'quadratic_damping'"),
     "nothing_like_it": (b"terms: [flux_capacitor]\n", "'flux_capacitor'"),
     "long_term": (b"terms: [" + b"a" * 5000 + b"]\n", "5000 characters"),
+    "long_own": (b"terms: [{term: " + b"a" * 5000 + b", force: u}]\n", "5000 characters"),
     "duplicate_term": (b"terms: [inertia, inertia]\n", "'inertia' twice"),
     "duplicate_own": (b"terms: [{term: a, force: u}, {term: a, force: v}]\n", "'a' twice"),
     "duplicate_key": (b"terms: [{term: inertia, value: 1, value: 2}]\n", "duplicate key"),
@@ -267,11 +268,13 @@ def _model_or_error(text: str) -> None:
         assert parse_model(format_model(model), HERE) == model
 
 
+@settings(deadline=None)
 @given(st.binary(max_size=300))
 def test_random_bytes(content: bytes) -> None:
     _model_or_error(content.decode("latin-1"))
 
 
+@settings(deadline=None)
 @given(
     st.text(
         alphabet=st.sampled_from("terms: inertia\n-[]{}&*!?|>'\"%@`#,01e._~<\\\tuv()+\x85\u2028\ufeff"), max_size=120
@@ -307,11 +310,13 @@ def _as_yaml(value: object) -> str:
     )
 
 
+@settings(deadline=None)
 @given(TREES)
 def test_random_structures(tree: object) -> None:
     _model_or_error(_as_yaml(tree))
 
 
+@settings(deadline=None)
 @given(st.fixed_dictionaries({"terms": st.lists(ENTRIES, max_size=5)}, optional={"name": LEAVES}))
 def test_random_structures_shaped_like_a_model(tree: dict[str, object]) -> None:
     _model_or_error(_as_yaml(tree))
@@ -334,6 +339,7 @@ def models(draw: st.DrawFn) -> Model:
     return Model(name, tuple(entries))
 
 
+@settings(deadline=None)
 @given(models())
 def test_a_written_model_reads_back_as_itself(model: Model) -> None:
     assert parse_model(format_model(model), HERE) == model
