@@ -1,0 +1,280 @@
+"""Displacement, velocity and acceleration from those of them that were measured.
+
+Derivatives and integrals are taken in the frequency domain, where they are exact for a band-limited
+record that closes on itself. A measured record does not close: its ends are continued by linear
+prediction (Burg's method, always stable) and faded out smoothly, so that no jump at the ends leaks into
+the record. Integration is blind below a cut-off frequency: drift and offset of an accelerometer, divided
+by (2 pi f)^2, would swamp everything else. The band that is left is stated, for judgements to keep to.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+from scipy.signal import lfilter, lfiltic
+
+from study.errors import StudyError
+from study.readers.unit_names import ROLES, VOLTAGE, Unit, parse_unit, role_unit
+from study.record import MOTIONS, SI_UNITS, Record
+from study.spectra import Segments, autospectrum
+
+Floats = NDArray[np.float64]
+ORDER = 64  # coefficients of the linear prediction at each end
+TRAINING = 4096  # samples that it is learnt from
+PREDICTABLE = 1e-14  # of the power: what may be left unpredicted, above the rounding errors of the recursion
+SHORTEST = 512  # samples by which each end is continued, at least
+RINGING = 4.0  # periods of the cut-off frequency by which ends are continued when integrating
+SETTLED = 2.0  # periods of the cut-off frequency at each end that an integrated channel is not yet sure of
+AVERAGES = 16  # segments, at least, for the spectrum that the cut-off is read from
+NEAR_END = 8  # samples at each end where a derivative leans on the continuation
+
+
+@dataclass(frozen=True)
+class CompletedRecord:
+    """A record with displacement, velocity and acceleration in one set of units.
+
+    Attributes
+    ----------
+    record : Record
+        Force, the three motions and any extra channels.
+    band : (float, float)
+        Lowest and highest frequency in hertz at which all three motions are right; judgements leave the rest out.
+    edge : int
+        Samples at each end that derivatives and integrals leave uncertain; 0 if nothing was computed.
+    says : tuple of str
+        What was converted or computed, a sentence each.
+    """
+
+    record: Record
+    band: tuple[float, float]
+    edge: int
+    says: tuple[str, ...]
+
+
+def complete(record: Record, cutoff: float | None = None) -> CompletedRecord:
+    """Fill in the motions that were not measured.
+
+    Parameters
+    ----------
+    record : Record
+        Force and at least one motion.
+    cutoff : float, optional
+        Lowest frequency in hertz that integration keeps (above it the gain is exactly one, below half of it
+        nothing is left). Default: :func:`suggest_cutoff`. If displacement and acceleration are both measured,
+        the velocity is the derivative of the one below the cut-off and the integral of the other above it; without
+        a cut-off it is the derivative of the displacement.
+
+    Returns
+    -------
+    CompletedRecord
+
+    Raises
+    ------
+    StudyError
+        If no motion is there, units cannot be brought together, or the cut-off is outside of (0, 1/(2 dt)).
+    """
+    measured = [m for m in MOTIONS if m in record]
+    if not measured:
+        raise StudyError(f"{record.name}: no displacement, velocity or acceleration is there; at least one is needed")
+    nyquist = 0.5 / record.dt
+    if cutoff is not None and not 0.0 < cutoff < nyquist:
+        raise StudyError(f"{record.name}: the cut-off is {cutoff:g} Hz; above 0 and below {nyquist:g} Hz is right")
+    record, says = consistent(record)
+    if len(measured) == len(MOTIONS):
+        return CompletedRecord(record, (0.0, nyquist), 0, says)
+    if measured == ["displacement", "acceleration"] and cutoff is not None:
+        return _blended(record, cutoff, says)
+    return _derived(record, measured, cutoff, says)
+
+
+def _derived(record: Record, measured: list[str], cutoff: float | None, says: tuple[str, ...]) -> CompletedRecord:
+    """Each missing motion from the nearest measured one, by derivatives if there is a choice."""
+    integrates = MOTIONS.index(measured[0]) > 0
+    low = (suggest_cutoff(record) if cutoff is None else cutoff) if integrates else 0.0
+    found: dict[str, Floats] = {}
+    sentences = list(says)
+    for level, name in enumerate(MOTIONS):
+        if name in measured:
+            continue
+        below = [m for m in measured if MOTIONS.index(m) < level]
+        source = below[-1] if below else measured[0]
+        order = level - MOTIONS.index(source)
+        found[name] = derivative(record[source], record.dt, order, low)
+        how = f"derivative {order}" if order > 0 else f"integral {-order}, above {low:.4g} Hz,"
+        sentences.append(f"{name} is {how} of the {source}")
+    edge = min(int(np.ceil(SETTLED / (low * record.dt))), len(record) // 4) if integrates else NEAR_END
+    return CompletedRecord(record.with_channels(found), (low, 0.5 / record.dt), edge, tuple(sentences))
+
+
+def _blended(record: Record, cutoff: float, says: tuple[str, ...]) -> CompletedRecord:
+    """Velocity from both sides: what integration loses below the cut-off, the derivative supplies."""
+    slow = derivative(record["displacement"], record.dt, 1)
+    fast = derivative(record["acceleration"], record.dt, -1, cutoff)
+    lost = slow - derivative(record["displacement"], record.dt, 1, cutoff)
+    velocity = {"velocity": fast + lost}
+    edge = min(int(np.ceil(SETTLED / (cutoff * record.dt))), len(record) // 4)
+    told = f"velocity is the derivative of the displacement below {cutoff:.4g} Hz and the integral of the acceleration"
+    return CompletedRecord(record.with_channels(velocity), (0.0, 0.5 / record.dt), edge, (*says, f"{told} above"))
+
+
+def derivative(values: Floats, dt: float, order: int, cutoff: float = 0.0) -> Floats:
+    """Derivative, or integral above a cut-off, in the frequency domain.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        Samples.
+    dt : float
+        Sampling interval in seconds.
+    order : int
+        1 and 2 differentiate, -1 and -2 integrate, 0 only leaves out what lies below the cut-off.
+    cutoff : float
+        In hertz: full gain above it, none below half of it, a raised cosine between. Must be above zero to
+        integrate.
+
+    Returns
+    -------
+    array, shape (n,)
+    """
+    reach = max(SHORTEST, int(np.ceil(RINGING / (cutoff * dt)))) if cutoff > 0.0 else SHORTEST
+    mean = float(np.mean(values))
+    longer = _continued(values - mean, min(reach, 8 * len(values)))
+    size = next_fast_len(len(longer), real=True)
+    spectrum = rfft(longer, size)
+    frequency = np.asarray(rfftfreq(size, dt))
+    omega = 2.0 * np.pi * frequency
+    gain = _pass_above(frequency, cutoff)
+    np.divide(gain, omega**-order, out=gain, where=omega > 0.0) if order < 0 else np.multiply(gain, omega**order, gain)
+    turned = spectrum * gain * 1j**order
+    if size % 2 == 0 and order % 2:
+        turned[-1] = 0.0  # the Nyquist line of an odd derivative has no real part
+    before = (len(longer) - len(values)) // 2
+    result = irfft(turned, size)[before : before + len(values)]
+    return result + mean if order == 0 and cutoff == 0.0 else np.asarray(result)
+
+
+def _pass_above(frequency: Floats, cutoff: float) -> Floats:
+    if cutoff == 0.0:
+        return np.ones_like(frequency)
+    rise = np.clip(2.0 * frequency / cutoff - 1.0, 0.0, 1.0)
+    return 0.5 - 0.5 * np.cos(np.pi * rise)
+
+
+def _continued(values: Floats, reach: int) -> Floats:
+    """The record between two continuations of ``reach`` samples that fade to zero, shape (n + 2 reach,)."""
+    after = _predicted(values, reach)
+    before = _predicted(values[::-1], reach)[::-1]
+    x = np.arange(1, reach + 1) / (reach + 1)
+    fade = 1.0 - x**4 * (35.0 - 84.0 * x + 70.0 * x**2 - 20.0 * x**3)  # three smooth derivatives at both ends
+    return np.concatenate([before * fade[::-1], values, after * fade])
+
+
+def _predicted(values: Floats, reach: int) -> Floats:
+    """What linear prediction makes of the samples behind the last one, shape (reach,).
+
+    A prediction of high order is stable in exact arithmetic only; one that grows is replaced by a shorter one.
+    """
+    recent = values[-TRAINING:]
+    limit = 2.0 * float(np.max(np.abs(recent)))
+    order = min(ORDER, len(recent) // 3)
+    while order > 0:
+        weights = np.concatenate([[1.0], -burg(recent, order)])
+        state = lfiltic([1.0], weights, recent[: -len(weights) : -1])
+        continued = np.asarray(lfilter([1.0], weights, np.zeros(reach), zi=state)[0], dtype=np.float64)
+        if float(np.max(np.abs(continued), initial=0.0)) <= limit:
+            return continued
+        order //= 2
+    return np.zeros(reach)
+
+
+def burg(values: Floats, order: int) -> Floats:
+    """Coefficients of a stable linear prediction ``x_n = sum_k a_k x_(n-k)`` (Burg, 1975), shape (order,).
+
+    The recursion minimises forward and backward prediction errors together and uses no window, so that
+    a sinusoid continues as itself. It stops early once nothing is left to predict.
+    """
+    forward, backward = values[1:].copy(), values[:-1].copy()
+    weights = np.zeros(0)
+    floor = PREDICTABLE * float(forward @ forward + backward @ backward)
+    for _ in range(order):
+        power = float(forward @ forward + backward @ backward)
+        if power <= floor or len(forward) < 2:
+            break
+        reflection = 2.0 * float(forward @ backward) / power
+        weights = np.concatenate([weights - reflection * weights[::-1], [reflection]])
+        forward, backward = (forward - reflection * backward)[1:], (backward - reflection * forward)[:-1]
+    return weights
+
+
+def suggest_cutoff(record: Record) -> float:
+    """Frequency in hertz above which a measured acceleration or velocity can be integrated.
+
+    The autospectrum of the displacement is that of the acceleration over (2 pi f)^4. Towards low frequencies that
+    of a response levels off, that of noise and drift rises as f^-4. Coming from below, the cut-off is where it
+    first stops falling for an octave; at most where the measured motion is strongest.
+    """
+    name = next(m for m in reversed(MOTIONS) if m in record)
+    length = min(len(record), max(32, min(4096, 2 * len(record) // AVERAGES)))
+    frequency, power = autospectrum(record[name], record.dt, Segments(length))
+    frequency, power = frequency[2:], power[2:]
+    displacement = _smooth(power) / frequency ** (2 * MOTIONS.index(name))
+    strongest = int(np.argmax(power))
+    for k in range(strongest):
+        octave = (frequency > frequency[k]) & (frequency <= 2.0 * frequency[k])
+        if np.all(displacement[octave] >= displacement[k]):
+            return float(frequency[k])
+    return float(frequency[strongest])
+
+
+def _smooth(power: Floats) -> Floats:
+    """Mean over a third of an octave, or three lines where that is more."""
+    total = np.concatenate([[0.0], np.cumsum(power)])
+    line = np.arange(len(power))
+    half = np.maximum(1, np.floor(line * 0.115)).astype(int)
+    first, last = np.maximum(line - half, 0), np.minimum(line + half + 1, len(power))
+    return np.asarray((total[last] - total[first]) / (last - first))
+
+
+def consistent(record: Record) -> tuple[Record, tuple[str, ...]]:
+    """The record with velocity per second of displacement and acceleration per second of velocity.
+
+    The unit of length is that of the first of displacement, velocity and acceleration that was measured
+    (metres for an acceleration in g). Numbers that are consistent already are not touched.
+
+    Returns
+    -------
+    record, says : Record, tuple of str
+        Converted where needed, and a sentence on each conversion.
+
+    Raises
+    ------
+    StudyError
+        If a unit is none, or calibrated and uncalibrated (volts) motions are mixed.
+    """
+    measured = [m for m in MOTIONS if m in record]
+    units = {m: role_unit(m, record.units.get(m) or SI_UNITS[m]) for m in measured}
+    if len({u.powers[3] for u in units.values()}) > 1:
+        told = ", ".join(f"{m} in {u.text}" for m, u in units.items())
+        raise StudyError(f"{record.name}: {told} cannot be compared; all calibrated, or all in volts, is right")
+    length = _length(units[measured[0]])
+    right = {m: _rate(length, k) for k, m in enumerate(MOTIONS)}
+    channels: dict[str, Floats] = {}
+    says: list[str] = []
+    for motion, unit in units.items():
+        wanted = right[motion]
+        factor = unit.factor / parse_unit(wanted).factor
+        if unit.powers[3] == 0 and factor != 1.0:
+            channels[motion] = record[motion] * factor
+            says.append(f"{motion} is converted from {unit.text} to {wanted}")
+    return replace(record.with_channels(channels), units={**record.units, **right}), tuple(says)
+
+
+def _length(unit: Unit) -> str:
+    """The unit of length in a unit of motion: ``mm`` in ``mm/s^2``, ``m`` in ``g``."""
+    first = unit.text.replace("/", " ").split()[0]
+    return first if parse_unit(first).powers in (ROLES["displacement"][0], VOLTAGE) else "m"
+
+
+def _rate(length: str, order: int) -> str:
+    return {0: length, 1: f"{length}/s", 2: f"{length}/s^2"}[order]

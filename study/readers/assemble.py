@@ -1,0 +1,123 @@
+"""From columns to a record: roles, units, sampling interval, and every check a channel must pass."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from study.errors import StudyError
+from study.readers import checks
+from study.readers.options import ReadOptions
+from study.readers.roles import assign, own_unit
+from study.readers.sampling import even_interval
+from study.readers.table import Column, Table
+from study.readers.unit_names import ROLES, is_unit, parse_unit, role_unit
+from study.record import MOTIONS, SI_UNITS, Record
+
+
+def record_from(path: Path, table: Table, options: ReadOptions) -> Record:
+    """The record that a table holds.
+
+    Raises
+    ------
+    StudyError
+        If columns, units, times or values do not make one.
+    """
+    if options.group and all("/" not in c.name for c in table.columns):
+        raise StudyError(f"{path}: a group {options.group!r} is asked for and this file has none; leave it out")
+    roles = assign(path, table, options)
+    for column in roles.values():
+        if column.fault:
+            raise StudyError(f"{path}: {column.fault}")
+    _check_lengths(path, roles, options)
+    units = _units(path, roles, options)
+    first, last = _range(path, len(roles["force"].values), options)
+    cut = table.from_sample(first)
+    kept = _usable(path, {r: replace(c, values=c.values[first:last]) for r, c in roles.items()}, cut, options)
+    dt, start = _sampling(path, kept, units, cut, options, first)
+    channels = {role: c.values for role, c in kept.items() if role != "time"}
+    named = {role: unit for role, unit in units.items() if role in channels}
+    return Record(dt, channels, {**SI_UNITS, **named}, _name(path, options), start, _period(path, roles, options))
+
+
+def _name(path: Path, options: ReadOptions) -> str:
+    """The file's own name; the folder's for what the simulator writes, which is always ``record.csv``."""
+    stem = path.resolve().parent.name if path.stem == "record" else path.stem
+    return f"{stem}_{options.group.strip('/').replace('/', '_')}" if options.group else stem
+
+
+def _check_lengths(path: Path, roles: Mapping[str, Column], options: ReadOptions) -> None:
+    lengths = {f"{role} ({c.name!r})": len(c.values) for role, c in roles.items()}
+    if len(set(lengths.values())) > 1:
+        told = ", ".join(f"{role} has {n}" for role, n in lengths.items())
+        raise StudyError(f"{path}: channels differ in length: {told} samples; the same number for all is right")
+    unknown = [role for role in options.units if role not in roles and role != "time"]
+    if unknown:
+        raise StudyError(f"{path}: a unit is given for {unknown[0]!r}; {', '.join(roles)} are the channels")
+
+
+def _units(path: Path, roles: Mapping[str, Column], options: ReadOptions) -> dict[str, str]:
+    """Unit of each channel, as records write it; an extra channel's may be anything."""
+    units: dict[str, str] = {}
+    for role, column in roles.items():
+        text = options.units.get(role) or own_unit(column, role)
+        if not text:
+            continue
+        if role not in ROLES:
+            units[role] = parse_unit(text).text if is_unit(text) else text
+            continue
+        try:
+            units[role] = role_unit(role, text).text
+        except StudyError as error:
+            raise StudyError(f"{path}: column {column.name!r}: {error}") from None
+    return units
+
+
+def _range(path: Path, length: int, options: ReadOptions) -> tuple[int, int]:
+    first, last = options.samples or (0, None)
+    end = length if last is None else last
+    if first >= length or end > length:
+        raise StudyError(f"{path}: samples {first} to {end} are asked for; the record has {length}")
+    if end - first < checks.FEWEST_SAMPLES:
+        raise StudyError(f"{path}: {end - first} samples are too few; {checks.FEWEST_SAMPLES} or more are right")
+    return first, end
+
+
+def _usable(path: Path, roles: Mapping[str, Column], table: Table, options: ReadOptions) -> dict[str, Column]:
+    """The channels, each checked; an extra channel with gaps that nobody asked for is left out."""
+    usable: dict[str, Column] = {}
+    for role, column in roles.items():
+        fault = checks.not_finite(column.values, table.place)
+        if fault is not None and role not in (*ROLES, *options.columns):
+            continue
+        if fault is None and role in ("force", *MOTIONS):
+            fault = checks.constant(column.values)
+            if fault is None and not options.accept_saturated:
+                fault = checks.saturated(column.values)
+        if fault is not None:
+            raise StudyError(f"{path}: column {column.name!r} ({role}) {fault}")
+        usable[role] = column
+    return usable
+
+
+def _sampling(
+    path: Path, roles: Mapping[str, Column], units: Mapping[str, str], table: Table, options: ReadOptions, first: int
+) -> tuple[float, float]:
+    """Interval and first time: what the user says, what the times say, what the file states."""
+    stated = options.interval
+    if "time" in roles:
+        time = roles["time"].values * parse_unit(units.get("time", "s")).factor
+        return (stated, float(time[0])) if stated is not None else even_interval(path, time, table.place)
+    dt = stated if stated is not None else table.dt
+    if dt is None:
+        raise StudyError(
+            f"{path}: it has no column of times and states no sampling rate; give --fs HERTZ, or a column of times "
+            "by --column time=..."
+        )
+    return dt, table.start + dt * first
+
+
+def _period(path: Path, roles: Mapping[str, Column], options: ReadOptions) -> int | None:
+    length = len(roles["force"].values)
+    if options.period is not None and options.period > length:
+        raise StudyError(f"{path}: a period of {options.period} samples is given; the record has {length}")
+    return options.period if options.period is not None else roles["force"].period

@@ -1,0 +1,55 @@
+"""What a channel must not be: with gaps, constant, saturated, too short."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+FEWEST_SAMPLES = 16
+FEWEST_CLIPPED = 10  # samples at the very same extreme value ...
+CLIPPED_SHARE = 1e-3  # ... and this share of the record ...
+CLIPPED_RATIO = 10.0  # ... and this many times as many as at the values next to it: then it is clipped
+FEWEST_VALUES = 20  # with fewer different values it is a switched signal, not a clipped one
+NEAR = 0.05  # of the range: the values next to the extreme
+
+
+def not_finite(values: Floats, place: Callable[[int], str]) -> str | None:
+    """A sentence on the first sample without a number."""
+    bad = np.flatnonzero(~np.isfinite(values))
+    if not len(bad):
+        return None
+    what = "no number" if np.isnan(values[bad[0]]) else "an infinite value"
+    more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
+    return f"has {what} in {place(int(bad[0]))}{more}; fill the gap, or cut it away by 'samples: [first, last]'"
+
+
+def constant(values: Floats) -> str | None:
+    """A sentence on a channel that does not move."""
+    if np.ptp(values) > 0.0:
+        return None
+    return f"is {values[0]:g} throughout; a signal that moves is right"
+
+
+def saturated(values: Floats) -> str | None:
+    """A sentence on a channel that rests at its highest or lowest value.
+
+    A signal passes its extreme once, a coarsely digitised one a few times more often than the values next
+    to it. A clipped one rests there. Signals of a few values (square waves, steps) and a lowest or highest
+    value of zero (blows of a hammer) are no sign of clipping.
+    """
+    for extreme, side in ((float(np.max(values)), "highest"), (float(np.min(values)), "lowest")):
+        count = int(np.count_nonzero(values == extreme))
+        if extreme == 0.0 or count < max(FEWEST_CLIPPED, CLIPPED_SHARE * len(values)):
+            continue
+        different, times = np.unique(values, return_counts=True)
+        if len(different) < FEWEST_VALUES:
+            continue
+        near = (np.abs(different - extreme) <= NEAR * np.ptp(values)) & (different != extreme)
+        usual = float(np.mean(times[near])) if near.any() else float(np.median(times))
+        if count > CLIPPED_RATIO * usual:
+            return (
+                f"rests at its {side} value {extreme:g} for {count} of {len(values)} samples, as a saturated channel "
+                "does; a wider measuring range is right (or 'accept_saturated: true' if the signal is like that)"
+            )
+    return None

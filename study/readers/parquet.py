@@ -1,0 +1,27 @@
+"""Parquet: columns by name."""
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from study.readers.table import NONE, Column, Table, split_unit
+
+
+def read(path: Path) -> Table:
+    """Read every column; moments in time become seconds from the first."""
+    parquet: Any = import_module("pyarrow.parquet")
+    table: Any = parquet.ParquetFile(path).read()  # one file, with nothing inferred from the folder's name
+    return Table(tuple(_column(str(name), data) for name, data in zip(table.column_names, table.columns, strict=True)))
+
+
+def _column(heading: str, data: Any) -> Column:
+    name, unit = split_unit(heading)
+    values: Any = np.asarray(data.to_numpy())
+    if values.dtype.kind == "M":
+        values = (values - values[:1]) / np.timedelta64(1, "s")
+    if values.dtype.kind not in "biuf":
+        fault = f"column {name!r} holds {data.type}; real numbers are right"
+        return Column(name, NONE, unit, fault=fault)
+    return Column(name, values.astype(np.float64), unit)

@@ -1,0 +1,159 @@
+"""What every kind of file is read into: named columns, and what the file itself says about them."""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.errors import StudyError
+from study.readers.unit_names import is_unit
+
+Floats = NDArray[np.float64]
+Array = NDArray[Any]  # as a file holds it: of any kind of number, or of none
+NONE = np.zeros(0)
+RATES = ("fs", "samplerate", "samplingrate", "samplingfrequency", "samplefrequency")
+INTERVALS = ("dt", "ts", "samplingtime", "samplingperiod", "sampletime", "samplinginterval")
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column as it stands in the file.
+
+    Attributes
+    ----------
+    name : str
+        Its name, without the unit.
+    values : array, shape (n,)
+        Empty where ``fault`` says why there are none.
+    unit, role : str
+        What the file says it is; empty where it says nothing.
+    fault : str
+        A sentence for the user who asks for this column, if it cannot be used.
+    period : int, optional
+        Samples in a period, if the file holds periods side by side.
+    """
+
+    name: str
+    values: Floats
+    unit: str = ""
+    role: str = ""
+    fault: str = ""
+    period: int | None = None
+
+
+def _sample(index: int) -> str:
+    return f"sample {index}"
+
+
+@dataclass(frozen=True)
+class Table:
+    """The columns of a file.
+
+    Attributes
+    ----------
+    columns : tuple of Column
+        In the file's order.
+    dt : float, optional
+        Sampling interval in seconds, if the file states one.
+    start : float
+        Time of the first sample in seconds, if the file states one.
+    place : callable
+        Where in the file a sample stands, in words: ``line 17``.
+    """
+
+    columns: tuple[Column, ...]
+    dt: float | None = None
+    start: float = 0.0
+    place: Callable[[int], str] = field(default=_sample)
+
+    def from_sample(self, first: int) -> "Table":
+        """The same table, places counted from a later sample on."""
+
+        def place(index: int) -> str:
+            return self.place(index + first)
+
+        return replace(self, place=place)
+
+    def listing(self) -> str:
+        """The columns as a message lists them."""
+        shown = [f"{k} {_short(c.name)!r}" for k, c in enumerate(self.columns[:12], start=1)]
+        return ", ".join(shown) + (f" and {len(self.columns) - 12} more" if len(self.columns) > 12 else "")
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 30 else f"{text[:27]}..."
+
+
+def split_unit(text: str) -> tuple[str, str]:
+    """Name and unit of a heading: ``Force [kN]``, ``force (kN)``, ``F / kN``.
+
+    Square brackets always hold a unit; what stands in round ones or behind a stroke is one only if it
+    can be.
+    """
+    text = text.strip()
+    found = re.fullmatch(r"(.*?)\s*\[([^\[\]]*)\]", text)
+    if found and found[1]:
+        return found[1], found[2].strip()
+    for pattern in (r"(.*?)\s*\((.*)\)", r"([^/]*?)\s*/\s*(.*)"):
+        found = re.fullmatch(pattern, text)
+        if found and found[1] and is_unit(found[2]):
+            return found[1], found[2].strip()
+    return text, ""
+
+
+def from_arrays(arrays: Mapping[str, object], units: Mapping[str, str]) -> Table:
+    """Columns from the named arrays of a binary file; lone numbers named fs or dt give the sampling rate if they agree.
+
+    Raises
+    ------
+    StudyError
+        If the file states a sampling rate that cannot be.
+    """
+    found: dict[str, Array] = {name: np.asarray(value) for name, value in arrays.items()}
+    series = [name for name, array in found.items() if array.size > 1]
+    columns: list[Column] = []
+    intervals: set[float] = set()
+    for name, array in found.items():
+        stem = re.sub(r"[^a-z]", "", name.rsplit("/", 1)[-1].lower())
+        if array.size == 1 and stem in (*RATES, *INTERVALS):
+            intervals.add(_interval(name, array, inverse=stem in RATES))
+        elif series == [name] and array.ndim == 2 and min(array.shape) > 1:
+            columns += _matrix_columns(name, array)
+        elif array.size > 1:
+            columns.append(_column(name, array, units.get(name, "")))
+    return Table(tuple(columns), intervals.pop() if len(intervals) == 1 else None)
+
+
+def _interval(name: str, array: Array, *, inverse: bool) -> float:
+    value = complex(array.reshape(-1)[0]) if array.dtype.kind in "iufc" else 0j
+    if value.imag or not np.isfinite(value.real) or value.real <= 0.0:
+        raise StudyError(f"{name!r} is {array.reshape(-1)[0]!s}; a sampling rate or interval above zero is right")
+    return 1.0 / value.real if inverse else value.real
+
+
+def _matrix_columns(name: str, array: Array) -> list[Column]:
+    """The columns of a file's only matrix: by number, channel beside channel."""
+    tall = array if array.shape[0] >= array.shape[1] else array.T
+    return [_column(f"{name}:{k}", tall[:, k - 1], "") for k in range(1, tall.shape[1] + 1)]
+
+
+def _column(name: str, array: Array, unit: str) -> Column:
+    """One channel: a row of numbers, or (samples, periods) put end to end."""
+    shape = array.shape
+    if array.dtype.kind not in "biuf":
+        kind = "complex numbers" if array.dtype.kind == "c" else "text or objects"
+        return Column(name, NONE, unit, fault=f"column {name!r} holds {kind}; real numbers are right")
+    array = array.squeeze()
+    if array.ndim > 2:
+        fault = f"column {name!r} has the shape {shape}; (samples,) or (samples, periods) is right"
+        return Column(name, NONE, unit, fault=fault)
+    if array.ndim < 2:
+        return Column(name, np.atleast_1d(array).astype(np.float64), unit)
+    if array.shape[0] == array.shape[1]:
+        fault = f"column {name!r} has the shape {shape}, samples and periods cannot be told apart; put them end to end"
+        return Column(name, NONE, unit, fault=fault)
+    tall = array if array.shape[0] > array.shape[1] else array.T
+    return Column(name, tall.T.reshape(-1).astype(np.float64), unit, period=tall.shape[0])

@@ -1,0 +1,164 @@
+"""Units as people write them: ``m/s²``, ``mm s^-2``, ``kN``, ``g``, ``mV``.
+
+Force, length, time and voltage are the base dimensions; a mass is a force over an acceleration, so that
+``kg m/s^2`` is a force.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+
+from study.errors import StudyError
+
+Powers = tuple[int, int, int, int]  # of force, length, time, voltage
+FORCE: Powers = (1, 0, 0, 0)
+LENGTH: Powers = (0, 1, 0, 0)
+TIME: Powers = (0, 0, 1, 0)
+VOLTAGE: Powers = (0, 0, 0, 1)
+VELOCITY: Powers = (0, 1, -1, 0)
+ACCELERATION: Powers = (0, 1, -2, 0)
+STANDARD_GRAVITY = 9.80665  # m/s^2, exact by definition (3rd CGPM, 1901)
+POUND_FORCE = 0.45359237 * STANDARD_GRAVITY  # N, exact by definition
+
+BASES: dict[str, tuple[float, Powers]] = {
+    "N": (1.0, FORCE),
+    "lbf": (POUND_FORCE, FORCE),
+    "lb": (POUND_FORCE, FORCE),
+    "kip": (1000.0 * POUND_FORCE, FORCE),
+    "kgf": (STANDARD_GRAVITY, FORCE),
+    "dyn": (1e-5, FORCE),
+    "kg": (1.0, (1, -1, 2, 0)),
+    "m": (1.0, LENGTH),
+    "in": (0.0254, LENGTH),
+    "inch": (0.0254, LENGTH),
+    "mil": (0.0254e-3, LENGTH),
+    "ft": (0.3048, LENGTH),
+    "s": (1.0, TIME),
+    "sec": (1.0, TIME),
+    "min": (60.0, TIME),
+    "h": (3600.0, TIME),
+    "V": (1.0, VOLTAGE),
+    "g": (STANDARD_GRAVITY, ACCELERATION),
+    "gn": (STANDARD_GRAVITY, ACCELERATION),
+    "g_n": (STANDARD_GRAVITY, ACCELERATION),
+    "Gal": (0.01, ACCELERATION),
+}
+PREFIXES = {"M": 1e6, "k": 1e3, "d": 1e-1, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
+PREFIXED = ("N", "m", "s", "V", "g", "gn")
+PLAIN = str.maketrans({
+    "²": "^2", "³": "^3", "⁻": "^-", "¹": "1", "·": " ", "⋅": " ", "*": " ", "µ": "u", "μ": "u", "−": "-",
+})  # fmt: skip
+FACTOR = re.compile(r"([A-Za-z_]+)(?:\^?(-?[0-9]))?")
+ROLES: dict[str, tuple[Powers, str]] = {
+    "force": (FORCE, "N, kN, MN, lbf or V"),
+    "displacement": (LENGTH, "m, mm, um, in, ft or V"),
+    "velocity": (VELOCITY, "m/s, mm/s, in/s or V"),
+    "acceleration": (ACCELERATION, "m/s^2, mm/s^2, g or V"),
+    "time": (TIME, "s, ms or us"),
+}
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit that was understood.
+
+    Attributes
+    ----------
+    text : str
+        As records, tables and figures write it (``m/s^2``, ``um``).
+    factor : float
+        How many SI units (N, m, s, V) it is.
+    powers : tuple of int
+        Powers of force, length, time and voltage.
+    """
+
+    text: str
+    factor: float
+    powers: Powers
+
+
+def parse_unit(text: str) -> Unit:
+    """Understand a unit.
+
+    Raises
+    ------
+    StudyError
+        If it is none, naming it and some that are.
+    """
+    plain = text.strip().replace("**", "^").translate(PLAIN).replace("^-^", "^-")
+    plain = re.sub(r"\s*([/^])\s*", r"\1", " ".join(plain.replace("(", " ").replace(")", " ").split()))
+    factor, powers = 1.0, (0, 0, 0, 0)
+    for position, group in enumerate(plain.split("/")):
+        if not group:
+            raise _unknown(text)
+        for token in group.split():
+            size, own = (1.0, (0, 0, 0, 0)) if (token, position) == ("1", 0) else _factor(token, text)
+            sign = -1 if position else 1
+            factor *= size**sign
+            powers = tuple(p + sign * o for p, o in zip(powers, own, strict=True))
+    if not math.isfinite(factor) or factor <= 0.0:
+        raise _unknown(text)
+    a, b, c, d = powers
+    return Unit(_written(plain), factor, (a, b, c, d))
+
+
+def _factor(token: str, text: str) -> tuple[float, tuple[int, ...]]:
+    found = FACTOR.fullmatch(token)
+    if found is None:
+        raise _unknown(text)
+    name, power = found[1], int(found[2] or "1")
+    size, powers = _base(name, text)
+    return size**power, tuple(power * p for p in powers)
+
+
+def _base(name: str, text: str) -> tuple[float, Powers]:
+    if name in BASES:
+        return BASES[name]
+    if name[:1] in PREFIXES and name[1:] in PREFIXED:
+        size, powers = BASES[name[1:]]
+        return PREFIXES[name[0]] * size, powers
+    raise _unknown(text)
+
+
+def _written(plain: str) -> str:
+    """The usual way to write it: powers with a caret, ``s`` for ``sec``."""
+    plain = re.sub(r"\bsec(?=\d|\b|\^)", "s", plain)
+    plain = re.sub(r"(?<=[A-Za-z])(-?\d)", r"^\1", plain)
+    return re.sub(r"/([A-Za-z]+)/\1\b", r"/\1^2", plain)  # m/s/s
+
+
+def _unknown(text: str) -> StudyError:
+    shown = text if len(text) <= 40 else f"{text[:37]}..."
+    return StudyError(f"there is no unit {shown!r}; N, kN, lbf, m, mm, um, in, m/s, m/s^2, g, s, ms and V are known")
+
+
+def role_unit(role: str, text: str) -> Unit:
+    """The unit of a channel, checked against what the channel is.
+
+    Parameters
+    ----------
+    role : str
+        ``force``, ``displacement``, ``velocity``, ``acceleration`` or ``time``.
+    text : str
+        As the user or the file wrote it. Volts are accepted for all but time: an uncalibrated sensor.
+
+    Raises
+    ------
+    StudyError
+        If there is no such unit, or it cannot be a unit of this.
+    """
+    unit = parse_unit(text)
+    powers, right = ROLES[role]
+    signal = role != "time" and unit.powers[3] == 1
+    if unit.powers != powers and not signal:
+        raise StudyError(f"{text!r} is no unit of {role}; {right} is right")
+    return unit
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit."""
+    try:
+        parse_unit(text)
+    except StudyError:
+        return False
+    return True
