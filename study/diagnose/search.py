@@ -1,0 +1,208 @@
+"""Starting values for a candidate: where in its shape parameters does it explain most?
+
+The residual of the model in free run is held against the response that a small amount of the candidate
+would add (the sensitivity at a zero coefficient, exact), after all that the model's own coefficients
+could do has been taken out. One free run a point; the best few points start a fit of everything.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, rfft, rfftfreq
+
+from study import fitting
+from study.errors import StudyError
+from study.fitting import Plan
+from study.free_run import FreeRun, prepare
+from study.model import Model, ModelTerm, free
+from study.output_error import FreeRunFit
+from study.record import MOTIONS, Record
+from study.terms import Term, get
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+PEAKS = 6  # lines of a spectrum that are tried as the frequency of a periodic effect
+STARTS = 3  # points of the search that start a fit
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """A fitted model and what it leaves unexplained on the fitting part; n samples.
+
+    Attributes
+    ----------
+    found : FreeRunFit
+        The fit.
+    basis : array, shape (n, p)
+        Orthonormal basis of everything its own coefficients and initial state could change.
+    displacement : array, shape (n,)
+        Displacement of the free run: free of noise.
+    linear : dict
+        Coefficients of the best linear approximation, zero for what is not linear.
+    approximation : dict
+        m, c and k of the best linear oscillator, whatever the model's terms are.
+    dt : float
+        Sampling interval in seconds.
+    row : int
+        Place of the measured response in ``MOTIONS``.
+    """
+
+    found: FreeRunFit
+    basis: Floats
+    displacement: Floats
+    linear: dict[str, float]
+    approximation: dict[str, float]
+    dt: float
+    row: int
+
+    def transfer(self, omega: Complexes) -> Complexes:
+        """Frequency response function from a small force to the measured response at ``omega = j 2 pi f``."""
+        own = self.approximation
+        return np.asarray(omega**self.row / (own["m"] * omega**2 + own["c"] * omega + own["k"]), dtype=np.complex128)
+
+
+@dataclass(frozen=True)
+class Start:
+    """A point of the search: shape parameters, coefficients there, and the share of the residual explained."""
+
+    parameters: tuple[float, ...]
+    coefficients: tuple[float, ...]
+    share: float
+
+
+def baseline(found: FreeRunFit, record: Record, how: Plan) -> Baseline:
+    """Prepare a fitted model for the search."""
+    jacobian = fitting.linearise(found, record, how)
+    scale = np.linalg.norm(jacobian, axis=0)
+    basis = np.linalg.qr(jacobian / np.where(scale > 0.0, scale, 1.0))[0]
+    motion = prepare(found.model, record, response="displacement", steps_per_sample=how.steps_per_sample, span=how.fit)
+    displacement, _ = motion.respond({}, found.initial)
+    linear = fitting.linear_start(found.model, record, how)
+    oscillator = Model("linear", tuple(free(get(n)) for n in ("inertia", "linear_damping", "linear_stiffness")))
+    approximation = fitting.linear_start(oscillator, record, how)
+    return Baseline(found, basis, displacement, linear, approximation, record.dt, MOTIONS.index(how.response))
+
+
+def _run(model: Model, record: Record, how: Plan, keys: Sequence[str]) -> FreeRun:
+    return prepare(
+        model, record, keys, response=how.response, steps_per_sample=how.steps_per_sample, span=how.fit
+    )  # fmt: skip
+
+
+def starts(term: Term, base: Baseline, record: Record, how: Plan) -> list[Start]:
+    """The best points of the search over a candidate's shape parameters, best first."""
+    tried: list[Start] = []
+    for parameters in _grid(term, base, record, how):
+        point = _try(term, parameters, base, record, how)
+        if point is not None:
+            tried.append(point)
+    tried.sort(key=lambda s: -s.share)
+    return tried[:STARTS]
+
+
+def _try(
+    term: Term, parameters: tuple[float, ...], base: Baseline, record: Record, how: Plan
+) -> Start | None:  # fmt: skip
+    """One point: least squares of the residual on the candidate's sensitivities."""
+    entry = ModelTerm(term, (0.0,) * len(term.components), parameters)
+    model = base.found.model.with_term(entry)
+    try:
+        run = _run(model, record, how, term.symbols)
+        _, added = run.respond(dict.fromkeys(term.symbols, 0.0), base.found.initial)
+    except StudyError:
+        return None
+    added = added - base.basis @ (base.basis.T @ added)
+    scale = np.linalg.norm(added, axis=0)
+    if not np.all(np.isfinite(scale)) or not np.any(scale > 0.0):
+        return None
+    scale[scale == 0.0] = 1.0
+    residual = base.found.residual
+    amounts, *_ = np.linalg.lstsq(added / scale, residual, rcond=1e-8)
+    power = float(residual @ residual)
+    share = 1.0 - float(np.sum((residual - added / scale @ amounts) ** 2)) / power if power > 0.0 else 0.0
+    return Start(parameters, tuple(float(a) for a in amounts / scale), share)
+
+
+def _grid(term: Term, base: Baseline, record: Record, how: Plan) -> list[tuple[float, ...]]:
+    """Points to try: amplitudes from the motion, times from the resonance, frequencies from spectra."""
+    if not term.parameters:
+        return [()]
+    match term.name:
+        case "dead_band":
+            return [(float(x),) for x in np.quantile(np.abs(base.displacement), np.linspace(0.08, 0.97, 14))]
+        case "one_sided_contact":
+            return [(float(x),) for x in np.quantile(base.displacement, np.linspace(0.1, 0.985, 16))]
+        case "relaxation":
+            return [(float(x) / _rate(base, record.dt),) for x in np.geomspace(0.05, 20.0, 12)]
+        case "hysteresis":
+            size = 1.0 / float(np.std(base.displacement))
+            betas = size * np.array([0.15, 0.4, 1.0, 2.5, 6.0])
+            return [(float(b), float(b * g)) for b, g in product(betas, (-0.9, -0.3, 0.3, 0.9))]
+        case "periodic_stiffness":
+            return _around(modulation_lines(base), how, record.dt)
+        case "harmonic_force":
+            return _around(residual_lines(base), how, record.dt)
+        case _:
+            raise StudyError(f"there is no search for the shape parameters of {term.name!r}")
+
+
+def _rate(base: Baseline, dt: float) -> float:
+    """Typical angular frequency of the motion in rad/s: rms velocity over rms displacement."""
+    u = base.displacement
+    return float(np.std(np.gradient(u, dt)) / np.std(u))
+
+
+def _windowed(values: Floats) -> Complexes:
+    return np.asarray(rfft(values * np.hanning(len(values))), dtype=np.complex128)
+
+
+def modulation_lines(base: Baseline) -> list[float]:
+    """Lines at which a stiffness that varies with time would explain most, by a matched filter.
+
+    The response added by ``u cos(2 pi f t)`` is ``H * (u cos)``; its product with the residual, summed,
+    is one line of the spectrum of ``u`` times the residual filtered by H backwards in time.
+    """
+    n = len(base.found.residual)
+    receptance = base.transfer(2j * np.pi * np.asarray(rfftfreq(n, base.dt)))
+    receptance[0] = receptance[1] if not np.isfinite(receptance[0]) else receptance[0]
+    matched = irfft(np.conj(receptance) * rfft(base.found.residual), n)
+    numerator = np.abs(_windowed(matched * base.displacement)) ** 2
+    passband = irfft(np.abs(receptance) ** 2, n)
+    spread = irfft(np.abs(rfft(base.displacement)) ** 2, n)
+    denominator = np.abs(rfft(passband * spread))
+    return _lines(numerator / np.maximum(denominator, 1e-6 * np.max(denominator)))
+
+
+def residual_lines(base: Baseline) -> list[float]:
+    """Lines that stand out of the residual's own spectrum."""
+    return _lines(np.abs(_windowed(base.found.residual)) ** 2)
+
+
+def _lines(spectrum: Floats) -> list[float]:
+    """The highest peaks over their surroundings, as line numbers refined by a parabola in the logarithm."""
+    n = len(spectrum)
+    width = max(8, n // 64)
+    padded = np.pad(spectrum, width, mode="reflect")
+    blocks = np.lib.stride_tricks.sliding_window_view(padded, 2 * width + 1)
+    step = max(1, width // 4)
+    centres = np.arange(0, n, step)
+    level = np.interp(np.arange(n), centres, np.median(blocks[centres], axis=1))
+    height = np.log(np.maximum(spectrum, 1e-300)) - np.log(np.maximum(level, 1e-300))
+    inner = np.arange(3, n - 1)
+    peaks = inner[(height[inner] >= height[inner - 1]) & (height[inner] > height[inner + 1])]
+    best = peaks[np.argsort(-height[peaks])][:PEAKS]
+    return [float(i) + _top(height[i - 1 : i + 2]) for i in best]
+
+
+def _top(three: Floats) -> float:
+    bend = float(three[0] - 2.0 * three[1] + three[2])
+    return 0.5 * float(three[0] - three[2]) / bend if bend < 0.0 else 0.0
+
+
+def _around(lines: list[float], how: Plan, dt: float) -> list[tuple[float, ...]]:
+    """Each line, and a third of a line to either side: a fit finds its way from there."""
+    resolution = 1.0 / ((how.fit[1] - how.fit[0]) * dt)
+    return [((line + shift) * resolution,) for line in lines for shift in (-0.35, 0.0, 0.35)]

@@ -1,0 +1,90 @@
+"""Is a candidate's coefficient a constant? A true term's is; that of a term which imitates another is not.
+
+Measured in the response, free of the bias that noise on the motion brings: the sensitivity S(t) of the
+free run to the coefficient is held against the residual e(t) in bands of frequency and in classes of
+amplitude, ``delta = sum(S* e) / sum(S* S)``: by how much the coefficient would have to change there.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import rfft, rfftfreq
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+BANDS = 8
+CLASSES = 4
+BLOCK = 64  # samples: long against a period, short against the swell of the amplitude
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A coefficient along something.
+
+    Attributes
+    ----------
+    at : array, shape (n,)
+        Centre frequency in Hz, or amplitude relative to the mean.
+    value : complex array, shape (n,)
+        The coefficient there (real along amplitude).
+    error : array, shape (n,)
+        Standard error of its real part.
+    """
+
+    at: Floats
+    value: Complexes
+    error: Floats
+
+    def spread(self) -> float:
+        """Root mean square deviation from the mean that its errors do not account for, relative to it."""
+        weight = 1.0 / np.maximum(self.error, 1e-300) ** 2
+        mean = np.sum(weight * self.value.real) / np.sum(weight)
+        beyond = np.abs(self.value - mean) ** 2 - 2.0 * self.error**2
+        share = np.sqrt(max(float(np.sum(weight * beyond) / np.sum(weight)), 0.0))
+        return float(share / abs(mean)) if mean != 0.0 else np.inf
+
+
+def along_frequency(sensitivity: Floats, residual: Floats, coefficient: float, dt: float) -> Curve:
+    """The coefficient in bands that hold equal shares of the sensitivity's power."""
+    taper = np.hanning(len(residual))
+    s, e = np.asarray(rfft(sensitivity * taper)), np.asarray(rfft(residual * taper))
+    power = np.abs(s) ** 2
+    edges = np.searchsorted(np.cumsum(power), np.linspace(0.0, 1.0, BANDS + 1) * np.sum(power))
+    edges[-1] = len(s)
+    frequency = np.asarray(rfftfreq(len(residual), dt))
+    rows = [_band(s[a:b], e[a:b], frequency[a:b]) for a, b in pairwise(edges.tolist()) if b - a > 3]
+    at, change, error = (np.array(column) for column in zip(*rows, strict=True))
+    return Curve(at.real, coefficient + change, error.real)
+
+
+def _band(s: Complexes, e: Complexes, frequency: Floats) -> tuple[float, complex, float]:
+    power = float(np.sum(np.abs(s) ** 2))
+    change = complex(np.sum(np.conj(s) * e) / power)
+    rest = e - change * s
+    error = np.sqrt(1.5 * float(np.mean(np.abs(rest) ** 2)) / 2.0 / power)  # 1.5: the taper joins lines
+    return float(np.sum(np.abs(s) ** 2 * frequency) / power), change, float(error)
+
+
+def along_amplitude(sensitivity: Floats, residual: Floats, coefficient: float) -> Curve:
+    """The coefficient in classes of blocks, from those where the effect is weak to those where it is strong."""
+    count = len(residual) // BLOCK
+    s = sensitivity[: count * BLOCK].reshape(count, BLOCK)
+    e = residual[: count * BLOCK].reshape(count, BLOCK)
+    own, cross = np.sum(s**2, axis=1), np.sum(s * e, axis=1)
+    order = np.argsort(own)
+    edges = np.searchsorted(np.cumsum(own[order]), np.linspace(0.0, 1.0, CLASSES + 1) * np.sum(own))
+    edges[-1] = count
+    at, value, error = list[float](), list[float](), list[float]()
+    for a, b in pairwise(edges.tolist()):
+        rows = order[a:b]
+        if len(rows) < 2:
+            continue
+        power = float(np.sum(own[rows]))
+        change = float(np.sum(cross[rows])) / power
+        scatter = cross[rows] - change * own[rows]
+        at.append(float(np.sqrt(np.mean(own[rows]) / np.mean(own))))
+        value.append(coefficient + change)
+        error.append(float(np.sqrt(np.sum(scatter**2)) / power))
+    return Curve(np.array(at), np.array(value, dtype=np.complex128), np.array(error))

@@ -1,0 +1,170 @@
+"""Fit a model to one part of a record in free run, and judge it on another part.
+
+What both ``compare`` and ``diagnose`` stand on. The fit begins from the best linear approximation
+``H(f) = G_Fy / G_FF``, which noise on the response does not bias, with every other coefficient at zero.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.errors import StudyError
+from study.free_run import prepare
+from study.model import Model
+from study.output_error import FreeRunFit, fit_free_run
+from study.record import MOTIONS, Record
+from study.spectra import Segments, cross_spectra
+
+Floats = NDArray[np.float64]
+LINEAR_ORDERS = {"k": 0, "c": 1, "m": 2}
+CHANCE = 0.01  # the linear start uses lines whose coherence noise alone would reach this rarely
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is fitted and what is judged.
+
+    Attributes
+    ----------
+    response : str
+        The measured motion that free runs are compared with.
+    fit, judge : pair of int
+        First sample and the one after the last of each part; they do not overlap.
+    steps_per_sample : int
+        Runge-Kutta steps in each sampling interval.
+    """
+
+    response: str
+    fit: tuple[int, int]
+    judge: tuple[int, int]
+    steps_per_sample: int = 2
+
+
+def plan(
+    record: Record,
+    fit: tuple[int, int] | None = None,
+    judge: tuple[int, int] | None = None,
+    measured: str | None = None,
+) -> Plan:
+    """Fit the first half and judge the second, unless told otherwise; compare with what was measured.
+
+    Raises
+    ------
+    StudyError
+        If the parts overlap or leave the record.
+    """
+    half = len(record) // 2
+    fit = fit or (0, half)
+    judge = judge or (half, len(record))
+    for name, (first, last) in (("fit", fit), ("judge", judge)):
+        if not 0 <= first < last <= len(record) or last - first < 64:
+            raise StudyError(f"the part to {name}, {first}:{last}, must hold 64 samples or more of {len(record)}")
+    if fit[0] < judge[1] and judge[0] < fit[1]:
+        raise StudyError(f"the parts to fit {fit[0]}:{fit[1]} and to judge {judge[0]}:{judge[1]} overlap")
+    response = measured or next((c for c in MOTIONS if c in record), None)
+    if response is None:
+        raise StudyError(f"record {record.name!r} has no displacement, velocity or acceleration")
+    return Plan(response, fit, judge)
+
+
+def linear_start(model: Model, record: Record, how: Plan) -> dict[str, float]:
+    """Mass, damping and stiffness of the best linear approximation; zero for everything else.
+
+    Raises
+    ------
+    StudyError
+        If force and response have nothing in common.
+    """
+    part = record.part(*how.fit)
+    length = min(1024, 2 ** int(np.log2(max(len(part) // 8, 16))))
+    force, motion = (part[name] - np.mean(part[name]) for name in ("force", how.response))
+    matrix = cross_spectra([force, motion], part.dt, Segments(length=length))
+    g, f = matrix.density[1:-1], matrix.frequency[1:-1]
+    power = g[:, 0, 0].real * g[:, 1, 1].real
+    coherence = np.abs(g[:, 0, 1]) ** 2 / np.where(power > 0.0, power, np.inf)
+    coherence = np.clip(coherence, 0.0, 1.0 - 1e-6)
+    by_chance = 1.0 - CHANCE ** (1.0 / max(matrix.averages - 1.0, 1.0))
+    keep = (coherence > by_chance) & (g[:, 0, 0].real > 1e-6 * np.max(g[:, 0, 0].real))
+    if np.count_nonzero(keep) < 4:
+        raise StudyError(f"force and {how.response} of {record.name!r} have nothing in common at any frequency")
+    omega = 2j * np.pi * f[keep]
+    receptance = g[keep, 0, 1] / g[keep, 0, 0] / omega ** MOTIONS.index(how.response)
+    weight = np.abs(receptance) * np.sqrt(coherence[keep] / (1.0 - coherence[keep]))
+    values = model.values
+    wanted = [key for key in LINEAR_ORDERS if key in values]
+    columns = np.stack([omega ** LINEAR_ORDERS[key] for key in wanted], axis=1) * weight[:, None]
+    scale = np.sqrt(np.sum(np.abs(columns) ** 2, axis=0))
+    design, target = columns / scale, weight / receptance
+    found = np.linalg.lstsq(
+        np.concatenate([design.real, design.imag]), np.concatenate([target.real, target.imag]), rcond=None
+    )[0]
+    start = dict.fromkeys(values, 0.0) | dict(zip(wanted, (float(v) for v in found / scale), strict=True))
+    if start["m"] <= 0.0:
+        start["m"] = float(np.sqrt(np.mean(np.abs(target) ** 2) / np.mean(np.abs(omega**2 * weight) ** 2)))
+    return start
+
+
+def held_keys(model: Model) -> tuple[str, ...]:
+    """The keys whose values the model gives: they are held, the rest is fitted."""
+    return tuple(key for key, value in model.values.items() if value is not None)
+
+
+def fit(
+    model: Model, record: Record, how: Plan, held: tuple[str, ...], start: Mapping[str, float] | None = None
+) -> FreeRunFit:
+    """Fit what is not held on the plan's fitting part; starting values from ``start`` or the linear start.
+
+    Raises
+    ------
+    StudyError
+        If the model cannot run, or a shape parameter has no starting value.
+    """
+    begin = dict(start) if start is not None else linear_start(model, record, how)
+    begin = {key: value for key, value in begin.items() if key not in held}
+    return fit_free_run(
+        model, record, start=begin, held=held, response=how.response,
+        steps_per_sample=how.steps_per_sample, span=how.fit,
+    )  # fmt: skip
+
+
+def held_out_residual(found: FreeRunFit, record: Record, how: Plan) -> Floats:
+    """Measured minus predicted response on the judging part, shape (samples to judge,).
+
+    Where the judging part follows the fitting part the free run goes on through both; elsewhere its
+    initial state, and nothing else, is estimated from the judging part.
+
+    Raises
+    ------
+    DivergenceError
+        If the free run leaves the range of finite numbers.
+    """
+    first, last = how.judge
+    measured = record[how.response][first:last]
+    if first == how.fit[1]:
+        run = prepare(
+            found.model, record, response=how.response, steps_per_sample=how.steps_per_sample, span=(how.fit[0], last)
+        )
+        response, _ = run.respond({}, found.initial)
+        return measured - response[first - how.fit[0] :]
+    keys = tuple(found.model.values)
+    again = fit_free_run(
+        found.model, record, held=keys, response=how.response, steps_per_sample=how.steps_per_sample, span=how.judge
+    )
+    return again.residual
+
+
+def with_steps(how: Plan, steps: int) -> Plan:
+    """The same plan with other steps per sample."""
+    return replace(how, steps_per_sample=steps)
+
+
+def linearise(found: FreeRunFit, record: Record, how: Plan) -> Floats:
+    """Derivatives of the response on the fitting part, shape (n, keys + 2): keys, then the initial state."""
+    run = prepare(
+        found.model, record, found.keys, response=how.response,
+        steps_per_sample=how.steps_per_sample, span=how.fit,
+    )  # fmt: skip
+    values = dict(zip(found.keys, (float(v) for v in found.values), strict=True))
+    return run.respond(values, found.initial, 2)[1]

@@ -1,0 +1,68 @@
+"""How much of a residual is noise, and how much has structure?
+
+Noise of a sensor is taken as white: its density is that of the quietest bands of the residual's
+autospectrum. What stands above it in other bands is structure that a better model could explain.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.spectra import Segments, autospectrum
+
+Floats = NDArray[np.float64]
+BANDS = 20
+QUIET = 5  # so many of the bands, the quietest, give the floor
+
+
+@dataclass(frozen=True)
+class Floor:
+    """Noise and structure in a residual.
+
+    Attributes
+    ----------
+    noise : float
+        Root mean square of white noise at the density of the quietest bands.
+    excess : float
+        Mean square of what stands above it.
+    excess_error : float
+        Standard error of the excess if there were noise alone.
+    """
+
+    noise: float
+    excess: float
+    excess_error: float
+
+    @property
+    def significance(self) -> float:
+        """Excess in its own standard errors."""
+        return self.excess / self.excess_error if self.excess_error > 0.0 else np.inf
+
+
+def floor(residual: Floats, dt: float) -> Floor:
+    """Split a residual into noise floor and structure."""
+    length = max(32, min(1024, 2 ** int(np.log2(len(residual) / 8))))
+    segments = Segments(length=length)
+    frequency, density = autospectrum(residual, dt, segments)
+    averages = segments.effective_averages(len(residual))
+    bands = np.array_split(density[1:-1], BANDS)
+    means = np.array([np.mean(band) for band in bands])
+    lines = np.array([len(band) for band in bands])
+    spread = 1.0 / np.sqrt(averages * lines / segments.line_inflation())
+    quiet = np.argsort(means)[:QUIET]
+    # The quietest of many equal bands lie below their common level by about one standard deviation.
+    level = float(np.mean(means[quiet])) * (1.0 + _selection(BANDS, QUIET) * float(np.mean(spread)))
+    width = float(frequency[1])
+    above = np.clip(means - level, 0.0, None) * lines * width
+    error = float(np.sqrt(np.sum((level * spread * lines * width) ** 2)))
+    bias = 0.4 * error * np.sqrt(BANDS)  # what clipping at zero adds for noise alone: 0.4 sigma a band
+    return Floor(float(np.sqrt(level * 0.5 / dt)), max(float(np.sum(above)) - bias, 0.0), error)
+
+
+def _selection(bands: int, quiet: int) -> float:
+    """Mean of the lowest ``quiet`` of ``bands`` standard normal numbers, its sign turned (Blom, 1958)."""
+    from scipy.special import ndtri
+
+    ranks = (np.arange(1, quiet + 1) - 0.375) / (bands + 0.25)
+    return -float(np.mean(ndtri(ranks)))
