@@ -296,13 +296,13 @@ def _to_crossing(
 ) -> float:  # fmt: skip
     """Step to where v vanishes and switch there; returns that fraction of the step.
 
-    The guess x, a fraction of what is left of the step, is corrected by Newton. Where v passes through zero, the time at which it
-    does so depends on the parameters, and the derivative of v jumps with the acceleration (saltation):
-    ``s_v+ = s_v- a+ / a-``. Where friction holds the mass from then on, v = 0 whatever the parameters.
+    The guess x, a fraction of what is left of the step, is corrected by Newton. Where v passes through
+    zero, the time at which it does so depends on the parameters, and the derivative of v jumps with the
+    acceleration (saltation): ``s_v+ = s_v- a+ / a-``. Where friction holds the mass, v = 0 whatever they are.
     """
     sign = r[side]
     span = (1.0 - begin) * h
-    before = 0.0
+    end, before = begin, 0.0
     for _ in range(3):
         x = min(max(x, 0.0), 1.0)
         end = begin + x * (1.0 - begin)

@@ -20,7 +20,8 @@ from study.record import Record
 Floats = NDArray[np.float64]
 OFFSET = 1e-4  # converged when the next step is below this many standard errors (Bates and Watts, 1981)
 ROUNDING = 1e-11  # ... or changes the response by less than this share of it
-LARGEST_DAMPING = 1e10  # a step this short which does not help means that none does
+PATIENCE = 8  # free runs that may pass without lowering the error by what matters
+MATTERS = 1e-3  # ... as a share of what one standard error brings
 INDISTINCT = 1e-12  # eigenvalue of the scaled normal matrix below which coefficients cannot be told apart
 POSITIVE = ("m", "u_g", "tau", "f_m", "f")  # coefficients and shape parameters without meaning below zero
 
@@ -107,8 +108,8 @@ def fit_free_run(
     max_iterations : int
         Free runs after which to give up.
     initial : str
-        ``estimate`` displacement and velocity at the first sample, or take them as zero: ``rest``.
-        The terms' own states begin at zero.
+        ``estimate`` displacement, velocity and the terms' own states at the first sample, or take them
+        as zero: ``rest``.
 
     Returns
     -------
@@ -153,10 +154,13 @@ def _starting_values(model: Model, start: Mapping[str, float], held: Collection[
 
 
 def _starting_state(measured: Floats, run: FreeRun) -> Floats:
-    """Displacement and velocity at the first sample as the response itself shows them."""
+    """Displacement and velocity at the first sample as far as the response itself shows them."""
+    state = np.zeros(len(run.slots) + 1)
     if run.row == 0:
-        return np.array([measured[0], (measured[1] - measured[0]) / run.dt])
-    return np.array([0.0, measured[0] if run.row == 1 else 0.0])
+        state[:2] = measured[0], (measured[1] - measured[0]) / run.dt
+    elif run.row == 1:
+        state[1] = measured[0]
+    return state
 
 
 @dataclass(frozen=True)
@@ -176,7 +180,8 @@ class _Problem:
         except DivergenceError:
             return None
         residual = self.measured - response
-        scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian))
+        with np.errstate(over="ignore", invalid="ignore"):  # on its way out of range: refused below
+            scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian))
         if not np.all(np.isfinite(scale)):
             return None
         scale[scale == 0.0] = 1.0
@@ -221,23 +226,32 @@ def _minimise(problem: _Problem, x: Floats, max_iterations: int) -> _End:
         raise DivergenceError(f"the free run diverges with the starting values {values}", problem.run.start)
     size = float(np.linalg.norm(problem.measured))
     freedom = max(len(problem.measured) - len(x), 1)
-    damping, growth = 1e-3, 2.0
+    damping, growth, costs = 1e-3, 2.0, list[float]()
     for iteration in range(1, max_iterations + 1):
+        one = len(x) * point.cost / freedom  # what a step of one standard error brings
         fall = point.decrement()
-        if fall <= OFFSET**2 * len(x) * point.cost / freedom or fall <= (ROUNDING * size) ** 2:
+        if fall <= OFFSET**2 * one or fall <= (ROUNDING * size) ** 2:
             return _End(point, True, iteration, f"converged after {iteration} free runs")
+        costs.append(point.cost)
+        if len(costs) > PATIENCE and costs[-1 - PATIENCE] - point.cost < MATTERS * one:
+            return _End(point, fall <= one, iteration, _stalled(iteration, np.sqrt(fall / one)))
         step = np.linalg.solve(point.normal + damping * np.eye(len(x)), point.gradient)
         trial = problem.linearise(point.x + step / point.scale)
         expected = float(step @ (damping * step + point.gradient))
         gain = -1.0 if trial is None else (point.cost - trial.cost) / expected
         if trial is not None and gain > 0.0:
             point = trial
-            damping, growth = damping * max(0.1, 1.0 - (2.0 * gain - 1.0) ** 3), 2.0
+            damping, growth = max(damping * max(0.1, 1.0 - (2.0 * gain - 1.0) ** 3), INDISTINCT), 2.0
         else:
             damping, growth = damping * growth, 2.0 * growth
-        if damping > LARGEST_DAMPING:
-            return _End(point, False, iteration, f"no step lowered the error after {iteration} free runs")
     return _End(point, False, max_iterations, f"still falling after {max_iterations} free runs, the most allowed")
+
+
+def _stalled(iteration: int, offset: float) -> str:
+    """Friction and stops make the sum of squares kinked, and its minimum may lie in a kink."""
+    if offset <= 1.0:
+        return f"converged after {iteration} free runs to where no step lowers the error"
+    return f"stuck after {iteration} free runs: no step lowers the error, one of {offset:.1f} standard errors should"
 
 
 def _result(model: Model, problem: _Problem, end: _End) -> FreeRunFit:
@@ -245,7 +259,7 @@ def _result(model: Model, problem: _Problem, end: _End) -> FreeRunFit:
     p = len(keys)
     variance = point.cost / max(len(point.residual) - len(point.x), 1)
     values, vectors = np.linalg.eigh(point.normal)
-    inverse = (vectors / np.maximum(values, np.finfo(float).tiny)) @ vectors.T
+    inverse = (vectors / np.maximum(values, np.finfo(float).eps)) @ vectors.T
     covariance = variance * inverse / np.outer(point.scale, point.scale)
     message = end.message
     blurred = np.max(np.abs(vectors[:, values <= INDISTINCT]), axis=1, initial=0.0) > 0.1
