@@ -11,6 +11,7 @@ from scipy.fft import irfft, rfft
 
 Floats = NDArray[np.float64]
 EDGE = 512  # samples by which a record that does not close on itself is continued at each end
+CLOSES = 10.0  # a record that does not close has many times the energy there of one whose ends are continued
 
 
 def between_samples(values: Floats, factor: int) -> Floats:
@@ -19,9 +20,10 @@ def between_samples(values: Floats, factor: int) -> Floats:
     Parameters
     ----------
     values : array, shape (n,)
-        Samples. If the record closes on itself to within its own typical step it is taken as
-        periodic, which is exact for a periodic excitation; otherwise its ends are continued by
-        point reflection and faded, which confines the error to the first and last few samples.
+        Samples. A record that closes on itself is taken as periodic, which is exact for a periodic
+        excitation; otherwise its ends are continued by point reflection and faded, which confines the
+        error to the first and last few samples. A jump from the last sample to the first has power up
+        to the Nyquist frequency, and that is how it is recognised.
     factor : int
         Grid points for each sample.
 
@@ -33,15 +35,20 @@ def between_samples(values: Floats, factor: int) -> Floats:
     n = len(values)
     if factor == 1 or n == 1:
         return values.copy()
-    step = float(np.sqrt(np.mean(np.diff(values) ** 2)))
-    if abs(values[-1] - values[0]) <= 3.0 * step:
-        return _periodic(values, factor)[: factor * (n - 1) + 1]
     edge = min(EDGE, n - 1)
     fade = 0.5 - 0.5 * np.cos(np.pi * np.arange(edge) / edge)
     before = (2.0 * values[0] - values[edge:0:-1]) * fade
     after = (2.0 * values[-1] - values[-2 : -edge - 2 : -1]) * fade[::-1]
-    fine = _periodic(np.concatenate([before, values, after]), factor)
-    return fine[factor * edge : factor * (edge + n - 1) + 1]
+    continued = np.concatenate([before, values, after])
+    if _top_energy(values) <= CLOSES * _top_energy(continued):
+        return _periodic(values, factor)[: factor * (n - 1) + 1]
+    return _periodic(continued, factor)[factor * edge : factor * (edge + n - 1) + 1]
+
+
+def _top_energy(values: Floats) -> float:
+    """Energy in the uppermost tenth of the lines."""
+    lines = np.asarray(rfft(values))
+    return float(np.sum(np.abs(lines[int(0.9 * len(lines)) :]) ** 2)) / len(values)
 
 
 def _periodic(values: Floats, factor: int) -> Floats:

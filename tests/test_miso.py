@@ -175,10 +175,10 @@ def test_too_few_averages_are_named() -> None:
 
 @pytest.fixture(scope="module")
 def repeats() -> tuple[np.ndarray, np.ndarray]:
-    """Estimates over 600 records whose output noise is white: A, and its stated covariance."""
+    """Estimates over 600 short records whose output noise is white: A, and its stated covariance."""
     cut, estimates, stated = Segments(32), [], []
     for seed in range(600):
-        channels = three_inputs(32 * 40, seed=1000 + seed)
+        channels = three_inputs(32 * 12, seed=1000 + seed)
         result = analyse(cross_spectra(channels, 1.0, cut))
         estimates.append(result.response)
         stated.append(result.covariance)

@@ -122,6 +122,19 @@ def test_line_inflation_agrees_with_scatter(settings: tuple[str, float]) -> None
     assert measured == pytest.approx(cut.line_inflation(), abs=0.06)
 
 
+@pytest.mark.parametrize("settings", [("hann", 0.5), ("hann", 0.7), ("boxcar", 0.5), ("hamming", 0.0)])
+def test_line_inflation_is_the_sum_over_all_pairs_of_lines_and_segments(settings: tuple[str, float]) -> None:
+    """Correlation of line f of a segment with line f + l of one k hops later, summed by brute force."""
+    window, overlap = settings
+    cut = Segments(64, overlap, window)
+    taper, t = cut.taper(), np.arange(64)
+    total = np.zeros(64)
+    for k in range(-64, 65):
+        shifted = np.array([taper[i + k * cut.hop] if 0 <= i + k * cut.hop < 64 else 0.0 for i in t])
+        total += np.abs(np.exp(-2j * np.pi * np.outer(t, t) / 64) @ (taper * shifted)) ** 2
+    assert cut.line_inflation() == pytest.approx(total.sum() / total[0], rel=1e-12)
+
+
 def test_band_keeps_its_lines(channels: list[np.ndarray]) -> None:
     matrix = cross_spectra(channels, DT)
     part = matrix.band(0.3, 10.0)

@@ -17,7 +17,7 @@ from study.graph import Graph
 from study.inputs import histories, reverse_inputs
 from study.model import Model, forward_graph, free, with_registers
 from study.simulate import Integrator, simulate
-from study.terms import LIBRARY, custom, get
+from study.terms import LIBRARY, Component, Term, custom, get
 
 PERIOD = 10.24  # seconds; the frequencies below are whole multiples of 1/PERIOD, so that time-varying terms close too
 F_M, F_H = 10 / PERIOD, 21 / PERIOD
@@ -87,6 +87,18 @@ def model_with(name: str) -> Model:
     return Model(name, terms)
 
 
+def evaluated(model: Model, columns: dict[str, np.ndarray]) -> np.ndarray:
+    """Acceleration and state derivatives of a model at given points, by the compiled kernel."""
+    forward = forward_graph(model)
+    program = with_registers(forward.graph.program(forward.slopes), model.numbers())
+    out = np.empty((len(columns["u"]), len(forward.slopes)))
+    kernels.evaluate(
+        program.code, program.first, program.registers.copy(),
+        np.array([program.inputs[c] for c in columns]), np.column_stack(list(columns.values())), program.outputs, out,
+    )  # fmt: skip
+    return out
+
+
 def test_every_term_has_a_row() -> None:
     assert set(ROWS) == set(LIBRARY)
 
@@ -97,20 +109,26 @@ def test_forward_force_agrees_with_an_independent_formula(name: str) -> None:
     generator = np.random.default_rng(7)
     u, v = generator.normal(0, 0.003, 200), generator.normal(0, 0.05, 200)
     t, z, applied = generator.uniform(0, 20, 200), generator.normal(0, 0.002, 200), generator.normal(0, 1, 200)
-    forward = forward_graph(model)
-    program = with_registers(forward.graph.program(forward.slopes), model.numbers())
     columns = {"u": u, "v": v, "t": t, "force": applied} | ({f"z:{name}": z} if name in MEMORY else {})
-    out = np.empty((200, len(forward.slopes)))
-    kernels.evaluate(
-        program.code, program.first, program.registers.copy(),
-        np.array([program.inputs[c] for c in columns]), np.column_stack(list(columns.values())), program.outputs, out,
-    )  # fmt: skip
+    out = evaluated(model, columns)
     extra = ROWS[name].force(SimpleNamespace(u=u, v=v, t=t, z=z)) if name not in LINEAR else 0.0
     np.testing.assert_allclose(out[:, 0], applied - 3.77 * v - 355.3 * u - extra, rtol=1e-12, atol=1e-13)
     if name == "relaxation":
         np.testing.assert_allclose(out[:, 1], v - z / 0.1, rtol=1e-13)
     if name == "hysteresis":
         np.testing.assert_allclose(out[:, 1], v - 300.0 * np.abs(v) * z - 100.0 * v * np.abs(z), rtol=1e-12)
+
+
+def test_a_differentiated_shape_goes_by_the_whole_chain_rule() -> None:
+    """d/dt of u cos(t) z through u, t and the state z: 2 (v cos(t) z - u sin(t) z + u cos(t) dz/dt)."""
+    term = Term("odd_one", (Component("q", "u*cos(t)*z", 1, 2.0),), "", "", "", state="v - 3*z")
+    model = Model("odd", (free(get("inertia")), free(term))).with_values({"m": 4.0, "q": 5.0})
+    u, v, t, z, applied = np.random.default_rng(1).normal(size=(5, 50))
+    out = evaluated(model, {"u": u, "v": v, "t": t, "z:odd_one": z, "force": applied})
+    rate = v - 3 * z
+    total = 10.0 * (v * np.cos(t) * z - u * np.sin(t) * z + u * np.cos(t) * rate)
+    np.testing.assert_allclose(out[:, 0], (applied - total) / 4.0, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(out[:, 1], rate, rtol=1e-13)
 
 
 @pytest.mark.parametrize("name", LIBRARY)
