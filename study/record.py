@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
@@ -74,6 +73,8 @@ class Record:
 
 def write_csv(record: Record, path: Path) -> None:
     """Write time and channels with as many digits as a double has; units other than SI stand behind the names."""
+    import pandas as pd  # half a second that records in memory do not cost
+
     named = {heading(name, record.units.get(name, "")): values for name, values in record.channels.items()}
     columns: dict[str, Floats] = {"time": record.time, **named}
     pd.DataFrame(columns).to_csv(path, index=False, float_format="%.17g", lineterminator="\n")
@@ -86,6 +87,8 @@ def heading(channel: str, unit: str) -> str:
 
 def read_csv(path: Path) -> Record:
     """Read what :func:`write_csv` wrote of a record in SI units. ``study.readers`` reads every other kind of file."""
+    import pandas as pd
+
     table = pd.read_csv(path)  # from pandas 3.1 on, the default parser returns the very doubles that were written
     time = table["time"].to_numpy(dtype=np.float64)
     dt = round(float(time[-1] - time[0]) / (len(time) - 1), 15)

@@ -25,7 +25,7 @@ SUFFIX = re.compile(r"(.+)_([A-Za-z0-9]+)")
 
 
 def assign(path: Path, table: Table, options: ReadOptions) -> dict[str, Column]:
-    """Column of each channel; extra channels keep their names.
+    """Column of each channel, in the file's order; extra channels keep their names.
 
     Parameters
     ----------
@@ -51,7 +51,8 @@ def assign(path: Path, table: Table, options: ReadOptions) -> dict[str, Column]:
     missing = _missing(named)
     if missing:
         raise _ask(path, table, f"no column is known to be the {missing}")
-    return named | _extra(table, named)
+    place = {id(c): k for k, c in enumerate(table.columns)}
+    return dict(sorted((named | _extra(table, named)).items(), key=lambda item: place[id(item[1])]))
 
 
 def _missing(named: Mapping[str, Column]) -> str:

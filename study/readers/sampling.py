@@ -48,15 +48,20 @@ def even_interval(path: Path, time: Floats, place: Callable[[int], str]) -> tupl
             "times that grow are right"
         )
     grid = np.arange(len(time), dtype=np.float64)
-    away = np.abs(time - (time[0] + mean * grid))
+    away = 0.5 * float(np.ptp(time - mean * grid))  # from the line that lies in the middle
     rounding = _rounding(time)
-    if float(np.max(away)) > max(JITTER * mean, min(rounding, ROUNDING * mean)):
+    if away > max(JITTER * mean, min(rounding, ROUNDING * mean)):
         raise StudyError(f"{path}: {_uneven(time, steps, place)}; even sampling (within 1 % of the interval) is right")
     exact = next((dt for dt in _candidates(time, mean) if np.array_equal(time[0] + dt * grid, time)), None)
     if exact is not None:
         return exact, float(time[0])
-    slack = (float(np.max(away)) + rounding) / (len(time) - 1)
-    return next((dt for dt in _candidates(time, mean) if abs(dt - mean) <= slack), mean), float(time[0])
+    slack = (2.0 * away + rounding) / (len(time) - 1)
+    return shortest_decimal(mean, slack), float(time[0])
+
+
+def shortest_decimal(interval: float, slack: float) -> float:
+    """The interval that a rounded one stands for: of those within ``slack``, the fewest digits (or of its inverse)."""
+    return next((dt for dt in _decimals(interval) if abs(dt - interval) <= slack), interval)
 
 
 def _uneven(time: Floats, steps: Floats, place: Callable[[int], str]) -> str:
@@ -84,12 +89,16 @@ def _candidates(time: Floats, mean: float) -> Iterator[float]:
     """Intervals that the times may have been made with, the likeliest first."""
     if time[0] == 0.0:
         yield float(time[1])
-    for digits in range(1, 17):
-        yield float(f"{mean:.{digits - 1}e}")
-        yield 1.0 / float(f"{1.0 / mean:.{digits - 1}e}")
-    below = above = mean
+    yield from _decimals(mean)
     yield mean
+    below = above = mean
     for _ in range(8):
         below, above = math.nextafter(below, 0.0), math.nextafter(above, math.inf)
         yield below
         yield above
+
+
+def _decimals(interval: float) -> Iterator[float]:
+    for digits in range(16):
+        yield float(f"{interval:.{digits}e}")
+        yield 1.0 / float(f"{1.0 / interval:.{digits}e}")

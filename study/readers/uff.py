@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from study.errors import StudyError
+from study.readers.sampling import shortest_decimal
 from study.readers.table import Column, Table
 
+ROUNDING = 5e-6  # the interval stands in the file with six digits
 TIME_RESPONSE = 1  # the standard's code of the function type
 ROLES = {8: "displacement", 9: "force", 11: "velocity", 12: "acceleration", 13: "force"}  # of the ordinate
 DIRECTIONS = {-3: "-Z", -2: "-Y", -1: "-X", 0: "", 1: "+X", 2: "+Y", 3: "+Z"}
@@ -62,7 +64,7 @@ def _table(path: Path, histories: list[Mapping[str, Any]]) -> Table:
     steps = sorted({float(s["abscissa_inc"]) for s in histories})
     if len(steps) > 1 or steps[0] <= 0.0:
         raise StudyError(f"{path}: its channels have the sampling intervals {steps}; one above zero is right")
-    return Table(tuple(columns), steps[0], float(first["abscissa_min"]))
+    return Table(tuple(columns), shortest_decimal(steps[0], ROUNDING * steps[0]), float(first["abscissa_min"]))
 
 
 def _column(name: str, item: Mapping[str, Any]) -> Column:

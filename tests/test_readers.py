@@ -1,0 +1,507 @@
+"""Every kind of file gives the record that was written into it."""
+
+import gc
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+import pyuff
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.io import savemat
+
+from study.errors import StudyError
+from study.model import Model, free
+from study.readers import ReadOptions, assignments, read_options, read_record, suspect_swapped
+from study.readers.unit_names import parse_unit, role_unit
+from study.record import MOTIONS, Record, write_csv
+from study.simulate import simulate
+from study.terms import LIBRARY
+
+DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parents[2] / "shared" / "data"))
+NEEDS_DATA = pytest.mark.skipif(not DATA.is_dir(), reason="the public records are not here")
+RNG = np.random.default_rng(11)
+TIME = 0.02 * np.arange(40)
+FORCE = RNG.standard_normal(40)
+DISPLACEMENT = 1e-3 * RNG.standard_normal(40)
+BOUC_WEN = {"force": "u", "displacement": "y"}
+
+
+def rows(delimiter: str = ",", decimal: str = ".", *columns: np.ndarray) -> str:
+    columns = columns or (TIME, FORCE, DISPLACEMENT)
+    lines = (delimiter.join(repr(float(x)) for x in row) for row in zip(*columns, strict=True))
+    return "\n".join(line.replace(".", decimal) for line in lines) + "\n"
+
+
+def check(record: Record, force: np.ndarray = FORCE, displacement: np.ndarray = DISPLACEMENT) -> None:
+    assert record.dt == 0.02
+    np.testing.assert_array_equal(record["force"], force)
+    np.testing.assert_array_equal(record["displacement"], displacement)
+
+
+TEXTS = {
+    "comma": ("time,force,displacement\n" + rows(), "N", "m"),
+    "usual short names": ("t, F, x\n" + rows(", "), "N", "m"),
+    "semicolon, decimal comma": ("Zeit;Force;Disp\n" + rows(";", ","), "N", "m"),
+    "semicolon, decimal point": ("time;force;disp\n" + rows(";"), "N", "m"),
+    "tab": ("time\tforce\tdisplacement\n" + rows("\t"), "N", "m"),
+    "tab, decimal comma": ("time\tforce\tdisplacement\n" + rows("\t", ","), "N", "m"),
+    "blanks": ("  time   force  displacement\n" + rows("   "), "N", "m"),
+    "blanks, units in brackets": ("time [s]  force [kN]  disp [mm]\n" + rows("  "), "kN", "mm"),
+    "units in square brackets": ("Time [s],Force [kN],Displacement [mm]\n" + rows(), "kN", "mm"),
+    "units in round brackets": ("time (s),force (lbf),disp (in)\n" + rows(), "lbf", "in"),
+    "units behind a stroke": ("t/s,F/N,x / mm\n" + rows(), "N", "mm"),
+    "units behind the name": ("time_s,force_kN,disp_mm\n" + rows(), "kN", "mm"),
+    "units row": ("time,force,displacement\ns,kN,µm\n" + rows(), "kN", "um"),
+    "units row in brackets": ("time,force,displacement\n[s],[N],[mm]\n" + rows(), "N", "mm"),
+    "preamble": ("Rig 7, channel A\nOperator: me\n\nSample rate,50\ntime,force,displacement\n" + rows(), "N", "m"),
+    "comments": ("# rig 7\n# 50 Hz\ntime,force,displacement\n" + rows() + "# end\n", "N", "m"),
+    "header in a comment": ("# rig 7\n# time force displacement\n" + rows(" "), "N", "m"),
+    "percent comments": ("% rig 7\ntime,force,displacement\n" + rows(), "N", "m"),
+    "quoted": (re.sub(r"([^,\n]+)", r'"\1"', "time,force,displacement\n" + rows()), "N", "m"),
+    "delimiter at line ends": ("time,force,displacement,\n" + rows().replace("\n", ",\n"), "N", "m"),
+    "known by units alone": ("time,channel 1 [N],channel 2 [m]\n" + rows(), "N", "m"),
+    "blank lines": ("time,force,displacement\n\n" + rows().replace("\n", "\n\n"), "N", "m"),
+    "a text column that nobody needs": (
+        "time,force,displacement,state\n" + rows().replace("\n", ",ok\n"), "N", "m"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("ending", ["\n", "\r\n", "\r"], ids=["unix", "windows", "old mac"])
+def test_text(name: str, ending: str, tmp_path: Path) -> None:
+    text, force, displacement = TEXTS[name]
+    path = tmp_path / "rig.csv"
+    path.write_bytes(text.replace("\n", ending).encode("utf-8"))
+    options = ReadOptions(columns={"time": "Zeit"}) if "Zeit" in text else None
+    record = read_record(path, options)
+    check(record)
+    assert (record.units["force"], record.units["displacement"]) == (force, displacement)
+    assert record.extra == ()
+    assert record.name == "rig"
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1"])
+def test_encodings(encoding: str, tmp_path: Path) -> None:
+    path = tmp_path / "rig.txt"
+    path.write_bytes(("time [s],force [N],displacement [µm]\n" + rows()).encode(encoding))
+    record = read_record(path)
+    check(record)
+    assert record.units["displacement"] == "um"
+
+
+def test_without_header_or_time(tmp_path: Path) -> None:
+    path = tmp_path / "rig.dat"
+    path.write_text(rows(" ", ".", FORCE, DISPLACEMENT))
+    check(read_record(path, ReadOptions(columns={"force": 1, "displacement": "2"}, fs=50.0)))
+    with pytest.raises(StudyError, match=r"no column is known to be the force.*1 'column 1', 2 'column 2'.*--column"):
+        read_record(path)
+    with pytest.raises(StudyError, match=r"--fs"):
+        read_record(path, ReadOptions(columns={"force": 1, "displacement": "2"}))
+
+
+def test_integers(tmp_path: Path) -> None:
+    path = tmp_path / "rig.csv"
+    counts = np.arange(40) ** 2 % 37
+    path.write_text("force,acc\n" + "".join(f"{c},{c % 7}\n" for c in counts))
+    record = read_record(path, ReadOptions(dt=0.5))
+    np.testing.assert_array_equal(record["force"], counts.astype(float))
+    assert record["acceleration"].dtype == np.float64
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "time,u,y",
+        "time,V1,V2",
+        "time,force,F 2,channel",
+        "time,f,input,x",
+        "time,force,output",
+        "time,x,F [kN],load [N]",
+    ],
+)
+def test_ambiguous_columns_are_asked_for(header: str, tmp_path: Path) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_text(f"{header}\n" + rows(",", ".", TIME, *[RNG.standard_normal(40) for _ in header.split(",")[1:]]))
+    with pytest.raises(StudyError) as caught:
+        read_record(path)
+    message = str(caught.value)
+    assert "rig.csv" in message
+    assert "--column force=NAME" in message
+    assert "\n" not in message
+    for name in header.split(","):
+        assert name.split(" [")[0] in message
+
+
+def test_units_tell_u_and_y_apart(tmp_path: Path) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_text("t,u [m],y [N]\n" + rows(",", ".", TIME, DISPLACEMENT, FORCE))
+    check(read_record(path))
+
+
+NAMES = st.text("abcdefgxyz_ 1", min_size=1, max_size=8).map(str.strip).filter(lambda n: n and n[0].isalpha())
+DOUBLES = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    dt=st.floats(1e-6, 1e3), start=st.sampled_from([0.0, 1.0, 100.02, -3.3]), seed=st.integers(0, 2**32 - 1),
+    extra=st.sampled_from(["", "strain", "c h 4"]), motions=st.sets(st.sampled_from(MOTIONS), min_size=1),
+)  # fmt: skip
+def test_what_write_csv_writes_is_read_bit_for_bit(
+    tmp_path_factory: Any, dt: float, start: float, seed: int, extra: str, motions: set[str]
+) -> None:
+    rng = np.random.default_rng(seed)
+    names = ["force", *sorted(motions), *([extra] if extra else [])]
+    written = Record(dt, {n: rng.standard_normal(50) * 10.0 ** rng.uniform(-20, 20, 50) for n in names}, start=start)
+    path = tmp_path_factory.mktemp("trip") / "rig.csv"
+    write_csv(written, path)
+    read = read_record(path)
+    assert list(read.channels) == names
+    for name in names:
+        np.testing.assert_array_equal(read[name], written[name])
+    np.testing.assert_array_equal(read.time, written.time)
+    assert read.units == written.units
+    if start == 0.0:
+        assert read.dt == dt
+
+
+def test_units_survive_the_way_through_a_file(tmp_path: Path) -> None:
+    units = {"force": "kN", "displacement": "mm", "strain": "um/m"}
+    record = Record(0.02, {"force": FORCE, "displacement": DISPLACEMENT, "strain": TIME}, units)
+    write_csv(record, tmp_path / "rig.csv")
+    assert {k: read_record(tmp_path / "rig.csv").units[k] for k in units} == units
+
+
+def test_the_simulator_names_its_records_by_folder(tmp_path: Path) -> None:
+    (tmp_path / "duffing").mkdir()
+    write_csv(Record(0.02, {"force": FORCE, "displacement": DISPLACEMENT}), tmp_path / "duffing" / "record.csv")
+    assert read_record(tmp_path / "duffing" / "record.csv").name == "duffing"
+
+
+@pytest.mark.parametrize("fs", [750.0, 610.3515625, 44100.0, 1.0 / 3.0])
+def test_printed_times_give_the_rate_they_were_made_with(fs: float, tmp_path: Path) -> None:
+    n = 3000
+    time = np.round(np.arange(n) / fs, int(np.ceil(np.log10(fs))) + 2)
+    path = tmp_path / "rig.csv"
+    table = {"time": time, "force": RNG.standard_normal(n), "displacement": RNG.standard_normal(n)}
+    pd.DataFrame(table).to_csv(path, index=False)
+    assert read_record(path).dt == pytest.approx(1.0 / fs, rel=1e-5)
+
+
+def test_jitter_below_one_percent_is_even(tmp_path: Path) -> None:
+    path = tmp_path / "rig.csv"
+    jitter = 0.02 * 0.008 * RNG.uniform(-1, 1, 40)
+    path.write_text("time,force,displacement\n" + rows(",", ".", TIME + jitter, FORCE, DISPLACEMENT))
+    assert read_record(path).dt == pytest.approx(0.02, rel=1e-3)
+
+
+def test_times_in_milliseconds(tmp_path: Path) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_text("t [ms],force,displacement\n" + rows(",", ".", 20.0 * np.arange(40), FORCE, DISPLACEMENT))
+    check(read_record(path))
+
+
+# binary formats
+
+
+def test_matlab_5_with_structures(tmp_path: Path) -> None:
+    path = tmp_path / "rig.mat"
+    savemat(path, {"run": {"F": FORCE, "acc": DISPLACEMENT[:, None], "fs": 50.0, "note": "x"}, "version": 3})
+    record = read_record(path)
+    assert record.dt == 0.02
+    np.testing.assert_array_equal(record["force"], FORCE)
+    np.testing.assert_array_equal(record["acceleration"], DISPLACEMENT)
+    assert read_record(path, ReadOptions(group="run")).name == "rig_run"
+    dotted = ReadOptions(columns={"force": "run.F", "velocity": "run.acc"})
+    np.testing.assert_array_equal(read_record(path, dotted)["velocity"], DISPLACEMENT)
+
+
+def test_matlab_4(tmp_path: Path) -> None:
+    path = tmp_path / "rig.mat"
+    savemat(path, {"force": FORCE, "displacement": DISPLACEMENT, "dt": 0.02}, format="4")
+    check(read_record(path))
+
+
+def test_matlab_7_3_is_hdf5_behind_512_bytes(tmp_path: Path) -> None:
+    path = tmp_path / "rig.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file["force"] = FORCE[None, :]
+        file["displacement"] = DISPLACEMENT[None, :]
+        file["Ts"] = [[0.02]]
+        file["#refs#/a"] = FORCE
+    with path.open("r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM")
+    check(read_record(path))
+
+
+def test_hdf5_periods_side_by_side(tmp_path: Path) -> None:
+    path = tmp_path / "rig.h5"
+    force, response = RNG.standard_normal((64, 5)), RNG.standard_normal((64, 5))
+    with h5py.File(path, "w") as file:
+        file["run/force"] = force
+        file["run/x"] = response.T  # MATLAB writes it this way round
+        file["run/force"].attrs["units"] = "kN"
+        file["run/fs"] = 50.0
+    record = read_record(path)
+    assert (len(record), record.period, record.units["force"]) == (320, 64, "kN")
+    np.testing.assert_array_equal(record["force"][64:128], force[:, 1])
+    np.testing.assert_array_equal(record["displacement"][128:192], response[:, 2])
+    assert record.part(64, 192).period == 64
+
+
+def test_one_matrix_is_a_table(tmp_path: Path) -> None:
+    path = tmp_path / "rig.mat"
+    savemat(path, {"data": np.column_stack([TIME, FORCE, DISPLACEMENT])})
+    check(read_record(path, ReadOptions(columns={"time": 1, "force": 2, "displacement": 3})))
+    check(read_record(path, ReadOptions(columns={"time": "data:1", "force": "data:2", "displacement": 3})))
+
+
+def test_groups_are_told_apart(tmp_path: Path) -> None:
+    path = tmp_path / "rig.h5"
+    with h5py.File(path, "w") as file:
+        for name, rate in (("low", 50.0), ("high", 100.0)):
+            file[f"{name}/force"], file[f"{name}/x"], file[f"{name}/fs"] = FORCE, DISPLACEMENT, rate
+    with pytest.raises(StudyError, match="--group high or low"):
+        read_record(path)
+    check(read_record(path, ReadOptions(group="low")))
+    assert read_record(path, ReadOptions(group="high")).dt == 0.01
+
+
+@pytest.mark.parametrize("names", [["time", "force", "displacement"], ["t [s]", "Force [kN]", "Displ (mm)"]])
+def test_parquet(names: list[str], tmp_path: Path) -> None:
+    path = tmp_path / "rig.parquet"
+    pd.DataFrame(dict(zip(names, (TIME, FORCE, DISPLACEMENT), strict=True))).to_parquet(path)
+    record = read_record(path)
+    check(record)
+    assert record.units["force"] == ("kN" if "[" in names[0] else "N")
+
+
+def test_parquet_with_moments_in_time(tmp_path: Path) -> None:
+    path = tmp_path / "rig.parquet"
+    moments = pd.date_range("2024-02-03 04:05:06", periods=40, freq="20ms")
+    pd.DataFrame({"time": moments, "force": FORCE, "displacement": DISPLACEMENT}).to_parquet(path)
+    check(read_record(path))
+
+
+def universal(values: np.ndarray, kind: int, node: int, dt: float = 0.02, **changes: Any) -> dict[str, Any]:
+    made = pyuff.prepare_58(
+        func_type=1, rsp_node=node, rsp_dir=3, ref_node=1, ref_dir=3, data=values, x=dt * np.arange(len(values)),
+        binary=0, ord_data_type=4, abscissa_spacing=1, num_pts=len(values), abscissa_min=0.0, abscissa_inc=dt,
+        abscissa_spec_data_type=17, ordinate_spec_data_type=kind, orddenom_spec_data_type=0, z_axis_spec_data_type=0,
+    )  # fmt: skip
+    return {**made, **changes}
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # pyuff leaves open what it writes
+@pytest.mark.parametrize("binary", [0, 1])
+@pytest.mark.parametrize("fs", [50.0, 750.0])
+@pytest.mark.parametrize("even", [0, 1])
+def test_uff_58(binary: int, fs: float, even: int, tmp_path: Path) -> None:
+    path = tmp_path / "rig.uff"
+    common = {"dt": 1.0 / fs, "binary": binary, "abscissa_spacing": even}
+    force = universal(FORCE, 13, 1, **common)
+    response = universal(DISPLACEMENT, 12, 2, **common, ordinate_axis_units_lab="g")
+    pyuff.UFF(str(path)).write_sets([force, response], "add")
+    gc.collect()
+    record = read_record(path)
+    assert record.dt == pytest.approx(1.0 / fs, rel=1e-12 if even else 1e-4)
+    np.testing.assert_allclose(record["force"], FORCE, rtol=1e-10)
+    np.testing.assert_allclose(record["acceleration"], DISPLACEMENT, rtol=1e-10)
+    assert record.units["acceleration"] == "g"
+
+
+# options
+
+
+def test_yaml_beside_the_file_and_options_over_it(tmp_path: Path) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_text("V1,V2\n" + rows(",", ".", FORCE, DISPLACEMENT))
+    mapping = "columns: {force: V1, displacement: V2}\nunits: {force: V, displacement: V}\n"
+    (tmp_path / "rig.record.yaml").write_text(mapping + "fs: 50\nsamples: [4, 36]\nperiod: 8\n")
+    record = read_record(path)
+    assert (len(record), record.dt, record.period, record.start) == (32, 0.02, 8, 0.08)
+    assert record.units["displacement"] == "V"
+    np.testing.assert_array_equal(record["force"], FORCE[4:36])
+    other = read_record(path, ReadOptions(columns={"force": "V2", "displacement": "V1"}, dt=0.5, units={"force": "mV"}))
+    np.testing.assert_array_equal(other["force"], DISPLACEMENT[4:36])
+    assert (other.dt, other.units["force"], other.units["displacement"]) == (0.5, "mV", "V")
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("- force", "no mapping"),
+        ("colums: {force: V1}", "no key 'colums'"),
+        ("columns: [force]", "columns is"),
+        ("columns: {force: 1.5}", "the column of force is 1.5"),
+        ("columns: {force: }", "the column of force is None"),
+        ("units: {force: 3}", "the unit of force is 3"),
+        ("fs: fast", "fs is 'fast'"),
+        ("fs: 1e7/2**14", "fs is '1e7/2"),
+        ("fs: 0", "fs is 0"),
+        ("dt: -1", "dt is -1"),
+        ("dt: .nan", "dt is nan"),
+        ("dt: 1\nfs: 1", "both"),
+        ("samples: 7", "samples is 7"),
+        ("samples: [9, 3]", "samples is 9 to 3"),
+        ("samples: [a, 3]", "the first sample is 'a'"),
+        ("period: 1", "period is 1"),
+        ("period: 2.5", "period is 2.5"),
+        ("accept_saturated: 1", "accept_saturated is 1"),
+        ("fs: &a 50\ndt: *a", "anchor"),
+        ("fs: !!python/object:os.system 1", "tag"),
+        ("{{{", "YAML"),
+    ],
+)
+def test_wrong_options_are_one_sentence(text: str, problem: str, tmp_path: Path) -> None:
+    path = tmp_path / "rig.record.yaml"
+    path.write_text(text)
+    with pytest.raises(StudyError, match=r"rig\.record\.yaml") as caught:
+        read_options(path)
+    assert problem in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_assignments() -> None:
+    assert assignments(["force=V1", " velocity = a=b "], "--column") == {"force": "V1", "velocity": "a=b"}
+    for wrong in (["force"], ["=V1"], ["force="], ["force=1", "force=2"]):
+        with pytest.raises(StudyError, match="--column"):
+            assignments(wrong, "--column")
+
+
+@pytest.mark.parametrize(
+    ("text", "written", "factor"),
+    [
+        ("N", "N", 1.0), ("kN", "kN", 1e3), ("MN", "MN", 1e6), ("lbf", "lbf", 4.4482216152605),
+        ("kg m/s^2", "kg m/s^2", 1.0),
+        ("mm", "mm", 1e-3), ("µm", "um", 1e-6), ("cm", "cm", 1e-2), ("in", "in", 0.0254), ("ft", "ft", 0.3048),
+        ("m/s²", "m/s^2", 1.0), ("m/s2", "m/s^2", 1.0), ("m/s/s", "m/s^2", 1.0), ("mm s^-2", "mm s^-2", 1e-3),
+        ("m·s⁻²", "m s^-2", 1.0), ("m/sec^2", "m/s^2", 1.0), ("g", "g", 9.80665),
+        ("mV", "mV", 1e-3), ("ms", "ms", 1e-3),
+    ],
+)  # fmt: skip
+def test_units(text: str, written: str, factor: float) -> None:
+    unit = parse_unit(text)
+    assert unit.text == written
+    assert unit.factor == pytest.approx(factor, rel=1e-12)
+    assert parse_unit(unit.text) == unit
+
+
+@pytest.mark.parametrize(
+    "text", ["", "x", "banana", "m/", "m^^2", "m/0", "N" * 999, "^", "m^99", "%", "m/s^", "furlong"]
+)
+def test_nonsense_units(text: str) -> None:
+    with pytest.raises(StudyError, match="there is no unit"):
+        parse_unit(text)
+
+
+@pytest.mark.parametrize(
+    ("role", "text"), [("force", "mm"), ("displacement", "g"), ("acceleration", "m/s"), ("time", "V")]
+)
+def test_units_of_something_else(role: str, text: str) -> None:
+    with pytest.raises(StudyError, match=f"'{text}' is no unit of {role}"):
+        role_unit(role, text)
+
+
+@given(st.text(max_size=12))
+def test_any_text_is_a_unit_or_one_sentence(text: str) -> None:
+    try:
+        unit = parse_unit(text)
+    except StudyError:
+        return
+    assert np.isfinite(unit.factor)
+    assert parse_unit(unit.text).powers == unit.powers
+
+
+# public records
+
+
+@NEEDS_DATA
+def test_silverbox() -> None:
+    mapping = {"force": "V1", "displacement": "V2"}
+    volts = dict.fromkeys(mapping, "V")
+    options = ReadOptions(columns=mapping, units=volts, fs=1e7 / 2**14)
+    matlab = read_record(DATA / "silverbox" / "SNLS80mV.mat", options)
+    text = read_record(DATA / "silverbox" / "SNLS80mV.csv", options)
+    assert len(matlab) == len(text) == 131072
+    assert matlab.dt == 2**14 / 1e7
+    for channel in mapping:
+        np.testing.assert_allclose(text[channel], matlab[channel], rtol=1e-4, atol=1e-6)
+    for name in ("SNLS80mV.mat", "SNLS80mV.csv"):
+        with pytest.raises(StudyError, match=r"'V1'.*--column force=NAME"):
+            read_record(DATA / "silverbox" / name)
+
+
+@NEEDS_DATA
+def test_bouc_wen() -> None:
+    train = read_record(DATA / "boucwen" / "train.h5", ReadOptions(columns=BOUC_WEN, period=8192))
+    assert (len(train), train.dt, train.period) == (40960, 1.0 / 750.0, 8192)
+    sweep = read_record(DATA / "boucwen" / "test.h5", ReadOptions(columns=BOUC_WEN, group="sinesweep"))
+    assert (len(sweep), sweep.name) == (153000, "test_sinesweep")
+    assert np.std(train["force"]) > 1.0 > np.std(train["displacement"])
+    with pytest.raises(StudyError, match="--group multisine or sinesweep"):
+        read_record(DATA / "boucwen" / "test.h5", ReadOptions(columns=BOUC_WEN))
+    with pytest.raises(StudyError, match=r"'multisine/u'.*--column"):
+        read_record(DATA / "boucwen" / "train.h5")
+
+
+@NEEDS_DATA
+def test_public_records_are_not_suspected_unless_swapped() -> None:
+    silverbox = {"force": "V1", "displacement": "V2"}
+    for path, columns, fs, group in [
+        (DATA / "silverbox" / "SNLS80mV.mat", silverbox, 610.35, None),
+        (DATA / "boucwen" / "test.h5", BOUC_WEN, None, "multisine"),
+        (DATA / "boucwen" / "test.h5", BOUC_WEN, None, "sinesweep"),
+    ]:
+        swapped = {"force": columns["displacement"], "displacement": columns["force"]}
+        assert suspect_swapped(read_record(path, ReadOptions(columns=columns, fs=fs, group=group))) is None
+        assert suspect_swapped(read_record(path, ReadOptions(columns=swapped, fs=fs, group=group)))
+
+
+# force and response swapped
+
+
+def rig(noise: float, seed: int) -> Record:
+    values = {"m": 1.0, "c": 3.77, "k": 355.3, "k3": 2.0e7}
+    names = ("inertia", "linear_damping", "linear_stiffness", "cubic_stiffness")
+    model = Model("rig", tuple(free(LIBRARY[n]) for n in names)).with_values(values)
+    rng = np.random.default_rng(seed)
+    spectrum = np.fft.rfft(rng.standard_normal(8192))
+    spectrum[np.fft.rfftfreq(8192, 0.02) > 12.5] = 0.0
+    record = simulate(model, np.fft.irfft(spectrum), 0.02)
+    return record.with_channels({m: record[m] + noise * np.std(record[m]) * rng.standard_normal(8192) for m in MOTIONS})
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+@pytest.mark.parametrize("scale", [1.0, 1e-9], ids=["SI", "scaled"])
+def test_swapped_is_suspected(motion: str, noise: float, scale: float) -> None:
+    record = rig(noise, seed=4)
+    force, response = record["force"], scale * record[motion]
+    assert suspect_swapped(Record(0.02, {"force": force, motion: response})) is None
+    said = suspect_swapped(Record(0.02, {"force": response, motion: force}))
+    assert said is not None
+    assert "swapped" in said
+
+
+def test_nothing_is_suspected_where_nothing_can_be_told() -> None:
+    record = rig(0.0, seed=5)
+    short = Record(0.02, {"force": record["displacement"][:200], "displacement": record["force"][:200]})
+    assert suspect_swapped(short) is None
+    noise = {"force": RNG.standard_normal(8192), "displacement": RNG.standard_normal(8192)}
+    assert suspect_swapped(Record(0.02, noise)) is None
+
+
+def test_heavy_imports_wait() -> None:
+    import subprocess
+    import sys
+
+    code = "import sys, study.readers; print([m for m in ('h5py', 'pyuff', 'pyarrow') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
