@@ -5,7 +5,7 @@ cubic stiffness and Van der Pol's damping. The output is always the force.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from study import expression, kernels
 from study.errors import StudyError
 from study.graph import Graph
+from study.interpolation import between_samples
 from study.model import Model, ModelTerm, with_registers
 from study.record import Record
 from study.terms import Component
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+STATE_STEPS = 4  # Runge-Kutta steps a sample for a term's own state
 
 
 @dataclass(frozen=True)
@@ -44,12 +46,15 @@ class Input:
         Names of the terms it carries.
     parameters : tuple of (str, float)
         Shape parameters in the formula.
+    state : str or None
+        dz/dt, where the shape is a state z with a memory.
     """
 
     shape: str
     parts: tuple[Part, ...]
     terms: tuple[str, ...]
     parameters: tuple[tuple[str, float], ...]
+    state: str | None = None
 
     def powers(self, frequency: Floats) -> Complexes:
         """``factor (j 2 pi f)^order`` of each part, shape (lines, parts)."""
@@ -69,12 +74,13 @@ def reverse_inputs(model: Model) -> tuple[Input, ...]:
     StudyError
         If a shape parameter is still unknown.
     """
-    found: dict[tuple[str, tuple[tuple[str, float], ...]], Input] = {}
+    found: dict[tuple[object, ...], Input] = {}
     for entry in model.terms:
         parameters = _known_parameters(entry)
         for component in entry.term.components:
-            key = (component.shape, parameters)
-            known = found.get(key, Input(component.shape, (), (), parameters))
+            state = entry.term.state if component.shape == "z" else None
+            key = (component.shape, parameters, state)
+            known = found.get(key, Input(component.shape, (), (), parameters, state))
             found[key] = _joined(known, entry, component)
     return tuple(found.values())
 
@@ -91,7 +97,7 @@ def _known_parameters(entry: ModelTerm) -> tuple[tuple[str, float], ...]:
 def _joined(known: Input, entry: ModelTerm, component: Component) -> Input:
     part = Part(component.symbol, component.order, component.factor)
     terms = known.terms if entry.name in known.terms else (*known.terms, entry.name)
-    return Input(known.shape, (*known.parts, part), terms, known.parameters)
+    return replace(known, parts=(*known.parts, part), terms=terms)
 
 
 def histories(inputs: Sequence[Input], record: Record) -> list[Floats]:
@@ -106,22 +112,36 @@ def histories(inputs: Sequence[Input], record: Record) -> list[Floats]:
 
 
 def history(item: Input, record: Record) -> Floats:
-    """g(u, v, t) of one input along a record, shape (n,)."""
+    """g(u, v, t) of one input along a record, shape (n,); a state begins at zero."""
+    formula = item.shape if item.state is None else item.state
+    wanted = [n for n in expression.names(formula) if n not in dict(item.parameters) and n != "z"]
+    data = _columns(wanted, formula, record)
+    graph = Graph()
+    known = {name: graph.input(name) for name in (*wanted, *dict(item.parameters), "z")}
+    program = with_registers(graph.program([expression.build(graph, formula, known)]), dict(item.parameters))
+    positions = np.array([program.inputs[n] for n in wanted], dtype=np.int64)
+    registers, output = program.registers.copy(), program.outputs
+    if item.state is not None:
+        fine = np.column_stack([between_samples(x, 2 * STATE_STEPS) for x in data])
+        states = np.empty(len(record))
+        kernels.integrate_state(
+            program.code, program.first, registers, positions, program.inputs["z"], int(output[0]),
+            record.dt / STATE_STEPS, STATE_STEPS, fine, states,
+        )  # fmt: skip
+        return states
+    table = np.column_stack(data) if data else np.zeros((len(record), 0))
+    out = np.empty((len(record), 1))
+    kernels.evaluate(program.code, program.first, registers, positions, table, output, out)
+    return out[:, 0]
+
+
+def _columns(wanted: Sequence[str], formula: str, record: Record) -> list[Floats]:
+    """The channels that a formula names."""
     columns = {"u": "displacement", "v": "velocity"}
-    wanted = [n for n in expression.names(item.shape) if n not in dict(item.parameters)]
     data: list[Floats] = []
     for name in wanted:
         channel = columns.get(name, name)
         if name != "t" and channel not in record:
-            raise StudyError(f"the formula {item.shape!r} needs the channel {channel!r}, which {record.name} lacks")
+            raise StudyError(f"the formula {formula!r} needs the channel {channel!r}, which {record.name} lacks")
         data.append(record.time if name == "t" else record[channel])
-    graph = Graph()
-    known = {name: graph.input(name) for name in (*wanted, *dict(item.parameters))}
-    program = with_registers(graph.program([expression.build(graph, item.shape, known)]), dict(item.parameters))
-    table = np.column_stack(data) if data else np.zeros((len(record), 0))
-    out = np.empty((len(record), 1))
-    positions = np.array([program.inputs[n] for n in wanted], dtype=np.int64)
-    kernels.evaluate(
-        program.code, program.first, program.registers.copy(), positions, table, program.outputs, out
-    )  # fmt: skip
-    return out[:, 0]
+    return data

@@ -1,0 +1,206 @@
+"""Candidates in order, with what an engineer needs to believe or doubt each."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study import fitting
+from study.diagnose import score, steadiness
+from study.diagnose.candidates import Trial
+from study.diagnose.score import Gain
+from study.diagnose.steadiness import Curve
+from study.fitting import Plan
+from study.output_error import FreeRunFit
+from study.record import Record
+from study.terms import Term
+
+Floats = NDArray[np.float64]
+TIE = 2.0  # candidates closer than this many standard errors of their difference are a tie
+INDISTINCT = 1e-6
+EXAMINED = 6  # candidates whose coefficient is followed along frequency and amplitude
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """One candidate.
+
+    Attributes
+    ----------
+    term : Term
+        The effect.
+    found : FreeRunFit
+        The model with it.
+    gain : Gain
+        What it explains of the held-out residual, with the p value of one comparison.
+    p_value : float
+        The same with the number of candidates accounted for (Bonferroni).
+    response_error : float
+        Held-out rms residual over rms response, after adding it.
+    coefficient, error : float
+        Its size (amplitude, for an effect of any phase) and standard error.
+    parameters : dict
+        Shape parameters, and the phase of an effect of any phase.
+    parameter_errors : dict
+        Their standard errors.
+    flatness : Curve or None
+        The coefficient along frequency, for the first few.
+    steadiness : Curve or None
+        The coefficient along amplitude.
+    tied_with : tuple of str
+        Candidates that this record cannot tell from it.
+    residual : array
+        Held-out residual.
+    """
+
+    term: Term
+    found: FreeRunFit
+    gain: Gain
+    p_value: float
+    response_error: float
+    coefficient: float
+    error: float
+    parameters: dict[str, float]
+    parameter_errors: dict[str, float]
+    flatness: Curve | None
+    steadiness: Curve | None
+    tied_with: tuple[str, ...]
+    residual: Floats
+
+    @property
+    def name(self) -> str:
+        """Name of the term."""
+        return self.term.name
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % confidence interval of the coefficient."""
+        return self.coefficient - 1.96 * self.error, self.coefficient + 1.96 * self.error
+
+    @property
+    def unsteadiness(self) -> float:
+        """By how much, relative to itself, the coefficient changes with frequency or amplitude."""
+        curves = [c for c in (self.flatness, self.steadiness) if c is not None]
+        return max((c.spread() for c in curves), default=math.nan)
+
+
+def rank(trials: Sequence[Trial], before: Floats, record: Record, how: Plan) -> list[Ranked]:
+    """Candidates by what they leave of the held-out residual, ties by how few unknowns they need.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        Every candidate, fitted and judged.
+    before : array, shape (samples to judge,)
+        Held-out residual without any of them.
+    record, how
+        The record and which parts of it are fitted and judged.
+    """
+    size = float(np.std(record[how.response][how.judge[0] : how.judge[1]]))
+    rows = [_row(t, before, len(trials), size, record, how) for t in trials]
+    rows.sort(key=lambda r: float(r.residual @ r.residual))
+    rows = _ties_by_simplicity(rows)
+    rows = [_examined(row, record, how) if i < EXAMINED else row for i, row in enumerate(rows)]
+    return [replace(row, tied_with=_tied(row, rows)) for row in rows]
+
+
+def _row(trial: Trial, before: Floats, count: int, size: float, record: Record, how: Plan) -> Ranked:
+    gain = score.gain(before, trial.residual)
+    covariance = score.clustered_covariance(fitting.linearise(trial.found, record, how), trial.found.residual)
+    coefficient, error, parameters, errors = _amount(trial, covariance)
+    return Ranked(
+        term=trial.term,
+        found=trial.found,
+        gain=gain,
+        p_value=min(1.0, gain.p_value * count),
+        response_error=float(np.sqrt(np.mean(trial.residual**2))) / size,
+        coefficient=coefficient,
+        error=error,
+        parameters=parameters,
+        parameter_errors=errors,
+        flatness=None,
+        steadiness=None,
+        tied_with=(),
+        residual=trial.residual,
+    )
+
+
+def _amount(trial: Trial, covariance: Floats) -> tuple[float, float, dict[str, float], dict[str, float]]:
+    """Coefficient and shape parameters of the candidate with standard errors."""
+    found, term = trial.found, trial.term
+    place = {key: i for i, key in enumerate(found.keys)}
+    values = {key: float(found.values[i]) for key, i in place.items()}
+    errors = {key: math.sqrt(max(float(covariance[i, i]), 0.0)) for key, i in place.items()}
+    names = {p.name: f"{term.name}.{p.name}" for p in term.parameters}
+    parameters = {name: values[key] for name, key in names.items() if key in values}
+    parameter_errors = {name: errors[key] for name, key in names.items() if key in values}
+    if len(term.symbols) == 1:
+        return values[term.symbols[0]], errors[term.symbols[0]], parameters, parameter_errors
+    a, b = (values[s] for s in term.symbols)
+    size = math.hypot(a, b)
+    direction = np.array([a, b]) / size if size > 0.0 else np.array([1.0, 0.0])
+    block = covariance[np.ix_([place[s] for s in term.symbols], [place[s] for s in term.symbols])]
+    across = np.array([direction[1], -direction[0]])
+    parameters["phase"] = math.atan2(-b, a)
+    parameter_errors["phase"] = math.sqrt(max(float(across @ block @ across), 0.0)) / size if size > 0.0 else math.inf
+    return size, math.sqrt(max(float(direction @ block @ direction), 0.0)), parameters, parameter_errors
+
+
+def _unknowns(row: Ranked) -> int:
+    return len(row.term.components) + len(row.term.parameters)
+
+
+def _misfit(row: Ranked) -> float:
+    """Both parts of the record together, with the price of each unknown (Schwarz, 1978); lower is better."""
+    power = float(row.residual @ row.residual) + float(row.found.residual @ row.found.residual)
+    n = len(row.residual) + len(row.found.residual)
+    return n * math.log(max(power, 1e-300)) + _unknowns(row) * math.log(n)
+
+
+def _ties_by_simplicity(rows: list[Ranked]) -> list[Ranked]:
+    """The candidates that the held-out residual cannot tell from the first, ordered by both parts of the record."""
+    level = [r for r in rows if _distance(r, rows[0]) < TIE] if rows else []
+    return sorted(level, key=_misfit) + [r for r in rows if not any(r is other for other in level)]
+
+
+def _distance(row: Ranked, other: Ranked) -> float:
+    """How much worse than the other a candidate is, in standard errors, over both parts of the record."""
+    if row is other:
+        return 0.0
+    held_out = score.difference(row.residual, other.residual)
+    both = score.difference(
+        np.concatenate([row.found.residual, row.residual]), np.concatenate([other.found.residual, other.residual])
+    )
+    return max(held_out, both)
+
+
+def _tied(row: Ranked, rows: Sequence[Ranked]) -> tuple[str, ...]:
+    if row.gain.explained <= 0.0 or row.p_value > 0.05:
+        return ()
+    near = [o for o in rows if o is not row and abs(_distance(o, row)) < TIE and abs(_distance(row, o)) < TIE]
+    return tuple(o.name for o in near)
+
+
+def _examined(row: Ranked, record: Record, how: Plan) -> Ranked:
+    """Follow the candidate's coefficient along frequency and amplitude."""
+    jacobian = fitting.linearise(row.found, record, how)
+    columns = [row.found.keys.index(s) for s in row.term.symbols]
+    direction = row.found.values[columns]
+    size = float(np.linalg.norm(direction))
+    if size == 0.0:
+        return row
+    own = jacobian[:, columns] @ (direction / size)
+    scale = np.linalg.norm(jacobian, axis=0)
+    others = np.delete(jacobian / np.where(scale > 0.0, scale, 1.0), columns, axis=1)
+    basis = np.linalg.qr(others)[0]
+    alone = own - basis @ (basis.T @ own)
+    if np.linalg.norm(alone) <= INDISTINCT * np.linalg.norm(own):
+        return row  # the model's own coefficients could do all that it does
+    residual = row.found.residual
+    return replace(
+        row,
+        flatness=steadiness.along_frequency(alone, residual, size, record.dt),
+        steadiness=steadiness.along_amplitude(alone, residual, size),
+    )
