@@ -7,6 +7,7 @@ of the numbers which the simulation yields, not of an idealisation of them.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +50,8 @@ class FreeRun:
         Samples in the stretch.
     row : int
         Which motion is the response: its place in ``MOTIONS``.
+    cuts : tuple of int
+        Samples of the stretch at which the motion begins anew from a state of its own.
     """
 
     program: Program
@@ -61,6 +64,7 @@ class FreeRun:
     start: float
     samples: int
     row: int
+    cuts: tuple[int, ...] = ()
 
     def respond(
         self, values: Mapping[str, float], initial: Sequence[float] | Floats, free_states: int = 0
@@ -71,35 +75,55 @@ class FreeRun:
         ----------
         values : mapping of float
             Value of each key.
-        initial : sequence of float
-            Displacement, velocity and, if given, the terms' own states at the first sample.
+        initial : array, shape (states,) or (cuts + 1, states)
+            Displacement, velocity and, if given, the terms' own states at the first sample, and at each cut.
         free_states : int
             How many of the initial states to differentiate by, after the keys.
 
         Returns
         -------
         response : array, shape (samples,)
-        jacobian : array, shape (samples, keys + free_states)
+        jacobian : array, shape (samples, keys + (cuts + 1) free_states)
 
         Raises
         ------
         DivergenceError
             If the response leaves the range of finite numbers.
+        StudyError
+            If there is not one initial state a piece.
         """
+        states, bounds = np.atleast_2d(initial), (0, *self.cuts, self.samples)
+        if len(states) != len(bounds) - 1:
+            raise StudyError(f"{len(states)} initial states were given; {len(bounds) - 1} pieces need one each")
         program = with_registers(self.program, {key: values[key] for key in self.keys})
+        if not self.cuts:
+            out = self._piece(program, 0, self.samples, states[0], free_states)
+            return out[:, 0], out[:, 1:]
+        keys = len(self.keys)
+        response, jacobian = np.empty(self.samples), np.zeros((self.samples, keys + len(states) * free_states))
+        for i, state in enumerate(states):
+            piece = slice(bounds[i], bounds[i + 1])
+            out = self._piece(program, piece.start, piece.stop, state, free_states)
+            response[piece], jacobian[piece, :keys] = out[:, 0], out[:, 1 : keys + 1]
+            jacobian[piece, keys + i * free_states : keys + (i + 1) * free_states] = out[:, keys + 1 :]
+        return response, jacobian
+
+    def _piece(self, program: Program, first: int, last: int, initial: Floats, free_states: int) -> Floats:
+        """Response beside its derivatives from one sample to another, shape (last - first, 1 + columns)."""
         first_free = 1 + len(self.keys)
         state = np.zeros((len(self.slots) + 1, first_free + free_states))
         state[: len(initial), 0] = initial
         state[range(free_states), range(first_free, first_free + free_states)] = 1.0
-        out = np.empty((self.samples, state.shape[1]))
+        out = np.empty((last - first, state.shape[1]))
+        begin = self.start + first * self.dt
         failed = kernels.integrate_variation(
             program.code, program.first, program.registers, self.slots, self.side,
-            self.start, self.dt, self.steps, self.drive, state, self.row, out,
+            begin, self.dt, self.steps, self.drive[2 * self.steps * first :], state, self.row, out,
         )  # fmt: skip
         if failed >= 0:
-            time = self.start + failed * self.dt
+            time = begin + failed * self.dt
             raise DivergenceError(f"the free run diverged at t = {time:.4g} s", time)
-        return out[:, 0], out[:, 1:]
+        return out
 
 
 def prepare(
@@ -110,6 +134,7 @@ def prepare(
     response: str = "displacement",
     steps_per_sample: int = 2,
     span: tuple[int, int] | None = None,
+    restarts: Sequence[int] = (),
 ) -> FreeRun:
     """Make a model ready to run under the force of a record.
 
@@ -127,13 +152,18 @@ def prepare(
         Runge-Kutta steps in each sampling interval.
     span : pair of int, optional
         First sample, and the one after the last; the whole record if left out.
+    restarts : sequence of int
+        Samples of the record, within the span, at which the motion begins anew (``study.restarts``).
 
     Raises
     ------
     StudyError
-        If a value, a channel or the span is not what it has to be.
+        If a value, a channel, the span or a restart is not what it has to be.
     """
     first, last = _checked_span(record, span)
+    bounds = (first, *restarts, last)
+    if any(b - a < 2 for a, b in pairwise(bounds)):
+        raise StudyError(f"the restarts {tuple(restarts)} must rise, and leave two samples between {first} and {last}")
     if response not in MOTIONS:
         raise StudyError(f"there is no response {response!r}; a free run yields {', '.join(MOTIONS)}")
     if steps_per_sample < 1:
@@ -144,7 +174,7 @@ def prepare(
     drive = np.column_stack(columns)[factor * first : factor * (last - 1) + 1]
     return FreeRun(
         program, slots, side, tuple(keys), drive, record.dt, steps_per_sample,
-        record.start + first * record.dt, last - first, MOTIONS.index(response),
+        record.start + first * record.dt, last - first, MOTIONS.index(response), tuple(r - first for r in restarts),
     )  # fmt: skip
 
 

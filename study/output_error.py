@@ -2,10 +2,11 @@
 
 The force is taken as known and the noise as additive on the response, so no noisy regressor enters and
 the estimate is not biased by noise (the reverse MI/SO estimate is, Section 5.4). The sum of squares is
-minimised by the method of Levenberg and Marquardt with exact derivatives (``study.free_run``).
+minimised by the method of Levenberg and Marquardt (``study.levenberg``) with exact derivatives
+(``study.free_run``). A chaotic system is run piece by piece (``study.restarts``).
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,16 +14,13 @@ from numpy.typing import NDArray
 
 from study.errors import DivergenceError, StudyError
 from study.free_run import FreeRun, prepare
+from study.levenberg import End, Point, minimise, point_at
 from study.model import Model
 from study.parameters import Estimate
 from study.record import Record
+from study.restarts import starting_state
 
 Floats = NDArray[np.float64]
-OFFSET = 1e-4  # converged when the next step is below this many standard errors (Bates and Watts, 1981)
-ROUNDING = 1e-11  # ... or changes the response by less than this share of it
-PATIENCE = 8  # free runs that may pass without lowering the error by what matters
-MATTERS = 1e-3  # ... as a share of what one standard error brings
-INDISTINCT = 1e-12  # eigenvalue of the scaled normal matrix below which coefficients cannot be told apart
 POSITIVE = ("m", "u_g", "tau", "f_m", "f")  # coefficients and shape parameters without meaning below zero
 
 
@@ -42,8 +40,8 @@ class FreeRunFit:
         ``s^2 (J^T J)^-1`` with s^2 from the residual, the uncertainty of the initial state included:
         right if the residual is white noise. With the true variance for s^2 it is the Cramer-Rao bound
         for white Gaussian noise.
-    initial : array, shape (states,)
-        Displacement, velocity and the terms' own states at the first sample.
+    initial : array, shape (states,), or (pieces, states) with restarts
+        Displacement, velocity and the terms' own states at the first sample, of each piece.
     residual : array, shape (n,)
         Measured minus predicted response.
     converged : bool
@@ -84,6 +82,7 @@ def fit_free_run(
     response: str = "displacement",
     steps_per_sample: int = 2,
     span: tuple[int, int] | None = None,
+    restarts: Sequence[int] = (),
     max_iterations: int = 60,
     initial: str = "estimate",
 ) -> FreeRunFit:
@@ -105,6 +104,9 @@ def fit_free_run(
         Runge-Kutta steps in each sampling interval.
     span : pair of int, optional
         First sample, and the one after the last; the whole record if left out.
+    restarts : sequence of int
+        Samples of the record at which the motion begins anew from a state that is estimated too;
+        :func:`study.restarts.restarts` says where a chaotic system needs that.
     max_iterations : int
         Free runs after which to give up.
     initial : str
@@ -127,15 +129,19 @@ def fit_free_run(
         raise StudyError(f"record {record.name!r} has no {response}; it has {', '.join(record.channels)}")
     if initial not in ("estimate", "rest"):
         raise StudyError(f"initial is {initial!r}; it must be 'estimate' or 'rest'")
+    if initial == "rest" and restarts:
+        raise StudyError(f"restarts at {tuple(restarts)} begin from estimated states; initial cannot be 'rest'")
     begin = _starting_values(model, start or {}, held)
-    keys = tuple(begin)
-    run = prepare(model, record, keys, response=response, steps_per_sample=steps_per_sample, span=span)
+    run = prepare(
+        model, record, tuple(begin), response=response, steps_per_sample=steps_per_sample, span=span, restarts=restarts
+    )
     first = 0 if span is None else span[0]
-    measured = record[response][first : first + run.samples]
-    state = _starting_state(measured, run) if initial == "estimate" else np.zeros(0)
-    problem = _Problem(run, measured, len(state))
-    end = _minimise(problem, np.concatenate([list(begin.values()), state]), max_iterations)
-    return _result(model, problem, end)
+    free = len(run.slots) + 1 if initial == "estimate" else 0
+    states = np.zeros((len(run.cuts) + 1, free))
+    if free:
+        states[:, :2] = [starting_state(record, response, sample) for sample in (first, *restarts)]
+    problem = _Problem(run, record[response][first : first + run.samples], free)
+    return _result(model, problem, problem.search(np.array([*begin.values(), *states.ravel()]), max_iterations))
 
 
 def _starting_values(model: Model, start: Mapping[str, float], held: Collection[str]) -> dict[str, float]:
@@ -153,123 +159,56 @@ def _starting_values(model: Model, start: Mapping[str, float], held: Collection[
     return begin
 
 
-def _starting_state(measured: Floats, run: FreeRun) -> Floats:
-    """Displacement and velocity at the first sample as far as the response itself shows them."""
-    state = np.zeros(len(run.slots) + 1)
-    if run.row == 0:
-        state[:2] = measured[0], (measured[1] - measured[0]) / run.dt
-    elif run.row == 1:
-        state[1] = measured[0]
-    return state
-
-
 @dataclass(frozen=True)
 class _Problem:
+    """A search over the keys and, piece by piece, over the free initial states."""
+
     run: FreeRun
     measured: Floats
     free_states: int
 
-    def linearise(self, x: Floats) -> "_Point | None":
+    def states(self, x: Floats) -> Floats:
+        """Initial states in the variables, shape (pieces, states)."""
+        states = np.zeros((len(self.run.cuts) + 1, len(self.run.slots) + 1))
+        states[:, : self.free_states] = x[len(self.run.keys) :].reshape(len(states), self.free_states)
+        return states
+
+    def linearise(self, x: Floats) -> Point | None:
         """Residual and Jacobian at x; None where the model has no finite response there."""
-        keys = self.run.keys
-        values = dict(zip(keys, (float(v) for v in x), strict=False))
+        values = dict(zip(self.run.keys, (float(v) for v in x), strict=False))
         if any(v <= 0.0 and key.rpartition(".")[2] in POSITIVE for key, v in values.items()):
             return None
         try:
-            response, jacobian = self.run.respond(values, x[len(keys) :], self.free_states)
+            response, jacobian = self.run.respond(values, self.states(x), self.free_states)
         except DivergenceError:
             return None
-        residual = self.measured - response
-        with np.errstate(over="ignore", invalid="ignore"):  # on its way out of range: refused below
-            scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian))
-        if not np.all(np.isfinite(scale)):
-            return None
-        scale[scale == 0.0] = 1.0
-        jacobian /= scale
-        return _Point(x, residual, float(residual @ residual), scale, jacobian.T @ jacobian, jacobian.T @ residual)
+        return point_at(x, self.measured - response, jacobian)
+
+    def search(self, x: Floats, max_iterations: int) -> End:
+        """The minimum near x."""
+        point = self.linearise(x)
+        if point is None:
+            values = ", ".join(f"{key} = {v:g}" for key, v in zip(self.run.keys, x, strict=False))
+            raise DivergenceError(f"the free run diverges with the starting values {values}", self.run.start)
+        return minimise(self.linearise, point, float(np.linalg.norm(self.measured)), max_iterations)
 
 
-@dataclass(frozen=True)
-class _Point:
-    """A point of the search; ``normal`` and ``gradient`` are those of the Jacobian with columns of unit length."""
-
-    x: Floats
-    residual: Floats
-    cost: float
-    scale: Floats
-    normal: Floats
-    gradient: Floats
-
-    def decrement(self) -> float:
-        """How much the sum of squares would fall in a full Gauss-Newton step, were the model linear."""
-        values, vectors = np.linalg.eigh(self.normal)
-        known = values > INDISTINCT
-        return float(np.sum((vectors.T @ self.gradient)[known] ** 2 / values[known]))
-
-
-@dataclass(frozen=True)
-class _End:
-    point: _Point
-    converged: bool
-    iterations: int
-    message: str
-
-
-def _minimise(problem: _Problem, x: Floats, max_iterations: int) -> _End:
-    """Levenberg-Marquardt with Nielsen's damping; the variables are scaled by the Jacobian's columns.
-
-    A trial that diverges is a rejected step. Every test is unchanged by a change of units.
-    """
-    point = problem.linearise(x)
-    if point is None:
-        values = ", ".join(f"{key} = {v:g}" for key, v in zip(problem.run.keys, x, strict=False))
-        raise DivergenceError(f"the free run diverges with the starting values {values}", problem.run.start)
-    size = float(np.linalg.norm(problem.measured))
-    freedom = max(len(problem.measured) - len(x), 1)
-    damping, growth, costs = 1e-3, 2.0, list[float]()
-    for iteration in range(1, max_iterations + 1):
-        one = len(x) * point.cost / freedom  # what a step of one standard error brings
-        fall = point.decrement()
-        if fall <= OFFSET**2 * one or fall <= (ROUNDING * size) ** 2:
-            return _End(point, True, iteration, f"converged after {iteration} free runs")
-        costs.append(point.cost)
-        if len(costs) > PATIENCE and costs[-1 - PATIENCE] - point.cost < MATTERS * one:
-            return _End(point, fall <= one, iteration, _stalled(iteration, np.sqrt(fall / one)))
-        step = np.linalg.solve(point.normal + damping * np.eye(len(x)), point.gradient)
-        trial = problem.linearise(point.x + step / point.scale)
-        expected = float(step @ (damping * step + point.gradient))
-        gain = -1.0 if trial is None else (point.cost - trial.cost) / expected
-        if trial is not None and gain > 0.0:
-            point = trial
-            damping, growth = max(damping * max(0.1, 1.0 - (2.0 * gain - 1.0) ** 3), INDISTINCT), 2.0
-        else:
-            damping, growth = damping * growth, 2.0 * growth
-    return _End(point, False, max_iterations, f"still falling after {max_iterations} free runs, the most allowed")
-
-
-def _stalled(iteration: int, offset: float) -> str:
-    """Friction and stops make the sum of squares kinked, and its minimum may lie in a kink."""
-    if offset <= 1.0:
-        return f"converged after {iteration} free runs to where no step lowers the error"
-    return f"stuck after {iteration} free runs: no step lowers the error, one of {offset:.1f} standard errors should"
-
-
-def _result(model: Model, problem: _Problem, end: _End) -> FreeRunFit:
+def _result(model: Model, problem: _Problem, end: End) -> FreeRunFit:
     point, keys = end.point, problem.run.keys
     p = len(keys)
-    variance = point.cost / max(len(point.residual) - len(point.x), 1)
-    values, vectors = np.linalg.eigh(point.normal)
-    inverse = (vectors / np.maximum(values, np.finfo(float).eps)) @ vectors.T
-    covariance = variance * inverse / np.outer(point.scale, point.scale)
     message = end.message
-    blurred = np.max(np.abs(vectors[:, values <= INDISTINCT]), axis=1, initial=0.0) > 0.1
-    names = [key for key, unclear in zip(keys, blurred, strict=False) if unclear]
-    if names:
-        message += f"; this record cannot tell apart or does not show {', '.join(names)}"
-    initial = np.zeros(len(problem.run.slots) + 1)
-    initial[: problem.free_states] = point.x[p:]
-    estimates = point.x[:p]
-    filled = model.with_values(dict(zip(keys, (float(v) for v in estimates), strict=True)))
+    unclear = [key for key, undecided in zip(keys, point.undecided(), strict=False) if undecided]
+    if unclear:
+        message += f"; this record cannot tell apart or does not show {', '.join(unclear)}"
+    states = problem.states(point.x)
     return FreeRunFit(
-        filled, keys, estimates, covariance[:p, :p], initial, point.residual, end.converged, end.iterations, message
+        model=model.with_values(dict(zip(keys, (float(v) for v in point.x), strict=False))),
+        keys=keys,
+        values=point.x[:p],
+        covariance=point.covariance()[:p, :p],
+        initial=states if problem.run.cuts else states[0],
+        residual=point.residual,
+        converged=end.converged,
+        iterations=end.iterations,
+        message=message,
     )

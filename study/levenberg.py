@@ -1,0 +1,132 @@
+"""Nonlinear least squares by the method of Levenberg and Marquardt, for exact derivatives.
+
+The variables are scaled by the columns of the Jacobian, and every test compares a step with its standard
+error or with the size of the data: nothing changes with the units. A trial without a finite response is a
+rejected step.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+OFFSET = 1e-4  # converged when the next step is below this many standard errors (Bates and Watts, 1981)
+ROUNDING = 1e-11  # ... or changes the response by less than this share of it
+PATIENCE = 8  # trials that may pass without lowering the error by what matters
+MATTERS = 1e-3  # ... as a share of what one standard error brings
+INDISTINCT = 1e-12  # eigenvalue of the scaled normal matrix below which variables cannot be told apart
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point of the search; p variables, n samples.
+
+    Attributes
+    ----------
+    x : array, shape (p,)
+        The variables.
+    residual : array, shape (n,)
+        Measured minus predicted.
+    cost : float
+        Sum of squares of the residual.
+    scale : array, shape (p,)
+        Length of each column of the Jacobian, one where it is zero.
+    normal : array, shape (p, p)
+        J^T J of the Jacobian with columns of unit length.
+    gradient : array, shape (p,)
+        J^T residual of the same.
+    """
+
+    x: Floats
+    residual: Floats
+    cost: float
+    scale: Floats
+    normal: Floats
+    gradient: Floats
+
+    def decrement(self) -> float:
+        """How much the sum of squares would fall in a full Gauss-Newton step, were the model linear."""
+        values, vectors = np.linalg.eigh(self.normal)
+        known = values > INDISTINCT
+        return float(np.sum((vectors.T @ self.gradient)[known] ** 2 / values[known]))
+
+    def covariance(self) -> Floats:
+        """``s^2 (J^T J)^-1`` with s^2 from the residual; very large where the data do not decide, shape (p, p)."""
+        variance = self.cost / max(len(self.residual) - len(self.x), 1)
+        values, vectors = np.linalg.eigh(self.normal)
+        inverse = (vectors / np.maximum(values, np.finfo(float).eps)) @ vectors.T
+        return np.asarray(variance * inverse / np.outer(self.scale, self.scale), dtype=np.float64)
+
+    def undecided(self) -> NDArray[np.bool_]:
+        """Which variables the data do not show, or cannot tell apart from others, shape (p,)."""
+        values, vectors = np.linalg.eigh(self.normal)
+        return np.max(np.abs(vectors[:, values <= INDISTINCT]), axis=1, initial=0.0) > 0.1
+
+
+def point_at(x: Floats, residual: Floats, jacobian: Floats) -> Point | None:
+    """The point with this residual and Jacobian (which is scaled in place); None if they are not finite."""
+    with np.errstate(over="ignore", invalid="ignore"):  # on its way out of range: refused below
+        scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian))
+        cost = float(residual @ residual)
+    if not (np.isfinite(cost) and np.all(np.isfinite(scale))):
+        return None
+    scale[scale == 0.0] = 1.0
+    jacobian /= scale
+    return Point(x, residual, cost, scale, jacobian.T @ jacobian, jacobian.T @ residual)
+
+
+@dataclass(frozen=True)
+class End:
+    """Where a search ended, after how many trials, and why."""
+
+    point: Point
+    converged: bool
+    iterations: int
+    message: str
+
+
+def minimise(linearise: Callable[[Floats], Point | None], point: Point, size: float, max_iterations: int) -> End:
+    """Search from a point, with Nielsen's damping.
+
+    Parameters
+    ----------
+    linearise : callable
+        The point at given variables, None where there is none.
+    point : Point
+        Where to begin.
+    size : float
+        Root of the sum of squares of the measured response.
+    max_iterations : int
+        Trials after which to give up.
+    """
+    count = len(point.x)
+    freedom = max(len(point.residual) - count, 1)
+    damping, growth, costs = 1e-3, 2.0, list[float]()
+    for iteration in range(1, max_iterations + 1):
+        one = count * point.cost / freedom  # what a step of one standard error brings
+        fall = point.decrement()
+        if fall <= OFFSET**2 * one or fall <= (ROUNDING * size) ** 2:
+            return End(point, True, iteration, f"converged after {iteration} free runs")
+        costs.append(point.cost)
+        if len(costs) > PATIENCE and costs[-1 - PATIENCE] - point.cost < MATTERS * one:
+            return _stalled(point, iteration, float(np.sqrt(fall / one)))
+        step = np.linalg.solve(point.normal + damping * np.eye(count), point.gradient)
+        trial = linearise(point.x + step / point.scale)
+        expected = float(step @ (damping * step + point.gradient))
+        gain = -1.0 if trial is None else (point.cost - trial.cost) / expected
+        if trial is not None and gain > 0.0:
+            point = trial
+            damping, growth = max(damping * max(0.1, 1.0 - (2.0 * gain - 1.0) ** 3), INDISTINCT), 2.0
+        else:
+            damping, growth = damping * growth, 2.0 * growth
+    return End(point, False, max_iterations, f"still falling after {max_iterations} free runs, the most allowed")
+
+
+def _stalled(point: Point, iteration: int, offset: float) -> End:
+    """Friction and stops make the sum of squares kinked, and its minimum may lie in a kink."""
+    if offset <= 1.0:
+        return End(point, True, iteration, f"converged after {iteration} free runs to where no step lowers the error")
+    why = f"no step lowers the error, though one of {offset:.2g} standard errors should"
+    return End(point, False, iteration, f"stuck after {iteration} free runs: {why}")
