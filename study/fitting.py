@@ -19,6 +19,7 @@ from study.spectra import Segments, cross_spectra
 
 Floats = NDArray[np.float64]
 LINEAR_ORDERS = {"k": 0, "c": 1, "m": 2}
+FAINT = 1e-3  # ... and whose force is above this share of the strongest line: leakage tells nothing
 CHANCE = 0.01  # the linear start uses lines whose coherence noise alone would reach this rarely
 
 
@@ -86,7 +87,7 @@ def linear_start(model: Model, record: Record, how: Plan) -> dict[str, float]:
     coherence = np.abs(g[:, 0, 1]) ** 2 / np.where(power > 0.0, power, np.inf)
     coherence = np.clip(coherence, 0.0, 1.0 - 1e-6)
     by_chance = 1.0 - CHANCE ** (1.0 / max(matrix.averages - 1.0, 1.0))
-    keep = (coherence > by_chance) & (g[:, 0, 0].real > 1e-6 * np.max(g[:, 0, 0].real))
+    keep = (coherence > by_chance) & (g[:, 0, 0].real > FAINT * np.max(g[:, 0, 0].real))
     if np.count_nonzero(keep) < 4:
         raise StudyError(f"force and {how.response} of {record.name!r} have nothing in common at any frequency")
     omega = 2j * np.pi * f[keep]
@@ -112,7 +113,12 @@ def held_keys(model: Model) -> tuple[str, ...]:
 
 
 def fit(
-    model: Model, record: Record, how: Plan, held: tuple[str, ...], start: Mapping[str, float] | None = None
+    model: Model,
+    record: Record,
+    how: Plan,
+    held: tuple[str, ...],
+    start: Mapping[str, float] | None = None,
+    max_iterations: int = 60,
 ) -> FreeRunFit:
     """Fit what is not held on the plan's fitting part; starting values from ``start`` or the linear start.
 
@@ -125,7 +131,7 @@ def fit(
     begin = {key: value for key, value in begin.items() if key not in held}
     return fit_free_run(
         model, record, start=begin, held=held, response=how.response,
-        steps_per_sample=how.steps_per_sample, span=how.fit,
+        steps_per_sample=how.steps_per_sample, span=how.fit, max_iterations=max_iterations,
     )  # fmt: skip
 
 

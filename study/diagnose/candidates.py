@@ -12,13 +12,14 @@ from study.diagnose import search
 from study.diagnose.search import Baseline
 from study.errors import StudyError
 from study.fitting import Plan
-from study.model import free
+from study.model import Model, free
 from study.output_error import FreeRunFit
 from study.record import Record
 from study.terms import LIBRARY, Term
 
 Floats = NDArray[np.float64]
 THREADS = 2
+SHORT, LONG = 15, 60  # free runs of a fit that tries a start, and of one that is kept
 NEVER_CANDIDATES = ("inertia",)
 
 
@@ -67,16 +68,20 @@ def try_all(
 
 
 def attempt(term: Term, base: Baseline, record: Record, how: Plan, held: tuple[str, ...]) -> Trial | None:
-    """The best of the fits that start from the search's best points; None where none has a finite response."""
-    best: FreeRunFit | None = None
+    """The model with a candidate, fitted from several starts; None where none has a finite response.
+
+    With shape parameters, each start is first fitted with these held: the misfit along a dead band or a
+    gap has kinks and side valleys in which a fit of everything at once gets stuck.
+    """
     model = base.found.model.with_term(free(term))
+    keys = free(term).keys[len(term.components) :]
+    best: FreeRunFit | None = None
     for values in _starts(term, base, record, how):
-        try:
-            found = fitting.fit(model, record, how, held, values)
-        except StudyError:
-            continue
-        if best is None or found.rms < best.rms:
-            best = found
+        limit = SHORT if keys else LONG
+        best = _better(best, _fit(model.with_values(values), record, how, (*held, *keys), values, limit))
+    if best is not None and keys:
+        values = {key: v for key, v in best.model.values.items() if v is not None}
+        best = _better(best, _fit(best.model, record, how, held, values, LONG))
     if best is None:
         return None
     try:
@@ -85,17 +90,33 @@ def attempt(term: Term, base: Baseline, record: Record, how: Plan, held: tuple[s
         return None
 
 
-def _starts(term: Term, base: Baseline, record: Record, how: Plan) -> list[dict[str, float]]:
-    """Where fits begin: the search's best points beside the fitted model, and the best one beside a linear model.
+def _better(one: FreeRunFit | None, other: FreeRunFit | None) -> FreeRunFit | None:
+    """The fit with the smaller residual; of two alike the later one, which knows more errors."""
+    if one is None or other is None:
+        return one or other
+    return other if other.rms <= one.rms else one
 
-    The second kind matters where the model without the candidate was driven to a far corner by its lack.
+
+def _fit(
+    model: Model, record: Record, how: Plan, held: tuple[str, ...], values: dict[str, float], limit: int
+) -> FreeRunFit | None:
+    try:
+        return fitting.fit(model, record, how, held, values, limit)
+    except StudyError:
+        return None
+
+
+def _starts(term: Term, base: Baseline, record: Record, how: Plan) -> list[dict[str, float]]:
+    """Where fits begin: points of the search beside the fitted model, and the best one beside a linear model.
+
+    The last kind matters where the model without the candidate was driven to a far corner by its lack.
     """
-    fitted = dict(zip(base.found.keys, (float(v) for v in base.found.values), strict=True))
+    fitted = {key: v for key, v in base.found.model.values.items() if v is not None}
     points = search.starts(term, base, record, how)
     keys = free(term).keys
     begins = [fitted | dict(zip(keys, p.coefficients + p.parameters, strict=True)) for p in points]
     if points:
-        anew = {k: v for k, v in base.linear.items() if k in fitted and "." not in k}
+        anew = {k: v for k, v in base.linear.items() if k in base.found.keys and "." not in k}
         still = dict(zip(keys, (0.0,) * len(term.components) + points[0].parameters, strict=True))
         begins.append(fitted | anew | still)
     return begins

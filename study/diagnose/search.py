@@ -25,7 +25,8 @@ from study.terms import Term, get
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 PEAKS = 6  # lines of a spectrum that are tried as the frequency of a periodic effect
-STARTS = 3  # points of the search that start a fit
+STARTS = 4  # points of the search that start a fit
+SPREAD = 5  # ... or so many, from one end of the range to the other, where the search is blunt
 
 
 @dataclass(frozen=True)
@@ -99,8 +100,11 @@ def starts(term: Term, base: Baseline, record: Record, how: Plan) -> list[Start]
         point = _try(term, parameters, base, record, how)
         if point is not None:
             tried.append(point)
-    tried.sort(key=lambda s: -s.share)
-    return tried[:STARTS]
+    best = sorted(tried, key=lambda s: -s.share)
+    if term.name in ("periodic_stiffness", "harmonic_force", "hysteresis"):
+        return best[:STARTS]
+    spread = [tried[i] for i in np.linspace(0, len(tried) - 1, SPREAD).astype(int)] if tried else []
+    return best[:1] + [point for point in spread if point is not best[0]]
 
 
 def _try(

@@ -8,13 +8,11 @@ from numpy.typing import NDArray
 
 from study import fitting, noise_floor
 from study.diagnose import candidates, nature, search
-from study.diagnose.candidates import Trial
 from study.diagnose.ranking import Ranked, rank
 from study.diagnose.search import Baseline
 from study.fitting import Plan
 from study.free_run import prepare
 from study.model import Model
-from study.noise_floor import Floor
 from study.output_error import FreeRunFit
 from study.record import Record
 from study.terms import Term
@@ -24,10 +22,10 @@ MISSING, NOTHING, UNKNOWN = "missing_effect", "nothing_missing", "unknown_effect
 LEVEL = 0.01  # of the p value, all candidates accounted for
 SMALLEST_SHARE = 0.01  # of the held-out residual: what a candidate must explain to be worth a term
 SIGNIFICANT = 5.0  # standard errors by which structure must stand above the noise floor
-NEGLIGIBLE = 2e-3  # of the response: structure below this is at the resolution of integration and calibration
-LEFT = 0.10  # of the first structure: what may be left for a candidate to count as the whole explanation
-STEADY = 0.25  # relative change of a coefficient with frequency or amplitude that a true term may show
-PAIRED = 5  # the best so many candidates are tried together with each other
+SMALLEST_GAIN = 1e-3  # of the rms response: what a candidate must explain; less is the resolution of integration
+NEGLIGIBLE = 2e-3  # of the rms response: structure below this is no evidence that something is missing
+LEFT = 0.01  # of the rms response: structure that may be left beside a candidate which counts as the explanation
+PAIRED = 2  # the best so many candidates are tried together with every other
 
 
 @dataclass(frozen=True)
@@ -44,14 +42,12 @@ class Diagnosis:
         Its held-out residual.
     response_error : float
         Its rms over that of the response.
-    floor : Floor
-        Noise floor and structure of the held-out residual.
     noise : float
         Noise floor over the rms of the response.
     candidates : tuple of Ranked
         Best first.
     left : float
-        Share of the structure that remains after the best explanation.
+        Rms of the structure that remains beside the best explanation, over the rms response.
     pair : tuple of str
         Two effects that explain together what none does alone; empty otherwise.
     families : dict
@@ -62,7 +58,6 @@ class Diagnosis:
     found: FreeRunFit
     residual: Floats
     response_error: float
-    floor: Floor
     noise: float
     candidates: tuple[Ranked, ...]
     left: float
@@ -112,13 +107,12 @@ def diagnose(
     trials = candidates.try_all(terms, base, record, how, held, progress)
     rows = rank(trials, residual, record, how)
     size = float(np.std(record[how.response][how.judge[0] : how.judge[1]]))
-    floor = _floor([residual, *(r.residual for r in rows[:3])], record.dt)
-    real = _structure(residual, floor, size, record.dt)
-    verdict, left, pair = _decide(rows, trials, residual, floor, size, base, record, how, held)
+    noise = _floor([residual, *(r.residual for r in rows[:3])], record.dt)
+    verdict, rows, left, pair = _decide(rows, residual, size, record, how, held)
     families = _families(base, record, how) if verdict == UNKNOWN else {}
     return Diagnosis(
-        verdict, found, residual, float(np.sqrt(np.mean(residual**2))) / size, real,
-        floor / size, tuple(rows), left, pair, families,
+        verdict, found, residual, float(np.sqrt(np.mean(residual**2))) / size,
+        noise / size, tuple(rows), left, pair, families,
     )  # fmt: skip
 
 
@@ -127,70 +121,49 @@ def _floor(residuals: Sequence[Floats], dt: float) -> float:
     return min(noise_floor.floor(r, dt).noise for r in residuals)
 
 
-def _structure(residual: Floats, noise: float, size: float, dt: float) -> Floor:
-    """Noise floor and excess of a residual; what is negligible against the response is no excess."""
-    found = noise_floor.floor(residual, dt)
-    del noise
-    if found.excess < (NEGLIGIBLE * size) ** 2:
-        return Floor(found.noise, 0.0, max(found.excess_error, np.finfo(float).tiny))
-    return found
-
-
 def _decide(
-    rows: list[Ranked],
-    trials: Sequence[Trial],
-    residual: Floats,
-    noise: float,
-    size: float,
-    base: Baseline,
-    record: Record,
-    how: Plan,
-    held: tuple[str, ...],
-) -> tuple[str, float, tuple[str, ...]]:
-    before = _structure(residual, noise, size, record.dt)
-    credible = [r for r in rows if _credible(r)]
+    rows: list[Ranked], residual: Floats, size: float, record: Record, how: Plan, held: tuple[str, ...]
+) -> tuple[str, list[Ranked], float, tuple[str, ...]]:
+    """Verdict, candidates in their final order, what is left, and the pair that explains it if none does alone."""
+    credible = [r for r in rows if _credible(r, residual, size)]
     if not credible:
-        return (UNKNOWN if before.significance > SIGNIFICANT else NOTHING), 1.0, ()
-    left = _left(credible[0].residual, before, noise, size, record.dt)
+        left = _left(residual, size, record.dt)
+        return (UNKNOWN if left > NEGLIGIBLE else NOTHING), rows, left, ()
+    left = _left(credible[0].residual, size, record.dt)
     if left <= LEFT:
-        return MISSING, left, ()
-    best, partner = _best_pair(rows, trials, base, record, how, held)
-    if best is not None:
-        together = _left(best.residual, before, noise, size, record.dt)
-        if together <= LEFT * max(left, LEFT) or together <= 0.3 * LEFT:
-            return MISSING, together, partner
-    if credible[0].unsteadiness <= STEADY:
-        return MISSING, left, ()
-    return UNKNOWN, left, ()
+        return MISSING, rows, left, ()
+    pair, remaining = _best_pair(rows, size, record, how, held)
+    if remaining <= LEFT:
+        first = [next(r for r in rows if r.name == name) for name in pair]
+        first.sort(key=lambda r: float(r.residual @ r.residual))
+        return MISSING, first + [r for r in rows if r.name not in pair], remaining, pair
+    return UNKNOWN, rows, left, ()
 
 
-def _credible(row: Ranked) -> bool:
-    return row.p_value < LEVEL and row.gain.explained > SMALLEST_SHARE
+def _credible(row: Ranked, residual: Floats, size: float) -> bool:
+    gained = max(float(np.mean(residual**2) - np.mean(row.residual**2)), 0.0)
+    return row.p_value < LEVEL and row.gain.explained > SMALLEST_SHARE and gained > (SMALLEST_GAIN * size) ** 2
 
 
-def _left(residual: Floats, before: Floor, noise: float, size: float, dt: float) -> float:
-    """Share of the first structure that a residual still shows, if it shows any beyond doubt."""
-    after = _structure(residual, noise, size, dt)
-    if after.significance < SIGNIFICANT or before.excess <= 0.0:
-        return 0.0
-    return after.excess / before.excess
+def _left(residual: Floats, size: float, dt: float) -> float:
+    """Rms of the structure in a residual over the rms response; zero where noise alone would show as much."""
+    found = noise_floor.floor(residual, dt)
+    return float(np.sqrt(found.excess)) / size if found.significance > SIGNIFICANT else 0.0
 
 
 def _best_pair(
-    rows: list[Ranked], trials: Sequence[Trial], base: Baseline, record: Record, how: Plan, held: tuple[str, ...]
-) -> tuple[Trial | None, tuple[str, ...]]:
-    """The best second candidate beside each of the first few; puts the pair's stronger member first in ``rows``."""
-    best: Trial | None = None
-    names: tuple[str, ...] = ()
-    terms = [t.term for t in trials]
+    rows: list[Ranked], size: float, record: Record, how: Plan, held: tuple[str, ...]
+) -> tuple[tuple[str, ...], float]:
+    """The two effects that together leave the least, and the structure that they leave."""
+    terms = [row.term for row in rows]
+    best: tuple[float, tuple[str, ...], Floats] | None = None
     for row in rows[:PAIRED]:
-        again = search.baseline(row.found, record, how)
-        left = [t for t in terms if t.name != row.name]
-        for trial in candidates.try_all(left, again, record, how, held):
-            if best is None or float(np.sum(trial.residual**2)) < float(np.sum(best.residual**2)):
-                best, names = trial, (row.name, trial.term.name)
-    del base
-    return best, names
+        beside = search.baseline(row.found, record, how)
+        for trial in candidates.try_all([t for t in terms if t.name != row.name], beside, record, how, held):
+            power = float(trial.residual @ trial.residual)
+            if best is None or power < best[0]:
+                best = power, (row.name, trial.term.name), trial.residual
+    return (best[1], _left(best[2], size, record.dt)) if best is not None else ((), np.inf)
 
 
 def _families(base: Baseline, record: Record, how: Plan) -> dict[str, float]:
