@@ -11,6 +11,7 @@ FEWEST_CLIPPED = 10  # samples at the very same extreme value ...
 CLIPPED_SHARE = 1e-3  # ... and this share of the record ...
 CLIPPED_RATIO = 10.0  # ... and this many times as many as at the values next to it: then it is clipped
 FEWEST_VALUES = 20  # with fewer different values it is a switched signal, not a clipped one
+SAME = 1e-9  # of the range: values that differ by rounding errors only
 NEAR = 0.05  # of the range: the values next to the extreme
 
 
@@ -42,10 +43,11 @@ def saturated(values: Floats) -> str | None:
         count = int(np.count_nonzero(values == extreme))
         if extreme == 0.0 or count < max(FEWEST_CLIPPED, CLIPPED_SHARE * len(values)):
             continue
-        different, times = np.unique(values, return_counts=True)
+        below = np.rint(np.abs(values - extreme) / (SAME * np.ptp(values)))  # 0 at the extreme, whole numbers elsewhere
+        different, times = np.unique(below, return_counts=True)
         if len(different) < FEWEST_VALUES:
             continue
-        near = (np.abs(different - extreme) <= NEAR * np.ptp(values)) & (different != extreme)
+        near = (different > 0.0) & (different <= NEAR / SAME)
         usual = float(np.mean(times[near])) if near.any() else float(np.median(times))
         if count > CLIPPED_RATIO * usual:
             return (

@@ -33,7 +33,7 @@ def read(path: Path, group: str | None) -> Table:
         if group is not None and not arrays:
             groups = sorted({n.rsplit("/", 1)[0] for n in _names(h5py, file) if "/" in n})
             raise StudyError(f"{path}: there is no group {group!r}; it holds {', '.join(groups) or 'none'}")
-    return from_arrays(arrays, units)
+    return from_arrays(path, arrays, units)
 
 
 def in_group(name: str, group: str | None) -> bool:

@@ -26,7 +26,7 @@ def read(path: Path, group: str | None) -> Table:
     if group is not None and not chosen:
         groups = sorted({n.rsplit("/", 1)[0] for n in arrays if "/" in n})
         raise StudyError(f"{path}: there is no structure {group!r}; it holds {', '.join(groups) or 'none'}")
-    return from_arrays(chosen, {})
+    return from_arrays(path, chosen, {})
 
 
 def _flat(fields: dict[str, Any], prefix: str) -> Iterator[tuple[str, object]]:

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -104,7 +105,7 @@ def split_unit(text: str) -> tuple[str, str]:
     return text, ""
 
 
-def from_arrays(arrays: Mapping[str, object], units: Mapping[str, str]) -> Table:
+def from_arrays(path: Path, arrays: Mapping[str, object], units: Mapping[str, str]) -> Table:
     """Columns from the named arrays of a binary file; lone numbers named fs or dt give the sampling rate if they agree.
 
     Raises
@@ -119,7 +120,7 @@ def from_arrays(arrays: Mapping[str, object], units: Mapping[str, str]) -> Table
     for name, array in found.items():
         stem = re.sub(r"[^a-z]", "", name.rsplit("/", 1)[-1].lower())
         if array.size == 1 and stem in (*RATES, *INTERVALS):
-            intervals.add(_interval(name, array, inverse=stem in RATES))
+            intervals.add(_interval(path, name, array, inverse=stem in RATES))
         elif series == [name] and array.ndim == 2 and min(array.shape) > 1:
             columns += _matrix_columns(name, array)
         elif array.size > 1:
@@ -127,10 +128,11 @@ def from_arrays(arrays: Mapping[str, object], units: Mapping[str, str]) -> Table
     return Table(tuple(columns), intervals.pop() if len(intervals) == 1 else None)
 
 
-def _interval(name: str, array: Array, *, inverse: bool) -> float:
+def _interval(path: Path, name: str, array: Array, *, inverse: bool) -> float:
     value = complex(array.reshape(-1)[0]) if array.dtype.kind in "iufc" else 0j
     if value.imag or not np.isfinite(value.real) or value.real <= 0.0:
-        raise StudyError(f"{name!r} is {array.reshape(-1)[0]!s}; a sampling rate or interval above zero is right")
+        shown = str(array.reshape(-1)[0])
+        raise StudyError(f"{path}: {name!r} is {shown}; a sampling rate or interval above zero is right")
     return 1.0 / value.real if inverse else value.real
 
 

@@ -112,7 +112,8 @@ class _Reading:
 
     delimiter: str
     decimal: str
-    cells: dict[int, list[str]]  # by line
+    cells: dict[int, list[str]]  # of the lines that have ``width`` cells, by line
+    others: dict[int, list[str]]  # of the other lines
     width: int
     numeric: tuple[int, ...]  # columns that mostly hold numbers
     score: int
@@ -121,6 +122,11 @@ class _Reading:
         """How many cells of a line are numbers, of those that should be."""
         row = self.cells[line]
         return sum(_is_number(row[k], self.decimal) for k in self.numeric)
+
+    def is_numbers(self, line: int) -> bool:
+        """Whether a line of another width holds several numbers and nothing else."""
+        row = self.others[line]
+        return len(row) > 1 and all(_is_number(cell, self.decimal) for cell in row)
 
     def is_sample(self, line: int) -> bool:
         """Whether a line holds numbers, or gaps, wherever it should."""
@@ -141,7 +147,8 @@ def _reading(lines: Sequence[str], delimiter: str, decimal: str) -> _Reading:
     rows = [row for row in full.values() if len(row) == width]
     numeric = tuple(c for c in range(width) if 2 * sum(_is_number(row[c], decimal) for row in rows) > len(rows))
     score = sum(len(numeric) > 0 and all(_is_number(r[c], decimal) or not r[c] for c in numeric) for r in rows)
-    return _Reading(delimiter, decimal, same, width, numeric, score * (1 + (len(numeric) > 1)))
+    others = {k: row for k, row in split.items() if len(row) != width}
+    return _Reading(delimiter, decimal, same, others, width, numeric, score * (1 + (len(numeric) > 1)))
 
 
 def _layout(path: Path, lines: Sequence[str]) -> Layout:
@@ -158,10 +165,18 @@ def _layout(path: Path, lines: Sequence[str]) -> Layout:
         words = words[:-1]
     header = best.cells[words[-1]] if words else _commented(lines[: samples[0]], best)
     first = min((k for k in above if k > (words[-1] if words else -1) and best.numbers(k)), default=samples[0])
-    named = [split_unit(cell) for cell in header] or [(f"column {k + 1}", "") for k in range(best.width)]
-    below = units or [""] * best.width
-    found = tuple(own or cell.strip("[]() ") for (_, own), cell in zip(named, below, strict=True))
-    return Layout(best.delimiter, best.decimal, first, tuple(name for name, _ in named), found)
+    odd = next((k for k in best.others if k < first and (k > words[-1] if words else best.is_numbers(k))), None)
+    if odd is not None:  # a sample with a cell too many or too few must not be taken for a heading
+        raise StudyError(f"{path}: line {odd + 1} has {len(best.others[odd])} cells; {best.width} are right")
+    names, found = _headings(header, units, best.width)
+    return Layout(best.delimiter, best.decimal, first, names, found)
+
+
+def _headings(header: Sequence[str], units: Sequence[str], width: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Name and unit of each column; a unit in the name comes before one in a row of its own."""
+    named = [split_unit(cell) for cell in header] or [(f"column {k + 1}", "") for k in range(width)]
+    below = [cell.strip("[]() ") for cell in units] or [""] * width
+    return tuple(n for n, _ in named), tuple(own or row for (_, own), row in zip(named, below, strict=True))
 
 
 def _is_units_row(cells: Sequence[str]) -> bool:
