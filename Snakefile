@@ -13,9 +13,11 @@ except StudyError as fault:
 
 include: "rules/common.smk"
 include: "rules/reproduce.smk"
+include: "rules/claims.smk"
 
 
 rule all:
     default_target: True
     input:
         [f"results/{case}/parameters.csv" for case in STUDY.cases],
+        CLAIM_RESULTS,

@@ -1,0 +1,65 @@
+# The report's claims, and the two studies that they rest on: the reading of "unit variance" and the
+# integrator's steps. All work on ensembles of their own seeds, not on results/<case>.
+MODELS = sorted(str(path) for path in Path("models").glob("*.yaml"))
+STATEMENTS = {"statements": "config/reported.tsv", "schema": "config/schemas/reported.schema.yaml"}
+ENSEMBLE_CODE = sorted(
+    {*CODE["record"], *CODE["identify"], "study/ensemble.py", "study/claims/evidence.py", "study/claims/sample.py"}
+)
+CLAIM_CODE = sorted({*ENSEMBLE_CODE, "study/preliminary.py", *(str(p) for p in Path("study/claims").glob("*.py"))})
+CLAIM_SETTINGS = {
+    key: STUDY.settings[key]
+    for key in (
+        "sampling", "excitations", "noise_seed", "integrator", "segments", "fit_band", "tolerances", "ensembles"
+    )
+}
+CLAIM_RESULTS = [
+    f"results/{name}"
+    for name in "excitation_reading.csv integrator_steps.csv integrator_steps.md claims.csv claims.md".split()
+]
+
+
+rule excitation_reading:
+    input:
+        **STATEMENTS,
+        models=MODELS,
+        code=[*ENSEMBLE_CODE, "study/excitation_reading.py", "study/claims/reported.py"],
+    output:
+        table="results/excitation_reading.csv",
+    params:
+        models="models",
+        settings=CLAIM_SETTINGS,
+    threads: 2
+    script:
+        "../scripts/excitation_reading.py"
+
+
+rule integrator_steps:
+    input:
+        models=MODELS,
+        code=[*ENSEMBLE_CODE, "study/integrator_study.py"],
+    output:
+        csv="results/integrator_steps.csv",
+        page="results/integrator_steps.md",
+    params:
+        models="models",
+        settings=CLAIM_SETTINGS,
+    threads: 2
+    script:
+        "../scripts/integrator_steps.py"
+
+
+rule claims:
+    input:
+        **STATEMENTS,
+        steps="results/integrator_steps.csv",
+        models=MODELS,
+        code=[*CLAIM_CODE, "study/excitation_reading.py"],
+    output:
+        csv="results/claims.csv",
+        page="results/claims.md",
+    params:
+        models="models",
+        settings=CLAIM_SETTINGS,
+    threads: 2
+    script:
+        "../scripts/claims.py"

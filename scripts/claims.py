@@ -1,0 +1,32 @@
+"""Snakemake step: judge every claim of the report."""
+
+import sys
+from pathlib import Path
+from typing import Any, cast
+
+import pandas as pd
+
+from study import tables
+from study.claims import evidence, reported, table
+from study.claims.verdict import Claim
+
+
+def main(models: str, statements: str, schema: str, steps: str, settings: dict[str, Any], csv: str, page: str) -> None:
+    rows = cast(list[dict[str, Any]], pd.read_csv(steps).to_dict("records"))
+    found = evidence.gather(settings, evidence.models_of(Path(models)), rows)
+    stated = reported.load(Path(statements), Path(schema))
+
+    def progress(number: int, claim: Claim) -> None:
+        print(f"{number} of {len(table.CLAIMS)}: {claim.id}: {claim.verdict}", file=sys.stderr, flush=True)
+
+    judged = table.judge(found, stated, progress)
+    tables.write_csv(judged, Path(csv))
+    Path(page).write_text(table.page(judged), encoding="utf-8")
+
+
+if "snakemake" in globals():
+    step = globals()["snakemake"]
+    main(
+        step.params.models, step.input.statements, step.input.schema, step.input.steps, step.params.settings,
+        step.output.csv, step.output.page,
+    )  # fmt: skip

@@ -1,0 +1,18 @@
+"""Snakemake step: both readings of unit variance against the numbers that the report quotes."""
+
+from pathlib import Path
+from typing import Any
+
+from study import excitation_reading, tables
+from study.claims import evidence, reported
+
+
+def main(models: str, statements: str, schema: str, settings: dict[str, Any], output: str) -> None:
+    found = evidence.gather(settings, evidence.models_of(Path(models)), [])
+    stated = reported.load(Path(statements), Path(schema))
+    tables.write_csv(excitation_reading.study(found, stated), Path(output))
+
+
+if "snakemake" in globals():
+    step = globals()["snakemake"]
+    main(step.params.models, step.input.statements, step.input.schema, step.params.settings, step.output.table)

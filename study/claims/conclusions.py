@@ -1,0 +1,116 @@
+"""Section 6: the conclusions."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.claims.common import recovered
+from study.claims.damping import COMBINED
+from study.claims.duffing import LINEAR_PARTS, levels
+from study.claims.evidence import Assumed, Drive, Ensemble, Evidence, Outcome
+from study.claims.levels import PARTS, noises
+from study.claims.reported import Reported
+from study.claims.sample import Sample
+from study.claims.verdict import Claim, Condition, at_least, conclude, together
+from study.ensemble import threaded
+from study.excitation import Excitation, force
+from study.simulate import Integrator, simulate
+
+Floats = NDArray[np.float64]
+ALL_PARTS = {
+    "duffing": (*LINEAR_PARTS, "k3"),
+    "van_der_pol": (*LINEAR_PARTS, "c3"),
+    "mathieu": (*LINEAR_PARTS, "k_m"),
+    "dead_band": (*LINEAR_PARTS, "k_dead_band"),
+}
+SPECTRA = {
+    "Pierson-Moskowitz": (("kind", "pierson_moskowitz"),),
+    "random-phase multisine": (("kind", "random_phase_multisine"),),
+    "swept sine": (("kind", "swept_sine"),),
+}
+
+
+def conclusion_3(evidence: Evidence, reported: Reported) -> Claim:
+    """Four terms that the combined system does not have, assumed beside its own."""
+    more = ("quadratic_stiffness", "quintic_stiffness")
+    ensemble = evidence.ensemble(Drive(COMBINED), Assumed(plus=more))
+    found = recovered(evidence, reported, COMBINED, ensemble, PARTS)
+    extra: list[Condition] = []
+    for name in ("k2", "k5"):
+        sample = ensemble.miso(name)
+        inside = abs(sample.mean) <= 2.0 * sample.scatter
+        extra.append(Condition(f"mean {name} within 2 standard deviations of zero", f"{name} {sample}", inside))
+    return conclude(reported, "conclusion_3", *found, *extra)
+
+
+def conclusion_4(evidence: Evidence, reported: Reported) -> Claim:
+    """Other spectra, a periodic force, a sweep, and a strongly skewed force."""
+    conditions: list[Condition] = []
+    for label, excitation in SPECTRA.items():
+        ensemble = evidence.ensemble(Drive(COMBINED, excitation=excitation), Assumed())
+        conditions.append(together(label, recovered(evidence, reported, COMBINED, ensemble, PARTS)))
+    skewed = recovered(evidence, reported, COMBINED, _skewed(evidence), PARTS)
+    conditions.append(together("squared Gaussian", skewed))
+    return conclude(reported, "conclusion_4", *conditions)
+
+
+def squared(seed: int, samples: int, dt: float, cutoff: float) -> Floats:
+    """A force of unit variance distributed as the square of a Gaussian: skewness 2.8, nothing above the cut-off."""
+    values = force(Excitation(reading="filtered", cutoff=0.5 * cutoff), samples, dt, seed) ** 2
+    return (values - np.mean(values)) / np.std(values)
+
+
+def _skewed(evidence: Evidence) -> Ensemble:
+    sampling, settings = evidence.settings["sampling"], evidence.settings["excitations"]["report"]
+    model, told = evidence.model(Drive(COMBINED)), Integrator(**evidence.settings["integrator"])
+
+    def one(seed: int) -> Outcome:
+        values = squared(seed, sampling["samples"], sampling["dt"], settings.get("cutoff", 12.5))
+        return evidence.analyse(model, simulate(model, values, sampling["dt"], told))
+
+    own, *others = threaded(one, [settings["seed"], *evidence.seeds])
+    return Ensemble(own, tuple(others))
+
+
+def conclusion_5_level(evidence: Evidence, reported: Reported) -> Claim:
+    """Nonlinear systems at the levels of Section 5.3."""
+    conditions: list[Condition] = []
+    for system in ("duffing", "van_der_pol", "dead_band"):
+        for level in (levels(reported)[0], levels(reported)[-1]):
+            ensemble = evidence.at(system, level)
+            found = recovered(evidence, reported, system, ensemble, ALL_PARTS[system])
+            conditions.append(together(f"{system} at {level:g}", found))
+    return conclude(reported, "conclusion_5_level", *conditions)
+
+
+def conclusion_5_noise(evidence: Evidence, reported: Reported) -> Claim:
+    """Each parameter under the lowest noise within 5 %."""
+    noise = noises(reported)[0]
+    ensemble = evidence.at(COMBINED, 1.0, noise)
+    conditions: list[Condition] = []
+    for name in PARTS:
+        true = reported.table_1(COMBINED, name)
+        sample: Sample = ensemble.miso(name).scaled(1.0 / true)
+        text = f"{100 * noise:g} % noise: {name} {100 * (sample.mean - 1):+.3g} +- {100 * sample.error:.1g} %"
+        conditions.append(Condition(f"mean {name} within 5 %", text, abs(sample.mean - 1.0) <= 0.05, text))
+    return conclude(reported, "conclusion_5_noise", *conditions)
+
+
+def conclusion_6(evidence: Evidence, reported: Reported) -> Claim:
+    """The lowest level of Section 5.3."""
+    ensemble = evidence.at(COMBINED, levels(reported)[0])
+    return conclude(
+        reported, "conclusion_6",
+        at_least("linear coherence at the lowest level", ensemble.linear_coherence(), 0.95),
+        *recovered(evidence, reported, COMBINED, ensemble, ("k3", "c3")),
+    )  # fmt: skip
+
+
+def conclusion_7(evidence: Evidence, reported: Reported) -> Claim:
+    """Every parameter of the four kinds."""
+    conditions: list[Condition] = []
+    for system, names in ALL_PARTS.items():
+        conditions.append(together(system, recovered(evidence, reported, system, evidence.unit(system), names)))
+    return conclude(reported, "conclusion_7", *conditions)
+
+
+CLAIMS = (conclusion_3, conclusion_4, conclusion_5_level, conclusion_5_noise, conclusion_6, conclusion_7)

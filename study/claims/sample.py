@@ -1,0 +1,117 @@
+"""A number over the seeds of an ensemble, and how far a distribution is from a Gaussian."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
+
+Floats = NDArray[np.float64]
+SIGNIFICANT = 1.96  # two-sided 5 % of the standard normal
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One number from each seed of an ensemble.
+
+    Attributes
+    ----------
+    values : tuple of float
+        From the seeds.
+    own : float or None
+        From the study's own record, where there is one.
+    """
+
+    values: tuple[float, ...]
+    own: float | None = None
+
+    @property
+    def mean(self) -> float:
+        """Mean over the seeds."""
+        return float(np.mean(self.values))
+
+    @property
+    def scatter(self) -> float:
+        """Standard deviation of one record."""
+        return float(np.std(self.values, ddof=1))
+
+    @property
+    def error(self) -> float:
+        """Standard error of the mean."""
+        return self.scatter / math.sqrt(len(self.values))
+
+    def __str__(self) -> str:
+        """Mean, standard error and the study's own record."""
+        own = "" if self.own is None else f" (own record {self.own:.4g})"
+        return f"{self.mean:.4g} +- {self.error:.2g}{own}"
+
+    def scaled(self, factor: float) -> "Sample":
+        """Every value times a factor."""
+        return Sample(tuple(factor * v for v in self.values), None if self.own is None else factor * self.own)
+
+    def minus(self, other: "Sample") -> "Sample":
+        """Seed by seed, the difference to another sample over the same seeds."""
+        own = None if self.own is None or other.own is None else self.own - other.own
+        return Sample(tuple(a - b for a, b in zip(self.values, other.values, strict=True)), own)
+
+
+def average(values: Floats | NDArray[np.bool_] | Sequence[float]) -> float:
+    """Mean of numbers, or share of what is true."""
+    return float(np.mean(np.asarray(values, dtype=np.float64)))
+
+
+def share(flags: Sequence[bool]) -> Sample:
+    """How often something holds."""
+    return Sample(tuple(float(f) for f in flags))
+
+
+def kurtosis(values: Floats) -> float:
+    """Fourth standardised moment: 3 for a Gaussian, lower for a flat top with short tails."""
+    centred = values - np.mean(values)
+    return float(np.mean(centred**4) / np.mean(centred**2) ** 2)
+
+
+def gaussian_score(values: Floats) -> float:
+    """Excess kurtosis over the standard error that a Gaussian process of the same correlation would show.
+
+    A correlated sample of n is worth ``n / sum rho^4`` independent ones to its kurtosis: the standard
+    error is ``sqrt(24 sum rho^4 / n)`` (Lomnicki, 1961). Symmetric systems leave nothing to the skewness.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        Evenly sampled.
+
+    Returns
+    -------
+    float
+        Beyond +-1.96 the Gaussian is refused at 5 %.
+    """
+    error = math.sqrt(24.0 / effective_size(values))
+    return (kurtosis(values) - 3.0) / error
+
+
+def effective_size(values: Floats) -> float:
+    """Number of independent values that a correlated sample is worth to its kurtosis."""
+    n = len(values)
+    centred = values - np.mean(values)
+    power = np.abs(np.asarray(rfft(centred, next_fast_len(2 * n)))) ** 2
+    correlation = irfft(power)[:n]
+    rho = correlation / correlation[0]
+    return n / float(1.0 + 2.0 * np.sum(rho[1:] ** 4))
+
+
+def is_gaussian(values: Floats) -> bool:
+    """Whether the kurtosis is one that a Gaussian process may well show (5 % level)."""
+    return abs(gaussian_score(values)) <= SIGNIFICANT
+
+
+def central_share(values: Floats) -> float:
+    """Share of the values within half a standard deviation of the mean; 0.383 for a Gaussian."""
+    centred = values - np.mean(values)
+    return float(np.mean(np.abs(centred) < 0.5 * np.std(centred)))
+
+
+GAUSSIAN_CENTRAL_SHARE = math.erf(0.5 / math.sqrt(2.0))
