@@ -153,7 +153,7 @@ def prepare(
     span : pair of int, optional
         First sample, and the one after the last; the whole record if left out.
     restarts : sequence of int
-        Samples of the record, within the span, at which the motion begins anew (``study.restarts``).
+        Samples of the record, within the span, at which the motion begins anew (``study.pieces``).
 
     Raises
     ------

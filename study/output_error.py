@@ -3,7 +3,7 @@
 The force is taken as known and the noise as additive on the response, so no noisy regressor enters and
 the estimate is not biased by noise (the reverse MI/SO estimate is, Section 5.4). The sum of squares is
 minimised by the method of Levenberg and Marquardt (``study.levenberg``) with exact derivatives
-(``study.free_run``). A chaotic system is run piece by piece (``study.restarts``).
+(``study.free_run``). A chaotic system is run piece by piece (``study.pieces``, ``study.chaotic``).
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -17,8 +17,8 @@ from study.free_run import FreeRun, prepare
 from study.levenberg import End, Point, minimise, point_at
 from study.model import Model
 from study.parameters import Estimate
+from study.pieces import starting_state
 from study.record import Record
-from study.restarts import starting_state
 
 Floats = NDArray[np.float64]
 POSITIVE = ("m", "u_g", "tau", "f_m", "f")  # coefficients and shape parameters without meaning below zero
@@ -84,7 +84,7 @@ def fit_free_run(
     span: tuple[int, int] | None = None,
     restarts: Sequence[int] = (),
     max_iterations: int = 60,
-    initial: str = "estimate",
+    initial: str | Floats = "estimate",
 ) -> FreeRunFit:
     """Fit a model in free run.
 
@@ -106,12 +106,12 @@ def fit_free_run(
         First sample, and the one after the last; the whole record if left out.
     restarts : sequence of int
         Samples of the record at which the motion begins anew from a state that is estimated too;
-        :func:`study.restarts.restarts` says where a chaotic system needs that.
+        see ``study.chaotic`` for systems that need it.
     max_iterations : int
         Free runs after which to give up.
-    initial : str
+    initial : str or array, shape (pieces, states)
         ``estimate`` displacement, velocity and the terms' own states at the first sample, or take them
-        as zero: ``rest``.
+        as zero: ``rest``. An array is estimated too and gives the starting values.
 
     Returns
     -------
@@ -127,18 +127,21 @@ def fit_free_run(
     """
     if response not in record:
         raise StudyError(f"record {record.name!r} has no {response}; it has {', '.join(record.channels)}")
-    if initial not in ("estimate", "rest"):
+    if isinstance(initial, str) and initial not in ("estimate", "rest"):
         raise StudyError(f"initial is {initial!r}; it must be 'estimate' or 'rest'")
-    if initial == "rest" and restarts:
+    resting = isinstance(initial, str) and initial == "rest"
+    if resting and restarts:
         raise StudyError(f"restarts at {tuple(restarts)} begin from estimated states; initial cannot be 'rest'")
     begin = _starting_values(model, start or {}, held)
     run = prepare(
         model, record, tuple(begin), response=response, steps_per_sample=steps_per_sample, span=span, restarts=restarts
     )
     first = 0 if span is None else span[0]
-    free = len(run.slots) + 1 if initial == "estimate" else 0
+    free = 0 if resting else len(run.slots) + 1
     states = np.zeros((len(run.cuts) + 1, free))
-    if free:
+    if not isinstance(initial, str):
+        states[:] = initial
+    elif free:
         states[:, :2] = [starting_state(record, response, sample) for sample in (first, *restarts)]
     problem = _Problem(run, record[response][first : first + run.samples], free)
     return _result(model, problem, problem.search(np.array([*begin.values(), *states.ravel()]), max_iterations))

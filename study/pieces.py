@@ -1,0 +1,167 @@
+"""Where a free run has to begin anew, because its system magnifies every disturbance.
+
+In a chaotic system (the report's Dead-Band system is one for long stretches) any error grows until the free
+run has nothing to do with the measured motion, however true the model. Pieces that are short against that
+growth, each with an initial state of its own, keep the fit well posed (multiple shooting; H. G. Bock, 1983).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.errors import DivergenceError
+from study.free_run import prepare
+from study.model import Model
+from study.record import MOTIONS, Record
+
+Floats = NDArray[np.float64]
+GROWTH = 10.0  # by how much a disturbance may be magnified within a piece
+PERIODS = 3.0  # length of the pieces that a search from afar begins with
+REACH = 0.2  # of a period: half width of the cubic that smooths a displacement into a state
+REACHES = (0.07, 0.15, REACH, 0.3)  # those that are tried where it matters
+
+
+def angular_rate(values: Floats, dt: float) -> float:
+    """Typical angular frequency of a motion in rad/s: rms of its derivative over its own."""
+    size = float(np.std(values))
+    return float(np.sqrt(np.mean(np.diff(values) ** 2))) / (dt * size) if size > 0.0 else 1.0 / dt
+
+
+def starting_state(record: Record, response: str, sample: int, reach: float = REACH) -> Floats:
+    """Displacement and velocity at a sample, as well as the record shows them, shape (2,).
+
+    A displacement is smoothed by a cubic over a part of its period, which yields the velocity too; what
+    neither it nor a channel of the record shows is taken as zero.
+    """
+    if response != "displacement":
+        return np.array([record[c][sample] if c in record else 0.0 for c in ("displacement", "velocity")])
+    values = record[response]
+    half = round(reach * 2.0 * np.pi / (angular_rate(values, record.dt) * record.dt))
+    half = int(np.clip(half, 2, max((len(values) - 1) // 2, 1)))
+    first = max(0, min(sample - half, len(values) - 2 * half - 1))
+    window = values[first : first + 2 * half + 1]
+    offset = (first - sample + np.arange(len(window))) / half
+    coefficients = np.polynomial.polynomial.polyfit(offset, window, min(3, len(window) - 1))
+    return np.array([coefficients[0], coefficients[1] / (half * record.dt)])
+
+
+def even_restarts(record: Record, response: str, span: tuple[int, int]) -> tuple[int, ...]:
+    """Restarts that cut a span into pieces of ``PERIODS`` periods of the motion."""
+    first, last = span
+    rate = angular_rate(record[response][first:last], record.dt)
+    count = max(1, round((last - first) * record.dt * rate / (2.0 * np.pi * PERIODS)))
+    return tuple(int(r) for r in np.linspace(first, last, count + 1).round()[1:-1])
+
+
+def needed_restarts(
+    model: Model, record: Record, states: Floats, span: tuple[int, int], restarts: Sequence[int], steps_per_sample: int
+) -> tuple[int, ...]:  # fmt: skip
+    """Which restarts of a fitted model have to stay.
+
+    The derivative of the state at a piece's end by that at its beginning is taken from a free run; products
+    of them say how a disturbance at any restart grows until any later one. Displacement and velocity are
+    weighed by the angular rate of the motion, so that a linear system without damping has growth one.
+
+    Parameters
+    ----------
+    model : Model
+        Every value known.
+    record : Record
+        Gives the force.
+    states : array, shape (pieces, states)
+        State at the beginning of each piece.
+    span : pair of int
+        First sample, and the one after the last.
+    restarts : sequence of int
+        Samples of the record at which the pieces after the first begin.
+    steps_per_sample : int
+        Runge-Kutta steps in each sampling interval.
+    """
+    motions = [
+        prepare(
+            model, record, response=motion, steps_per_sample=steps_per_sample, span=span, restarts=restarts
+        ).respond({}, states, 2)
+        for motion in ("displacement", "velocity")
+    ]  # fmt: skip
+    rate = angular_rate(motions[0][0], record.dt)
+    bounds = (span[0], *restarts, span[1])
+    kept: list[int] = []
+    products: list[Floats] = []
+    for i, (begin, end) in enumerate(pairwise(bounds)):
+        rows = [jacobian[end - 1 - span[0], 2 * i : 2 * i + 2] for _, jacobian in motions]
+        through = np.stack(rows) * np.array([[1.0, rate], [1.0 / rate, 1.0]])
+        products = [through @ p for p in products] + [through]
+        if max(float(np.linalg.norm(p, 2)) for p in products) > GROWTH and len(products) > 1:
+            kept.append(begin)
+            products = [through]
+    return tuple(kept)
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """A span of a record in pieces, for trying initial states that a search could not find by itself.
+
+    Attributes
+    ----------
+    record : Record
+        Force and response.
+    response : str
+        The measured motion that is compared.
+    span : pair of int
+        First sample, and the one after the last.
+    restarts : tuple of int
+        Samples of the record at which the pieces after the first begin.
+    steps_per_sample : int
+        Runge-Kutta steps in each sampling interval.
+    """
+
+    record: Record
+    response: str
+    span: tuple[int, int]
+    restarts: tuple[int, ...]
+    steps_per_sample: int
+
+    def motions(self, model: Model, states: Floats) -> list[Floats]:
+        """Displacement, velocity and acceleration of the free run, each of shape (samples,)."""
+        return [
+            prepare(
+                model, self.record, response=motion, steps_per_sample=self.steps_per_sample,
+                span=self.span, restarts=self.restarts,
+            ).respond({}, states)[0]
+            for motion in MOTIONS
+        ]  # fmt: skip
+
+    def misfits(self, motions: list[Floats]) -> Floats:
+        """Sum of squares of the residual of each piece, shape (pieces,)."""
+        residual = self.record[self.response][slice(*self.span)] - motions[MOTIONS.index(self.response)]
+        return np.add.reduceat(residual**2, [0, *(r - self.span[0] for r in self.restarts)])
+
+    def better(self, model: Model, one: Floats, other: Floats) -> Floats:
+        """Piece by piece the states that fit better, shape (pieces, states); ``one`` where the other diverges."""
+        try:
+            first, second = (self.misfits(self.motions(model, states)) for states in (one, other))
+        except DivergenceError:
+            return one
+        return np.where((second < first)[:, None], other, one)
+
+    def first_states(self, model: Model) -> Floats:
+        """Initial states as the record shows them, smoothed as widely as fits each piece best."""
+        states = np.zeros((len(self.restarts) + 1, 2 + len(model.states)))
+        for i, reach in enumerate(REACHES):
+            tried = np.zeros_like(states)
+            begins = (self.span[0], *self.restarts)
+            tried[:, :2] = [starting_state(self.record, self.response, sample, reach) for sample in begins]
+            states = tried if i == 0 else self.better(model, states, tried)
+        return states
+
+    def joined(self, model: Model, states: Floats) -> Floats:
+        """States at which the piece before arrives, where they fit better than those given."""
+        u, v, a = self.motions(model, states)
+        ends, dt = np.array(self.restarts, dtype=np.int64) - self.span[0] - 1, self.record.dt
+        arrived = states.copy()
+        arrived[1:, 0] = u[ends] + dt * v[ends] + 0.5 * dt**2 * a[ends]
+        arrived[1:, 1] = v[ends] + dt * a[ends]
+        return self.better(model, states, arrived)
