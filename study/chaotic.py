@@ -31,7 +31,7 @@ def fit_in_pieces(
     """Fit a model in free run when it is chaotic, or the start is far off.
 
     The record is cut into pieces of a few periods, each from an initial state of its own: no error grows
-    far within them, and the search finds its way from poor starting values. If the fitted system needs no
+    far within them, and the search finds its way from poorer starting values. If the fitted system needs no
     cuts, as most do, the whole record is fitted from there in one free run. Otherwise the pieces are
     doubled for as long as the misfit grows by no more than the initial states explain that are given up.
 
