@@ -123,5 +123,5 @@ def has_line(label: str, found: Floats, target: float, within: float, why: str =
         f"{label} within {within:g} Hz of {target:g} Hz",
         f"{label} nearest to {target:g} Hz at {best:.2f} Hz",
         abs(best - target) <= within,
-        why or f"there is no {label} there; the nearest stands at {best:.2f} Hz",
+        why or f"the {label} nearest to {target:g} Hz stands at {best:.2f} Hz",
     )

@@ -61,11 +61,14 @@ class Assumed:
         Terms added to the system's own; terms left out.
     segments : tuple of (str, value)
         Settings of the segments in place of the configured.
+    band : pair of float, optional
+        Lines that the parameters are fitted to, in hertz, in place of the configured.
     """
 
     plus: tuple[str, ...] = ()
     minus: tuple[str, ...] = ()
     segments: tuple[tuple[str, Any], ...] = ()
+    band: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -263,7 +266,7 @@ def identify(model: Model, record: Record, assumed: Assumed, settings: Table) ->
         model = model.without_term(name)
     for name in assumed.plus:
         model = model.with_term(get(name))
-    low, high = settings["fit_band"]
+    low, high = assumed.band or settings["fit_band"]
     told = Settings(Segments(**{**settings["segments"], **dict(assumed.segments)}), (low, high))
     single = _analysis(siso.identify(model, record, told), told)
     return Outcome(single, _analysis(miso.identify(model, record, told), told))

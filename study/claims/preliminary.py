@@ -23,9 +23,8 @@ GAPS = 120  # half widths tried between none and the largest displacement
 def slopes(record: Record, mass: float, *shapes: Floats) -> list[float]:
     """Least-squares coefficients of the restoring force on some shapes, each of shape (n,)."""
     scale = [float(np.sqrt(np.mean(s**2))) for s in shapes]
-    columns = [s / size for s, size in zip(shapes, scale, strict=True)]
-    scaled: Floats = np.asarray(np.column_stack(columns), dtype=np.float64)
-    found: Floats = np.linalg.solve(scaled.T @ scaled, scaled.T @ restoring_force(record, mass))
+    scaled = np.array([s / size for s, size in zip(shapes, scale, strict=True)], dtype=np.float64).T
+    found = np.asarray(np.linalg.solve(scaled.T @ scaled, scaled.T @ restoring_force(record, mass)), dtype=np.float64)
     return [float(x) / size for x, size in zip(found, scale, strict=True)]
 
 

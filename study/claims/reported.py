@@ -7,6 +7,8 @@ from pathlib import Path
 from study.config import read_table
 from study.errors import StudyError
 
+MANY = 8  # numbers that still read well in one cell
+
 
 @dataclass(frozen=True)
 class Statement:
@@ -79,7 +81,8 @@ class Reported:
     def numbers(self, name: str) -> str:
         """Every number of a claim, for the column ``reported``."""
         rows = [s for s in self.statements.values() if s.id == name or s.id.startswith(f"{name}.")]
-        return ", ".join(str(s) for s in rows if s.value is not None) or "as stated"
+        found = [str(s) for s in rows if s.value is not None]
+        return "as tabulated" if len(found) > MANY else ", ".join(found) or "as stated"
 
 
 def load(path: Path, schema: Path) -> Reported:

@@ -33,6 +33,11 @@ class Sample:
         return float(np.mean(self.values))
 
     @property
+    def median(self) -> float:
+        """Median over the seeds: what a reading that now and then misses the curve comes to."""
+        return float(np.median(self.values))
+
+    @property
     def scatter(self) -> float:
         """Standard deviation of one record."""
         return float(np.std(self.values, ddof=1))

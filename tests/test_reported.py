@@ -1,0 +1,72 @@
+"""What the report states: the table itself, its schema, and Table 1 against its second writing."""
+
+from pathlib import Path
+
+import pytest
+
+from study.claims import reported
+from study.errors import StudyError
+from study.excitation_reading import quantities
+from tests.conftest import LINEAR, TABLE_1
+
+ROOT = Path(__file__).parents[1]
+SCHEMA = ROOT / "config" / "schemas" / "reported.schema.yaml"
+HEADING = "id\twhere\twhat\tvalue\tunit\n"
+
+
+@pytest.fixture(scope="module")
+def stated() -> reported.Reported:
+    return reported.load(ROOT / "config" / "reported.tsv", SCHEMA)
+
+
+def load(folder: Path, rows: str) -> reported.Reported:
+    path = folder / "reported.tsv"
+    path.write_text(HEADING + rows, encoding="utf-8")
+    return reported.load(path, SCHEMA)
+
+
+@pytest.mark.parametrize("system", TABLE_1)
+def test_table_1_is_the_one_the_tests_know(stated: reported.Reported, system: str) -> None:
+    values = {key: v for term in {**LINEAR, **TABLE_1[system]}.values() for key, v in term.items()}
+    renamed = {"km_cos": "k_m", "dead_band.u_g": "u_g", "periodic_stiffness.f_m": "f_m"}
+    for key, value in values.items():
+        if key in ("kg", "km_sin"):
+            continue
+        assert stated.table_1(system, renamed.get(key, key)) == pytest.approx(value)
+    assert stated.table_1("dead_band", "k_dead_band") == stated.table_1("dead_band", "k")
+
+
+def test_the_numbers_the_report_quotes(stated: reported.Reported) -> None:
+    quoted = {"siso_stiffness": 500.0, "siso_frequency": 3.6, "duffing_share": 0.9, "dead_band_share": 0.65}
+    assert {name: stated.value(name) for name in quoted} == quoted
+    assert {q.reported for q in quantities(stated)} >= set(quoted)
+
+
+def test_numbers_of_a_claim_come_with_units(stated: reported.Reported) -> None:
+    assert stated.numbers("mathieu_fast") == "5 Hz, 2 Hz, 3 Hz, 8 Hz"
+    assert stated.numbers("linear_coherence") == "as stated"
+    assert stated.numbers("table_1") == "as tabulated"
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ("a\tp. 1\twhat\tmany\tHz\n", "value is 'many', which is not a number"),
+        ("a\tp. 1\twhat\t1\tHz\na\tp. 2\twhat\t2\tHz\n", "'a' stands twice"),
+        ("a\tp. 1\twhat\t1\n", "has 4 cells"),
+        ("A b\tp. 1\twhat\t1\tHz\n", "'A b'"),
+        ("a\t\twhat\t1\tHz\n", "where"),
+    ],
+)
+def test_a_bad_row_is_named(tmp_path: Path, rows: str, said: str) -> None:
+    with pytest.raises(StudyError, match=r"reported\.tsv") as caught:
+        load(tmp_path, rows)
+    assert said in str(caught.value)
+
+
+def test_missing_statements_and_values_are_named(tmp_path: Path) -> None:
+    found = load(tmp_path, "a\tp. 1\twhat\t\tHz\n")
+    with pytest.raises(StudyError, match="no value for 'a'"):
+        found.value("a")
+    with pytest.raises(StudyError, match="no row 'b'"):
+        found.value("b")
