@@ -1,7 +1,15 @@
 # The report's claims, and the two studies that they rest on: the reading of "unit variance" and the
 # integrator's steps. All work on ensembles of their own seeds, not on results/<case>.
+from study.claims.reported import load as load_reported
+
 MODELS = sorted(str(path) for path in Path("models").glob("*.yaml"))
 STATEMENTS = {"statements": "config/reported.tsv", "schema": "config/schemas/reported.schema.yaml"}
+
+try:
+    load_reported(*(Path(path) for path in STATEMENTS.values()))
+except StudyError as fault:
+    sys.exit(f"study: {fault}")
+
 ENSEMBLE_CODE = sorted(
     {*CODE["record"], *CODE["identify"], "study/ensemble.py", "study/claims/evidence.py", "study/claims/sample.py"}
 )
@@ -24,7 +32,12 @@ rule excitation_reading:
         models=MODELS,
         code=[*ENSEMBLE_CODE, "study/excitation_reading.py", "study/claims/reported.py"],
     output:
-        table="results/excitation_reading.csv",
+        table=report(
+            "results/excitation_reading.csv",
+            category="Tables",
+            caption="captions/excitation_reading.rst",
+            labels={"table": "Reading of unit variance"},
+        ),
     params:
         models="models",
         settings=CLAIM_SETTINGS,
@@ -38,7 +51,12 @@ rule integrator_steps:
         models=MODELS,
         code=[*ENSEMBLE_CODE, "study/integrator_study.py"],
     output:
-        csv="results/integrator_steps.csv",
+        csv=report(
+            "results/integrator_steps.csv",
+            category="Tables",
+            caption="captions/integrator_steps.rst",
+            labels={"table": "Steps of the integrator"},
+        ),
         page="results/integrator_steps.md",
     params:
         models="models",
@@ -55,7 +73,12 @@ rule claims:
         models=MODELS,
         code=[*CLAIM_CODE, "study/excitation_reading.py"],
     output:
-        csv="results/claims.csv",
+        csv=report(
+            "results/claims.csv",
+            category="Tables",
+            caption="captions/claims.rst",
+            labels={"table": "Claims of the report"},
+        ),
         page="results/claims.md",
     params:
         models="models",
