@@ -15,6 +15,7 @@ from study.inputs import histories, reverse_inputs
 from study.miso import analyse
 from study.model import Model, free
 from study.output_error import FreeRunFit, fit_free_run
+from study.pieces import REACHES, Pieces, starting_state
 from study.record import MOTIONS, SI_UNITS, Record
 from study.simulate import Integrator, simulate
 from study.spectra import Segments, cross_spectra
@@ -251,6 +252,23 @@ def test_a_regular_system_needs_no_pieces(systems: dict[str, Model], records: di
     near = fit_free_run(model, record)
     np.testing.assert_allclose(fit.values, near.values, rtol=1e-4)
     assert fit.initial.shape == (2,)
+
+
+def test_a_piece_gone_astray_is_joined_to_the_one_before(systems: dict[str, Model], records: dict[str, Record]) -> None:
+    model, record, cuts = systems["duffing"], records["duffing"], (100, 200, 300)
+    pieces = Pieces(record, "displacement", (0, 400), cuts, 4)
+    true = np.stack([record["displacement"][[0, *cuts]], record["velocity"][[0, *cuts]]], axis=1)
+    astray = true.copy()
+    astray[2] = [0.01, -0.2]
+    joined = pieces.joined(model, astray)
+    np.testing.assert_array_equal(joined[[0, 1, 3]], true[[0, 1, 3]])
+    size = [np.std(record["displacement"]), np.std(record["velocity"])]
+    assert np.all(np.abs(joined[2] - true[2]) < 0.2 * np.array(size))
+    assert np.all(np.abs(astray[2] - true[2]) > np.array(size))
+    begun = pieces.misfits(pieces.motions(model, pieces.first_states(model)))
+    for reach in REACHES:
+        one = np.array([starting_state(record, "displacement", sample, reach) for sample in (0, *cuts)])
+        assert np.all(begun <= pieces.misfits(pieces.motions(model, one)) * (1.0 + 1e-12))
 
 
 def test_chaotic_system_is_fitted_in_pieces(systems: dict[str, Model], records: dict[str, Record]) -> None:
