@@ -62,7 +62,8 @@ def with_values(values: np.ndarray, **changes: float) -> np.ndarray:
     return out
 
 
-CLIPPED = np.clip(np.random.default_rng(1).standard_normal(2000), -1.5, 1.5)
+WIDE = np.random.default_rng(1).standard_normal(2000)
+CLIPPED = np.clip(WIDE, -1.5, 1.5)
 LONG = 0.02 * np.arange(2000)
 TEXTS: dict[str, tuple[str, tuple[str, ...]]] = {
     "empty": ("", ("empty", "right")),
@@ -99,8 +100,8 @@ TEXTS: dict[str, tuple[str, tuple[str, ...]]] = {
     "constant force": (table(HEADER, TIME, 0.0 * FORCE + 3.5, MOTION), ("'force'", "3.5 throughout")),
     "constant motion": (table(HEADER, TIME, FORCE, 0.0 * MOTION), ("'displacement'", "0 throughout")),
     "saturated": (table(HEADER, LONG, RNG.standard_normal(2000), CLIPPED), ("'displacement'", "1.5", "saturated")),
-    "saturated below": (table(HEADER, LONG, np.maximum(CLIPPED, -1.0) * 1.0001 + LONG * 1e-9, CLIPPED),
-                        ("saturated",)),
+    "saturated below": (table("time,Force,displacement", LONG, np.maximum(WIDE, -1.0), WIDE),
+                        ("'Force' (force)", "lowest", "-1 ", "saturated")),
     "no such unit": (table("time,force [banana],x"), ("'force'", "'banana'", "N, kN")),
     "unit of something else": (table("time,force [mm],x"), ("'mm'", "force", "N, kN")),
     "time in newtons": (table("time [N],force,x"), ("'N'", "time", "s, ms")),

@@ -76,7 +76,8 @@ def _range(path: Path, length: int, options: ReadOptions) -> tuple[int, int]:
     first, last = options.samples or (0, None)
     end = length if last is None else last
     if first >= length or end > length:
-        raise StudyError(f"{path}: samples {first} to {end} are asked for; the record has {length}")
+        told = f"from {first} on" if last is None else f"{first} to {last}"
+        raise StudyError(f"{path}: samples {told} are asked for; the record has {length}, counted from 0")
     if end - first < checks.FEWEST_SAMPLES:
         raise StudyError(f"{path}: {end - first} samples are too few; {checks.FEWEST_SAMPLES} or more are right")
     return first, end
@@ -94,7 +95,8 @@ def _usable(path: Path, roles: Mapping[str, Column], table: Table, options: Read
             if fault is None and not options.accept_saturated:
                 fault = checks.saturated(column.values)
         if fault is not None:
-            raise StudyError(f"{path}: column {column.name!r} ({role}) {fault}")
+            meaning = "" if column.name == role else f" ({role})"
+            raise StudyError(f"{path}: column {column.name!r}{meaning} {fault}")
         usable[role] = column
     return usable
 

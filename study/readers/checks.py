@@ -29,7 +29,7 @@ def constant(values: Floats) -> str | None:
     """A sentence on a channel that does not move."""
     if np.ptp(values) > 0.0:
         return None
-    return f"is {values[0]:g} throughout; a signal that moves is right"
+    return f"is {values[0] + 0.0:g} throughout; a signal that moves is right"
 
 
 def saturated(values: Floats) -> str | None:

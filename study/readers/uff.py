@@ -23,8 +23,10 @@ def read(path: Path) -> Table:
     Raises
     ------
     StudyError
-        If it has none, or they were not sampled together.
+        If it is cut short, has none, or they were not sampled together.
     """
+    if not path.read_bytes().rstrip().endswith(b"-1"):
+        raise StudyError(f"{path}: its last dataset is cut short; a line '-1' at the end is right")
     pyuff: Any = import_module("pyuff")
     file: Any = pyuff.UFF(str(path))
     types: list[int] = [int(t) for t in file.get_set_types()]
