@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from study.errors import StudyError
 from study.free_run import prepare
+from study.linear import least_squares
 from study.model import Model
 from study.output_error import FreeRunFit, fit_free_run
 from study.record import MOTIONS, Record
@@ -95,13 +96,12 @@ def linear_start(model: Model, record: Record, how: Plan) -> dict[str, float]:
     weight = np.abs(receptance) * np.sqrt(coherence[keep] / (1.0 - coherence[keep]))
     values = model.values
     wanted = [key for key in LINEAR_ORDERS if key in values]
-    columns = np.stack([omega ** LINEAR_ORDERS[key] for key in wanted], axis=1) * weight[:, None]
-    scale = np.sqrt(np.sum(np.abs(columns) ** 2, axis=0))
-    design, target = columns / scale, weight / receptance
-    found = np.linalg.lstsq(
-        np.concatenate([design.real, design.imag]), np.concatenate([target.real, target.imag]), rcond=None
-    )[0]
-    start = dict.fromkeys(values, 0.0) | dict(zip(wanted, (float(v) for v in found / scale), strict=True))
+    design = np.stack([omega ** LINEAR_ORDERS[key] for key in wanted], axis=1) * weight[:, None]
+    target = weight / receptance
+    found = least_squares(
+        np.concatenate([design.real, design.imag]), np.concatenate([target.real, target.imag])
+    )  # fmt: skip
+    start = dict.fromkeys(values, 0.0) | dict(zip(wanted, (float(v) for v in found), strict=True))
     if start["m"] <= 0.0:
         start["m"] = float(np.sqrt(np.mean(np.abs(target) ** 2) / np.mean(np.abs(omega**2 * weight) ** 2)))
     return start
@@ -161,9 +161,9 @@ def held_out_residual(found: FreeRunFit, record: Record, how: Plan) -> Floats:
     return again.residual
 
 
-def with_steps(how: Plan, steps: int) -> Plan:
-    """The same plan with other steps per sample."""
-    return replace(how, steps_per_sample=steps)
+def shortened(how: Plan, samples: int) -> Plan:
+    """The same plan with no more than so many samples to fit: enough to tell candidates apart, and sooner done."""
+    return replace(how, fit=(how.fit[0], min(how.fit[1], how.fit[0] + samples)))
 
 
 def linearise(found: FreeRunFit, record: Record, how: Plan) -> Floats:

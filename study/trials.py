@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from study.errors import DivergenceError
 from study.excitation import Excitation, displacement_noise, force
+from study.free_run import predict
 from study.inputs import Input, history, reverse_inputs
+from study.linear import least_squares
 from study.model import Model, ModelTerm, free
 from study.record import Record
 from study.simulate import Integrator, simulate
@@ -25,6 +27,7 @@ HIDDEN = tuple(name for name in LIBRARY if name not in LINEAR)
 NOISES = (0.0, 0.01, 0.05, 0.10)
 SHARE = (0.10, 0.40)  # of the restoring force, what no linear model can take over
 SAMPLES = 8192
+ATTEMPTS = 300  # systems drawn until one carries the effects at the wanted strength and stays finite
 
 
 @dataclass(frozen=True)
@@ -79,7 +82,7 @@ def make_trial(
     drawn_response = str(rng.choice(["displacement", "acceleration"]))
     noise = drawn_noise if noise is None else noise
     response = response or drawn_response
-    for _ in range(50):
+    for _ in range(ATTEMPTS):
         found = _attempt(rng, seed, tuple(hidden), noise, response)
         if found is not None:
             return found
@@ -110,7 +113,7 @@ def _attempt(rng: np.random.Generator, seed: int, hidden: tuple[str, ...], noise
         return None
     if any(not 0.8 * SHARE[0] < share_of(truth, name, record) < 1.2 * SHARE[1] for name in hidden):
         return None
-    values = record[response]
+    values = predict(truth, record, response=response, steps_per_sample=8)  # exact at stick and slip too
     if noise > 0.0:
         values = values + displacement_noise(values, noise, seed)
     measured = Record(dt, {"force": drive, response: values}, record.units, f"trial_{seed}")
@@ -200,8 +203,7 @@ def _unshared(entry: ModelTerm, record: Record) -> float:
     """Root mean square of a term's force less its best fit by displacement, velocity and acceleration."""
     own = _force(entry, record)
     motion = np.column_stack([record[c] for c in ("displacement", "velocity", "acceleration")])
-    motion = motion / np.std(motion, axis=0)
-    rest = own - motion @ np.linalg.lstsq(motion, own, rcond=None)[0]
+    rest = own - motion @ least_squares(motion, own)
     return float(np.sqrt(np.mean(rest**2)))
 
 

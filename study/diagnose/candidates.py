@@ -19,7 +19,7 @@ from study.terms import LIBRARY, Term
 
 Floats = NDArray[np.float64]
 THREADS = 2
-SHORT, LONG = 15, 60  # free runs of a fit that tries a start, and of one that is kept
+SHORT, LONG = 15, 40  # free runs of a fit that tries a start, and of one that is kept
 NEVER_CANDIDATES = ("inertia",)
 
 
@@ -58,8 +58,12 @@ def try_all(
 ) -> list[Trial]:
     """Fit and judge every candidate; those that cannot be fitted are left out."""
     done: list[Trial] = []
+
+    def one(term: Term) -> Trial | None:
+        return attempt(term, base, record, how, held)
+
     with ThreadPoolExecutor(THREADS) as pool:
-        for count, trial in enumerate(pool.map(lambda term: attempt(term, base, record, how, held), terms), start=1):
+        for count, trial in enumerate(pool.map(one, terms), start=1):
             if trial is not None:
                 done.append(trial)
             if progress is not None:
@@ -120,3 +124,15 @@ def _starts(term: Term, base: Baseline, record: Record, how: Plan) -> list[dict[
         still = dict(zip(keys, (0.0,) * len(term.components) + points[0].parameters, strict=True))
         begins.append(fitted | anew | still)
     return begins
+
+
+def refitted(trial: Trial, record: Record, how: Plan, held: tuple[str, ...]) -> Trial:
+    """The same candidate fitted on more of the record, from where it stands."""
+    values = {key: v for key, v in trial.found.model.values.items() if v is not None}
+    found = _fit(trial.found.model, record, how, held, values, LONG)
+    if found is None:
+        return trial
+    try:
+        return Trial(trial.term, found, fitting.held_out_residual(found, record, how))
+    except StudyError:
+        return trial

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from study.diagnose.search import Baseline, modulation_lines, residual_lines
+from study.linear import least_squares
 
 Floats = NDArray[np.float64]
 DEGREE = 7
@@ -89,12 +90,12 @@ def _share(base: Baseline, shapes: Sequence[Floats], dt: float) -> float:
     residual = base.found.residual
     n = len(residual)
     size = next_fast_len(2 * n)
-    omega = 2j * np.pi * np.asarray(rfftfreq(size, dt))
+    omega = np.asarray(2j * np.pi * rfftfreq(size, dt), dtype=np.complex128)
+    omega[0] = omega[1]  # a constant goes through as the lowest line does
     transfer = base.transfer(omega)
     columns = np.column_stack([irfft(transfer * rfft(s, size), size)[:n] for s in shapes])
-    columns = columns / np.std(columns, axis=0).clip(1e-300)
     half = n // 2
-    amounts = np.linalg.lstsq(columns[:half], residual[:half], rcond=1e-6)[0]
+    amounts = least_squares(columns[:half], residual[:half], 1e-6)
     rest = residual[half:] - columns[half:] @ amounts
     power = float(residual[half:] @ residual[half:])
     return 1.0 - float(rest @ rest) / power if power > 0.0 else 0.0

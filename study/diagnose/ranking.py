@@ -19,6 +19,8 @@ from study.terms import Term
 
 Floats = NDArray[np.float64]
 TIE = 2.0  # candidates closer than this many standard errors of their difference are a tie
+UNSTEADY = 0.3  # relative change of its coefficient at which a candidate is no longer believed ...
+NEARLY = 0.9  # ... if a steadier one explains at least so much of what it does
 INDISTINCT = 1e-6
 EXAMINED = 6  # candidates whose coefficient is followed along frequency and amplitude
 
@@ -103,6 +105,7 @@ def rank(trials: Sequence[Trial], before: Floats, record: Record, how: Plan) -> 
     rows.sort(key=lambda r: float(r.residual @ r.residual))
     rows = _ties_by_simplicity(rows)
     rows = [_examined(row, record, how) if i < EXAMINED else row for i, row in enumerate(rows)]
+    rows = _constant_first(rows)
     return [replace(row, tied_with=_tied(row, rows)) for row in rows]
 
 
@@ -160,9 +163,27 @@ def _misfit(row: Ranked) -> float:
 
 
 def _ties_by_simplicity(rows: list[Ranked]) -> list[Ranked]:
-    """The candidates that the held-out residual cannot tell from the first, ordered by both parts of the record."""
-    level = [r for r in rows if _distance(r, rows[0]) < TIE] if rows else []
-    return sorted(level, key=_misfit) + [r for r in rows if not any(r is other for other in level)]
+    """Of the candidates that the held-out residual cannot tell from the first, put the best of the simplest first.
+
+    One with more unknowns never overtakes; one with as many or fewer does if both parts of the record say so.
+    """
+    if not rows:
+        return rows
+    level = [r for r in rows if _distance(r, rows[0]) < TIE and _unknowns(r) <= _unknowns(rows[0])]
+    first = min(level, key=_misfit)
+    return [first] + [r for r in rows if r is not first]
+
+
+def _constant_first(rows: list[Ranked]) -> list[Ranked]:
+    """Put a candidate whose coefficient is no constant behind one that explains nearly as much and has one.
+
+    A wrong term that imitates a true one needs a coefficient which changes with frequency and level.
+    """
+    if not rows or rows[0].unsteadiness <= UNSTEADY:
+        return rows
+    enough = NEARLY * rows[0].gain.explained
+    steady = [r for r in rows[:EXAMINED] if r.unsteadiness <= UNSTEADY and r.gain.explained >= enough]
+    return steady[:1] + [r for r in rows if r is not steady[0]] if steady else rows
 
 
 def _distance(row: Ranked, other: Ranked) -> float:

@@ -17,6 +17,7 @@ from study import fitting
 from study.errors import StudyError
 from study.fitting import Plan
 from study.free_run import FreeRun, prepare
+from study.linear import least_squares
 from study.model import Model, ModelTerm, free
 from study.output_error import FreeRunFit
 from study.record import MOTIONS, Record
@@ -103,8 +104,8 @@ def starts(term: Term, base: Baseline, record: Record, how: Plan) -> list[Start]
     best = sorted(tried, key=lambda s: -s.share)
     if term.name in ("periodic_stiffness", "harmonic_force", "hysteresis"):
         return best[:STARTS]
-    spread = [tried[i] for i in np.linspace(0, len(tried) - 1, SPREAD).astype(int)] if tried else []
-    return best[:1] + [point for point in spread if point is not best[0]]
+    step = max(1, (len(tried) - 1) // (SPREAD - 1))
+    return best[:1] + [point for point in tried[::step] if point is not best[0]]
 
 
 def _try(
@@ -119,15 +120,13 @@ def _try(
     except StudyError:
         return None
     added = added - base.basis @ (base.basis.T @ added)
-    scale = np.linalg.norm(added, axis=0)
-    if not np.all(np.isfinite(scale)) or not np.any(scale > 0.0):
+    if not np.all(np.isfinite(added)) or not np.any(added):
         return None
-    scale[scale == 0.0] = 1.0
     residual = base.found.residual
-    amounts, *_ = np.linalg.lstsq(added / scale, residual, rcond=1e-8)
+    amounts = least_squares(added, residual, 1e-8)
     power = float(residual @ residual)
-    share = 1.0 - float(np.sum((residual - added / scale @ amounts) ** 2)) / power if power > 0.0 else 0.0
-    return Start(parameters, tuple(float(a) for a in amounts / scale), share)
+    share = 1.0 - float(np.sum((residual - added @ amounts) ** 2)) / power if power > 0.0 else 0.0
+    return Start(parameters, tuple(float(a) for a in amounts), share)
 
 
 def _grid(term: Term, base: Baseline, record: Record, how: Plan) -> list[tuple[float, ...]]:
@@ -170,7 +169,7 @@ def modulation_lines(base: Baseline) -> list[float]:
     is one line of the spectrum of ``u`` times the residual filtered by H backwards in time.
     """
     n = len(base.found.residual)
-    receptance = base.transfer(2j * np.pi * np.asarray(rfftfreq(n, base.dt)))
+    receptance = base.transfer(np.asarray(2j * np.pi * rfftfreq(n, base.dt), dtype=np.complex128))
     receptance[0] = receptance[1] if not np.isfinite(receptance[0]) else receptance[0]
     matched = irfft(np.conj(receptance) * rfft(base.found.residual), n)
     numerator = np.abs(_windowed(matched * base.displacement)) ** 2

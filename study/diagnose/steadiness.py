@@ -51,12 +51,18 @@ def along_frequency(sensitivity: Floats, residual: Floats, coefficient: float, d
     taper = np.hanning(len(residual))
     s, e = np.asarray(rfft(sensitivity * taper)), np.asarray(rfft(residual * taper))
     power = np.abs(s) ** 2
-    edges = np.searchsorted(np.cumsum(power), np.linspace(0.0, 1.0, BANDS + 1) * np.sum(power))
-    edges[-1] = len(s)
+    edges = _equal_shares(power, BANDS)
     frequency = np.asarray(rfftfreq(len(residual), dt))
-    rows = [_band(s[a:b], e[a:b], frequency[a:b]) for a, b in pairwise(edges.tolist()) if b - a > 3]
-    at, change, error = (np.array(column) for column in zip(*rows, strict=True))
-    return Curve(at.real, coefficient + change, error.real)
+    rows = [_band(s[a:b], e[a:b], frequency[a:b]) for a, b in pairwise(edges) if b - a > 3]
+    change = np.array([row[1] for row in rows], dtype=np.complex128)
+    return Curve(np.array([row[0] for row in rows]), coefficient + change, np.array([row[2] for row in rows]))
+
+
+def _equal_shares(power: Floats, count: int) -> list[int]:
+    """Edges of ``count`` stretches that hold equal shares of a power."""
+    total = np.cumsum(power)
+    inner = [int(np.searchsorted(total, share * total[-1])) for share in np.arange(1, count) / count]
+    return [0, *inner, len(power)]
 
 
 def _band(s: Complexes, e: Complexes, frequency: Floats) -> tuple[float, complex, float]:
@@ -74,10 +80,9 @@ def along_amplitude(sensitivity: Floats, residual: Floats, coefficient: float) -
     e = residual[: count * BLOCK].reshape(count, BLOCK)
     own, cross = np.sum(s**2, axis=1), np.sum(s * e, axis=1)
     order = np.argsort(own)
-    edges = np.searchsorted(np.cumsum(own[order]), np.linspace(0.0, 1.0, CLASSES + 1) * np.sum(own))
-    edges[-1] = count
+    edges = _equal_shares(own[order], CLASSES)
     at, value, error = list[float](), list[float](), list[float]()
-    for a, b in pairwise(edges.tolist()):
+    for a, b in pairwise(edges):
         rows = order[a:b]
         if len(rows) < 2:
             continue

@@ -24,7 +24,9 @@ SMALLEST_SHARE = 0.01  # of the held-out residual: what a candidate must explain
 SIGNIFICANT = 5.0  # standard errors by which structure must stand above the noise floor
 SMALLEST_GAIN = 1e-3  # of the rms response: what a candidate must explain; less is the resolution of integration
 NEGLIGIBLE = 2e-3  # of the rms response: structure below this is no evidence that something is missing
-LEFT = 0.01  # of the rms response: structure that may be left beside a candidate which counts as the explanation
+LEFT = 0.0075  # of the rms response: structure that may be left beside a candidate which counts as the explanation
+SEARCHED = 16384  # samples of the fitting part that the search uses
+REFITTED = 6  # ... after which the best so many are fitted on the whole of it
 PAIRED = 2  # the best so many candidates are tried together with every other
 
 
@@ -102,18 +104,28 @@ def diagnose(
     held = fitting.held_keys(model) if held is None else held
     found = fitting.fit(model, record, how, held)
     residual = fitting.held_out_residual(found, record, how)
-    base = search.baseline(found, record, how)
+    short = fitting.shortened(how, SEARCHED)
+    base = search.baseline(_refitted(found, record, how, short, held), record, short)
     terms = candidates.candidate_terms(base, extra, without)
-    trials = candidates.try_all(terms, base, record, how, held, progress)
+    trials = candidates.try_all(terms, base, record, short, held, progress)
+    if short != how:
+        trials.sort(key=lambda t: float(t.residual @ t.residual))
+        best = [candidates.refitted(t, record, how, held) for t in trials[:REFITTED]]
+        trials = best + trials[REFITTED:]
     rows = rank(trials, residual, record, how)
     size = float(np.std(record[how.response][how.judge[0] : how.judge[1]]))
     noise = _floor([residual, *(r.residual for r in rows[:3])], record.dt)
     verdict, rows, left, pair = _decide(rows, residual, size, record, how, held)
-    families = _families(base, record, how) if verdict == UNKNOWN else {}
+    families = _families(base, record, short) if verdict == UNKNOWN else {}
     return Diagnosis(
         verdict, found, residual, float(np.sqrt(np.mean(residual**2))) / size,
         noise / size, tuple(rows), left, pair, families,
     )  # fmt: skip
+
+
+def _refitted(found: FreeRunFit, record: Record, how: Plan, short: Plan, held: tuple[str, ...]) -> FreeRunFit:
+    """The fit on the stretch that the search uses."""
+    return found if short == how else fitting.fit(found.model, record, short, held, found.model.numbers())
 
 
 def _floor(residuals: Sequence[Floats], dt: float) -> float:
@@ -134,8 +146,7 @@ def _decide(
         return MISSING, rows, left, ()
     pair, remaining = _best_pair(rows, size, record, how, held)
     if remaining <= LEFT:
-        first = [next(r for r in rows if r.name == name) for name in pair]
-        first.sort(key=lambda r: float(r.residual @ r.residual))
+        first = [r for r in rows if r.name in pair]
         return MISSING, first + [r for r in rows if r.name not in pair], remaining, pair
     return UNKNOWN, rows, left, ()
 
@@ -156,10 +167,11 @@ def _best_pair(
 ) -> tuple[tuple[str, ...], float]:
     """The two effects that together leave the least, and the structure that they leave."""
     terms = [row.term for row in rows]
+    short = fitting.shortened(how, SEARCHED)
     best: tuple[float, tuple[str, ...], Floats] | None = None
     for row in rows[:PAIRED]:
-        beside = search.baseline(row.found, record, how)
-        for trial in candidates.try_all([t for t in terms if t.name != row.name], beside, record, how, held):
+        beside = search.baseline(_refitted(row.found, record, how, short, held), record, short)
+        for trial in candidates.try_all([t for t in terms if t.name != row.name], beside, record, short, held):
             power = float(trial.residual @ trial.residual)
             if best is None or power < best[0]:
                 best = power, (row.name, trial.term.name), trial.residual
