@@ -111,7 +111,7 @@ def rank(trials: Sequence[Trial], before: Floats, record: Record, how: Plan) -> 
 
 def _row(trial: Trial, before: Floats, count: int, size: float, record: Record, how: Plan) -> Ranked:
     gain = score.gain(before, trial.residual)
-    covariance = score.clustered_covariance(fitting.linearise(trial.found, record, how), trial.found.residual)
+    covariance = score.clustered_covariance(_jacobian(trial.found, record, how), trial.found.residual)
     coefficient, error, parameters, errors = _amount(trial, covariance)
     return Ranked(
         term=trial.term,
@@ -128,6 +128,11 @@ def _row(trial: Trial, before: Floats, count: int, size: float, record: Record, 
         tied_with=(),
         residual=trial.residual,
     )
+
+
+def _jacobian(found: FreeRunFit, record: Record, how: Plan) -> Floats:
+    """Derivatives on the samples that this candidate was fitted on: of a long record, the first ones."""
+    return fitting.linearise(found, record, fitting.shortened(how, len(found.residual)))
 
 
 def _amount(trial: Trial, covariance: Floats) -> tuple[float, float, dict[str, float], dict[str, float]]:
@@ -191,6 +196,8 @@ def _distance(row: Ranked, other: Ranked) -> float:
     if row is other:
         return 0.0
     held_out = score.difference(row.residual, other.residual)
+    if len(row.found.residual) != len(other.found.residual):
+        return held_out
     both = score.difference(
         np.concatenate([row.found.residual, row.residual]), np.concatenate([other.found.residual, other.residual])
     )
@@ -206,7 +213,7 @@ def _tied(row: Ranked, rows: Sequence[Ranked]) -> tuple[str, ...]:
 
 def _examined(row: Ranked, record: Record, how: Plan) -> Ranked:
     """Follow the candidate's coefficient along frequency and amplitude."""
-    jacobian = fitting.linearise(row.found, record, how)
+    jacobian = _jacobian(row.found, record, how)
     columns = [row.found.keys.index(s) for s in row.term.symbols]
     direction = row.found.values[columns]
     size = float(np.linalg.norm(direction))

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study import fitting, noise_floor
+from study.compare.fitted import fit_model
 from study.diagnose import candidates, nature, search
 from study.diagnose.ranking import Ranked, rank
 from study.diagnose.search import Baseline
@@ -72,7 +73,6 @@ def diagnose(
     record: Record,
     how: Plan,
     *,
-    held: tuple[str, ...] | None = None,
     extra: Sequence[Term] = (),
     without: Sequence[str] = (),
     progress: Callable[[int], None] | None = None,
@@ -87,8 +87,6 @@ def diagnose(
         Force and response.
     how : Plan
         What is fitted and what is judged.
-    held : tuple of str, optional
-        Keys that keep their value; all that the model gives, if left out.
     extra : sequence of Term
         The user's own candidates.
     without : sequence of str
@@ -101,8 +99,8 @@ def diagnose(
     StudyError
         If the model cannot be fitted to the record.
     """
-    held = fitting.held_keys(model) if held is None else held
-    found = fitting.fit(model, record, how, held)
+    held = fitting.held_keys(model)
+    found = fit_model(model, record, how)
     residual = fitting.held_out_residual(found, record, how)
     short = fitting.shortened(how, SEARCHED)
     base = search.baseline(_refitted(found, record, how, short, held), record, short)
@@ -146,8 +144,8 @@ def _decide(
         return MISSING, rows, left, ()
     pair, remaining = _best_pair(rows, size, record, how, held)
     if remaining <= LEFT:
-        first = [r for r in rows if r.name in pair]
-        return MISSING, first + [r for r in rows if r.name not in pair], remaining, pair
+        first = next(r for r in rows if r.name in pair)
+        return MISSING, [first] + [r for r in rows if r is not first], remaining, pair
     return UNKNOWN, rows, left, ()
 
 

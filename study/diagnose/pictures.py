@@ -1,0 +1,50 @@
+"""Pictures of a diagnosis: Axes in, Axes out."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from study.diagnose.ranking import Ranked
+from study.diagnose.verdict import Diagnosis
+
+SHOWN = 10
+
+
+def ranking(axes: Axes, found: Diagnosis) -> Axes:
+    """Held-out error of the response after adding each candidate, beside the error before and the noise floor."""
+    rows = found.candidates[:SHOWN]
+    place = np.arange(len(rows))
+    values = [100.0 * min(r.response_error, 10.0 * found.response_error) for r in rows]
+    axes.barh(place, values, height=0.62, color=["0.25" if i == 0 else "0.7" for i in place])
+    axes.set_yticks(place, [_label(r) for r in rows])
+    axes.invert_yaxis()
+    axes.set_xlim(0.0, 118.0 * found.response_error)
+    axes.axvline(100.0 * found.response_error, color="0.1", linewidth=1.4, linestyle="-", label="without it")
+    axes.axvline(100.0 * found.noise, color="0.1", linewidth=1.4, linestyle=":", label="noise floor")
+    axes.set_xlabel("held-out error of the response after adding it / %")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.12), ncols=2, frameon=False)
+    return axes
+
+
+def _label(row: Ranked) -> str:
+    return row.name.replace("_", " ") + (" (tie)" if row.tied_with else "")
+
+
+def constancy(frequency: Axes, amplitude: Axes, rows: Sequence[Ranked]) -> None:
+    """The coefficient of the first candidates along frequency and amplitude, relative to its value."""
+    styles = (("o", "-", "0.1"), ("s", "--", "0.45"), ("^", ":", "0.6"))
+    for row, (marker, line, colour) in zip(rows, styles, strict=False):
+        for axes, curve in ((frequency, row.flatness), (amplitude, row.steadiness)):
+            if curve is None:
+                continue
+            axes.errorbar(
+                curve.at, curve.value.real / row.coefficient, 1.96 * curve.error / abs(row.coefficient),
+                marker=marker, linestyle=line, color=colour, capsize=2.0, label=row.name.replace("_", " "),
+            )  # fmt: skip
+    for axes, what in ((frequency, "frequency / Hz"), (amplitude, "strength of the effect / its mean")):
+        axes.axhline(1.0, color="0.8", linewidth=0.8, zorder=0)
+        axes.set_xlabel(what)
+        axes.set_ylim(-0.5, 2.5)
+    frequency.set_ylabel("coefficient there / coefficient")
+    frequency.legend(loc="upper center", bbox_to_anchor=(1.0, 1.16), ncols=3, frameon=False)

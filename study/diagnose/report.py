@@ -1,0 +1,74 @@
+"""The diagnosis as a table for people and as fields for files."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from study.diagnose.ranking import Ranked
+from study.diagnose.verdict import Diagnosis
+
+SHOWN = 8  # candidates in the table on the screen
+
+
+def table(found: Diagnosis, force: str, length: str) -> str:
+    """The first candidates as a person reads them in ten seconds."""
+    from tabulate import tabulate
+
+    head = ["", "effect", "explains", "error with it", "coefficient", "p", "changes by", "tied with"]
+    rows = [_shown(i, row, force, length) for i, row in enumerate(found.candidates[:SHOWN], start=1)]
+    return tabulate(rows, head, tablefmt="simple", disable_numparse=True)
+
+
+def _shown(place: int, row: Ranked, force: str, length: str) -> list[str]:
+    unit = row.term.unit(row.term.symbols[0], force, length)
+    half = 1.96 * row.error
+    return [
+        str(place),
+        row.name,
+        f"{100 * row.gain.explained:.1f} +- {100 * row.gain.error:.1f} %",
+        f"{100 * row.response_error:.3g} %",
+        f"{row.coefficient:.4g} +- {half:.2g} {unit}",
+        f"{row.p_value:.1g}",
+        f"{100 * row.unsteadiness:.0f} %" if math.isfinite(row.unsteadiness) else "-",
+        ", ".join(row.tied_with),
+    ]
+
+
+def fields(found: Diagnosis) -> dict[str, Any]:
+    """What ``diagnosis.json`` holds of the diagnosis itself; candidates best first."""
+    return {
+        "verdict": found.verdict,
+        "error": {"response": found.response_error},
+        "noise_floor": {"response": found.noise},
+        "candidates": [_candidate(row) for row in found.candidates],
+        "pair": list(found.pair),
+        "left": found.left,
+        "depends_on": found.families,
+        "converged": found.found.converged,
+    }
+
+
+def _candidate(row: Ranked) -> dict[str, Any]:
+    low, high = row.interval
+    return {
+        "term": row.name,
+        "parameters": {key: _finite(value) for key, value in row.parameters.items()},
+        "parameter_errors": {key: _finite(value) for key, value in row.parameter_errors.items()},
+        "coefficient": row.coefficient,
+        "interval": [_finite(low), _finite(high)],
+        "response_error": row.response_error,
+        "explained": row.gain.explained,
+        "explained_error": row.gain.error,
+        "p_value": row.p_value,
+        "changes": {
+            "frequency": _finite(row.flatness.spread()) if row.flatness else None,
+            "amplitude": _finite(row.steadiness.spread()) if row.steadiness else None,
+        },
+        "tied_with": list(row.tied_with),
+        "converged": row.found.converged,
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

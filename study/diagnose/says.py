@@ -1,0 +1,91 @@
+"""The diagnosis in plain sentences, composed from its numbers and from nothing else."""
+
+from study.diagnose.ranking import Ranked
+from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
+
+DEPENDENCE = 0.1  # held-out share from which the unexplained force is said to depend on something
+CLOSE = 0.05  # families this close to the best one are named with it
+
+
+def sentences(found: Diagnosis, force: str, length: str) -> list[str]:
+    """What to tell the engineer.
+
+    Parameters
+    ----------
+    found : Diagnosis
+        The diagnosis.
+    force, length : str
+        Units of force and displacement.
+    """
+    if found.verdict == NOTHING:
+        return [_nothing(found)]
+    if found.verdict == MISSING:
+        return _missing(found, force, length)
+    return _unknown(found)
+
+
+def _nothing(found: Diagnosis) -> str:
+    return (
+        f"Nothing is missing that this record could show: the error of the response is {_percent(found.response_error)}"
+        f" and its noise floor {_percent(found.noise)}; none of {len(found.candidates)} candidates explains any of it."
+    )
+
+
+def _missing(found: Diagnosis, force: str, length: str) -> list[str]:
+    first = found.candidates[0]
+    said = [
+        f"{_words(first.name)} is missing ({first.term.meaning}).",
+        f"With it the held-out error of the response falls from {_percent(found.response_error)} to "
+        f"{_percent(first.response_error)}; the noise floor is {_percent(found.noise)}.",
+        f"Its coefficient is {_amount(first, force, length)}{_shape(first)}.",
+    ]
+    if found.pair:
+        second = next(name for name in found.pair if name != first.name)
+        said.append(f"It does not explain all: beside it {_words(second).lower()} is needed.")
+    elif found.left > 0.0:
+        said.append(f"Structure of {_percent(found.left)} of the response is left beside it.")
+    if first.tied_with:
+        said.append(f"This record cannot tell it from {', '.join(_words(n).lower() for n in first.tied_with)}.")
+    return said
+
+
+def _unknown(found: Diagnosis) -> list[str]:
+    said = [
+        f"Something is missing that no candidate explains: {_percent(found.response_error)} error of the response, "
+        f"of which {_percent(found.noise)} would be noise."
+    ]
+    best = found.candidates[0] if found.candidates else None
+    if best is not None and best.gain.explained > 0.0 and best.p_value < 0.05:
+        said.append(
+            f"The nearest, {_words(best.name).lower()}, leaves {_percent(best.response_error)}; "
+            "what remains has structure, so its shape is not right."
+        )
+    families = sorted(found.families.items(), key=lambda item: -item[1])
+    if families and families[0][1] > DEPENDENCE:
+        named = [name for name, share in families if share > families[0][1] - CLOSE]
+        said.append(
+            f"The missing force depends on {' or '.join(named)}: general functions of it explain "
+            f"{_percent(families[0][1])} of what is unexplained, held out."
+        )
+    else:
+        said.append("Neither displacement, velocity, the past nor time as such explains a tenth of it.")
+    return said
+
+
+def _amount(row: Ranked, force: str, length: str) -> str:
+    low, high = row.interval
+    unit = row.term.unit(row.term.symbols[0], force, length)
+    return f"{row.coefficient:.4g} {unit} (95 % interval {low:.4g} to {high:.4g})"
+
+
+def _shape(row: Ranked) -> str:
+    parts = [f"{name} = {value:.4g} +- {row.parameter_errors[name]:.2g}" for name, value in row.parameters.items()]
+    return f", with {', '.join(parts)}" if parts else ""
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ").capitalize()
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"

@@ -1,0 +1,57 @@
+"""Which test would tell two tied candidates apart? Found by simulating both at other levels of excitation."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from study.diagnose.ranking import Ranked
+from study.errors import StudyError
+from study.fitting import Plan
+from study.free_run import prepare
+from study.linear import least_squares
+from study.record import Record
+
+LEVELS = (1.2, 1.5, 1.8, 2.2, 2.7, 3.3, 4.0, 5.0, 0.5, 0.25)
+DISTINCT = 5.0  # standard errors by which the responses must differ
+LONGEST = 16384  # samples simulated
+
+
+def separating_level(one: Ranked, other: Ranked, record: Record, how: Plan) -> float | None:
+    """The first factor on the force at which the two models would be told apart by a record of this length.
+
+    The second model may adjust all of its coefficients to what the first one does; what it still cannot
+    follow is held against the noise of this record, taken as white. None where no tried level separates.
+    """
+    noise = float(np.mean(one.residual**2))
+    span = (how.fit[0], min(how.fit[1], how.fit[0] + LONGEST))
+    for level in LEVELS:
+        louder = record.with_channels({"force": level * record["force"]})
+        try:
+            target = prepare(one.found.model, louder, response=how.response, span=span).respond({}, (0.0, 0.0))[0]
+            run = prepare(other.found.model, louder, other.found.keys, response=how.response, span=span)
+            values = dict(zip(other.found.keys, (float(v) for v in other.found.values), strict=True))
+            nearest, jacobian = run.respond(values, (0.0, 0.0))
+        except StudyError:
+            continue
+        gap = target - nearest
+        gap = gap - jacobian @ least_squares(jacobian, gap, 1e-9)
+        # The difference of the two misfits is about |gap|^2, its standard error 2 |gap| sigma.
+        if np.sum(gap**2) > (2.0 * DISTINCT) ** 2 * noise:
+            return level
+    return None
+
+
+def advice(rows: Sequence[Ranked], record: Record, how: Plan) -> str:
+    """A sentence on the tie of the first candidate, or nothing if there is none."""
+    if not rows or not rows[0].tied_with:
+        return ""
+    rival = next((r for r in rows if r.name == rows[0].tied_with[0]), None)
+    if rival is None:
+        return ""
+    level = separating_level(rows[0], rival, record, how)
+    names = f"{rows[0].name} and {rival.name}"
+    if level is None:
+        return (
+            f"No level from a quarter to five times this one would tell {names} apart; another kind of test is needed."
+        )
+    return f"To tell {names} apart, excite at {level:g} times this level."

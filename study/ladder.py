@@ -1,0 +1,72 @@
+"""The ladder: every model tried on a record so far, its errors, and the noise floor, kept beside the model file."""
+
+import json
+from pathlib import Path
+from typing import Any, cast
+
+from study.errors import StudyError
+from study.files import read_text, replace_file
+
+Step = dict[str, Any]
+
+
+def path_of(model: Path) -> Path:
+    """Where the ladder of a model file is kept: ``rig.yaml`` has ``rig.history.json`` beside it."""
+    return model.with_name(f"{model.stem}.history.json")
+
+
+def read(model: Path) -> list[Step]:
+    """The steps so far, oldest first; none where nothing was added yet.
+
+    Raises
+    ------
+    StudyError
+        If the file is there and is no ladder.
+    """
+    path = path_of(model)
+    if not path.exists():
+        return []
+    wanted = "a ladder as 'study add' writes it"
+    try:
+        content: object = json.loads(read_text(path, wanted))
+    except json.JSONDecodeError as error:
+        raise StudyError(f"{path}: line {error.lineno} is not JSON; {wanted} is right") from None
+    steps = cast(Step, content).get("steps") if isinstance(content, dict) else None
+    if not isinstance(steps, list) or not all(_is_step(s) for s in cast(list[object], steps)):
+        raise StudyError(f"{path}: it holds no list of steps with terms, record and errors; {wanted} is right")
+    return cast(list[Step], steps)
+
+
+def _is_step(step: object) -> bool:
+    return isinstance(step, dict) and {"terms", "record", "error", "noise_floor"} <= set(cast(Step, step))
+
+
+def write(model: Path, steps: list[Step]) -> None:
+    """Keep the steps, the old file surviving any failure."""
+    replace_file(path_of(model), (json.dumps({"steps": steps}, indent=1) + "\n").encode())
+
+
+def climbed(steps: list[Step], before: Step, after: Step) -> list[Step]:
+    """The ladder with a step more; it begins with the model before it, unless that is where it stands."""
+    known = steps and steps[-1]["terms"] == before["terms"] and steps[-1]["record"] == before["record"]
+    return [*steps, *([] if known else [before]), after]
+
+
+def table(steps: list[Step]) -> str:
+    """The ladder for people, one line a model."""
+    from tabulate import tabulate
+
+    rows: list[list[str]] = []
+    for number, step in enumerate(steps):
+        what = f"+ {step['added']}" if step.get("added") else ", ".join(step["terms"])
+        error = step["error"]
+        rows.append(
+            [str(number), what, step["record"], _percent(error["force"]), _percent(error["response"]),
+             f"{step['rms']:.4g} {step['unit']}", _percent(step["noise_floor"]["response"])]
+        )  # fmt: skip
+    head = ["", "model", "record", "force error", "response error", "rms", "noise floor"]
+    return tabulate(rows, head, tablefmt="simple", disable_numparse=True)
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{100.0 * share:.3g} %"
