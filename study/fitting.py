@@ -103,7 +103,8 @@ def linear_start(model: Model, record: Record, how: Plan) -> dict[str, float]:
     )  # fmt: skip
     start = dict.fromkeys(values, 0.0) | dict(zip(wanted, (float(v) for v in found), strict=True))
     if start["m"] <= 0.0:
-        start["m"] = float(np.sqrt(np.mean(np.abs(target) ** 2) / np.mean(np.abs(omega**2 * weight) ** 2)))
+        inertial = omega**2 * weight
+        start["m"] = float(np.linalg.norm(target)) / float(np.linalg.norm(inertial))
     return start
 
 

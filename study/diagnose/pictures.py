@@ -1,5 +1,8 @@
 """Pictures of a diagnosis: Axes in, Axes out."""
 
+# Matplotlib leaves the **kwargs of its methods untyped.
+# pyright: reportUnknownMemberType=false
+
 from collections.abc import Sequence
 
 import numpy as np

@@ -21,6 +21,7 @@ Floats = NDArray[np.float64]
 TIE = 2.0  # candidates closer than this many standard errors of their difference are a tie
 UNSTEADY = 0.3  # relative change of its coefficient at which a candidate is no longer believed ...
 NEARLY = 0.9  # ... if a steadier one explains at least so much of what it does
+PRACTICALLY = 0.99  # of what an effect of three unknowns explains: enough for one of a single unknown
 INDISTINCT = 1e-6
 EXAMINED = 6  # candidates whose coefficient is followed along frequency and amplitude
 
@@ -105,7 +106,7 @@ def rank(trials: Sequence[Trial], before: Floats, record: Record, how: Plan) -> 
     rows.sort(key=lambda r: float(r.residual @ r.residual))
     rows = _ties_by_simplicity(rows)
     rows = [_examined(row, record, how) if i < EXAMINED else row for i, row in enumerate(rows)]
-    rows = _constant_first(rows)
+    rows = _simple_first(_constant_first(rows))
     return [replace(row, tied_with=_tied(row, rows)) for row in rows]
 
 
@@ -189,6 +190,17 @@ def _constant_first(rows: list[Ranked]) -> list[Ranked]:
     enough = NEARLY * rows[0].gain.explained
     steady = [r for r in rows[:EXAMINED] if r.unsteadiness <= UNSTEADY and r.gain.explained >= enough]
     return steady[:1] + [r for r in rows if r is not steady[0]] if steady else rows
+
+
+def _simple_first(rows: list[Ranked]) -> list[Ranked]:
+    """Put an effect with a memory or a frequency of its own behind a single coefficient that does practically as much.
+
+    With three unknowns and a free initial state it can imitate an offset or a weak curvature.
+    """
+    if not rows or _unknowns(rows[0]) < 3:
+        return rows
+    plain = [r for r in rows if _unknowns(r) == 1 and r.gain.explained >= PRACTICALLY * rows[0].gain.explained]
+    return plain[:1] + [r for r in rows if r is not plain[0]] if plain else rows
 
 
 def _distance(row: Ranked, other: Ranked) -> float:

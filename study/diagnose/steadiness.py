@@ -60,15 +60,15 @@ def along_frequency(sensitivity: Floats, residual: Floats, coefficient: float, d
 
 def _equal_shares(power: Floats, count: int) -> list[int]:
     """Edges of ``count`` stretches that hold equal shares of a power."""
-    total = np.cumsum(power)
-    inner = [int(np.searchsorted(total, share * total[-1])) for share in np.arange(1, count) / count]
+    total: Floats = np.cumsum(power)
+    inner = [int(np.searchsorted(total, float(total[-1]) * k / count)) for k in range(1, count)]
     return [0, *inner, len(power)]
 
 
 def _band(s: Complexes, e: Complexes, frequency: Floats) -> tuple[float, complex, float]:
     power = float(np.sum(np.abs(s) ** 2))
-    change = complex(np.sum(np.conj(s) * e) / power)
-    rest = e - change * s
+    change = complex(np.vdot(s, e)) / power
+    rest: Complexes = e - change * s
     error = np.sqrt(1.5 * float(np.mean(np.abs(rest) ** 2)) / 2.0 / power)  # 1.5: the taper joins lines
     return float(np.sum(np.abs(s) ** 2 * frequency) / power), change, float(error)
 
@@ -79,7 +79,7 @@ def along_amplitude(sensitivity: Floats, residual: Floats, coefficient: float) -
     s = sensitivity[: count * BLOCK].reshape(count, BLOCK)
     e = residual[: count * BLOCK].reshape(count, BLOCK)
     own, cross = np.sum(s**2, axis=1), np.sum(s * e, axis=1)
-    order = np.argsort(own)
+    order: NDArray[np.intp] = np.argsort(own)
     edges = _equal_shares(own[order], CLASSES)
     at, value, error = list[float](), list[float](), list[float]()
     for a, b in pairwise(edges):
@@ -88,8 +88,8 @@ def along_amplitude(sensitivity: Floats, residual: Floats, coefficient: float) -
             continue
         power = float(np.sum(own[rows]))
         change = float(np.sum(cross[rows])) / power
-        scatter = cross[rows] - change * own[rows]
-        at.append(float(np.sqrt(np.mean(own[rows]) / np.mean(own))))
+        scatter: Floats = cross[rows] - change * own[rows]
+        at.append((float(np.mean(own[rows])) / float(np.mean(own))) ** 0.5)
         value.append(coefficient + change)
         error.append(float(np.sqrt(np.sum(scatter**2)) / power))
     return Curve(np.array(at), np.array(value, dtype=np.complex128), np.array(error))
