@@ -78,7 +78,8 @@ def along_amplitude(sensitivity: Floats, residual: Floats, coefficient: float) -
     count = len(residual) // BLOCK
     s = sensitivity[: count * BLOCK].reshape(count, BLOCK)
     e = residual[: count * BLOCK].reshape(count, BLOCK)
-    own, cross = np.sum(s**2, axis=1), np.sum(s * e, axis=1)
+    own: Floats = np.sum(s**2, axis=1)
+    cross: Floats = np.sum(s * e, axis=1)
     order: NDArray[np.intp] = np.argsort(own)
     edges = _equal_shares(own[order], CLASSES)
     at, value, error = list[float](), list[float](), list[float]()
