@@ -26,7 +26,6 @@ def ranking(axes: Axes, found: Diagnosis) -> Axes:
     axes.axvline(100.0 * found.response_error, color="0.1", linewidth=1.4, linestyle="-", label="without it")
     axes.axvline(100.0 * found.noise, color="0.1", linewidth=1.4, linestyle=":", label="noise floor")
     axes.set_xlabel("held-out error of the response after adding it / %")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.12), ncols=2, frameon=False)
     return axes
 
 
@@ -50,4 +49,3 @@ def constancy(frequency: Axes, amplitude: Axes, rows: Sequence[Ranked]) -> None:
         axes.set_xlabel(what)
         axes.set_ylim(-0.5, 2.5)
     frequency.set_ylabel("coefficient there / coefficient")
-    frequency.legend(loc="upper center", bbox_to_anchor=(1.0, 1.16), ncols=3, frameon=False)

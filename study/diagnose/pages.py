@@ -1,0 +1,27 @@
+"""The pictures of a diagnosis as pages."""
+
+from matplotlib.figure import Figure
+
+from study.diagnose import pictures
+from study.diagnose.verdict import Diagnosis
+from study.figures import page
+
+FOLLOWED = 3  # candidates whose coefficient is drawn along frequency and amplitude
+
+
+def pages(found: Diagnosis, record: str) -> dict[str, Figure]:
+    """Figures by the stem of their file name; the caller applies the style sheet."""
+    ranking, (axes,) = page.page(
+        f"What is missing from the model of {record}", f"verdict: {found.verdict.replace('_', ' ')}",
+        panel=3.4, legend_rows=1, headed=False,
+    )  # fmt: skip
+    ranking.subplots_adjust(left=0.34)
+    pictures.ranking(axes, found)
+    page.legend(ranking, [axes])
+    constancy, panels = page.page(
+        f"Is the coefficient a constant? {record}", "that of a true term is, along frequency and along amplitude",
+        columns=2, width=page.width(2), panel=2.8, share=False,
+    )  # fmt: skip
+    pictures.constancy(panels[0], panels[1], found.candidates[:FOLLOWED])
+    page.legend(constancy, panels)
+    return {"candidates": ranking, "constancy": constancy}
