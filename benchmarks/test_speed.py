@@ -1,0 +1,102 @@
+"""How fast, beside what: run with `pytest benchmarks`; each row stands beside its peer in one table.
+
+Ratios in one run say something; absolute times say as much about the machine. Not part of `make test`.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.signal import csd
+
+from study.excitation import Excitation, force
+from study.interpolation import between_samples
+from study.model import Model, forward_program
+from study.modelfile import read_model
+from study.simulate import METHODS, Integrator, simulate
+from study.spectra import Segments, cross_spectra
+
+MODELS = sorted((Path(__file__).parent.parent / "models").glob("*.yaml"))
+DT, SAMPLES, STEPS = 0.02, 8192, 8
+
+
+def the_force():
+    return force(Excitation(), SAMPLES, DT, 1)
+
+
+def integration(model: Model, method: str):
+    """The compiled loop alone: SAMPLES x STEPS steps of one system."""
+    program = forward_program(model)
+    drive = between_samples(the_force(), 2 * STEPS)[:, None]
+    drive = np.vstack([drive, drive[-1:], drive[-1:]])
+    registers = program.registers.copy()
+
+    def run():
+        out, state = np.empty((SAMPLES, 3)), np.zeros(2)
+        assert METHODS[method](
+            program.code, program.first, registers, program.outputs, 0.0, DT, STEPS, drive, state, out
+        ) == -1  # fmt: skip
+
+    return run
+
+
+@pytest.mark.parametrize("path", MODELS, ids=lambda p: p.stem)
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.benchmark(group="integration: 65,536 steps (13.1 ms is 5 million a second)")
+def test_integration(benchmark, path, method):
+    benchmark(integration(read_model(path), method))
+
+
+@pytest.mark.benchmark(group="a Duffing record at equal error (1e-6 of the rms)")
+def test_simulate(benchmark):
+    model = read_model(MODELS[0].parent / "duffing.yaml")
+    values = the_force()[:1024]
+    benchmark(lambda: simulate(model, values, DT, Integrator("rk4", 8)))
+
+
+@pytest.mark.benchmark(group="a Duffing record at equal error (1e-6 of the rms)")
+def test_scipy_dop853(benchmark):
+    fine = between_samples(the_force()[:1024], 16)
+    grid = np.arange(len(fine)) * DT / 16
+
+    def slope(t, x):
+        return [x[1], np.interp(t, grid, fine) - 3.77 * x[1] - 355.3 * x[0] - 2e7 * x[0] ** 3]
+
+    at = np.arange(1024) * DT
+    benchmark.pedantic(
+        lambda: solve_ivp(slope, (0.0, at[-1]), [0.0, 0.0], "DOP853", at, rtol=1e-6, atol=1e-12, max_step=DT / 2),
+        rounds=2,
+    )
+
+
+def channels(count: int = 4, samples: int = 1_000_000):
+    rng = np.random.default_rng(1)
+    return [rng.standard_normal(samples) for _ in range(count)]
+
+
+@pytest.mark.benchmark(group="cross-spectral matrix, 4 channels of 1,000,000 samples")
+def test_matrix(benchmark):
+    data = channels()
+    benchmark.pedantic(lambda: cross_spectra(data, DT), rounds=3, warmup_rounds=1)
+
+
+@pytest.mark.benchmark(group="cross-spectral matrix, 4 channels of 1,000,000 samples")
+def test_matrix_by_scipy_csd(benchmark):
+    data = channels()
+    benchmark.pedantic(lambda: [[csd(x, y, 1 / DT, nperseg=512, detrend=False) for x in data] for y in data], rounds=2)
+
+
+@pytest.mark.benchmark(group="cross-spectral matrix, 4 channels of 1,000,000 samples")
+def test_bare_ffts(benchmark):
+    """What no estimate can do without: one windowed FFT a segment and channel."""
+    data, cut = channels(), Segments()
+    taper = cut.taper()
+
+    def run():
+        for x in data:
+            view = np.lib.stride_tricks.sliding_window_view(x, cut.length)[:: cut.hop]
+            for first in range(0, len(view), 256):
+                np.fft.rfft(view[first : first + 256] * taper)
+
+    benchmark.pedantic(run, rounds=3, warmup_rounds=1)
