@@ -40,13 +40,13 @@ class Floor:
         return self.excess / self.excess_error if self.excess_error > 0.0 else np.inf
 
 
-def floor(residual: Floats, dt: float) -> Floor:
-    """Split a residual into noise floor and structure."""
+def floor(residual: Floats, dt: float, low: float = 0.0) -> Floor:
+    """Split a residual into noise floor and structure, both above the frequency ``low`` (hertz)."""
     length = max(32, min(1024, 2 ** int(np.log2(len(residual) / 8))))
     segments = Segments(length=length)
     frequency, density = autospectrum(residual, dt, segments)
     averages = segments.effective_averages(len(residual))
-    bands = np.array_split(density[1:-1], BANDS)
+    bands = np.array_split(density[1:-1][frequency[1:-1] >= low], BANDS)
     means = np.array([np.mean(band) for band in bands])
     lines = np.array([len(band) for band in bands])
     spread = 1.0 / np.sqrt(averages * lines / segments.line_inflation())
@@ -57,7 +57,7 @@ def floor(residual: Floats, dt: float) -> Floor:
     above = np.clip(means - level, 0.0, None) * lines * width
     error = float(np.sqrt(np.sum((level * spread * lines * width) ** 2)))
     bias = 0.4 * error * np.sqrt(BANDS)  # what clipping at zero adds for noise alone: 0.4 sigma a band
-    return Floor(float(np.sqrt(level * 0.5 / dt)), max(float(np.sum(above)) - bias, 0.0), error)
+    return Floor(float(np.sqrt(level * (0.5 / dt - low))), max(float(np.sum(above)) - bias, 0.0), error)
 
 
 def _selection(bands: int, quiet: int) -> float:

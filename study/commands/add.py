@@ -1,0 +1,96 @@
+"""``study add``: add an effect to a model, fit again, and see the error before and after."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from study.commands.command import Command
+from study.commands.records import add_reading_arguments, out_folder, plan_of, read_records
+
+if TYPE_CHECKING:
+    from study.compare.comparison import Comparison
+    from study.terms import Term
+
+QUIET = 2.0  # seconds of work before progress is shown
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("model", type=Path, help="model file (YAML); the term is added to it")
+    parser.add_argument("term", help="an effect of the library, or a name for your own with --force")
+    parser.add_argument("--force", metavar="FORMULA", help="formula of your own effect, such as 'u*abs(u)'")
+    parser.add_argument("--data", dest="records", type=Path, nargs="+", required=True, metavar="RECORD")
+    parser.add_argument("--out", type=Path, help="folder for results (default results/RECORD)")
+    add_reading_arguments(parser)
+
+
+def _run(arguments: argparse.Namespace) -> None:
+    from tqdm import tqdm
+
+    from study import ladder
+    from study.compare.comparison import compare
+    from study.compare.output import check_folder, write_files
+    from study.compare.report import as_json, document, summary
+    from study.modelfile import add_term, read_model
+
+    folder = out_folder(arguments)
+    check_folder(folder)
+    term = _term(arguments)
+    model = read_model(arguments.model)
+    _refuse_second(arguments.model, model.terms, term.name)
+    steps = ladder.read(arguments.model)
+    records = read_records(arguments)
+    pairs: list[tuple[Comparison, Comparison]] = []
+    with tqdm(total=2 * len(records), delay=QUIET, leave=False, unit=" fits") as bar:
+        for record in records:
+            how = plan_of(arguments, record)
+            before = compare(model, record, how, cutoff=arguments.cutoff)
+            bar.update()
+            pairs.append((before, compare(model.with_term(term), record, how, cutoff=arguments.cutoff)))
+            bar.update()
+    for before, after in pairs:
+        steps = ladder.climbed(steps, _step(before, None), _step(after, term.name))
+    ladder.write(arguments.model, steps)
+    add_term(arguments.model, term)
+    write_files(folder, {"comparison.json": as_json(document([after for _, after in pairs]))})
+    print(summary([after for _, after in pairs]))
+    print("\n" + ladder.table(steps))
+
+
+def _term(arguments: argparse.Namespace) -> "Term":
+    from study import terms
+
+    if arguments.force is not None:
+        return terms.custom(arguments.term, arguments.force)
+    return terms.get(arguments.term)
+
+
+def _refuse_second(path: Path, entries: Any, name: str) -> None:
+    from study.errors import StudyError
+
+    if any(entry.name == name for entry in entries):
+        raise StudyError(f"{path}: {name} is in the model already; an effect can be added once")
+
+
+def _step(found: "Comparison", added: str | None) -> dict[str, Any]:
+    """A comparison as a rung of the ladder."""
+    from study.compare.report import coefficient_row
+
+    return {
+        "terms": [t.name for t in found.model.terms],
+        "added": added,
+        "record": found.record.name,
+        "error": {"force": found.force.error, "response": found.response_error},
+        "rms": float(found.response_error * found.judged.size),
+        "unit": found.record.units.get(found.how.response, ""),
+        "noise_floor": {"response": found.noise_floor},
+        "converged": found.found.converged,
+        "coefficients": [coefficient_row(c) for c in found.coefficients],
+    }
+
+
+COMMAND = Command(
+    "add", "add an effect, fit again: error before and after",
+    "study add rig.yaml quadratic_damping --data rig.csv\n"
+    "  study add rig.yaml bracket --force \"u*abs(u)\" --data rig.csv",
+    _arguments, _run,
+)  # fmt: skip

@@ -1,0 +1,70 @@
+"""``study compare``: how good a model is, and where it fails."""
+
+import argparse
+from pathlib import Path
+
+from study.commands.command import Command
+from study.commands.records import add_record_arguments, out_folder, plan_of, read_records
+
+QUIET = 2.0  # seconds of work before progress is shown
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    add_record_arguments(parser)
+    parser.add_argument("--model", type=Path, required=True, help="model file (YAML); what it gives is held")
+    parser.add_argument("--out", type=Path, help="folder for results (default results/RECORD)")
+
+
+def _run(arguments: argparse.Namespace) -> None:
+    from tqdm import tqdm
+
+    from study.compare.comparison import STEPS, across, compare
+    from study.compare.output import check_folder, write_files
+    from study.compare.pictures import level_pictures, pictures
+    from study.compare.report import as_json, document, summary, tables
+    from study.modelfile import read_model
+
+    folder = out_folder(arguments)
+    check_folder(folder)
+    model = read_model(arguments.model)
+    records = read_records(arguments)
+    plans = [plan_of(arguments, record) for record in records]
+    many = len(records) > 1
+    files: dict[str, bytes] = {}
+    with tqdm(total=(STEPS + 1) * len(records), delay=QUIET, leave=False, unit="step") as bar:
+
+        def told(what: str) -> None:
+            bar.set_description(what, refresh=False)
+            bar.update()
+
+        found = [
+            compare(model, record, how, cutoff=arguments.cutoff, progress=told)
+            for record, how in zip(records, plans, strict=True)
+        ]
+        for one in found:
+            told("pictures")
+            prefix = f"{one.record.name}_" if many else ""
+            files |= {prefix + name: content for name, content in pictures(one).items()}
+    moving = across(found)
+    files |= level_pictures(moving, found[0].record.units.get("force", "N"))
+    files |= {f"{name}.csv": content for name, content in tables(found, moving).items()}
+    files["comparison.json"] = as_json(document(found, moving))
+    write_files(folder, files)
+    print(summary(found, moving))
+    print(
+        f"\n{folder}: comparison.json, {_count(files, '.csv')} tables, {_count(files, '.png')} pictures (PNG and SVG)"
+    )
+
+
+def _count(files: dict[str, bytes], kind: str) -> int:
+    return sum(name.endswith(kind) for name in files)
+
+
+COMMAND = Command(
+    "compare", "how good a model is, and where it fails",
+    "study compare rig.csv --model rig.yaml\n"
+    "  study compare low.csv high.csv --model rig.yaml --out results/levels\n"
+    "  study compare SNLS80mV.csv --column force=V1 --column displacement=V2 --unit force=V --unit displacement=V"
+    " --fs 610.35 --fit 40650:127400 --judge 100:40575 --model silverbox.yaml",
+    _arguments, _run,
+)  # fmt: skip

@@ -1,0 +1,98 @@
+"""``study diagnose``: which effect is missing from a model."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from study.commands.command import Command
+from study.commands.records import add_record_arguments, out_folder, plan_of, read_records
+
+if TYPE_CHECKING:
+    from study.diagnose.verdict import Diagnosis
+    from study.model import Model
+    from study.record import Record
+
+QUIET = 2.0  # seconds of work before progress is shown
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    add_record_arguments(parser)
+    parser.add_argument("--model", type=Path, required=True, help="model file (YAML); what it gives is held")
+    parser.add_argument("--out", type=Path, help="folder for results (default results/RECORD)")
+    parser.add_argument(
+        "--candidate", action="append", default=[], metavar="NAME=FORMULA", help="a candidate of your own"
+    )
+    parser.add_argument("--without", action="append", default=[], metavar="TERM", help="leave a term out")
+
+
+def _run(arguments: argparse.Namespace) -> None:
+    from study import terms
+    from study.compare.output import check_folder, write_files
+    from study.compare.report import as_json
+    from study.diagnose.sources import own_candidates
+    from study.modelfile import read_model
+
+    folder = out_folder(arguments)
+    check_folder(folder)
+    model = read_model(arguments.model)
+    own = own_candidates(arguments.candidate)
+    for name in arguments.without:
+        terms.get(name)
+    files: dict[str, bytes] = {}
+    records = read_records(arguments)
+    for record in records:
+        content, pictures = _one(model, record, arguments, own)
+        prefix = f"{record.name}_" if len(records) > 1 else ""
+        files[f"{prefix}diagnosis.json"] = as_json(content)
+        files |= {prefix + name: data for name, data in pictures.items()}
+    write_files(folder, files)
+    print(f"\n{folder}: {', '.join(name for name in files if not name.endswith('.svg'))}")
+
+
+def _one(
+    model: "Model", record: "Record", arguments: argparse.Namespace, own: list[Any]
+) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """Diagnose one record, print what was found, and give the files' contents."""
+    from tqdm import tqdm
+
+    from study.compare.comparison import compare
+    from study.compare.report import where
+    from study.diagnose import report
+    from study.diagnose.pages import files
+    from study.diagnose.verdict import diagnose
+
+    how = plan_of(arguments, record)
+    with tqdm(delay=QUIET, leave=False, unit=" candidates", desc=record.name) as bar:
+        compared = compare(model, record, how, cutoff=arguments.cutoff)
+        found = diagnose(
+            model, record, how, extra=own, without=tuple(arguments.without), progress=lambda _: bar.update()
+        )  # fmt: skip
+        said = _said(found, record, how)
+    force, length = record.units.get("force", "N"), compared.record.units.get("displacement", "m")
+    print(f"{record.name}: {found.verdict.replace('_', ' ')}")
+    print(report.table(found, force, length))
+    print("\n" + said)
+    content = report.fields(found)
+    content["error"]["force"] = compared.force.error
+    content |= {"record": record.name, "where": where(compared), "says": said}
+    return content, files(found, record.name)
+
+
+def _said(found: "Diagnosis", record: "Record", how: Any) -> str:
+    from study.diagnose.says import sentences
+    from study.diagnose.separate import advice
+    from study.diagnose.verdict import MISSING
+
+    force, length = record.units.get("force", "N"), record.units.get("displacement", "m")
+    said = sentences(found, force, length)
+    if found.verdict == MISSING:
+        said.append(advice(found.candidates, record, how))
+    return " ".join(s for s in said if s)
+
+
+COMMAND = Command(
+    "diagnose", "which effect is missing from a model",
+    "study diagnose rig.csv --model rig.yaml\n"
+    "  study diagnose rig.csv --model rig.yaml --candidate \"bracket=u*abs(u) + 0.1*v**3\" --without hysteresis",
+    _arguments, _run,
+)  # fmt: skip

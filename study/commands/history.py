@@ -1,0 +1,35 @@
+"""``study history``: the ladder of models tried so far, with their errors and the noise floor."""
+
+import argparse
+from pathlib import Path
+
+from study.commands.command import Command
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("model", type=Path, help="model file (YAML) that 'study add' has added to")
+    parser.add_argument("--out", type=Path, help="also draw the ladder and write history.json there")
+
+
+def _run(arguments: argparse.Namespace) -> None:
+    from study import ladder
+    from study.modelfile import read_model
+
+    read_model(arguments.model)
+    steps = ladder.read(arguments.model)
+    if not steps:
+        print(f"{arguments.model}: nothing was added yet; 'study add' begins the ladder")
+        return
+    print(ladder.table(steps))
+    if arguments.out is not None:
+        from study.compare.output import check_folder, write_files
+        from study.figures.ladder import files
+
+        check_folder(arguments.out)
+        write_files(arguments.out, files(steps, arguments.model.stem) | {"history.json": ladder.as_bytes(steps)})
+
+
+COMMAND = Command(
+    "history", "every model so far, its error, the noise floor",
+    "study history rig.yaml\n  study history rig.yaml --out results/rig", _arguments, _run,
+)  # fmt: skip

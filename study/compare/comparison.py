@@ -1,0 +1,191 @@
+"""Compare a model with measured records: how good it is, and where it fails."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from study import fitting
+from study.compare.amplitude import Growths, growths
+from study.compare.fitted import Coefficient, coefficients, fit_model
+from study.compare.frequency import Band, bands
+from study.compare.judged import Judged, judge
+from study.compare.levels import Level, levels
+from study.compare.noise import Noise, noise_of
+from study.compare.restoring import Restoring, restoring
+from study.compare.reverse import ForceError, force_error
+from study.compare.stretches import AlongTime, along_time
+from study.errors import StudyError
+from study.fitting import Plan
+from study.model import Model
+from study.motion import complete
+from study.output_error import FreeRunFit
+from study.record import Record
+
+STEPS = 5  # reports of progress a record
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A model held against one record.
+
+    Attributes
+    ----------
+    model : Model
+        As it was given.
+    record : Record
+        With all three motions, in consistent units.
+    how : Plan
+        What was fitted and what is judged.
+    found : FreeRunFit
+        The fit.
+    coefficients : tuple of Coefficient
+        Every value with its interval and unit.
+    judged : Judged
+        Measured and predicted response on the judging part.
+    noise : Noise
+        Noise floor of the response.
+    force : ForceError
+        The error in reverse.
+    bands : tuple of Band
+        Where in frequency most of the unexplained power of response and force lies.
+    restoring : Restoring
+        The force that the model lacks.
+    growths : Growths or None
+        What it grows with; None where nothing stands above the noise.
+    time : AlongTime
+        Whether the error changes along the record.
+    notes : tuple of str
+        What was converted, integrated or left out.
+    """
+
+    model: Model
+    record: Record
+    how: Plan
+    found: FreeRunFit
+    coefficients: tuple[Coefficient, ...]
+    judged: Judged
+    noise: Noise
+    force: ForceError
+    bands: tuple[Band, ...]
+    restoring: Restoring
+    growths: Growths | None
+    time: AlongTime
+    notes: tuple[str, ...]
+
+    @property
+    def response_error(self) -> float:
+        """Rms of measured minus predicted response over the rms of the response."""
+        return self.judged.error
+
+    @property
+    def noise_floor(self) -> float:
+        """The part of that which no model could explain."""
+        return self.noise.rms / self.judged.size
+
+    @property
+    def structure(self) -> float:
+        """Rms of what stands above the noise over the rms of the response; zero if noise alone would leave as much."""
+        return 0.0 if self.noise.alone else float(np.sqrt(self.noise.excess)) / self.judged.size
+
+    @property
+    def level(self) -> float:
+        """Rms force of the fitting part."""
+        return float(np.std(self.record["force"][slice(*self.how.fit)]))
+
+
+def compare(
+    model: Model,
+    record: Record,
+    how: Plan | None = None,
+    *,
+    cutoff: float | None = None,
+    progress: Progress | None = None,
+) -> Comparison:
+    """Fit what a model leaves open to one part of a record and judge it on the other.
+
+    Parameters
+    ----------
+    model : Model
+        Values that it gives are held, the others fitted.
+    record : Record
+        Force and at least one motion.
+    how : Plan, optional
+        What is fitted and what is judged; :func:`study.fitting.plan` if left out.
+    cutoff : float, optional
+        Frequency in hertz above which a measured velocity or acceleration is integrated; what lies below is
+        not judged. Found from the record if left out.
+    progress : callable, optional
+        Called with what is being done, ``STEPS`` times.
+
+    Raises
+    ------
+    StudyError
+        If the model cannot be fitted to this record, or record and plan do not go together.
+    """
+    told: Progress = progress or (lambda _: None)
+    how = how or fitting.plan(record)
+    told("motions")
+    completed = complete(record, cutoff)
+    told("fit")
+    found = fit_model(model, completed.record, how)
+    told("free run")
+    judged = judge(found, completed.record, how, completed.band[0])
+    noise = noise_of(judged, completed.record, how.judge[1])
+    told("force")
+    force = force_error(found.model, completed, how, noise)
+    told("where it fails")
+    lacking = restoring(found.model, found.keys, judged, noise, completed, how)
+    return Comparison(
+        model=model,
+        record=completed.record,
+        how=how,
+        found=found,
+        coefficients=coefficients(found, completed.record, how),
+        judged=judged,
+        noise=noise,
+        force=force,
+        bands=bands(noise, force, judged.low),
+        restoring=lacking,
+        growths=None if noise.alone else growths(lacking, _edge(judged, noise)),
+        time=along_time(judged),
+        notes=completed.says,
+    )
+
+
+def _edge(judged: Judged, noise: Noise) -> int:
+    """Samples at each end which the filters leave unsure: half the memory of the spectral gain."""
+    memory = round(0.5 / (float(noise.frequency[1]) * judged.dt))
+    return min(memory, len(judged.measured) // 16)
+
+
+def across(comparisons: Sequence[Comparison]) -> tuple[Level, ...]:
+    """The coefficients of several records of one model by level of excitation; empty for one record.
+
+    Raises
+    ------
+    StudyError
+        If the records have different units.
+    """
+    if len(comparisons) < 2:
+        return ()
+    ordered = sorted(comparisons, key=lambda c: c.level)
+    first = ordered[0].record
+    for other in ordered[1:]:
+        for channel in ("force", "displacement"):
+            if other.record.units.get(channel) != first.units.get(channel):
+                raise StudyError(
+                    f"{channel} is in {first.units.get(channel)} in {first.name} and in "
+                    f"{other.record.units.get(channel)} in {other.record.name}; the same unit in all records is right"
+                )
+    return levels([c.level for c in ordered], [c.coefficients for c in ordered])
+
+
+def distinct(records: Sequence[Record]) -> tuple[Record, ...]:
+    """Records whose names differ, so that tables and folders can be told apart."""
+    names = [r.name for r in records]
+    return tuple(
+        r if names.count(r.name) == 1 else replace(r, name=f"{r.name}_{names[: i + 1].count(r.name)}")
+        for i, r in enumerate(records)
+    )

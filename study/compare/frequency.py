@@ -1,0 +1,62 @@
+"""In which frequency band does the unexplained power lie?"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.compare.noise import Noise
+from study.compare.reverse import ForceError
+
+Floats = NDArray[np.float64]
+MOST = 2.0 / 3.0  # of the unexplained power, at least, lies in the band that is named
+CLEAR = 2.0  # standard errors above the noise, for a line to count
+
+
+@dataclass(frozen=True)
+class Band:
+    """The narrowest band that holds most of what is unexplained.
+
+    Attributes
+    ----------
+    of : str
+        ``response`` or ``force``.
+    low, high : float
+        Its ends in hertz.
+    share : float
+        Share of the unexplained power that lies in it.
+    """
+
+    of: str
+    low: float
+    high: float
+    share: float
+
+
+def bands(noise: Noise, force: ForceError, low: float) -> tuple[Band, ...]:
+    """The bands of the response and of the force; one that has nothing unexplained is left out."""
+    spread = CLEAR / np.sqrt(noise.averages)
+    response = np.where(noise.residual > noise.density * (1.0 + spread), noise.residual - noise.density, 0.0)
+    response[noise.frequency < low] = 0.0
+    left = np.where(force.band & (force.unexplained > force.noise), force.unexplained - force.noise, 0.0) * force.force
+    found = (narrowest("response", noise.frequency, response), narrowest("force", force.frequency, left))
+    return tuple(band for band in found if band is not None)
+
+
+def narrowest(of: str, frequency: Floats, power: Floats, most: float = MOST) -> Band | None:
+    """The shortest run of lines which holds at least ``most`` of the power; of several, the one with most power.
+
+    A line stands for the band of its width about it.
+    """
+    total = float(np.sum(power))
+    if not total > 0.0:
+        return None
+    sums = np.concatenate([[0.0], np.cumsum(power)])
+    ends = np.searchsorted(sums, sums[:-1] + most * total * (1.0 - 1e-12))
+    first = np.flatnonzero(ends < len(sums))
+    length = ends[first] - first
+    inside = sums[ends[first]] - sums[first]
+    best = first[np.lexsort((-inside, length))[0]]
+    half = 0.5 * float(frequency[1])
+    low, high = float(frequency[best]) - half, float(frequency[ends[best] - 1]) + half
+    return Band(of, max(low, 0.0), min(high, float(frequency[-1])), float(sums[ends[best]] - sums[best]) / total)

@@ -1,0 +1,52 @@
+"""All files of a comparison at once: either every one is in its place, or none is."""
+
+import os
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+
+from study.errors import StudyError
+from study.files import reason, replacing
+
+
+def check_folder(folder: Path) -> None:
+    """See that a folder can be written to, or made, before any work is done; nothing is made yet.
+
+    Raises
+    ------
+    StudyError
+        If not.
+    """
+    try:
+        there = next((p for p in (folder, *folder.absolute().parents) if p.exists()), Path("/"))
+        usable = there.is_dir() and os.access(there, os.W_OK | os.X_OK)
+    except (OSError, ValueError) as error:  # ValueError: a path with a null byte
+        raise StudyError(f"{str(folder)!r}: no folder can be there ({reason(error)}); another --out is right") from None
+    if not usable:
+        why = "it is write-protected" if there.is_dir() else "it is no folder"
+        raise StudyError(f"{folder}: cannot be written to ({there}: {why}); a writable folder is right")
+
+
+def write_files(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write files into a folder, which is made if need be.
+
+    All are written beside their places first and moved there when the last is complete: on a full disk
+    the old ones stay.
+
+    Raises
+    ------
+    StudyError
+        If they cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StudyError(f"{folder}: cannot be made ({reason(error)}); a writable folder is right") from None
+    with ExitStack() as stack:
+        for name, content in files.items():
+            beside = stack.enter_context(replacing(folder / name))
+            try:
+                beside.write_bytes(content)
+            except OSError as error:
+                why = f"cannot be written ({reason(error)}) and is as it was"
+                raise StudyError(f"{folder / name}: {why}; a writable folder with free space is right") from None

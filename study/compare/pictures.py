@@ -1,0 +1,158 @@
+"""The pictures of a comparison, as the bytes of files."""
+
+# Matplotlib leaves the **kwargs of its methods untyped.
+# pyright: reportUnknownMemberType=false
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib import style
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from study.compare.comparison import Comparison
+from study.compare.levels import Level
+from study.compare.says import percent
+from study.compare.surface import curve, surface
+from study.figures import coherence, misfit, page
+from study.figures.curves import InputCoherence
+
+Floats = NDArray[np.float64]
+SHEET = Path(__file__).parent.parent.parent / "config" / "study.mplstyle"
+KINDS = ("png", "svg")
+WIDE = 7.2  # inches
+CYCLES = 12  # of the response, in the close-up
+HEARD = 1e-4  # of its largest density: pictures end where the force has no more than that
+
+
+def pictures(found: Comparison) -> dict[str, bytes]:
+    """Every picture of one record by file name."""
+    drawn: Mapping[str, Callable[[Comparison], Figure]] = {
+        "response": response, "force_error": force_error, "missing_force": missing_force,
+        "error_in_time": error_in_time,
+    }  # fmt: skip
+    with style.context(SHEET if SHEET.is_file() else "default"):
+        return _bytes({name: draw(found) for name, draw in drawn.items()})
+
+
+def level_pictures(moving: Sequence[Level], force_unit: str) -> dict[str, bytes]:
+    """The picture of coefficients by level; none for one record."""
+    if not moving:
+        return {}
+    with style.context(SHEET if SHEET.is_file() else "default"):
+        return _bytes({"coefficients_by_level": by_level(moving, force_unit)})
+
+
+def _bytes(figures: Mapping[str, Figure]) -> dict[str, bytes]:
+    return {f"{name}.{kind}": page.rendered(figure, kind) for name, figure in figures.items() for kind in KINDS}
+
+
+def response(found: Comparison) -> Figure:
+    """Measured and predicted response, their difference, and a close-up where that is largest."""
+    judged, unit = found.judged, found.record.units.get(found.how.response, "")
+    about = f"error {percent(found.response_error)} of the rms response, noise floor {percent(found.noise_floor)}"
+    figure, axes = page.page(
+        f"{found.record.name}: {found.how.response}", f"model {found.model.name}; {about}", rows=3, width=WIDE,
+        panel=1.8, legend_rows=2, share=False,
+    )  # fmt: skip
+    misfit.response(axes[0], judged.time, judged.measured, judged.predicted, unit)
+    misfit.residual(axes[1], judged.time, judged.residual, found.noise.rms, unit)
+    near = _worst(judged.residual, judged.measured)
+    misfit.response(axes[2], judged.time[near], judged.measured[near], judged.predicted[near], unit)
+    page.letter(axes, ("all that is judged", "the difference", "close-up of (a) where the difference is largest"))
+    page.legend(figure, axes, columns=2)
+    return figure
+
+
+def _worst(residual: Floats, measured: Floats) -> slice:
+    """Some cycles about the stretch with the largest error."""
+    centred = measured - np.mean(measured)
+    crossings = max(int(np.count_nonzero(np.diff(np.signbit(centred)))), 2)
+    length = int(np.clip(2 * CYCLES * len(measured) / crossings, 32, len(measured)))
+    power = np.convolve(residual**2, np.ones(length), "valid")
+    first = int(np.argmax(power))
+    return slice(first, first + length)
+
+
+def force_error(found: Comparison) -> Figure:
+    """Unexplained share of the force by frequency, and what each input explains."""
+    force = found.force
+    highest = _highest(force.frequency, force.force)
+    low, high = force.frequency[force.band][[0, -1]]
+    about = f"{percent(force.total)} of its power from {low:.3g} to {high:.3g} Hz"
+    figure, axes = page.page(
+        f"{found.record.name}: error of the force", f"model {found.model.name}; unexplained is {about}", rows=2,
+        width=WIDE, panel=2.3, legend_rows=2, share=False,
+    )  # fmt: skip
+    misfit.force_error(axes[0], force, highest)
+    keep = (force.frequency > 0.0) & (force.frequency <= highest)
+    shares = [
+        InputCoherence(i.shape, " + ".join(i.terms), force.frequency[keep], c[keep])
+        for i, c in zip(force.inputs, force.cumulative, strict=True)
+    ]
+    coherence.cumulative(axes[1], shares)
+    axes[1].set_xlim(0.0, highest)
+    axes[1].legend(loc="lower right", frameon=True, framealpha=0.85, edgecolor="none")
+    page.letter(axes, ("what is left of the force", "what the inputs explain, one after the other"))
+    page.legend(figure, axes[:1], columns=2)
+    return figure
+
+
+def _highest(frequency: Floats, density: Floats) -> float:
+    heard = np.flatnonzero(density > HEARD * float(np.max(density)))
+    return float(frequency[heard[-1]])
+
+
+def missing_force(found: Comparison) -> Figure:
+    """The force that the model lacks over the (u, v) plane and against each of them."""
+    lacking, unit = found.restoring, dict(found.record.units)
+    band = lacking.frequency[lacking.gate]
+    about = "the difference is noise" if not len(band) else f"seen in bands from {band[0]:.3g} to {band[-1]:.3g} Hz"
+    figure, axes = page.page(
+        f"{found.record.name}: the force that the model lacks", f"model {found.model.name}; {about}", rows=3,
+        width=WIDE, panel=2.3, share=False,
+    )  # fmt: skip
+    u, v, force = lacking.displacement, lacking.velocity, lacking.force
+    misfit.missing_force(axes[0], surface(u, v, force), unit)
+    misfit.force_curve(axes[1], curve(u, force), "displacement", unit)
+    misfit.force_curve(axes[2], curve(v, force), "velocity", unit)
+    page.letter(axes, ("mean over the plane of motion", "against displacement", "against velocity"))
+    page.legend(figure, axes)
+    return figure
+
+
+def error_in_time(found: Comparison) -> Figure:
+    """Error along the judging part."""
+    figure, axes = page.page(
+        f"{found.record.name}: error along the record",
+        f"model {found.model.name}; differences between stretches of equal level: p = {found.time.p_value:.2g}",
+        rows=2, width=WIDE, panel=2.0, share=False,
+    )  # fmt: skip
+    misfit.error_in_time(axes[0], found.time, found.noise_floor)
+    misfit.error_beyond_level(axes[1], found.time)
+    page.letter(axes, ("error and response", "beyond what the level accounts for"))
+    page.legend(figure, axes[:1])
+    return figure
+
+
+def by_level(moving: Sequence[Level], force_unit: str) -> Figure:
+    """Every fitted coefficient against the level of the force."""
+    columns = 2 if len(moving) > 1 else 1
+    figure, axes = page.page(
+        "Coefficients by level of excitation", "with 95 % intervals; the right model's do not move",
+        rows=-(-len(moving) // columns), columns=columns, width=1.25 * WIDE, panel=1.9, legend_rows=0, share=False,
+    )  # fmt: skip
+    figure.subplots_adjust(wspace=0.38)
+    for panel, level in zip(axes, moving, strict=False):
+        misfit.coefficient_by_level(panel, level, force_unit)
+        verdict = "moves" if level.moves else "does not move"
+        panel.set_title(f"{level.key}: {verdict} (p = {level.p_value:.2g})")
+    _hide(axes[len(moving) :])
+    return figure
+
+
+def _hide(axes: Sequence[Axes]) -> None:
+    for panel in axes:
+        panel.set_visible(False)

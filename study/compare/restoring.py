@@ -1,0 +1,184 @@
+"""The force that a model lacks, along the record, robust against noise.
+
+``r = F - (forces of all terms)`` needs the motion and its derivatives. Those of the measured response
+would be swamped by noise; those of the free run know nothing of what is missing. The motion used here
+is the free run plus the difference to the measured response in those bands where that stands above the
+noise: where the difference is noise, r is zero; where it is not, r is the missing force. (A Wiener filter
+instead of a gate leaves a part of the missing motion out everywhere, which flattens powers: a cubic
+damping then shows a power of 2.6 at 1 % noise, with the gate 2.8.)
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+
+from study import fitting, kernels
+from study.compare.judged import Judged
+from study.compare.noise import Noise
+from study.fitting import Plan
+from study.inputs import history, reverse_inputs
+from study.model import Model, forward_graph, free, with_registers
+from study.motion import CompletedRecord, derivative
+from study.record import MOTIONS, Record
+from study.terms import get
+
+Floats = NDArray[np.float64]
+CLEAR = 3.0  # standard errors by which the residual must stand above the noise, for a line to be used
+SMOOTH = 5  # lines that are averaged
+LEAST_DAMPING = 0.02  # of critical, in the weight that a line has
+
+
+@dataclass(frozen=True)
+class Restoring:
+    """The missing force on the judging part; n samples.
+
+    Attributes
+    ----------
+    displacement, velocity : arrays, shape (n,)
+        The motion, free of noise.
+    force : array, shape (n,)
+        Measured force less inertia and all forces of the model, in the unit of force.
+    free : array, shape (n, p)
+        Derivatives of that by each coefficient that was fitted: what a refit could still take over.
+    gate : bool array, shape (lines,)
+        Lines of ``frequency`` on which the difference stands above the noise.
+    weight : array, shape (lines,)
+        Response of the best linear oscillator to a unit force: noise is white behind it.
+    frequency : array, shape (lines,)
+        In hertz.
+    noise : float
+        Mean square of the noise that is left in :meth:`weighted` ``force``.
+    dt : float
+        Sampling interval in seconds.
+    """
+
+    displacement: Floats
+    velocity: Floats
+    force: Floats
+    free: Floats
+    gate: NDArray[np.bool_]
+    weight: Floats
+    frequency: Floats
+    noise: float
+    dt: float
+
+    def weighted(self, force: Floats) -> Floats:
+        """A force as it shows in the response, in the bands that stand above the noise, shape (n,)."""
+        return _filtered(force, self.dt, self.frequency, self.weight * self.gate)
+
+
+def restoring(
+    model: Model, keys: Sequence[str], judged: Judged, noise: Noise, completed: CompletedRecord, how: Plan
+) -> Restoring:
+    """The missing force on the judging part.
+
+    Parameters
+    ----------
+    model : Model
+        Every value known.
+    keys : sequence of str
+        What was fitted.
+    judged : Judged
+        Free run and measured response.
+    noise : Noise
+        Noise of the response.
+    completed : CompletedRecord
+        Record in consistent units.
+    how : Plan
+        What was fitted and judged.
+    """
+    gate = above_noise(noise, judged.low)
+    motion = _motion(judged, gate, noise.frequency)
+    part = completed.record.part(*how.judge)
+    named = part.with_channels(dict(zip(MOTIONS, motion, strict=True)))
+    forces = missing_force(model, keys, named)
+    width = float(noise.frequency[1])
+    return Restoring(
+        displacement=motion[0],
+        velocity=motion[1],
+        force=forces[:, 0],
+        free=forces[:, 1:],
+        gate=gate,
+        weight=_weight(completed.record, how, noise.frequency),
+        frequency=noise.frequency,
+        noise=float(np.sum(noise.density[gate]) * width),
+        dt=judged.dt,
+    )
+
+
+def above_noise(noise: Noise, low: float) -> NDArray[np.bool_]:
+    """Lines on which the residual, averaged over a few of them, surely stands above the noise."""
+    few = np.ones(SMOOTH)
+    level = np.convolve(noise.residual, few, "same") / np.convolve(np.ones_like(noise.residual), few, "same")
+    spread = CLEAR / np.sqrt(noise.averages * SMOOTH / 2.0)  # 2: neighbouring lines share a taper
+    return (level > noise.density * (1.0 + spread)) & (noise.frequency >= low)
+
+
+def _motion(judged: Judged, gate: NDArray[np.bool_], frequency: Floats) -> Floats:
+    """Displacement, velocity and acceleration: free run plus what is sure of the difference, shape (3, n)."""
+    sure = _filtered(judged.difference, judged.dt, frequency, gate.astype(np.float64))
+    parts = [_shifted(sure, judged, row - judged.row) for row in range(3)]
+    return judged.motion + np.stack(parts)
+
+
+def _shifted(values: Floats, judged: Judged, order: int) -> Floats:
+    if order == 0:
+        return values
+    return derivative(values, judged.dt, order, judged.low if order < 0 else 0.0)
+
+
+def missing_force(model: Model, keys: Sequence[str], record: Record) -> Floats:
+    """``F - (forces of all terms)`` along a record, and its derivatives by some keys, shape (n, 1 + keys).
+
+    Raises
+    ------
+    StudyError
+        If the model is incomplete, or names a channel that the record lacks.
+    """
+    values = model.numbers()
+    forward = forward_graph(model, record.extra)
+    graph = forward.graph
+    slope = forward.slopes[0]
+    program = with_registers(
+        graph.program([slope, *(graph.derivative(slope, graph.input(key)) for key in keys)]), values
+    )
+    columns = {"u": record["displacement"], "v": record["velocity"], "t": record.time, "force": record["force"]}
+    columns |= {name: record[name] for name in record.extra} | _states(model, record)
+    positions = np.array([program.inputs[name] for name in columns], dtype=np.int64)
+    out = np.empty((len(record), 1 + len(keys)))
+    kernels.evaluate(
+        program.code, program.first, program.registers.copy(), positions,
+        np.column_stack(list(columns.values())), program.outputs, out,
+    )  # fmt: skip
+    out[:, 0] -= record["acceleration"]
+    return out * values["m"]
+
+
+def _states(model: Model, record: Record) -> dict[str, Floats]:
+    """The memories of the terms along the record's motion."""
+    return {f"z:{i.terms[0]}": history(i, record) for i in reverse_inputs(model) if i.state is not None}
+
+
+def _weight(record: Record, how: Plan, frequency: Floats) -> Floats:
+    """|H(f)| of the best linear oscillator from force to the measured response."""
+    names = ("inertia", "linear_damping", "linear_stiffness")
+    own = fitting.linear_start(Model("linear", tuple(free(get(n)) for n in names)), record, how)
+    omega = 2.0 * np.pi * np.maximum(frequency, 0.5 * frequency[1])
+    damping = max(abs(own["c"]), 2.0 * LEAST_DAMPING * float(np.sqrt(abs(own["k"]) * own["m"])))
+    stiffness = np.abs(own["k"] - own["m"] * omega**2 + 1j * omega * damping)
+    return omega ** MOTIONS.index(how.response) / stiffness
+
+
+def _filtered(values: Floats, dt: float, frequency: Floats, gain: Floats) -> Floats:
+    """Values through a real gain without delay; the ends are continued by point reflection."""
+    n = len(values)
+    edge = min(n - 1, round(2.0 / (float(frequency[1]) * dt)))
+    before, after = 2.0 * values[0] - values[edge:0:-1], 2.0 * values[-1] - values[-2 : -edge - 2 : -1]
+    longer = np.concatenate([before, values, after])
+    size = next_fast_len(len(longer), real=True)
+    lines = np.asarray(rfftfreq(size, dt))
+    spectrum = rfft(longer, size) * np.interp(lines, frequency, gain)
+    return np.asarray(irfft(spectrum, size)[edge : edge + n], dtype=np.float64)

@@ -1,0 +1,158 @@
+"""The error of the force: what the reverse system leaves of the measured force, frequency by frequency.
+
+Inputs are the shapes of the model's terms along the measured motion, the output is the measured force
+(the report's Figure 14). What no linear combination of the inputs explains is 1 - multiple coherence,
+(4.38); what the fitted coefficients leave is at least that. Noise on the motion is part of both.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study import miso
+from study.compare.noise import Noise, segments_of
+from study.fitting import Plan
+from study.inputs import Input, histories, reverse_inputs
+from study.model import Model
+from study.motion import CompletedRecord
+from study.record import MOTIONS
+from study.spectra import Segments, SpectralMatrix, cross_spectra
+
+Floats = NDArray[np.float64]
+FEWEST_AVERAGES = 4  # for each input
+AUDIBLE = 1e-6  # of its largest density: the force has no power on lines below
+ABOVE = 2.0  # the motion stands above its noise where its density is at least so many times that of the noise
+
+
+@dataclass(frozen=True)
+class ForceError:
+    """Unexplained share of the force on the judging part; q inputs, arrays of shape (lines,).
+
+    Attributes
+    ----------
+    frequency : array
+        In hertz.
+    force : array
+        Autospectral density of the force.
+    unexplained : array
+        1 - multiple coherence, corrected for the degrees of freedom that the inputs take.
+    parametric : array
+        Density of what the fitted coefficients leave of the force, over that of the force.
+    noise : array
+        Share that noise on the response alone makes of it, to first order: ``|A_u|^2 G_nn / G_FF``.
+    cumulative : array, shape (q, lines)
+        Cumulative coherences, one input after the other.
+    inputs : tuple of Input
+        What the inputs are.
+    band : bool array
+        Lines on which the motion stands above its noise and the force has power.
+    """
+
+    frequency: Floats
+    force: Floats
+    unexplained: Floats
+    parametric: Floats
+    noise: Floats
+    cumulative: Floats
+    inputs: tuple[Input, ...]
+    band: NDArray[np.bool_]
+
+    def _over_band(self, share: Floats) -> float:
+        weight = self.force[self.band]
+        return float(np.sum(share[self.band] * weight) / np.sum(weight))
+
+    @property
+    def total(self) -> float:
+        """Share of the force's power that is unexplained, over the band."""
+        return self._over_band(self.unexplained)
+
+    @property
+    def parametric_total(self) -> float:
+        """The same for the fitted coefficients."""
+        return self._over_band(self.parametric)
+
+    @property
+    def noise_total(self) -> float:
+        """The share of noise alone, over the band; at most one."""
+        return min(self._over_band(self.noise), 1.0)
+
+
+def force_error(model: Model, completed: CompletedRecord, how: Plan, noise: Noise) -> ForceError:
+    """Judge a fitted model in reverse on the judging part.
+
+    Parameters
+    ----------
+    model : Model
+        Every value known.
+    completed : CompletedRecord
+        Record with all three motions.
+    how : Plan
+        What is judged.
+    noise : Noise
+        Noise of the response.
+
+    Raises
+    ------
+    StudyError
+        If the judging part is too short for so many inputs.
+    """
+    first, last = how.judge
+    first, last = max(first, completed.edge), min(last, len(completed.record) - completed.edge)
+    record = completed.record
+    inputs = reverse_inputs(model)
+    channels = [h[first:last] for h in histories(inputs, record)]
+    cut = _segments(last - first, len(inputs))
+    matrix = cross_spectra([*channels, record[how.response][first:last], record["force"][first:last]], record.dt, cut)
+    reverse, response = _without(matrix, len(inputs)), matrix.density[:, -2, -2].real
+    result = miso.analyse(reverse)
+    freedom = result.averages / (result.averages - len(inputs))
+    force = np.maximum(result.output, np.finfo(float).tiny)
+    density = np.interp(matrix.frequency, noise.frequency, noise.density)
+    return ForceError(
+        frequency=matrix.frequency,
+        force=result.output,
+        unexplained=np.clip((1.0 - result.multiple) * freedom, 0.0, 1.0),
+        parametric=_left(reverse, inputs, model) / force,
+        noise=_from_noise(matrix.frequency, inputs, model, how, density) / force,
+        cumulative=result.cumulative,
+        inputs=inputs,
+        band=_band(matrix.frequency, response, density, result.output, completed.band[0]),
+    )
+
+
+def _segments(samples: int, inputs: int) -> Segments:
+    """The usual segments, shortened until there are enough averages for so many inputs."""
+    cut = segments_of(samples)
+    while cut.length > 64 and cut.effective_averages(samples) < FEWEST_AVERAGES * inputs:
+        cut = replace(cut, length=cut.length // 2)
+    return cut
+
+
+def _without(matrix: SpectralMatrix, channel: int) -> SpectralMatrix:
+    keep = [i for i in range(matrix.density.shape[1]) if i != channel]
+    return replace(matrix, density=matrix.density[:, keep][:, :, keep])
+
+
+def _left(matrix: SpectralMatrix, inputs: Sequence[Input], model: Model) -> Floats:
+    """Density of the force less what the coefficients make of the inputs: ``w^H G w`` with ``w = (-A, 1)``."""
+    values = model.numbers()
+    parts = [-i.response(matrix.frequency, values) for i in inputs]
+    weights = np.stack([*parts, np.ones(len(matrix.frequency))], axis=1)
+    return np.einsum("fi,fij,fj->f", weights.conj(), matrix.density, weights).real.clip(0.0)
+
+
+def _from_noise(frequency: Floats, inputs: Sequence[Input], model: Model, how: Plan, density: Floats) -> Floats:
+    """Density of force that noise on the response makes through the linear terms."""
+    linear = next(i for i in inputs if i.shape == "u")
+    stiffness = np.abs(linear.response(frequency, model.numbers())) ** 2
+    omega = 2.0 * np.pi * np.maximum(frequency, 0.5 * frequency[1])
+    return stiffness * density / omega ** (2 * MOTIONS.index(how.response))
+
+
+def _band(frequency: Floats, response: Floats, noise: Floats, force: Floats, low: float) -> NDArray[np.bool_]:
+    """Lines to judge by; if none passes, all of those on which the force has power."""
+    heard = (force > AUDIBLE * float(np.max(force))) & (frequency >= max(low, frequency[1]))
+    clear = heard & (response >= ABOVE * noise)
+    return clear if np.any(clear) else heard

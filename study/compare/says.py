@@ -1,0 +1,146 @@
+"""Two or three plain sentences, composed from the numbers of a comparison and saying no more than they do."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from study.compare.amplitude import Growth, Growths
+from study.compare.comparison import Comparison
+from study.compare.levels import Level
+from study.compare.noise import SCATTER
+from study.compare.stretches import AlongTime
+
+NEGLIGIBLE = 2e-3  # of the rms response: structure below this is no evidence that something is missing
+CHANCE = 0.01  # p value below which a change along the record is no chance
+TOLD_APART = 2.0  # standard errors by which the best way must explain more than another
+EXPLAINS = 0.5  # of what stands above the noise: what a power must explain to be named
+NEAR = 0.25  # how near to a whole number a power must lie to be called by it
+SURE = 0.4  # standard error of a power, at most, for it to be called by a whole number
+HARDLY = 0.6  # a power below this is a step that noise has rounded, or close to one
+NAMES = {0: "constant size", 2: "square", 3: "cube", 4: "fourth power", 5: "fifth power"}
+PARITY = {"odd": "odd in it", "even": "even in it"}
+
+
+def says(found: Comparison) -> str:
+    """What a user should know of one record, in two or three sentences."""
+    sentences = [_how_good(found)]
+    if found.structure > NEGLIGIBLE:
+        sentences.append(_where(found))
+    if not found.found.converged:
+        sentences.append(f"The fit did not arrive at a minimum ({found.found.message}), so this may be the fit's fault")
+    return ". ".join(s[0].upper() + s[1:] for s in sentences) + "."
+
+
+def percent(share: float) -> str:
+    """A share in per cent, two digits: ``38 %``, ``1.2 %``, ``0.034 %``."""
+    value = 100.0 * share
+    return f"{value:.0f} %" if value >= 9.95 else f"{value:.2g} %"
+
+
+def _plain(number: float) -> str:
+    """Two digits, never with an exponent."""
+    return np.format_float_positional(float(f"{number:.2g}"), trim="-")
+
+
+def _how_good(found: Comparison) -> str:
+    error, floor = percent(found.response_error), percent(found.noise_floor)
+    start = f"the model misses the response by {error} of its rms"
+    if found.noise.alone:
+        how = " (from the scatter between periods)" if found.noise.source == SCATTER else ""
+        return f"{start}, and that is noise{how}: nothing stands above the noise floor of {floor}"
+    if found.structure <= NEGLIGIBLE:
+        return (
+            f"{start}; what stands above the noise floor of {floor} is {percent(found.structure)} of the response, "
+            "too little to call anything missing"
+        )
+    return f"{start}, where noise alone would leave {floor}"
+
+
+def _where(found: Comparison) -> str:
+    response = next((b for b in found.bands if b.of == "response"), None)
+    band = ""
+    if response is not None:
+        band = (
+            f"{percent(response.share)} of what is unexplained lies between "
+            f"{_plain(response.low)} and {_plain(response.high)} Hz; "
+        )
+    return band + f"{_grows(found.growths)}; {_along(found.time)}"
+
+
+def _grows(found: Growths | None) -> str:
+    """The best power, as far as it stands out."""
+    if found is None or found.ways[0].share < EXPLAINS:
+        best = "" if found is None else f" (the best explains {percent(max(found.ways[0].share, 0.0))})"
+        return f"no power of displacement or velocity accounts for it{best}"
+    best = found.ways[0]
+    rivals = [w for w, margin in zip(found.ways[1:], found.margins[1:], strict=True) if margin < TOLD_APART]
+    rivals = [w for w in rivals if w.share > EXPLAINS]
+    share = "" if best.share > 0.95 else f", which accounts for {percent(best.share)} of it"
+    if not rivals:
+        return f"it {_growth(best)}{share}"
+    others = " or ".join(_short(w) for w in rivals)
+    return f"it {_growth(best)}{share}, though {others} would do as well"
+
+
+def _growth(way: Growth) -> str:
+    whole = _whole(way)
+    if way.of == "damping by displacement":
+        return f"is a damping force that grows with {_power(way, whole)} of displacement"
+    if whole == 0:
+        return (
+            f"is a force of constant size with the sign of {way.of}" if way.parity == "odd" else "is a constant force"
+        )
+    if way.power < HARDLY:
+        return f"hardly grows with {way.of} (about the power {way.power:.1f}) and is {PARITY[way.parity]}"
+    if whole == 1:
+        one_sided = "" if way.parity == "odd" else ", whatever its sign"
+        return f"grows in proportion to {way.of}{one_sided} and is {PARITY[way.parity]}"
+    return f"grows with {_power(way, whole)} of {way.of} and is {PARITY[way.parity]}"
+
+
+def _short(way: Growth) -> str:
+    whole = _whole(way)
+    if way.of == "damping by displacement":
+        return f"a damping force with {_power(way, whole)} of displacement"
+    if whole in (0, 1):
+        amount = "a force of constant size with the sign" if whole == 0 else "an effect in proportion to the size"
+        return f"{amount} of {way.of}" if way.parity == "odd" or whole else "a constant force"
+    return f"{_power(way, whole)} of {way.of} ({way.parity})"
+
+
+def _whole(way: Growth) -> int | None:
+    """The whole number that a power is, if it is sure enough."""
+    nearest = round(way.power)
+    near = abs(way.power - nearest) <= max(NEAR, TOLD_APART * way.power_error)
+    return nearest if near and way.power_error <= SURE and nearest in (0, 1, *NAMES) else None
+
+
+def _power(way: Growth, whole: int | None) -> str:
+    if whole == 1:
+        return "the size"
+    return f"the {NAMES[whole]}" if whole in NAMES else f"about the power {way.power:.1f}"
+
+
+def _along(found: AlongTime) -> str:
+    if found.p_value >= CHANCE:
+        return f"it does not change along the record (p = {found.p_value:.2g})"
+    if found.confounded:
+        return "it changes along the record, but so does the level, and the two cannot be told apart here"
+    worst = max(found.stretches, key=lambda s: s.ratio)
+    return (
+        f"it changes along the record (p = {found.p_value:.1g}) and is largest from {worst.begin:.4g} to "
+        f"{worst.end:.4g} s, {worst.ratio:.2g} times the power that is usual at that level"
+    )
+
+
+def says_of_all(found: Sequence[Comparison], moving: Sequence[Level]) -> str:
+    """The same of several records: the worst of them, and whether the coefficients move between levels."""
+    if len(found) == 1:
+        return says(found[0])
+    worst = max(found, key=lambda c: c.structure)
+    moved = [level for level in moving if level.moves]
+    names = ", ".join(f"{level.key} by {percent(level.change)}" for level in moved)
+    levels = f"coefficients move with the level: {names}" if moved else "no coefficient moves with the level"
+    if not moving:
+        levels = "no coefficient was fitted"
+    return f"{worst.record.name} (the worst of {len(found)}): {says(worst)} {levels[0].upper() + levels[1:]}."

@@ -1,0 +1,137 @@
+"""Does the error change along the record, beyond what the level of the response accounts for?"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as fisher
+
+from study.compare.judged import Judged
+
+Floats = NDArray[np.float64]
+STRETCHES = 6
+BLOCKS = 48  # at most
+TOGETHER = 0.75  # of the level's variance between blocks: above, level and time change together
+APART = 6.0  # correlation times in a block, at least: then neighbours are nearly independent
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A stretch of the judging part.
+
+    Attributes
+    ----------
+    begin, end : float
+        In seconds.
+    error : float
+        Rms residual over the rms response of the whole judging part.
+    response : float
+        Rms response over that of the whole judging part.
+    ratio : float
+        Power of the residual over what is usual at this level of the response.
+    """
+
+    begin: float
+    end: float
+    error: float
+    response: float
+    ratio: float
+
+
+@dataclass(frozen=True)
+class AlongTime:
+    """The stretches and the test.
+
+    Attributes
+    ----------
+    stretches : tuple of Stretch
+        In order of time.
+    p_value : float
+        Probability of such differences between stretches of equal level by chance; 1 where too few
+        blocks can be told apart for a test.
+    growth : float
+        Exponent with which the power of the residual grows with the power of the response, block by block.
+    growth_error : float
+        Its standard error.
+    confounded : bool
+        Whether the level of the response changes along the record so much that what changes with time
+        cannot be told from what grows with level.
+    """
+
+    stretches: tuple[Stretch, ...]
+    p_value: float
+    growth: float
+    growth_error: float
+    confounded: bool
+
+
+def along_time(judged: Judged) -> AlongTime:
+    """Compare stretches of the judging part.
+
+    The logarithm of the residual's power in blocks is explained by that of the response (and its square)
+    and then by the stretch as well; an F test says whether the second step brings more than chance would.
+    """
+    residual, response = judged.residual, judged.measured - float(np.mean(judged.measured))
+    count = _blocks(residual)
+    e, y = _log_powers(residual, count), _log_powers(response, count)
+    group = np.arange(count) * STRETCHES // count
+    level = y - np.mean(y)
+    plain = np.stack([np.ones(count), level, level**2], axis=1)
+    usual, sum_plain = _regress(plain, e)
+    stretch = (group[:, None] == np.arange(1, STRETCHES)).astype(np.float64)
+    full = np.concatenate([plain, stretch], axis=1)
+    _, sum_full = _regress(full, e)
+    freedom = count - full.shape[1]
+    p_value = 1.0
+    if freedom > 2 and sum_full > 0.0:
+        ratio = (sum_plain - sum_full) / (STRETCHES - 1) / (sum_full / freedom)
+        p_value = float(fisher.sf(ratio, STRETCHES - 1, freedom))
+    growth, growth_error = _slope(level, e)
+    rows = tuple(_stretch(judged, residual, response, k, np.exp(e - usual), group) for k in range(STRETCHES))
+    together = 1.0 - _regress(np.concatenate([plain[:, :1], stretch], axis=1), level)[1] / max(
+        float(level @ level), 1e-300
+    )
+    return AlongTime(rows, p_value, growth, growth_error, together > TOGETHER)
+
+
+def _blocks(residual: Floats) -> int:
+    """How many blocks are long against the residual's memory: the sum of its squared autocorrelation."""
+    n = len(residual)
+    size = 1 << (2 * n - 1).bit_length()
+    power = np.abs(np.fft.rfft(residual - np.mean(residual), size)) ** 2
+    correlation = np.fft.irfft(power, size)[: n // 4]
+    memory = 2.0 * float(np.sum((correlation / max(float(correlation[0]), 1e-300)) ** 2)) - 1.0
+    return int(np.clip(n / (APART * memory), 2 * STRETCHES, BLOCKS))
+
+
+def _log_powers(values: Floats, count: int) -> Floats:
+    powers = np.array([float(np.mean(part**2)) for part in np.array_split(values, count)])
+    return np.log(np.maximum(powers, 1e-30 * max(float(np.max(powers)), 1e-300)))
+
+
+def _regress(columns: Floats, values: Floats) -> tuple[Floats, float]:
+    fitted = columns @ np.linalg.lstsq(columns, values, rcond=None)[0]
+    return fitted, float(np.sum((values - fitted) ** 2))
+
+
+def _slope(x: Floats, y: Floats) -> tuple[float, float]:
+    power = float(x @ x)
+    if not power > 0.0:
+        return 0.0, np.inf
+    slope = float(x @ y) / power
+    rest = y - np.mean(y) - slope * x
+    return slope, float(np.sqrt(np.sum(rest**2) / max(len(x) - 2, 1) / power))
+
+
+def _stretch(
+    judged: Judged, residual: Floats, response: Floats, k: int, ratios: Floats, group: NDArray[np.int64]
+) -> Stretch:
+    bounds = np.linspace(0, len(residual), STRETCHES + 1).round().astype(int)
+    first, last = int(bounds[k]), int(bounds[k + 1])
+    begin = float(judged.time[first])
+    return Stretch(
+        begin, begin + (last - first) * judged.dt,
+        float(np.sqrt(np.mean(residual[first:last] ** 2))) / judged.size,
+        float(np.sqrt(np.mean(response[first:last] ** 2))) / judged.size,
+        float(np.exp(np.mean(np.log(ratios[group == k])))),
+    )  # fmt: skip

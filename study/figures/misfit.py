@@ -1,0 +1,195 @@
+"""Where a model fails: response beside prediction, force error, missing force over the motion, error in time."""
+
+# Matplotlib leaves the **kwargs of its methods untyped.
+# pyright: reportUnknownMemberType=false
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import TwoSlopeNorm
+from matplotlib.ticker import LogLocator
+from numpy.typing import NDArray
+
+from study import units
+from study.compare.levels import Level
+from study.compare.reverse import ForceError
+from study.compare.stretches import AlongTime
+from study.compare.surface import Curve, Surface
+from study.figures import labels
+
+Floats = NDArray[np.float64]
+COLUMNS = 1500  # of a panel: a longer history is drawn as its extremes in so many columns
+SURE = 2.0  # standard errors: cells whose mean is below are marked as not sure
+MEASURED: dict[str, Any] = {"color": "0.35", "label": "measured"}
+PREDICTED: dict[str, Any] = {"color": "C0", "label": "free run of the model"}
+RESIDUAL: dict[str, Any] = {"color": "C1", "label": "measured less predicted"}
+NOISE: dict[str, Any] = {"color": "black", "linestyle": (0, (1.0, 1.5)), "linewidth": 1.2}
+FLOOR = 1e-6  # shares below are drawn there
+
+
+def history(axes: Axes, time: Floats, values: Floats, look: dict[str, Any], **more: Any) -> Axes:
+    """A history, or, if it is long, the band between its extremes in each column of the picture."""
+    if len(values) <= 2 * COLUMNS:
+        style: dict[str, Any] = {"linewidth": 0.9, **look, **more}
+        axes.plot(time, values, **style)
+        return axes
+    bounds = np.linspace(0, len(values), COLUMNS + 1).astype(int)[:-1]
+    low, high = np.minimum.reduceat(values, bounds), np.maximum.reduceat(values, bounds)
+    axes.fill_between(time[bounds], low, high, linewidth=0.3, **{**look, **more})
+    return axes
+
+
+def response(axes: Axes, time: Floats, measured: Floats, predicted: Floats, unit: str) -> Axes:
+    """Measured and predicted response."""
+    factor, shown = labels.prefixed(unit, float(np.max(np.abs(measured))))
+    history(axes, time, measured / factor, MEASURED)
+    history(axes, time, predicted / factor, PREDICTED, alpha=0.8, linestyle="--")
+    return _time_axis(axes, time, f"response ({units.pretty(shown)})")
+
+
+def residual(axes: Axes, time: Floats, difference: Floats, noise: float, unit: str) -> Axes:
+    """What the model misses, beside twice the noise floor."""
+    factor, shown = labels.prefixed(unit, float(np.max(np.abs(difference))))
+    history(axes, time, difference / factor, RESIDUAL)
+    for k, side in enumerate((-2.0, 2.0)):
+        axes.axhline(side * noise / factor, label="twice the rms of the noise" if k else None, zorder=3.0, **NOISE)
+    return _time_axis(axes, time, f"difference ({units.pretty(shown)})")
+
+
+def _time_axis(axes: Axes, time: Floats, label: str) -> Axes:
+    axes.set_xlim(float(time[0]), float(time[-1]))
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel(label)
+    return axes
+
+
+def force_error(axes: Axes, found: ForceError, highest: float) -> Axes:
+    """Unexplained share of the force, line by line; shaded where the motion stands above its noise."""
+    keep = (found.frequency > 0.0) & (found.frequency <= highest)
+    f = found.frequency[keep]
+    axes.fill_between(
+        f, 0.0, 1.0, where=found.band[keep].tolist(), transform=axes.get_xaxis_transform(), color="0.93", linewidth=0.0,
+        label="motion above its noise", zorder=0.5,
+    )  # fmt: skip
+    axes.plot(f, _shown(found.parametric[keep]), color="C0", label="left by the fitted coefficients")
+    axes.plot(f, _shown(found.unexplained[keep]), color="C1", linestyle=(0, (5.0, 2.0)), label="1 - multiple coherence")
+    axes.plot(f, _shown(found.noise[keep]), label="noise on the response alone", **NOISE)
+    axes.set_yscale("log")
+    axes.set_ylim(_limits(found, keep))
+    axes.set_xlim(0.0, highest)
+    axes.set_xlabel("frequency (Hz)")
+    axes.set_ylabel("unexplained share of the force")
+    return axes
+
+
+def _limits(found: ForceError, keep: NDArray[np.bool_]) -> tuple[float, float]:
+    """From the lowest share to the highest of the shaded band: beyond it the noise leaves the panel."""
+    shares = _shown(np.concatenate([found.parametric[keep], found.unexplained[keep]]))
+    inside = np.concatenate([found.parametric[found.band], found.unexplained[found.band]])
+    return 0.5 * float(np.min(shares)), max(2.0, 1.5 * float(np.max(inside)))
+
+
+def _shown(share: Floats) -> Floats:
+    return np.maximum(share, FLOOR)
+
+
+def missing_force(axes: Axes, found: Surface, unit: dict[str, str]) -> Axes:
+    """Mean missing force over displacement and velocity; a dot marks a cell whose mean may be noise."""
+    factor, shown = labels.prefixed(unit["displacement"], float(np.max(np.abs(found.displacement))))
+    rate, rate_shown = _rate(unit["velocity"], found.velocity)
+    largest = float(np.nanmax(np.abs(found.mean), initial=0.0)) or 1.0
+    mesh = axes.pcolormesh(
+        found.displacement / factor, found.velocity / rate, found.mean.T, cmap="RdBu_r",
+        norm=TwoSlopeNorm(0.0, -largest, largest), rasterized=True,
+    )  # fmt: skip
+    middle_u = 0.5 * (found.displacement[1:] + found.displacement[:-1]) / factor
+    middle_v = 0.5 * (found.velocity[1:] + found.velocity[:-1]) / rate
+    i, j = np.nonzero(np.abs(found.mean) < SURE * found.error)
+    axes.plot(middle_u[i], middle_v[j], ".", color="0.45", markersize=1.5, label="may be noise")
+    axes.grid(visible=False)
+    place = axes.get_position()
+    axes.set_position((place.x0, place.y0, 0.85 * place.width, place.height))  # room for the scale of colours
+    figure = axes.get_figure()
+    assert figure is not None, "the axes stand on a page"
+    bar = figure.colorbar(mesh, cax=axes.inset_axes((1.025, 0.0, 0.025, 1.0)))
+    bar.set_label(f"missing force ({units.pretty(unit['force'])})")
+    axes.set_xlabel(f"displacement ({units.pretty(shown)})")
+    axes.set_ylabel(f"velocity ({units.pretty(rate_shown)})")
+    return axes
+
+
+def force_curve(axes: Axes, found: Curve, against: str, unit: dict[str, str]) -> Axes:
+    """Mean missing force against displacement or velocity, with 95 % intervals."""
+    largest = float(np.max(np.abs(found.at), initial=0.0))
+    scaled = labels.prefixed(unit[against], largest) if against == "displacement" else _rate(unit[against], found.at)
+    factor, shown = scaled
+    axes.axhline(0.0, color="0.6", linewidth=0.8)
+    axes.errorbar(
+        found.at / factor, found.mean, 1.96 * found.error, fmt="o-", color="C0", markersize=3.5, linewidth=1.2,
+        elinewidth=1.0, capsize=2.0, label="mean and 95 % interval",
+    )  # fmt: skip
+    axes.set_xlabel(f"{against} ({units.pretty(shown)})")
+    axes.set_ylabel(f"missing force ({units.pretty(unit['force'])})")
+    return axes
+
+
+def _rate(unit: str, values: Floats) -> tuple[float, str]:
+    """Divisor and unit in which velocities are easy to read: m/s become mm/s where that is better."""
+    if unit != "m/s":
+        return 1.0, unit
+    factor, shown = labels.prefixed("m", float(np.max(np.abs(values), initial=0.0)))
+    return factor, f"{shown}/s"
+
+
+def error_in_time(axes: Axes, found: AlongTime, floor: float) -> Axes:
+    """Error and level of the response, stretch by stretch, over the rms response of the whole judging part."""
+    edges = [*(s.begin for s in found.stretches), found.stretches[-1].end]
+    axes.stairs(
+        [100.0 * s.response for s in found.stretches],
+        edges,
+        baseline=None,
+        color="0.35",
+        linewidth=1.4,
+        label="response",
+    )
+    axes.stairs(
+        [100.0 * s.error for s in found.stretches], edges, baseline=None, color="C1", linewidth=2.0, label="error"
+    )
+    axes.axhline(100.0 * floor, label="noise floor", **NOISE)
+    axes.set_yscale("log", subs=[])
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.set_ylabel("rms (% of the rms response)")
+    return _stretch_axis(axes, edges)
+
+
+def error_beyond_level(axes: Axes, found: AlongTime) -> Axes:
+    """Power of the residual over what is usual at that level of the response."""
+    edges = [*(s.begin for s in found.stretches), found.stretches[-1].end]
+    axes.axhline(1.0, color="0.6", linewidth=0.8)
+    axes.stairs([s.ratio for s in found.stretches], edges, baseline=None, color="C0", linewidth=2.0)
+    axes.set_yscale("log", base=2)
+    reach = max(2.0, *(1.2 * max(s.ratio, 1.0 / max(s.ratio, 1e-9)) for s in found.stretches))
+    axes.set_ylim(1.0 / reach, reach)
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.set_ylabel("power of the error over\nthat usual at this level")
+    return _stretch_axis(axes, edges)
+
+
+def _stretch_axis(axes: Axes, edges: Sequence[float]) -> Axes:
+    axes.set_xlim(edges[0], edges[-1])
+    axes.set_xlabel("time (s)")
+    return axes
+
+
+def coefficient_by_level(axes: Axes, level: Level, force_unit: str) -> Axes:
+    """One coefficient against the rms force, with 95 % intervals."""
+    axes.errorbar(
+        level.force, level.value, 1.96 * np.array(level.error), fmt="o-", color="C1" if level.moves else "C0",
+        markersize=4.0, linewidth=1.2, capsize=2.5,
+    )  # fmt: skip
+    axes.set_xlabel(f"rms force ({units.pretty(force_unit)})")
+    axes.set_ylabel(f"{level.key} ({units.pretty(level.unit)})")
+    return axes
