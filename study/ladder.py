@@ -43,7 +43,12 @@ def _is_step(step: object) -> bool:
 
 def write(model: Path, steps: list[Step]) -> None:
     """Keep the steps, the old file surviving any failure."""
-    replace_file(path_of(model), (json.dumps({"steps": steps}, indent=1) + "\n").encode())
+    replace_file(path_of(model), as_bytes(steps))
+
+
+def as_bytes(steps: list[Step]) -> bytes:
+    """The steps as the content of a file."""
+    return (json.dumps({"steps": steps}, indent=1) + "\n").encode()
 
 
 def climbed(steps: list[Step], before: Step, after: Step) -> list[Step]:

@@ -79,7 +79,7 @@ def _step(found: "Comparison", added: str | None) -> dict[str, Any]:
         "terms": [t.name for t in found.model.terms],
         "added": added,
         "record": found.record.name,
-        "error": {"force": found.force.error, "response": found.response_error},
+        "error": {"force": found.force.total, "response": found.response_error},
         "rms": float(found.response_error * found.judged.size),
         "unit": found.record.units.get(found.how.response, ""),
         "noise_floor": {"response": found.noise_floor},

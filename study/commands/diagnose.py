@@ -63,17 +63,19 @@ def _one(
 
     how = plan_of(arguments, record)
     with tqdm(delay=QUIET, leave=False, unit=" candidates", desc=record.name) as bar:
+
+        def one_more(_: int) -> None:
+            bar.update()
+
         compared = compare(model, record, how, cutoff=arguments.cutoff)
-        found = diagnose(
-            model, record, how, extra=own, without=tuple(arguments.without), progress=lambda _: bar.update()
-        )  # fmt: skip
+        found = diagnose(model, record, how, extra=own, without=tuple(arguments.without), progress=one_more)
         said = _said(found, record, how)
     force, length = record.units.get("force", "N"), compared.record.units.get("displacement", "m")
     print(f"{record.name}: {found.verdict.replace('_', ' ')}")
     print(report.table(found, force, length))
     print("\n" + said)
     content = report.fields(found)
-    content["error"]["force"] = compared.force.error
+    content["error"]["force"] = compared.force.total
     content |= {"record": record.name, "where": where(compared), "says": said}
     return content, files(found, record.name)
 

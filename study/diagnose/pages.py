@@ -5,7 +5,9 @@ from matplotlib.figure import Figure
 from study.diagnose import pictures
 from study.diagnose.verdict import Diagnosis
 from study.figures import page
+from study.figures.sheet import in_style
 
+KINDS = ("png", "svg")
 FOLLOWED = 3  # candidates whose coefficient is drawn along frequency and amplitude
 
 
@@ -25,3 +27,10 @@ def pages(found: Diagnosis, record: str) -> dict[str, Figure]:
     pictures.constancy(panels[0], panels[1], found.candidates[:FOLLOWED])
     page.legend(constancy, panels)
     return {"candidates": ranking, "constancy": constancy}
+
+
+def files(found: Diagnosis, record: str) -> dict[str, bytes]:
+    """The pictures by file name, in the project's style."""
+    with in_style():
+        drawn = pages(found, record)
+        return {f"{name}.{kind}": page.rendered(figure, kind) for name, figure in drawn.items() for kind in KINDS}

@@ -8,6 +8,7 @@ import numpy as np
 from study.diagnose.ranking import Ranked
 from study.diagnose.verdict import Diagnosis
 
+TIES = 2  # ties named in the table; the file names all
 SHOWN = 8  # candidates in the table on the screen
 
 
@@ -31,8 +32,13 @@ def _shown(place: int, row: Ranked, force: str, length: str) -> list[str]:
         f"{row.coefficient:.4g} +- {half:.2g} {unit}",
         f"{row.p_value:.1g}",
         f"{100 * row.unsteadiness:.0f} %" if math.isfinite(row.unsteadiness) else "-",
-        ", ".join(row.tied_with),
+        _few(row.tied_with),
     ]
+
+
+def _few(names: tuple[str, ...]) -> str:
+    shown = ", ".join(names[:TIES])
+    return f"{shown} and {len(names) - TIES} more" if len(names) > TIES else shown
 
 
 def fields(found: Diagnosis) -> dict[str, Any]:

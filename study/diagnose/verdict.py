@@ -144,7 +144,7 @@ def _decide(
         return MISSING, rows, left, ()
     pair, remaining = _best_pair(rows, size, record, how, held)
     if remaining <= LEFT:
-        first = next(r for r in rows if r.name in pair)
+        first = next(r for r in rows if r.name == pair[0])
         return MISSING, [first] + [r for r in rows if r is not first], remaining, pair
     return UNKNOWN, rows, left, ()
 
@@ -163,17 +163,20 @@ def _left(residual: Floats, size: float, dt: float) -> float:
 def _best_pair(
     rows: list[Ranked], size: float, record: Record, how: Plan, held: tuple[str, ...]
 ) -> tuple[tuple[str, ...], float]:
-    """The two effects that together leave the least, and the structure that they leave."""
+    """Two effects that explain together, and the structure they leave; pairs with the first candidate are preferred."""
     terms = [row.term for row in rows]
     short = fitting.shortened(how, SEARCHED)
-    best: tuple[float, tuple[str, ...], Floats] | None = None
+    best: tuple[tuple[str, ...], float] = ((), np.inf)
     for row in rows[:PAIRED]:
         beside = search.baseline(_refitted(row.found, record, how, short, held), record, short)
-        for trial in candidates.try_all([t for t in terms if t.name != row.name], beside, record, short, held):
-            power = float(trial.residual @ trial.residual)
-            if best is None or power < best[0]:
-                best = power, (row.name, trial.term.name), trial.residual
-    return (best[1], _left(best[2], size, record.dt)) if best is not None else ((), np.inf)
+        seconds = candidates.try_all([t for t in terms if t.name != row.name], beside, record, short, held)
+        second = min(seconds, key=lambda t: float(t.residual @ t.residual), default=None)
+        if second is not None:
+            left = _left(second.residual, size, record.dt)
+            best = min(best, ((row.name, second.term.name), left), key=lambda pair: pair[1])
+        if best[1] <= LEFT:
+            break
+    return best
 
 
 def _families(base: Baseline, record: Record, how: Plan) -> dict[str, float]:

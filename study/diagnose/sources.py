@@ -1,0 +1,23 @@
+"""Candidates that the user brings: formulas on the command line."""
+
+from collections.abc import Sequence
+
+from study.errors import StudyError
+from study.terms import Term, custom
+
+
+def own_candidates(given: Sequence[str]) -> list[Term]:
+    """``NAME=FORMULA`` as terms.
+
+    Raises
+    ------
+    StudyError
+        If one is not of this form, or its formula is refused.
+    """
+    found: list[Term] = []
+    for text in given:
+        name, sign, formula = text.partition("=")
+        if not sign:
+            raise StudyError(f"{text!r} is no candidate; NAME=FORMULA such as 'bracket=u*abs(u)' is right")
+        found.append(custom(name.strip(), formula.strip()))
+    return found

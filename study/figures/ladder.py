@@ -1,0 +1,44 @@
+"""The ladder as a picture: the error of the response falling towards the noise floor."""
+
+# Matplotlib leaves the **kwargs of its methods untyped.
+# pyright: reportUnknownMemberType=false
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from study.figures import page
+
+KINDS = ("png", "svg")
+
+
+def ladder(axes: Axes, steps: Sequence[dict[str, Any]]) -> Axes:
+    """Held-out error of the response and of the force by model, on a logarithmic scale, noise floor dotted."""
+    place = np.arange(len(steps))
+    for key, style, colour in (("response", "-o", "0.1"), ("force", "--s", "0.5")):
+        values = [100.0 * s["error"][key] if s["error"][key] else np.nan for s in steps]
+        axes.plot(place, values, style, color=colour, label=f"error of the {key}")
+    floor = [100.0 * s["noise_floor"]["response"] for s in steps]
+    axes.plot(place, floor, ":", color="0.1", label="noise floor of the response")
+    axes.set_yscale("log")
+    names = [f"+ {s['added']}".replace("_", " ") if s.get("added") else "as given" for s in steps]
+    axes.set_xticks(place, names, rotation=20, ha="right")
+    axes.set_ylabel("held-out error / %")
+    axes.margins(x=0.08)
+    return axes
+
+
+def files(steps: Sequence[dict[str, Any]], name: str) -> dict[str, bytes]:
+    """The picture by file name, in the project's style."""
+    from study.figures.sheet import in_style
+
+    with in_style():
+        figure, (axes,) = page.page(
+            f"The ladder of {name}", "every model so far, judged on what was not fitted", panel=3.0, headed=False
+        )
+        figure.subplots_adjust(bottom=0.26)
+        ladder(axes, steps)
+        page.legend(figure, [axes])
+        return {f"ladder.{kind}": page.rendered(figure, kind) for kind in KINDS}
