@@ -92,6 +92,12 @@ TEXTS: dict[str, tuple[str, tuple[str, ...]]] = {
     "comments between": ("# a\n# b\n" + table(change=cell(6, 1, "")).replace("0.04,", "# c\n0.04,", 1), ("line 11",)),
     "a lost sample": (table(HEADER, np.delete(TIME, 30), FORCE[1:], MOTION[1:]), ("gap", "0.04 s", "0.02 s")),
     "uneven": (table(HEADER, TIME**1.2, FORCE, MOTION), ("uneven", "even sampling")),
+    "two decimal marks": (table().replace(",", ";").replace("0.02;", "0,02;"), ("line 3",)),
+    "decimal mark by column": ("\n".join(["time;force;x", *[f"0,{k:02d};{k % 7}.5;{k * k % 11}.5" for k in range(64)]]),
+                               ("'time'", "'0,00'", "line 2")),
+    "a comment hides cells": (table(change={0: "0.0,1.0 # , 2.0"}), ("line 2", "cells")),
+    "comments hide cells": ("\n".join([HEADER, *[x.replace(",", " #,", 2).replace(" #", "", 1) for x in lines()]]),
+                            ("line 2", "2 cells", "3 are right")),
     "time runs backwards": (table(HEADER, TIME[::-1], FORCE, MOTION), ("backwards", "line 3")),
     "time jumps back": (table(HEADER, with_values(TIME, _40=0.1), FORCE, MOTION), ("backwards", "line 42")),
     "time stands still": (table(HEADER, 0.0 * TIME, FORCE, MOTION), ("stands still", "line 3")),
@@ -174,13 +180,15 @@ WRITERS: dict[str, Callable[[Path], None]] = {"mat": _matlab, "h5": _hdf5, "parq
 
 
 @pytest.mark.parametrize("suffix", WRITERS)
-@pytest.mark.parametrize("share", [0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.97])
+@pytest.mark.parametrize("share", [0.02, 0.1, 0.3, 0.45, 0.7, 0.9, 0.97])
 def test_truncated(suffix: str, share: float, tmp_path: Path) -> None:
     path = tmp_path / f"rig.{suffix}"
     WRITERS[suffix](path)
     data = path.read_bytes()
     path.write_bytes(data[: int(share * len(data))])
-    sentence(path)
+    said = sentence(path)
+    if share >= 0.1:
+        assert "cut short" in said
 
 
 @pytest.mark.parametrize("suffix", WRITERS)
@@ -269,6 +277,13 @@ def test_uff_without_time_histories(tmp_path: Path) -> None:
     assert "58" in sentence(path)
 
 
+def test_uff_that_states_more_samples_than_it_holds(tmp_path: Path) -> None:
+    path = tmp_path / "rig.uff"
+    _uff(path)
+    path.write_text(path.read_text().replace(f"{N:10d}         1", f"{N + 9:10d}         1", 1))
+    assert f"states {N + 9} samples and holds {N}" in sentence(path)
+
+
 OPTIONS: dict[str, tuple[ReadOptions, tuple[str, ...]]] = {
     "no such column": (ReadOptions(columns={"force": "F9"}), ("'F9'", "2 'force'", "--column")),
     "number too high": (ReadOptions(columns={"force": 4}), ("column 4", "1 'time'")),
@@ -342,6 +357,8 @@ def test_a_gap_can_be_cut_away(tmp_path: Path) -> None:
     record = read_record(path, ReadOptions(samples=(7, None)))
     assert len(record) == N - 7
     assert record.start == pytest.approx(0.14)
+    path.write_text(table(change=cell(6, 1, "") | cell(40, 1, "")))
+    assert "line 42" in sentence(path, ReadOptions(samples=(7, None)))
 
 
 @pytest.mark.parametrize(

@@ -105,6 +105,14 @@ def test_without_header_or_time(tmp_path: Path) -> None:
         read_record(path, ReadOptions(columns={"force": 1, "displacement": "2"}))
 
 
+def test_full_names_come_before_short_ones(tmp_path: Path) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_text("time,force,displacement,input,x\n" + rows(",", ".", TIME, FORCE, DISPLACEMENT, TIME**2, TIME**3))
+    record = read_record(path)
+    check(record)
+    assert record.extra == ("input", "x")
+
+
 def test_integers(tmp_path: Path) -> None:
     path = tmp_path / "rig.csv"
     counts = np.arange(40) ** 2 % 37
@@ -467,14 +475,15 @@ def test_public_records_are_not_suspected_unless_swapped() -> None:
 # force and response swapped
 
 
-def rig(noise: float, seed: int) -> Record:
+def rig(noise: float, seed: int, low: float = 0.0, high: float = 12.5, level: float = 1.0) -> Record:
     values = {"m": 1.0, "c": 3.77, "k": 355.3, "k3": 2.0e7}
     names = ("inertia", "linear_damping", "linear_stiffness", "cubic_stiffness")
     model = Model("rig", tuple(free(LIBRARY[n]) for n in names)).with_values(values)
     rng = np.random.default_rng(seed)
     spectrum = np.fft.rfft(rng.standard_normal(8192))
-    spectrum[np.fft.rfftfreq(8192, 0.02) > 12.5] = 0.0
-    record = simulate(model, np.fft.irfft(spectrum), 0.02)
+    frequency = np.fft.rfftfreq(8192, 0.02)
+    spectrum[(frequency > high) | (frequency < low)] = 0.0
+    record = simulate(model, level * np.fft.irfft(spectrum), 0.02)
     return record.with_channels({m: record[m] + noise * np.std(record[m]) * rng.standard_normal(8192) for m in MOTIONS})
 
 
@@ -488,6 +497,14 @@ def test_swapped_is_suspected(motion: str, noise: float, scale: float) -> None:
     said = suspect_swapped(Record(0.02, {"force": response, motion: force}))
     assert said is not None
     assert "swapped" in said
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("band", [(0.0, 2.0), (5.0, 12.5)], ids=["below resonance", "above resonance"])
+def test_half_a_band_under_noise_is_not_suspected(motion: str, band: tuple[float, float]) -> None:
+    for seed in range(12):
+        record = rig(0.3, seed, *band, level=0.1)
+        assert suspect_swapped(Record(0.02, {"force": record["force"], motion: record[motion]})) is None
 
 
 def test_nothing_is_suspected_where_nothing_can_be_told() -> None:

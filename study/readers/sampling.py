@@ -52,7 +52,7 @@ def even_interval(path: Path, time: Floats, place: Callable[[int], str]) -> tupl
     rounding = _rounding(time)
     if away > max(JITTER * mean, min(rounding, ROUNDING * mean)):
         raise StudyError(f"{path}: {_uneven(time, steps, place)}; even sampling (within 1 % of the interval) is right")
-    exact = next((dt for dt in _candidates(time, mean) if np.array_equal(time[0] + dt * grid, time)), None)
+    exact = next((dt for dt in _candidates(mean) if np.array_equal(time[0] + dt * grid, time)), None)
     if exact is not None:
         return exact, float(time[0])
     slack = (2.0 * away + rounding) / (len(time) - 1)
@@ -85,10 +85,8 @@ def _rounding(time: Floats) -> float:
     return 0.0
 
 
-def _candidates(time: Floats, mean: float) -> Iterator[float]:
+def _candidates(mean: float) -> Iterator[float]:
     """Intervals that the times may have been made with, the likeliest first."""
-    if time[0] == 0.0:
-        yield float(time[1])
     yield from _decimals(mean)
     yield mean
     below = above = mean

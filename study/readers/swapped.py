@@ -65,6 +65,8 @@ def suspect_swapped(record: Record) -> str | None:
     swapped = _fit(omega, turn / ratio, weight)
     if _is_mechanical(given) or not _is_mechanical(swapped) or swapped.error > BETTER * given.error:
         return None
+    if swapped.mass * omega.max() ** 2 < abs(swapped.stiffness):  # a spring alone fits too much
+        return None
     return (
         f"{record.name}: force and {motion} seem to be swapped: read the other way round, their ratio is that of a "
         f"mass on a spring to within {100.0 * swapped.error:.0f} %, as given it misses by {100.0 * given.error:.0f} % "

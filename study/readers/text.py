@@ -24,11 +24,12 @@ from study.readers.unit_names import is_unit
 HEAD_BYTES = 200_000
 HEAD_LINES = 200
 BLANKS = r"\s+"
+SPACE = " \t"  # what the compiled parser takes for blanks; Python knows more
 DIALECTS = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (BLANKS, "."), (BLANKS, ","))
 COMMENTS = ("#", "%", "!", "//")
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
 RIGHT = "a table with one line for each sample is right"
-NO_TEXT = re.compile(rb"[\x00-\x08\x0b\x0e-\x19\x1b-\x1f]")  # control characters that no text file holds
+NO_TEXT = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f]")  # control characters that no text file holds
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ def read(path: Path, data: bytes) -> Table:
     StudyError
         If they are no text, hold no numbers, or a line has more cells than the others.
     """
-    data = _utf8(path, data)
+    data = _utf8(path, data.rstrip(b"\x1a"))  # some programs still end a text as CP/M did
     lines = data[:HEAD_BYTES].decode("utf-8", errors="replace").split("\n")
     if len(data) > HEAD_BYTES and len(lines) > 1:
         lines = lines[:-1]  # the last one is cut in two
@@ -93,9 +94,9 @@ def _is_comment(line: str) -> bool:
 
 def _cells(line: str, delimiter: str) -> list[str]:
     if delimiter == BLANKS:  # a unit in brackets belongs to the name before it
-        return re.split(r"\s+(?![\[(/])", line.strip())
+        return re.split(r"[ \t]+(?![\[(/])", line.strip(SPACE))
     rows = list(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
-    return [cell.strip() for cell in rows[0]] if rows else []
+    return [cell.strip(SPACE) for cell in rows[0]] if rows else []
 
 
 def _is_number(cell: str, decimal: str) -> bool:
@@ -205,6 +206,7 @@ def _table(path: Path, body: bytes, layout: Layout) -> Table:
         raise StudyError(f"{path}: {_ragged(str(error), place, len(layout.names))}") from None
     except (ValueError, OverflowError):  # text in a cell: find which
         return _with_text(path, body, layout, place)
+    _check_width(path, frame, layout)
     columns = [
         Column(name, frame[k].to_numpy(dtype=np.float64), unit)
         for k, (name, unit) in enumerate(zip(layout.names, layout.units, strict=True))
@@ -220,15 +222,23 @@ def _parse(body: bytes, layout: Layout, dtype: str) -> pd.DataFrame:
     )  # fmt: skip
 
 
+def _check_width(path: Path, frame: pd.DataFrame, layout: Layout) -> None:
+    """A comment behind the first sample can hide some of its cells."""
+    if frame.shape[1] != len(layout.names):
+        told = f"line {layout.first + 1} has {frame.shape[1]} cells of numbers"
+        raise StudyError(f"{path}: {told}; {len(layout.names)} are right")
+
+
 def _with_text(path: Path, body: bytes, layout: Layout, place: "_Place") -> Table:
     """The slow road: each cell on its own; a column with text says where it stands if it is asked for."""
     try:
         frame = _parse(body, layout, "str")
     except (ValueError, pd.errors.ParserError) as error:
         raise StudyError(f"{path}: {_ragged(str(error), place, len(layout.names))}") from None
+    _check_width(path, frame, layout)
     columns: list[Column] = []
     for k, (name, unit) in enumerate(zip(layout.names, layout.units, strict=True)):
-        cells = ["" if isinstance(c, float) else str(c).strip() for c in frame[k].tolist()]
+        cells = [c.strip(SPACE) if isinstance(c, str) else "" for c in frame[k].tolist()]
         wrong = next((i for i, c in enumerate(cells) if c and not _is_number(c, layout.decimal)), None)
         if wrong is None:
             columns.append(Column(name, _floats(cells, layout.decimal), unit))
@@ -254,6 +264,8 @@ def _ragged(error: str, place: "_Place", width: int) -> str:
     found = re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", error)
     if found is None:
         return f"the table cannot be read; {RIGHT}"
+    if int(found[1]) != width:  # the first line is the odd one
+        return f"{place(0)} has {found[1]} cells of numbers; {width} are right"
     return f"line {int(found[2]) + place.first} has {found[3]} cells; {width} as in the lines above are right"
 
 

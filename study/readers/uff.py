@@ -1,5 +1,6 @@
 """Universal File Format, dataset 58: functions at nodal degrees of freedom, of which time histories are used."""
 
+import re
 from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
@@ -12,6 +13,7 @@ from study.readers.sampling import shortest_decimal
 from study.readers.table import Column, Table
 
 ROUNDING = 5e-6  # the interval stands in the file with six digits
+MARK = re.compile(rb"^ {4}-1 *\r?$", re.MULTILINE)  # before and behind each dataset
 TIME_RESPONSE = 1  # the standard's code of the function type
 ROLES = {8: "displacement", 9: "force", 11: "velocity", 12: "acceleration", 13: "force"}  # of the ordinate
 DIRECTIONS = {-3: "-Z", -2: "-Y", -1: "-X", 0: "", 1: "+X", 2: "+Y", 3: "+Z"}
@@ -25,7 +27,7 @@ def read(path: Path) -> Table:
     StudyError
         If it is cut short, has none, or they were not sampled together.
     """
-    if not path.read_bytes().rstrip().endswith(b"-1"):
+    if len(MARK.findall(path.read_bytes())) % 2:
         raise StudyError(f"{path}: its last dataset is cut short; a line '-1' at the end is right")
     pyuff: Any = import_module("pyuff")
     file: Any = pyuff.UFF(str(path))
