@@ -3,21 +3,28 @@ import sys
 from pathlib import Path
 
 from study.config import load
-from study.errors import StudyError
+from study.step import alone, one_sentence
 
-try:
+with one_sentence():
     STUDY = load(Path("config"))
-except StudyError as fault:
-    sys.exit(f"study: {fault}")
+    if workflow.is_main_process and not workflow.dryrun:
+        LOCK = alone(Path(".snakemake/running"))  # held until this process ends
+
+
+report: "rules/captions/workflow.rst"
 
 
 include: "rules/common.smk"
 include: "rules/reproduce.smk"
 include: "rules/claims.smk"
+include: "rules/monte_carlo.smk"
+include: "rules/summary.smk"
+include: "rules/cases.smk"
 
 
 rule all:
     default_target: True
     input:
-        [f"results/{case}/parameters.csv" for case in STUDY.cases],
+        [products(case) for case in STUDY.cases],
         CLAIM_RESULTS,
+        SUMMARY_RESULTS,

@@ -1,17 +1,26 @@
-# The modules that each stage rests on. Snakemake sees a change of a script by itself, of a module only
-# when it is an input: touching study/miso.py re-runs identification and what follows, not simulation.
+# What several rules share: the modules that each stage rests on, settings and files by case.
+from study.config import PRELIMINARY
+from study.estimators import ESTIMATORS
+from study.modules import rests_on
+
+# Touching study/miso.py re-runs identification and what follows, not simulation, though the two share
+# study/case.py: what only identification uses is not followed from there.
+IDENTIFICATION_ONLY = ["study.estimators", "study.estimators.base", "study.spectra"]
 CODE = {
-    "record": [
-        f"study/{module}.py"
-        for module in (
-            "case excitation expression graph interpolation kernels model modelfile record simulate terms"
-        ).split()
-    ],
-    "identify": [
-        f"study/{module}.py" for module in "inputs miso parameters spectra tables".split()
-    ]
-    + [f"study/estimators/{module}.py" for module in "base siso miso hand_read".split()],
+    "record": rests_on(Path("scripts/make_record.py"), without=IDENTIFICATION_ONLY),
+    "identify": rests_on(Path("scripts/identify.py"), also=ESTIMATORS.values()),
+    "draw": rests_on(Path("scripts/draw_case.py")),
+    "preliminary": rests_on(Path("scripts/draw_preliminary.py")),
+    "monte_carlo": rests_on(Path("scripts/monte_carlo.py"), also=ESTIMATORS.values()),
+    "rates": rests_on(Path("scripts/rates.py")),
+    "join": rests_on(Path("scripts/join.py")),
+    "table_page": rests_on(Path("scripts/table_page.py")),
+    "summary": rests_on(Path("scripts/summary.py")),
 }
+NOISE = {name: case.noise for name, case in STUDY.cases.items()}
+STYLE = "config/study.mplstyle"
+ENDINGS = ("png", "svg")
+IDENTIFIED_FILES = ("frequency_response.csv", "coherence.csv", "parameters.csv")
 
 
 def record_settings(wildcards):
@@ -24,3 +33,40 @@ def identification_settings(wildcards):
 
 def model_of(wildcards):
     return STUDY.cases[wildcards.case].model
+
+
+def title_of(wildcards):
+    return STUDY.cases[wildcards.case].title
+
+
+def pictures(stem):
+    """The files of a figure."""
+    return [f"figures/{stem}.{ending}" for ending in ENDINGS]
+
+
+def products(case):
+    """Everything that is made of a case."""
+    tables = [f"results/{case}/{name}" for name in ("record.csv", *IDENTIFIED_FILES)]
+    return tables + [path for stem in STUDY.cases[case].figures.values() for path in pictures(stem)]
+
+
+def draws_preliminary(case):
+    """Whether figures of the preliminary analysis are drawn of a case."""
+    return any(kind in case.figures for kind in PRELIMINARY)
+
+
+def figures_of(case, kinds, described):
+    """Outputs of a rule that draws: by kind the files, the PNG of each with its words in the report page."""
+    found = {}
+    for kind, stem in STUDY.cases[case].figures.items():
+        if kind in kinds:
+            png, svg = pictures(stem)
+            number = stem.removeprefix("figure_").rjust(2) if stem.startswith("figure_") else "not in the report"
+            page = {
+                "caption": f"captions/{kind}.rst",
+                "category": "Figures",
+                "subcategory": STUDY.cases[case].title,
+                "labels": {"figure": number, "shows": described[kind]},
+            }
+            found[kind] = [report(png, **page), svg]
+    return found

@@ -1,4 +1,4 @@
-# Records, identification, figures of each case of config/cases.tsv.
+# Record and identification of each case of config/cases.tsv.
 wildcard_constraints:
     case="|".join(re.escape(case) for case in STUDY.cases),
 
@@ -11,6 +11,8 @@ rule record:
         record="results/{case}/record.csv",
     params:
         settings=record_settings,
+    benchmark:
+        "results/benchmarks/record.{case}.tsv"
     script:
         "../scripts/make_record.py"
 
@@ -26,14 +28,7 @@ rule identify:
         parameters="results/{case}/parameters.csv",
     params:
         settings=identification_settings,
+    benchmark:
+        "results/benchmarks/identify.{case}.tsv"
     script:
         "../scripts/identify.py"
-
-
-for _case in STUDY.cases:
-
-    rule:
-        name:
-            _case
-        input:
-            f"results/{_case}/parameters.csv",

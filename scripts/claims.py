@@ -9,6 +9,7 @@ import pandas as pd
 from study import tables
 from study.claims import evidence, reported, table
 from study.claims.verdict import Claim
+from study.step import one_sentence
 
 
 def main(models: str, statements: str, schema: str, steps: str, settings: dict[str, Any], csv: str, page: str) -> None:
@@ -26,7 +27,8 @@ def main(models: str, statements: str, schema: str, steps: str, settings: dict[s
 
 if "snakemake" in globals():
     step = globals()["snakemake"]
-    main(
-        step.params.models, step.input.statements, step.input.schema, step.input.steps, step.params.settings,
-        step.output.csv, step.output.page,
-    )  # fmt: skip
+    with one_sentence():
+        main(
+            step.params.models, step.input.statements, step.input.schema, step.input.steps, step.params.settings,
+            step.output.csv, step.output.page,
+        )  # fmt: skip

@@ -10,7 +10,9 @@ from matplotlib.figure import Figure
 from study import preliminary
 from study.errors import StudyError
 from study.figures import coherence, curves, distribution, labels, page, response
+from study.files import replace_file
 from study.record import read_csv
+from study.step import one_sentence
 
 HIGHEST = 10.0  # hertz: the report's systems have their dynamics below it (Section 2.2)
 PARTS = ("real part", "imaginary part")
@@ -106,13 +108,14 @@ def draw(
                 raise StudyError(f"there is no kind of figure {kind!r}; known are {', '.join(kinds)}")
             figure = kinds[kind]()
             for path in paths:
-                path.write_bytes(page.rendered(figure, path.suffix[1:]))
+                replace_file(path, page.rendered(figure, path.suffix[1:]))
 
 
 if "snakemake" in globals():
     step = globals()["snakemake"]
-    draw(
-        Path(step.input.record), Path(step.input.responses), Path(step.input.coherences),
-        {kind: [Path(p) for p in paths] for kind, paths in step.output.items()},
-        title=step.params.title, style=Path(step.input.style),
-    )  # fmt: skip
+    with one_sentence():
+        draw(
+            Path(step.input.record), Path(step.input.responses), Path(step.input.coherences),
+            {kind: [Path(p) for p in paths] for kind, paths in step.output.items()},
+            title=step.params.title, style=Path(step.input.style),
+        )  # fmt: skip

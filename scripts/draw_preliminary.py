@@ -1,4 +1,4 @@
-"""Snakemake step: records and models -> the figures of Section 3, and those of the force."""
+"""Snakemake step: record and model of a case -> its figures of Section 3, and those of the force."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,9 +10,12 @@ from matplotlib import style as styles
 from matplotlib.figure import Figure
 
 from study import preliminary, spectra
+from study.errors import StudyError
 from study.figures import distribution, labels, motion, page
+from study.files import replace_file
 from study.modelfile import read_model
 from study.record import read_csv
+from study.step import one_sentence
 
 HIGHEST = 10.0  # hertz, as in the figures of A_j
 STRETCH = 512  # samples of the force that are shown: the report's subrecord
@@ -20,7 +23,7 @@ STRETCH = 512  # samples of the force that are shown: the report's subrecord
 
 @dataclass(frozen=True)
 class Source:
-    """A case's files and its title."""
+    """Files of a case, and its title."""
 
     record: Path
     model: Path
@@ -80,47 +83,47 @@ def force_histogram(source: Source) -> Figure:
     return figure
 
 
-def draw(
-    sources: Mapping[str, Source], outputs: Mapping[str, Sequence[Path]],
-    *, style: Path, segments: Mapping[str, Any], periodic: str = "mathieu", force: str = "linear",
-) -> None:  # fmt: skip
-    """Draw the figures of the preliminary analysis.
+def draw(source: Source, outputs: Mapping[str, Sequence[Path]], *, style: Path, segments: Mapping[str, Any]) -> None:
+    """Draw figures of the preliminary analysis of a case.
 
     Parameters
     ----------
-    sources : mapping
-        The cases, by name.
+    source : Source
+        The case.
     outputs : mapping
-        Files to write (PNG or SVG): for a case's name its force/displacement patterns, for
-        ``autospectrum, force_history, force_histogram`` those of the cases below.
+        For each of ``pattern, autospectrum, force_history, force_histogram`` that is wanted the files to
+        write, PNG or SVG.
     style : Path
         The style sheet.
     segments : mapping
         Length, overlap and window of the spectra.
-    periodic, force : str
-        The case whose response, and the case whose force, is shown.
+
+    Raises
+    ------
+    StudyError
+        If a kind of picture is asked for that there is not.
     """
     cut = spectra.Segments(**segments)
+    kinds = {
+        "pattern": lambda: pattern(source),
+        "autospectrum": lambda: periodic_lines(source, cut),
+        "force_history": lambda: force_history(source, cut),
+        "force_histogram": lambda: force_histogram(source),
+    }
     with styles.context(style):
         for kind, paths in outputs.items():
-            match kind:
-                case "autospectrum":
-                    figure = periodic_lines(sources[periodic], cut)
-                case "force_history":
-                    figure = force_history(sources[force], cut)
-                case "force_histogram":
-                    figure = force_histogram(sources[force])
-                case _:
-                    figure = pattern(sources[kind])
+            if kind not in kinds:
+                raise StudyError(f"there is no kind of figure {kind!r}; known are {', '.join(kinds)}")
+            figure = kinds[kind]()
             for path in paths:
-                path.write_bytes(page.rendered(figure, path.suffix[1:]))
+                replace_file(path, page.rendered(figure, path.suffix[1:]))
 
 
 if "snakemake" in globals():
     step = globals()["snakemake"]
-    rows = zip(step.params.cases, step.input.records, step.input.models, step.params.titles, strict=True)
-    draw(
-        {name: Source(Path(record), Path(model), title) for name, record, model, title in rows},
-        {kind: [Path(p) for p in paths] for kind, paths in step.output.items()},
-        style=Path(step.input.style), segments=step.params.segments,
-    )  # fmt: skip
+    with one_sentence():
+        draw(
+            Source(Path(step.input.record), Path(step.input.model), step.params.title),
+            {kind: [Path(p) for p in paths] for kind, paths in step.output.items()},
+            style=Path(step.input.style), segments=step.params.segments,
+        )  # fmt: skip

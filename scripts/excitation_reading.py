@@ -5,6 +5,7 @@ from typing import Any
 
 from study import excitation_reading, tables
 from study.claims import evidence, reported
+from study.step import one_sentence
 
 
 def main(models: str, statements: str, schema: str, settings: dict[str, Any], output: str) -> None:
@@ -15,4 +16,5 @@ def main(models: str, statements: str, schema: str, settings: dict[str, Any], ou
 
 if "snakemake" in globals():
     step = globals()["snakemake"]
-    main(step.params.models, step.input.statements, step.input.schema, step.params.settings, step.output.table)
+    with one_sentence():
+        main(step.params.models, step.input.statements, step.input.schema, step.params.settings, step.output.table)

@@ -7,6 +7,7 @@ from study import tables
 from study.case import identify_case
 from study.modelfile import read_model
 from study.record import read_csv
+from study.step import one_sentence
 
 
 def main(model: str, record: str, outputs: dict[str, str], settings: dict[str, Any]) -> None:
@@ -19,4 +20,5 @@ def main(model: str, record: str, outputs: dict[str, str], settings: dict[str, A
 
 if "snakemake" in globals():
     step = globals()["snakemake"]
-    main(step.input.model, step.input.record, dict(step.output.items()), step.params.settings)
+    with one_sentence():
+        main(step.input.model, step.input.record, dict(step.output.items()), step.params.settings)

@@ -7,6 +7,7 @@ from study import integrator_study, tables
 from study.claims.evidence import Drive, models_of, record_settings
 from study.claims.simulation import SYSTEMS
 from study.excitation import READINGS
+from study.step import one_sentence
 
 SHARE = 5  # differences on the same forces scatter little: a fifth of the ensemble's seeds is plenty
 
@@ -27,4 +28,5 @@ def main(models: str, settings: dict[str, Any], csv: str, page: str) -> None:
 
 if "snakemake" in globals():
     step = globals()["snakemake"]
-    main(step.params.models, step.params.settings, step.output.csv, step.output.page)
+    with one_sentence():
+        main(step.params.models, step.params.settings, step.output.csv, step.output.page)

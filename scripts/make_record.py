@@ -4,14 +4,19 @@ from pathlib import Path
 from typing import Any
 
 from study.case import make_record
+from study.files import replacing
 from study.modelfile import read_model
 from study.record import write_csv
+from study.step import one_sentence
 
 
 def main(model: str, output: str, settings: dict[str, Any]) -> None:
-    write_csv(make_record(read_model(Path(model)), settings), Path(output))
+    record = make_record(read_model(Path(model)), settings)
+    with replacing(Path(output)) as beside:
+        write_csv(record, beside)
 
 
 if "snakemake" in globals():
     step = globals()["snakemake"]
-    main(step.input.model, step.output.record, step.params.settings)
+    with one_sentence():
+        main(step.input.model, step.output.record, step.params.settings)

@@ -1,25 +1,30 @@
-"""Snakemake step: how often each tolerance is met over many seeds, for some of the cases."""
+"""Snakemake step: how often a case meets each tolerance over many seeds."""
 
+import sys
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from study import ensemble, tables
 from study.modelfile import read_model
+from study.step import one_sentence
+
+EVERY = 100  # seeds between two signs of life
 
 
-def main(cases: list[dict[str, Any]], seeds: range, output: str) -> None:
-    frames = []
-    for case in cases:
-        print(f"{case['record']['case']}: {len(seeds)} seeds", flush=True)
-        model = read_model(Path(case["model"]))
-        found = ensemble.estimates(model, case["record"], case["identification"], seeds)
-        frames.append(ensemble.rates(found))
-    tables.write_csv(pd.concat(frames, ignore_index=True), Path(output))
+def main(model: str, record: dict[str, Any], identification: dict[str, Any], seeds: range, output: str) -> None:
+    def progress(done: int) -> None:
+        if done % EVERY == 0 or done == len(seeds):
+            print(f"{record['case']}: {done} of {len(seeds)} seeds", file=sys.stderr, flush=True)
+
+    found = ensemble.estimates(read_model(Path(model)), record, identification, seeds, workers=1, progress=progress)
+    tables.write_csv(ensemble.rates(found), Path(output))
 
 
 if "snakemake" in globals():
     step = globals()["snakemake"]
-    count, first = step.params.ensemble["seeds"], step.params.ensemble["first_seed"]
-    main(step.params.cases, range(first, first + count), step.output.table)
+    first, count = step.params.ensemble["first_seed"], step.params.ensemble["seeds"]
+    with one_sentence():
+        main(
+            step.input.model, step.params.record, step.params.identification, range(first, first + count),
+            step.output.table,
+        )  # fmt: skip

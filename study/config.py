@@ -1,20 +1,24 @@
 """The study's configuration: read, checked whole before any job starts, and handed out case by case."""
 
-import csv
-import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-import jsonschema
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
+import numpy as np
 
+from study import terms
 from study.errors import StudyError
+from study.estimators import ESTIMATORS
+from study.excitation import Excitation, theoretical_autospectrum
+from study.model import Model, forward_graph
+from study.modelfile import read_model
+from study.schema import check, numbered_rows, read_yaml
 
 Table = dict[str, Any]
-FIGURE_KINDS = ("linear", "nonlinear", "coherence", "histogram")
+IDENTIFIED = ("linear", "nonlinear", "coherence", "histogram")  # drawn of every case
+PRELIMINARY = ("pattern", "autospectrum", "force_history", "force_histogram")  # of Section 3: drawn where numbered
+FIGURE_KINDS = IDENTIFIED + PRELIMINARY
 
 
 @dataclass(frozen=True)
@@ -36,7 +40,8 @@ class Case:
     also_assumed : str
         A term that the identification assumes beside those of the model, or empty.
     figures : dict
-        Stem of the file name of each kind of figure.
+        Stem of the file name of each kind of figure that is drawn: ``figure_<number>``, and for kinds
+        of ``IDENTIFIED`` without a number ``<case>_<kind>``.
     title : str
         For captions.
     """
@@ -93,52 +98,56 @@ class StudyConfig:
             "absolute": tolerances["absolute"],
         }
 
-    def as_dict(self) -> Table:
-        """Everything, for the rules that need every case."""
-        return {"settings": self.settings, "cases": {name: asdict(case) for name, case in self.cases.items()}}
-
 
 def load(folder: Path) -> StudyConfig:
-    """Read ``config.yaml`` and ``cases.tsv`` of a folder and check them against its schemas.
+    """Read ``config.yaml`` and ``cases.tsv`` of a folder, and the models that they name, and check them all.
+
+    Nothing that passes here can be refused by a job for the way it is configured.
 
     Raises
     ------
     StudyError
         At the first fault, naming file, row and value.
     """
-    settings = read_yaml(folder / "config.yaml")
-    check(settings, folder / "schemas" / "config.schema.yaml", str(folder / "config.yaml"))
-    _check_settings(settings, str(folder / "config.yaml"))
-    table = folder / "cases.tsv"
-    rows = read_table(table, folder / "schemas" / "cases.schema.yaml")
+    source = folder / "config.yaml"
+    settings = read_yaml(source)
+    check(settings, folder / "schemas" / "config.schema.yaml", str(source))
+    _check_settings(settings, str(source))
     cases: dict[str, Case] = {}
     figures: dict[str, str] = {}
-    for number, row in enumerate(rows, start=2):
-        where = f"{table}, row {number} (case {row['case']!r})"
+    for where, row in numbered_rows(folder / "cases.tsv", folder / "schemas" / "cases.schema.yaml"):
         if row["case"] in cases:
             raise StudyError(f"{where}: the case stands twice; each name may be used once")
         cases[row["case"]] = _case(row, where, settings, folder.parent / "models", figures)
+    for name in settings["tolerances"].get("of_case", {}):
+        if name not in cases:
+            raise StudyError(f"{source}: tolerances.of_case names {name!r}; the cases are {', '.join(cases)}")
     return StudyConfig(settings, cases)
 
 
 def _case(row: Table, where: str, settings: Table, models: Path, taken: dict[str, str]) -> Case:
-    model = models / f"{row['model']}.yaml"
-    if not model.is_file():
+    path = models / f"{row['model']}.yaml"
+    if not path.is_file():
         known = ", ".join(sorted(p.stem for p in models.glob("*.yaml")))
         raise StudyError(f"{where}: there is no system {row['model']!r}; {models.name}/ holds {known}")
     if row["excitation"] not in settings["excitations"]:
         known = ", ".join(settings["excitations"])
         raise StudyError(f"{where}: there is no excitation {row['excitation']!r}; config.yaml names {known}")
-    figures: dict[str, str] = {}
-    for kind in FIGURE_KINDS:
-        stem = f"figure_{row[kind]}" if row[kind] is not None else f"{row['case']}_{kind}"
-        if stem in taken:
-            raise StudyError(f"{where}: {kind} is {stem.removeprefix('figure_')}, which {taken[stem]} has already")
-        taken[stem] = figures[kind] = stem
-        taken[stem] = f"case {row['case']!r}"
+    try:
+        model = _complete_model(path)
+        _check_assumed(model, row["also_assumed"], settings)
+    except StudyError as error:
+        raise StudyError(f"{where}: {error}") from None
+    figures = _figures(row, where, taken)
+    if "autospectrum" in figures and "periodic_stiffness" not in model:
+        raise StudyError(f"{where}: autospectrum is {row['autospectrum']}; its lines need a term periodic_stiffness")
+    if "pattern" in figures and (model.states or not model.numbers().get("k", 0.0) > 0.0):
+        raise StudyError(
+            f"{where}: pattern is {row['pattern']}; it needs a linear stiffness above zero and no term with a memory"
+        )
     return Case(
         name=row["case"],
-        model=str(Path(models.name) / model.name),
+        model=str(Path(models.name) / path.name),
         excitation=settings["excitations"][row["excitation"]],
         level=row["level"],
         noise=row["noise"],
@@ -146,6 +155,49 @@ def _case(row: Table, where: str, settings: Table, models: Path, taken: dict[str
         figures=figures,
         title=row["title"],
     )
+
+
+def _figures(row: Table, where: str, taken: dict[str, str]) -> dict[str, str]:
+    """Stems of the files of a case's figures; ``taken`` holds those of the rows before."""
+    figures: dict[str, str] = {}
+    for kind in FIGURE_KINDS:
+        number = row[kind]
+        if number is None and kind in PRELIMINARY:
+            continue
+        stem = f"{row['case']}_{kind}" if number is None else f"figure_{number}"
+        if stem in taken:
+            raise StudyError(f"{where}: {kind} is {number}, a number that {taken[stem]} has already")
+        taken[stem] = f"{kind} of the case {row['case']!r}"
+        figures[kind] = stem
+    return figures
+
+
+def _complete_model(path: Path) -> Model:
+    """A model that can be simulated: every value known, every formula of motion and time alone."""
+    model = read_model(path)
+    try:
+        model.numbers()
+        forward_graph(model)
+    except StudyError as error:
+        raise StudyError(f"{path}: {error}") from None
+    return model
+
+
+def _check_assumed(model: Model, extra: str, settings: Table) -> None:
+    """Whether the record can tell the inputs of the assumed model apart."""
+    from study.spectra import Segments  # a second of SciPy, for those alone who load a configuration
+
+    if extra:
+        term = terms.get(extra)
+        if term.parameters:
+            raise StudyError(f"also_assumed {extra!r} needs a value for {term.parameters[0].name}; take a term without")
+        model = model.with_term(term)
+    inputs = len({c.shape for entry in model.terms for c in entry.term.components})
+    count = Segments(**settings["segments"]).count(settings["sampling"]["samples"])
+    if count <= inputs:
+        raise StudyError(
+            f"segments of config.yaml cut the record into {count}; {inputs} inputs need {inputs + 1} or more"
+        )
 
 
 def _check_settings(settings: Table, where: str) -> None:
@@ -156,101 +208,17 @@ def _check_settings(settings: Table, where: str) -> None:
             f"{where}: segments.length is {segments['length']}, longer than the record of {sampling['samples']} samples"
         )
     low, high = settings["fit_band"]
-    nyquist = 0.5 / sampling["dt"]
+    nyquist, resolution = 0.5 / sampling["dt"], 1.0 / (segments["length"] * sampling["dt"])
     if not low < high <= nyquist:
         raise StudyError(f"{where}: fit_band is [{low}, {high}]; it must rise and end below {nyquist:g} Hz")
-    for name, excitation in settings["excitations"].items():
-        cutoff = excitation.get("cutoff", 0.0)
-        if cutoff > nyquist:
-            raise StudyError(f"{where}: excitations.{name}.cutoff is {cutoff:g} Hz, above the Nyquist {nyquist:g} Hz")
-
-
-def read_yaml(path: Path) -> Table:
-    """A YAML file that holds a mapping, read without executing anything.
-
-    Raises
-    ------
-    StudyError
-        If it cannot be read or is no mapping.
-    """
-    try:
-        content: object = cast(Any, YAML(typ="safe")).load(path)
-    except OSError as error:
-        raise StudyError(f"{path} cannot be read: {error.strerror}") from None
-    except (YAMLError, UnicodeDecodeError, ValueError) as error:
-        reason = " ".join(str(error).split())
-        raise StudyError(f"{path} is not valid YAML: {reason[:200]}") from None
-    if not isinstance(content, dict):
-        raise StudyError(f"{path} holds {type(content).__name__}, not a mapping of settings")
-    return cast(Table, content)
-
-
-def read_table(path: Path, schema: Path) -> list[Table]:
-    """Rows of a tab-separated table, each cell turned into what the schema wants and checked.
-
-    Raises
-    ------
-    StudyError
-        At the first fault, naming file, row, column and value.
-    """
-    properties: Table = read_yaml(schema)["properties"]
-    try:
-        lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
-    except (OSError, UnicodeDecodeError) as error:
-        raise StudyError(f"{path} cannot be read: {error}") from None
-    if len(lines) < 2:
-        raise StudyError(f"{path} has no rows; a heading and at least one row are needed")
-    rows = list(csv.reader(lines, delimiter="\t"))
-    heading = rows[0]
-    found: list[Table] = []
-    for number, cells in enumerate(rows[1:], start=2):
-        if len(cells) != len(heading):
-            raise StudyError(f"{path}, row {number} has {len(cells)} cells; its heading has {len(heading)}")
-        where = f"{path}, row {number} ({heading[0]} {cells[0]!r})"
-        row = {
-            column: _cell(text, properties.get(column, {}), f"{where}: {column}")
-            for column, text in zip(heading, cells, strict=True)
-        }
-        check(row, schema, where)
-        found.append(row)
-    return found
-
-
-def _cell(text: str, rule: Table, where: str) -> object:
-    wanted = rule.get("type", "string")
-    kinds = cast(list[str], wanted) if isinstance(wanted, list) else [str(wanted)]
-    if "null" in kinds and not text.strip():
-        return None
-    if "string" in kinds:
-        return text.strip()
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise StudyError(f"{where} is {text!r}, which is not a number")
-    return int(number) if "integer" in kinds and number == int(number) else number
-
-
-def check(value: object, schema: Path, where: str) -> None:
-    """Hold a value against a JSON Schema.
-
-    Raises
-    ------
-    StudyError
-        With the fault that explains most, in one sentence.
-    """
-    library = cast(Any, jsonschema)  # its annotations are partial
-    validator = library.Draft202012Validator(read_yaml(schema))
-    error = library.exceptions.best_match(validator.iter_errors(value))
-    if error is not None:
-        raise StudyError(f"{where}: {_sentence(error)}")
-
-
-def _sentence(error: Any) -> str:
-    place = ".".join(str(p) for p in error.absolute_path)
-    if error.validator == "additionalProperties":
-        allowed = cast(Table, error.schema).get("properties", {})
-        extra = [key for key in cast(Table, error.instance) if key not in allowed]
-        return f"{place + ': ' if place else ''}unknown key {extra[0]!r}; known are {', '.join(allowed)}"
-    return f"{place} is not right: {error.message}" if place else error.message
+    if high - low < 4.0 * resolution:
+        raise StudyError(f"{where}: fit_band is [{low}, {high}]; it must span four lines of {resolution:g} Hz or more")
+    for name in settings["estimators"]:
+        if name not in ESTIMATORS:
+            raise StudyError(f"{where}: there is no estimator {name!r}; known are {', '.join(ESTIMATORS)}")
+    for name, described in settings["excitations"].items():
+        try:
+            excitation = Excitation(**{key: value for key, value in described.items() if key != "seed"})
+            theoretical_autospectrum(excitation, np.zeros(1), sampling["samples"], sampling["dt"])
+        except StudyError as error:
+            raise StudyError(f"{where}: excitations.{name}: {error}") from None

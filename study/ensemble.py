@@ -17,13 +17,23 @@ from study.model import Model
 Table = Mapping[str, Any]
 T = TypeVar("T")
 S = TypeVar("S")
+WANTED = 0.99  # of the seeds, for each noise-free parameter
 NOISE_OFFSET = 1_000_000  # noise seeds stand apart from force seeds
 
 
-def threaded(work: Callable[[S], T], items: Sequence[S], progress: Callable[[int], None] | None = None) -> list[T]:
-    """Results of ``work`` for each item, in order; the kernels and the FFT release the interpreter lock."""
+def threaded(
+    work: Callable[[S], T],
+    items: Sequence[S],
+    progress: Callable[[int], None] | None = None,
+    workers: int | None = None,
+) -> list[T]:
+    """Results of ``work`` for each item, in order; the kernels and the FFT release the interpreter lock.
+
+    ``progress`` is called with the number of items done; ``workers`` is the number of threads, as many
+    as there are cores where it is left out.
+    """
     done: list[T] = []
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
         for result in pool.map(work, items):
             done.append(result)
             if progress is not None:
@@ -31,7 +41,10 @@ def threaded(work: Callable[[S], T], items: Sequence[S], progress: Callable[[int
     return done
 
 
-def estimates(model: Model, record: Table, identification: Table, seeds: Iterable[int]) -> pd.DataFrame:
+def estimates(
+    model: Model, record: Table, identification: Table, seeds: Iterable[int],
+    *, workers: int | None = None, progress: Callable[[int], None] | None = None,
+) -> pd.DataFrame:  # fmt: skip
     """Every parameter of every estimator for every seed, as ``tables.parameters`` with a column ``seed``.
 
     A seed whose run diverges leaves one row with the parameter ``diverged`` and the time as its estimate.
@@ -46,7 +59,7 @@ def estimates(model: Model, record: Table, identification: Table, seeds: Iterabl
         found = identify_case(model, measured, identification)
         return tables.parameters(record["case"], model, found, identification).assign(seed=seed)
 
-    return pd.concat([f for f in threaded(one, list(seeds)) if len(f)], ignore_index=True)
+    return pd.concat([f for f in threaded(one, list(seeds), progress, workers) if len(f)], ignore_index=True)
 
 
 def rates(table: pd.DataFrame) -> pd.DataFrame:
@@ -76,6 +89,30 @@ def rates(table: pd.DataFrame) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
+
+
+def page(table: pd.DataFrame, noise: Mapping[str, float]) -> str:
+    """What :func:`rates` found as a page: which MI/SO estimates of noise-free cases meet their tolerance too seldom.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Of all cases, as :func:`rates` gives it.
+    noise : mapping of float
+        Noise of each case.
+    """
+    own = table[(table["estimator"] == "miso") & (table["case"].map(noise) == 0.0)]
+    low = own[own["within_tolerance"] < WANTED].sort_values("within_tolerance")
+    lines = [
+        "# How often each tolerance is met",
+        "",
+        f"{len(own) - len(low)} of {len(own)} MI/SO estimates of noise-free cases meet their tolerance in at least "
+        f"{100.0 * WANTED:g} % of {int(table['seeds'].max())} seeds.",
+    ]
+    for _, row in low.iterrows():
+        rate, error = 100.0 * row["within_tolerance"], 100.0 * row["rate_error"]
+        lines.append(f"- {row['case']}: {row['parameter']} in {rate:.1f} ± {error:.1f} %")
+    return "\n".join(lines) + "\n"
 
 
 def averages(values: Sequence[float]) -> tuple[float, float]:

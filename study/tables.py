@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from study.estimators.base import Identified, true_parameters
+from study.files import replacing
 from study.inputs import Input
 from study.model import Model
 
@@ -111,4 +112,5 @@ def label(item: Input) -> str:
 def write_csv(table: pd.DataFrame, path: Path) -> None:
     """Write a table with twelve significant digits: more than any estimate has, fewer than rounding has."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    table.to_csv(path, index=False, float_format="%.12g", lineterminator="\n")
+    with replacing(path) as beside:
+        table.to_csv(beside, index=False, float_format="%.12g", lineterminator="\n")

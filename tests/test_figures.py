@@ -386,16 +386,22 @@ def test_draw_refuses_an_unknown_kind(draw_case, products, tmp_path):
         draw_case.draw(*products("duffing"), {"other": [tmp_path / "a.png"]}, title="", style=SHEET)
 
 
-@pytest.mark.parametrize("kind", ["duffing", "mathieu", "autospectrum", "force_history", "force_histogram"])
-def test_preliminary_figures(draw_preliminary, products, tmp_path, kind, monkeypatch):
-    record = products("plain")[0]
-    sources = {
-        name: draw_preliminary.Source(record, ROOT / "models" / f"{name}.yaml", f"{name} system")
-        for name in ("linear", "duffing", "mathieu")
-    }
+@pytest.mark.parametrize(
+    ("system", "kind"),
+    [("duffing", "pattern"), ("mathieu", "pattern"), ("mathieu", "autospectrum"), ("linear", "force_history"),
+     ("linear", "force_histogram")],
+)  # fmt: skip
+def test_preliminary_figures(draw_preliminary, products, tmp_path, system, kind, monkeypatch):
+    source = draw_preliminary.Source(products("plain")[0], ROOT / "models" / f"{system}.yaml", f"{system} system")
     seen, real = [], page.rendered
     monkeypatch.setattr(page, "rendered", lambda figure, ending: seen.append(figure) or real(figure, ending))
     output = tmp_path / "a.svg"
-    draw_preliminary.draw(sources, {kind: [output]}, style=SHEET, segments={"length": 256})
+    draw_preliminary.draw(source, {kind: [output]}, style=SHEET, segments={"length": 256})
     assert b"</svg>" in output.read_bytes()
     check_layout(seen[0])
+
+
+def test_preliminary_refuses_an_unknown_kind(draw_preliminary, products, tmp_path):
+    source = draw_preliminary.Source(products("plain")[0], ROOT / "models" / "linear.yaml", "")
+    with pytest.raises(StudyError, match="no kind of figure 'other'; known are pattern"):
+        draw_preliminary.draw(source, {"other": [tmp_path / "a.png"]}, style=SHEET, segments={})

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from study.config import read_table
 from study.errors import StudyError
+from study.schema import read_table
 
 MANY = 8  # numbers that still read well in one cell
 

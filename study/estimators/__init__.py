@@ -1,12 +1,14 @@
 """Ways to get coefficients from a record. Each is one file with one function, entered in ``ESTIMATORS``."""
 
 from importlib import import_module
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 from study.errors import StudyError
-from study.estimators.base import Estimator, Identified, Settings
-from study.model import Model
-from study.record import Record
+
+if TYPE_CHECKING:  # who only asks which estimators there are waits for none of their modules
+    from study.estimators.base import Estimator, Identified, Settings
+    from study.model import Model
+    from study.record import Record
 
 ESTIMATORS = {
     "siso": "study.estimators.siso",
@@ -15,7 +17,7 @@ ESTIMATORS = {
 }
 
 
-def get(name: str) -> Estimator:
+def get(name: str) -> "Estimator":
     """The estimator of this name, its module imported only now.
 
     Raises
@@ -25,9 +27,9 @@ def get(name: str) -> Estimator:
     """
     if name not in ESTIMATORS:
         raise StudyError(f"there is no estimator {name!r}; known are {', '.join(ESTIMATORS)}")
-    return cast(Estimator, import_module(ESTIMATORS[name]).identify)
+    return cast("Estimator", import_module(ESTIMATORS[name]).identify)
 
 
-def identify(name: str, model: Model, record: Record, settings: Settings) -> Identified:
+def identify(name: str, model: "Model", record: "Record", settings: "Settings") -> "Identified":
     """Identify a record with the estimator of this name."""
     return get(name)(model, record, settings)

@@ -109,4 +109,4 @@ def _periodic(e: Estimate) -> tuple[Parameter, Parameter]:
         return Parameter("k_m", 0.0, e.error("km_cos")), Parameter("phase", 0.0, math.inf)
     amplitude = Parameter("k_m", size, e.derived_error({"km_cos": a / size, "km_sin": b / size}))
     turn = e.derived_error({"km_cos": b / size**2, "km_sin": -a / size**2})
-    return amplitude, Parameter("phase", math.atan2(-b, a), turn)
+    return amplitude, Parameter("phase", math.atan2(0.0 - b, a), turn)  # 0 - 0, not -0

@@ -1,0 +1,66 @@
+# Figures of each case, and its name as a target. Their files are named by the report's numbers, which no
+# wildcard can say: one rule a case.
+from study.config import IDENTIFIED
+from study.errors import StudyError
+
+DESCRIBED = {
+    "linear": "A_1: magnitude and phase",
+    "nonlinear": "A_2 (A_3): real and imaginary part",
+    "coherence": "cumulative coherence",
+    "histogram": "histogram of the response",
+    "pattern": "restoring force against displacement",
+    "autospectrum": "autospectrum of the response",
+    "force_history": "force history and autospectrum",
+    "force_histogram": "histogram of the force",
+}
+
+with one_sentence():
+    for _rule in workflow.rules:
+        if _rule.name in [*STUDY.cases, "all"]:
+            raise StudyError(f"config/cases.tsv: {_rule.name!r} is the name of a rule; give the case another")
+
+for _case in STUDY.cases:
+
+    rule:
+        name:
+            f"draw.{_case}"
+        input:
+            record=f"results/{_case}/record.csv",
+            responses=f"results/{_case}/frequency_response.csv",
+            coherences=f"results/{_case}/coherence.csv",
+            style=STYLE,
+            code=CODE["draw"],
+        output:
+            **figures_of(_case, IDENTIFIED, DESCRIBED),
+        params:
+            title=STUDY.cases[_case].title,
+        benchmark:
+            f"results/benchmarks/draw.{_case}.tsv"
+        script:
+            "../scripts/draw_case.py"
+
+    if draws_preliminary(STUDY.cases[_case]):
+
+        rule:
+            name:
+                f"draw_preliminary.{_case}"
+            input:
+                record=f"results/{_case}/record.csv",
+                model=STUDY.cases[_case].model,
+                style=STYLE,
+                code=CODE["preliminary"],
+            output:
+                **figures_of(_case, PRELIMINARY, DESCRIBED),
+            params:
+                title=STUDY.cases[_case].title,
+                segments=STUDY.settings["segments"],
+            benchmark:
+                f"results/benchmarks/draw_preliminary.{_case}.tsv"
+            script:
+                "../scripts/draw_preliminary.py"
+
+    rule:
+        name:
+            _case
+        input:
+            products(_case),

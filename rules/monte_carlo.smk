@@ -1,0 +1,37 @@
+# How often each tolerance is met: `snakemake -j2 monte_carlo`, a few minutes, not part of `all`.
+rule ensemble:
+    input:
+        model=model_of,
+        code=CODE["monte_carlo"],
+    output:
+        table="results/monte_carlo/{case}.csv",
+    params:
+        record=record_settings,
+        identification=identification_settings,
+        ensemble=STUDY.settings["monte_carlo"],
+    benchmark:
+        "results/benchmarks/ensemble.{case}.tsv"
+    script:
+        "../scripts/monte_carlo.py"
+
+
+rule rates:
+    input:
+        tables=[f"results/monte_carlo/{case}.csv" for case in STUDY.cases],
+        code=CODE["join"],
+    output:
+        table="results/monte_carlo.csv",
+    script:
+        "../scripts/join.py"
+
+
+rule monte_carlo:
+    input:
+        table="results/monte_carlo.csv",
+        code=CODE["rates"],
+    output:
+        page="results/monte_carlo.md",
+    params:
+        noise=NOISE,
+    script:
+        "../scripts/rates.py"

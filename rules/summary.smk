@@ -1,0 +1,69 @@
+# What all cases give together: one table of parameters, and the page that a reader opens first.
+BENCHMARKS = [f"results/benchmarks/{stage}.{case}.tsv" for stage in ("record", "identify", "draw") for case in STUDY.cases]
+BENCHMARKS += [
+    f"results/benchmarks/draw_preliminary.{name}.tsv" for name, case in STUDY.cases.items() if draws_preliminary(case)
+]
+BENCHMARKS += [f"results/benchmarks/{rule}.tsv" for rule in ("excitation_reading", "integrator_steps", "claims")]
+PAGES = {
+    "claims": "Claims of the report",
+    "parameters": "Parameters of all cases",
+    "excitation_reading": "Reading of unit variance",
+    "integrator_steps": "Steps of the integrator",
+}
+SUMMARY_RESULTS = ["results/parameters.csv", "results/summary.md"] + [f"results/pages/{name}.html" for name in PAGES]
+
+
+rule parameters:
+    input:
+        tables=[f"results/{case}/parameters.csv" for case in STUDY.cases],
+        code=CODE["join"],
+    output:
+        table=report(
+            "results/parameters.csv",
+            caption="captions/parameters.rst",
+            category="Tables",
+            labels={"table": "Parameters of all cases", "as": "raw CSV"},
+        ),
+    script:
+        "../scripts/join.py"
+
+
+rule summary:
+    input:
+        parameters="results/parameters.csv",
+        claims="results/claims.csv",
+        reading="results/excitation_reading.csv",
+        benchmarks=BENCHMARKS,
+        code=CODE["summary"],
+    output:
+        page="results/summary.md",
+        html=report(
+            "results/pages/summary.html",
+            caption="captions/summary.rst",
+            category="Summary",
+            labels={"page": "The report, run again"},
+        ),
+    params:
+        told={"noise": NOISE, "setting": STUDY.settings["excitations"]["report"].get("reading", "raw")},
+    script:
+        "../scripts/summary.py"
+
+
+rule pages:
+    input:
+        tables=[f"results/{name}.csv" for name in PAGES],
+        code=CODE["table_page"],
+    output:
+        pages=[
+            report(
+                f"results/pages/{name}.html",
+                caption=f"captions/{name}.rst",
+                category="Tables",
+                labels={"table": title, "as": "page"},
+            )
+            for name, title in PAGES.items()
+        ],
+    params:
+        titles=PAGES,
+    script:
+        "../scripts/table_page.py"

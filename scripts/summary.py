@@ -1,0 +1,41 @@
+"""Snakemake step: tables of the study -> the page that a reader opens first."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from study import document, summary
+from study.files import replace_file
+from study.step import one_sentence
+
+
+def run_times(paths: Sequence[str]) -> pd.DataFrame:
+    """Seconds of each job from Snakemake's benchmark files, which are named ``<stage>.<case>.tsv``."""
+    rows = []
+    for path in paths:
+        stage, _, case = Path(path).name.removesuffix(".tsv").partition(".")
+        rows.append({"stage": stage, "case": case, "seconds": float(pd.read_csv(path, sep="\t")["s"].iloc[0])})
+    return pd.DataFrame(rows, columns=["stage", "case", "seconds"])
+
+
+def main(inputs: Mapping[str, str], benchmarks: Sequence[str], told: Mapping[str, Any], page: str, html: str) -> None:
+    tables = summary.Tables(
+        parameters=pd.read_csv(inputs["parameters"]),
+        claims=pd.read_csv(inputs["claims"], keep_default_na=False),
+        reading=pd.read_csv(inputs["reading"]),
+        times=run_times(benchmarks),
+        noise=told["noise"],
+        setting=told["setting"],
+    )
+    blocks = summary.blocks(tables)
+    replace_file(Path(page), document.markdown(blocks).encode())
+    replace_file(Path(html), document.page("The report, run again", blocks).encode())
+
+
+if "snakemake" in globals():
+    step = globals()["snakemake"]
+    tables = {name: getattr(step.input, name) for name in ("parameters", "claims", "reading")}
+    with one_sentence():
+        main(tables, step.input.benchmarks, step.params.told, step.output.page, step.output.html)

@@ -1,0 +1,106 @@
+"""Pages made of headings, text and tables, as Markdown for a reader of files and as HTML for the report page."""
+
+import html
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tabulate import tabulate
+
+STYLE = """\
+body { font: 15px/1.45 system-ui, sans-serif; color: #1a1a1a; max-width: 1200px; margin: 1.5em auto; padding: 0 1em }
+table { border-collapse: collapse; margin: 0.6em 0 1.4em; font-size: 13px }
+th, td { text-align: left; vertical-align: top; padding: 0.3em 0.7em; border-bottom: 1px solid #ddd }
+th { border-bottom: 2px solid #888; position: sticky; top: 0; background: white }
+tr:hover td { background: #f4f7fb }
+code { background: #f2f2f2; padding: 0 0.2em }"""
+BOLD, CODE, LINK = r"\*\*(.+?)\*\*", r"`(.+?)`", r"\[(.+?)\]\(([^)]+)\)"
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A heading of level 1 or 2."""
+
+    text: str
+    level: int = 2
+
+
+@dataclass(frozen=True)
+class Text:
+    """A paragraph. Text may hold ``**bold**``, a word of code in back quotes, and ``[a](link)``."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Bullets:
+    """A list of sentences."""
+
+    items: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of words under a heading."""
+
+    heading: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+Block = Heading | Text | Bullets | Table
+
+
+def table(heading: Sequence[str], rows: Sequence[Sequence[object]]) -> Block:
+    """A table, or a word that says that there is nothing."""
+    if not rows:
+        return Text("None.")
+    return Table(tuple(heading), tuple(tuple(str(cell) for cell in row) for row in rows))
+
+
+def markdown(blocks: Sequence[Block]) -> str:
+    """The page as Markdown."""
+    return "\n\n".join(_markdown(block) for block in blocks) + "\n"
+
+
+def _markdown(block: Block) -> str:
+    match block:
+        case Heading(text, level):
+            return f"{'#' * level} {text}"
+        case Text(text):
+            return text
+        case Bullets(items):
+            return "\n".join(f"- {item}" for item in items)
+        case Table(heading, rows):
+            cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
+            return tabulate(cells, headers=list(heading), tablefmt="pipe", disable_numparse=True)
+
+
+def page(title: str, blocks: Sequence[Block]) -> str:
+    """The page as one HTML file that asks for nothing from anywhere."""
+    body = "\n".join(_html(block) for block in blocks)
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f"<title>{html.escape(title)}</title>\n<style>\n{STYLE}\n</style>\n</head>\n<body>\n{body}\n</body>\n</html>\n"
+    )
+
+
+def _html(block: Block) -> str:
+    match block:
+        case Heading(text, level):
+            return f"<h{level}>{_inline(text)}</h{level}>"
+        case Text(text):
+            return f"<p>{_inline(text)}</p>"
+        case Bullets(items):
+            return "<ul>" + "".join(f"<li>{_inline(item)}</li>" for item in items) + "</ul>"
+        case Table(heading, rows):
+            head = "".join(f"<th>{_inline(cell)}</th>" for cell in heading)
+            lines = ["<tr>" + "".join(f"<td>{_inline(cell)}</td>" for cell in row) + "</tr>" for row in rows]
+            return f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n" + "\n".join(lines) + "\n</tbody>\n</table>"
+
+
+def _inline(text: str) -> str:
+    """Marks within a line; links lead out of a self-contained page and become plain words."""
+    text = html.escape(text, quote=False)
+    for pattern, put in ((BOLD, r"<strong>\1</strong>"), (CODE, r"<code>\1</code>"), (LINK, r"\1")):
+        text = re.sub(pattern, put, text)
+    return text

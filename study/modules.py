@@ -1,0 +1,67 @@
+"""Which modules a script rests on: Snakemake sees a change of a script by itself, of a module only when told."""
+
+import ast
+from collections.abc import Collection, Iterable, Iterator
+from functools import cache
+from pathlib import Path
+
+from study.errors import StudyError
+
+
+def rests_on(script: Path, *, also: Iterable[str] = (), without: Collection[str] = ()) -> list[str]:
+    """Files of the package that a script imports, directly or through one another.
+
+    Parameters
+    ----------
+    script : Path
+        A Python file; the package stands in the folder above its own.
+    also : iterable of str
+        Modules that are imported by name while the script runs, such as ``study.estimators.miso``.
+    without : collection of str
+        Modules that are not followed: what the script imports along with what it needs, and does not use.
+
+    Returns
+    -------
+    list of str
+        Sorted paths relative to the working directory.
+    """
+    root = script.parent.parent
+    found: set[Path] = set()
+    waiting = [script, *(path for name in also for path in _files(name, root))]
+    skipped = {path for name in without for path in _files(name, root)}
+    while waiting:
+        path = waiting.pop()
+        if path not in found and path not in skipped:
+            found.add(path)
+            waiting += [other for name in _imported(path) for other in _files(name, root)]
+    return sorted(str(path) for path in found - {script})
+
+
+@cache
+def _imported(path: Path) -> tuple[str, ...]:
+    """Names that a file imports, those inside functions included, those for the type checker alone not."""
+    try:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+    except (OSError, SyntaxError) as error:
+        raise StudyError(f"{path} cannot be read as Python: {error}") from None
+    return tuple(_names(tree))
+
+
+def _names(tree: ast.AST) -> Iterator[str]:
+    for node in ast.iter_child_nodes(tree):
+        match node:
+            case ast.Import(names=names):
+                yield from (name.name for name in names)
+            case ast.ImportFrom(module=str(module), names=names):
+                yield module
+                yield from (f"{module}.{name.name}" for name in names)
+            case ast.If(test=ast.Name(id="TYPE_CHECKING")):
+                pass
+            case _:
+                yield from _names(node)
+
+
+def _files(name: str, root: Path) -> list[Path]:
+    """The file of a module of the package, or of a package in it."""
+    stem = root.joinpath(*name.split("."))
+    return [p for p in (stem.with_suffix(".py"), stem / "__init__.py") if name.startswith("study.") and p.is_file()]

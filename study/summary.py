@@ -1,0 +1,184 @@
+"""``results/summary.md``: the page that a reader opens first, made of the tables that the study wrote."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from study.claims.verdict import NOT_REPRODUCED, PARTLY, REPRODUCED
+from study.document import Block, Bullets, Heading, Text, table
+
+INTRODUCTION = (
+    "Bendat, Palo and Coppolino identify nonlinear systems with one degree of freedom from force and response: "
+    "reverse the two, and every term of the equation of motion is a linear path of its own (reverse dynamic MI/SO). "
+    "This page sets what their report states beside what this study finds. Every number on it is computed."
+)
+FILES = (
+    ("`results/<case>/record.csv`", "the record: time, force, displacement, velocity, acceleration"),
+    ("`results/<case>/frequency_response.csv`", "A_j(f) by estimator with its standard error, and the exact function"),
+    ("`results/<case>/coherence.csv`", "ordinary, partial and cumulative coherences"),
+    ("`results/<case>/parameters.csv`", "parameters of the case; `results/parameters.csv` holds those of all cases"),
+    ("`figures/figure_<number>.png`, `.svg`", "the report's Figures 2 to 8 and 16 to 61, by its numbers"),
+    ("`results/claims.md`, `claims.csv`", "every checkable statement: reported, measured, criterion, verdict"),
+    ("`results/excitation_reading.csv`", 'both readings of "unit variance" against the numbers that the report quotes'),
+    ("`results/integrator_steps.md`, `.csv`", "what the report's one step a sample does to each recovered parameter"),
+    ("`results/monte_carlo.csv`", "how often each tolerance is met over many seeds: `snakemake -j2 monte_carlo`"),
+    ("`report.html`", "all of it on one page that needs no network: `snakemake --report report.html`"),
+)
+
+
+@dataclass(frozen=True)
+class Tables:
+    """What the page is made of, each as the study wrote it.
+
+    Attributes
+    ----------
+    parameters, claims, reading : DataFrame
+        ``results/parameters.csv``, ``claims.csv``, ``excitation_reading.csv``.
+    times : DataFrame
+        Columns ``stage, case, seconds``: one row a job.
+    noise : dict of float
+        Noise of each case, by name, in the order of the page.
+    setting : str
+        The reading of unit variance that the study runs with.
+    """
+
+    parameters: pd.DataFrame
+    claims: pd.DataFrame
+    reading: pd.DataFrame
+    times: pd.DataFrame
+    noise: dict[str, float]
+    setting: str
+
+
+def blocks(tables: Tables) -> list[Block]:
+    """The whole page."""
+    sections: list[tuple[str, Callable[[Tables], list[Block]]]] = [
+        ("What was reproduced", counts),
+        ("The report's numbers beside ours", numbers),
+        ("Parameters by case", parameters),
+        ("Claims that are not or only partly reproduced", failing),
+        ("Claims that are reproduced", reproduced),
+        ('What "unit variance" refers to', reading),
+        ("Where everything is", lambda _: [table(["where", "what"], FILES)]),
+        ("Run times", run_times),
+    ]
+    found: list[Block] = [Heading("The report, run again", 1), Text(INTRODUCTION)]
+    for title, section in sections:
+        found += [Heading(title), *section(tables)]
+    return found
+
+
+def counts(tables: Tables) -> list[Block]:
+    """How many claims and parameters hold, in sentences."""
+    verdicts = tables.claims["verdict"]
+    total, (whole, part, none) = len(verdicts), (
+        int((verdicts == verdict).sum()) for verdict in (REPRODUCED, PARTLY, NOT_REPRODUCED)
+    )  # fmt: skip
+    own = tables.parameters[tables.parameters["estimator"] == "miso"]
+    quiet = own[own["case"].map(tables.noise) == 0.0]
+    noisy = own[own["case"].map(tables.noise) > 0.0]
+    lines = [
+        f"Of {total} statements of the report, **{whole} are reproduced**, {part} partly, {none} not: "
+        "each of these has its reason below.",
+        f"Without noise, MI/SO recovers {_met(quiet)} parameters of {quiet['case'].nunique()} cases within "
+        "tolerances that were set before looking.",
+    ]
+    if len(noisy):
+        lines.append(
+            f"With noise on the displacement, {_met(noisy)} parameters of {noisy['case'].nunique()} cases are "
+            "within the same tolerances; the claims of Section 5.4 say why."
+        )
+    return [Bullets(tuple(lines))]
+
+
+def _met(table: pd.DataFrame) -> str:
+    return f"{int(table['within_tolerance'].sum())} of {len(table)}"
+
+
+def numbers(tables: Tables) -> list[Block]:
+    """Every statement with a number: reported, measured, verdict."""
+    stated = tables.claims[~tables.claims["reported"].isin(["as stated", "as tabulated"])]
+    rows = [
+        [row["where"], row["claim"], row["reported"], str(row["measured"]).split("; ")[0], row["verdict"]]
+        for _, row in stated.iterrows()
+    ]
+    note = (
+        "Ours: mean over the seeds of an ensemble with its standard error, and the study's own record in brackets. "
+        "Of statements with several conditions the first is shown; [claims.md](claims.md) has them all."
+    )
+    return [Text(note), table(["where", "what", "report", "ours", "verdict"], rows)]
+
+
+def parameters(tables: Tables) -> list[Block]:
+    """One row a parameter, one column an estimator: estimate, standard error, error, verdict."""
+    names = list(dict.fromkeys(tables.parameters["estimator"]))
+    rows: list[list[str]] = []
+    for (case, parameter), group in tables.parameters.groupby(["case", "parameter"], sort=False):
+        found = {str(row["estimator"]): row for _, row in group.iterrows()}
+        cells = [_estimate(found[name]) if name in found else "" for name in names]
+        limit = found.get("miso", group.iloc[0])
+        rows.append([str(case), str(parameter), f"{limit['true']:.6g}", _tolerance(limit), *cells])
+    note = (
+        "In SI units (kg, N s/m, N/m, Hz, N/m^3, N s/m^3, rad); with its standard error, and the error against the "
+        "true value. In bold what lies outside the tolerance."
+    )
+    heading = ["case", "parameter", "true", "tolerance", *(name.replace("_", " ") for name in names)]
+    return [Text(note), table(heading, rows)]
+
+
+def _estimate(row: "pd.Series[Any]") -> str:
+    error = "" if pd.isna(row["standard_error"]) else f" ± {row['standard_error']:.2g}"
+    relative = "" if pd.isna(row["relative_error"]) else f" ({100.0 * row['relative_error']:+.2g} %)"
+    text = f"{row['estimate']:.5g}{error}{relative}"
+    return text if row["within_tolerance"] else f"**{text}**"
+
+
+def _tolerance(row: "pd.Series[Any]") -> str:
+    if pd.isna(row["tolerance"]):
+        return "none"
+    return f"{100.0 * row['tolerance']:g} %" if row["true"] != 0.0 else f"{row['tolerance']:g}"
+
+
+def failing(tables: Tables) -> list[Block]:
+    """What is not reproduced, or partly, and why."""
+    kept = tables.claims[tables.claims["verdict"] != REPRODUCED].sort_values("verdict", kind="stable")
+    rows = [[row["verdict"], row["where"], row["claim"], row["why"]] for _, row in kept.iterrows()]
+    return [table(["verdict", "where", "claim", "why"], rows)]
+
+
+def reproduced(tables: Tables) -> list[Block]:
+    """What is reproduced, and what was measured."""
+    kept = tables.claims[tables.claims["verdict"] == REPRODUCED]
+    rows = [[row["where"], row["claim"], row["measured"]] for _, row in kept.iterrows()]
+    return [table(["where", "claim", "measured"], rows)]
+
+
+def reading(tables: Tables) -> list[Block]:
+    """Both readings of unit variance beside the numbers that the report quotes."""
+    rows = [
+        [row["quantity"], f"{row['reported']:g}", _mean(row, "raw"), _mean(row, "filtered"), row["nearer"]]
+        for _, row in tables.reading.iterrows()
+    ]
+    raw = int((tables.reading["nearer"] == "raw").sum())
+    note = (
+        f"The variance of the white sequence before its low-pass (raw) comes nearer in {raw} of {len(rows)} numbers, "
+        f"that of the applied force (filtered) in {len(rows) - raw}. The study runs with `{tables.setting}`."
+    )
+    return [Text(note), table(["number", "report", "raw", "filtered", "nearer"], rows)]
+
+
+def _mean(row: "pd.Series[Any]", which: str) -> str:
+    return f"{row[f'{which}_mean']:.4g} ± {row[f'{which}_standard_error']:.1g}"
+
+
+def run_times(tables: Tables) -> list[Block]:
+    """Seconds by stage."""
+    rows: list[list[str]] = []
+    for stage, group in tables.times.groupby("stage", sort=False):
+        seconds = group["seconds"]
+        rows.append([str(stage).replace("_", " "), str(len(group)), f"{seconds.sum():.1f}", f"{seconds.max():.1f}"])
+    rows.append(["all", str(len(tables.times)), f"{tables.times['seconds'].sum():.1f}", ""])
+    note = "Wall time of each stage's jobs on the machine that made these results, start-up of Python included."
+    return [Text(note), table(["stage", "jobs", "seconds together", "longest"], rows)]
