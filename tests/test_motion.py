@@ -244,10 +244,10 @@ def test_burg_continues_what_can_be_continued() -> None:
     assert np.max(np.abs(nodes)) < 1.0 + 1e-9
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(
     samples=st.integers(16, 300), seed=st.integers(0, 2**32 - 1), order=st.sampled_from([-2, -1, 0, 1, 2]),
-    scale=st.sampled_from([1e-12, 1.0, 1e12]), shape=st.sampled_from(["noise", "ramp", "step", "blow", "constant"]),
+    scale=st.sampled_from([2.0**-40, 1.0, 2.0**40]), shape=st.sampled_from(["noise", "ramp", "step", "blow", "constant"]),
 )  # fmt: skip
 def test_any_signal_gives_finite_numbers_that_scale(
     samples: int, seed: int, order: int, scale: float, shape: str
@@ -264,12 +264,7 @@ def test_any_signal_gives_finite_numbers_that_scale(
     one = derivative(signal, DT, order, cutoff)
     assert one.shape == signal.shape
     assert np.isfinite(one).all()
-    np.testing.assert_allclose(
-        derivative(scale * signal, DT, order, cutoff),
-        scale * one,
-        rtol=1e-5,
-        atol=scale * (1e-6 * np.max(np.abs(one)) + 1e-12),
-    )
+    np.testing.assert_array_equal(derivative(scale * signal, DT, order, cutoff), scale * one)  # a power of two: exactly
     if shape == "constant" and order:
         assert np.max(np.abs(one)) < 1e-9
 
