@@ -247,7 +247,7 @@ def test_burg_continues_what_can_be_continued() -> None:
 @settings(max_examples=150, deadline=None)
 @given(
     samples=st.integers(16, 300), seed=st.integers(0, 2**32 - 1), order=st.sampled_from([-2, -1, 0, 1, 2]),
-    scale=st.sampled_from([2.0**-40, 1.0, 2.0**40]), shape=st.sampled_from(["noise", "ramp", "step", "blow", "constant"]),
+    scale=st.sampled_from([2.0**-40, 2.0**40]), shape=st.sampled_from(["noise", "ramp", "step", "blow", "constant"]),
 )  # fmt: skip
 def test_any_signal_gives_finite_numbers_that_scale(
     samples: int, seed: int, order: int, scale: float, shape: str
