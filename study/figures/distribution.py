@@ -35,6 +35,6 @@ def histogram(axes: Axes, counts: Histogram, quantity: str, unit: str) -> Axes:
     axes.set_ylabel(f"probability density (1/{units.pretty(shown)})")
     spread, skewness = labels.quantity(counts.deviation, unit), round(counts.skewness, 2) + 0.0  # not "-0.00"
     axes.set_title(
-        f"deviation {spread}, skewness {skewness:.2f} (Gaussian: 0), kurtosis {counts.kurtosis:.2f} (3)"
+        f"std. deviation {spread}, skewness {skewness:.2f} (Gaussian: 0), kurtosis {counts.kurtosis:.2f} (3)"
     )
     return axes
