@@ -1,9 +1,4 @@
-"""Records with a hidden effect: the proof, and the practice ground, of ``diagnose``.
-
-A trial draws a system, an excitation, an effect (or none, or two) and its strength, which sensor there
-is and its noise, simulates, and keeps the answer apart from the record and the model that a user would
-believe in. Everything follows from the seed.
-"""
+"""A trial: a system, an excitation, a hidden effect (or none, or two) and a sensor, all drawn from one seed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,22 +6,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study.errors import DivergenceError
+from study.errors import DivergenceError, StudyError
 from study.excitation import Excitation, displacement_noise, force
 from study.free_run import predict
-from study.inputs import Input, history, reverse_inputs
-from study.linear import least_squares
 from study.model import Model, ModelTerm, free
-from study.record import Record
+from study.record import MOTIONS, Record
 from study.simulate import Integrator, simulate
 from study.terms import LIBRARY, Term, get
+from study.trials.strength import SHARE, grown, share_of
 
 Floats = NDArray[np.float64]
-LINEAR = ("inertia", "linear_damping", "linear_stiffness")
+LINEAR = ("inertia", "linear_damping", "linear_stiffness")  # what a linear model has: it cannot be hidden behind one
 HIDDEN = tuple(name for name in LIBRARY if name not in LINEAR)
+EITHER_WAY = (  # effects that occur with either sign: an opening or a closing gap, hardening or softening
+    "quadratic_stiffness", "signed_quadratic_stiffness", "cubic_stiffness", "dead_band", "bilinear_stiffness",
+    "constant_force",
+)  # fmt: skip
 NOISES = (0.0, 0.01, 0.05, 0.10)
-SHARE = (0.10, 0.40)  # of the restoring force, what no linear model can take over
+KNOWN = ("none", "none", "cubic_stiffness", "van_der_pol_damping")  # of which one is drawn
+KNOWN_SHARE = 0.15
 SAMPLES = 8192
+PUSH, FORGOTTEN = 20, 1e-3  # samples at the start; share of the motion in the second half
 ATTEMPTS = 300  # systems drawn until one carries the effects at the wanted strength and stays finite
 
 
@@ -72,12 +72,20 @@ def make_trial(
     noise : float, optional
         Mean square of the noise over that of the response.
     response : str, optional
-        ``displacement`` or ``acceleration``.
+        ``displacement``, ``velocity`` or ``acceleration``.
+
+    Raises
+    ------
+    StudyError
+        If an effect cannot be hidden, or the response is no motion.
+    DivergenceError
+        If no system was found that stays finite with these effects.
     """
     rng = np.random.default_rng([2026, seed])
     if hidden is None:
         count = int(rng.choice([0, 1, 1, 1, 1, 2]))
         hidden = tuple(str(n) for n in rng.choice(HIDDEN, count, replace=False))
+    _check(hidden, response)
     drawn_noise = float(rng.choice(NOISES))
     drawn_response = str(rng.choice(["displacement", "acceleration"]))
     noise = drawn_noise if noise is None else noise
@@ -89,41 +97,59 @@ def make_trial(
     raise DivergenceError(f"no system of trial {seed} stays finite with {', '.join(hidden)}", 0.0)
 
 
+def _check(hidden: Sequence[str], response: str | None) -> None:
+    for name in hidden:
+        if get(name).name not in HIDDEN:
+            raise StudyError(f"{name!r} cannot be hidden, a linear model has it; take {', '.join(HIDDEN)}")
+    if len(set(hidden)) < len(hidden):
+        raise StudyError(f"the effects to hide are {', '.join(hidden)}; each may be named once")
+    if response is not None and response not in MOTIONS:
+        raise StudyError(f"response is {response!r}; it must be one of {', '.join(MOTIONS)}")
+
+
 def _attempt(rng: np.random.Generator, seed: int, hidden: tuple[str, ...], noise: float, response: str) -> Trial | None:
-    base, dt = _system(rng, hidden)
+    base, dt = _system(rng)
     excitation = Excitation(level=float(10.0 ** rng.uniform(-1.0, 5.0)), reading="filtered", cutoff=0.25 / dt)
     drive = force(excitation, SAMPLES, dt, seed)
     try:
         quiet = simulate(base, drive, dt, Integrator("rk4", 4))
         scale = float(np.std(quiet["displacement"]))
         base, quiet = _with_own_nonlinearity(rng, base, hidden, drive, dt, quiet)
-        truth, shares = base, list[float]()
+        truth: Model | None = base
         for name in hidden:
-            target = float(rng.uniform(*SHARE))
-            entry = _drawn(rng, get(name), quiet, scale)
-            grown = _grow(truth, entry, drive, dt, target)
-            if grown is None:
+            truth = _with_effect(rng, truth, name, quiet, scale, drive, dt)
+            if truth is None:
                 return None
-            truth, share = grown
-            shares.append(share)
         record = simulate(truth, drive, dt, Integrator("rk4", 8))
+        forgets = _forgets(truth, drive, dt)
     except DivergenceError:
         return None
-    if not 0.1 * scale < np.std(record["displacement"]) < 10.0 * scale:
+    shares = tuple(share_of(truth, name, record) for name in hidden)
+    if not forgets or not 0.1 * scale < np.std(record["displacement"]) < 10.0 * scale:
         return None
-    if any(not 0.8 * SHARE[0] < share_of(truth, name, record) < 1.2 * SHARE[1] for name in hidden):
+    if any(not SHARE[0] <= share <= SHARE[1] for share in shares):
         return None
     values = predict(truth, record, response=response, steps_per_sample=8)  # exact at stick and slip too
     if noise > 0.0:
         values = values + displacement_noise(values, noise, seed)
     measured = Record(dt, {"force": drive, response: values}, record.units, f"trial_{seed}")
-    believed = replace(base, name="believed").with_values(dict.fromkeys(base.values, None))
-    return Trial(measured, believed, truth, hidden, noise, tuple(shares))
+    believed = replace(base, name=f"trial_{seed}").with_values(dict.fromkeys(base.values, None))
+    return Trial(measured, believed, truth, hidden, noise, shares)
 
 
-def _system(rng: np.random.Generator, hidden: tuple[str, ...]) -> tuple[Model, float]:
+def _forgets(model: Model, drive: Floats, dt: float) -> bool:
+    """Whether the motion forgets a small push at its start: that of a chaotic system does not, and no free run follows.
+
+    A spring that pushes away from the centre would make such a system, with two places to rest.
+    """
+    pushed = drive.copy()
+    pushed[:PUSH] += 0.1 * float(np.std(drive))
+    one, other = (simulate(model, f, dt, Integrator("rk4", 2))["displacement"][SAMPLES // 2 :] for f in (drive, pushed))
+    return float(np.std(one - other)) < FORGOTTEN * float(np.std(one))
+
+
+def _system(rng: np.random.Generator) -> tuple[Model, float]:
     """A linear oscillator of any size, sampled as the report's is, give or take a factor of two."""
-    del hidden
     mass = float(10.0 ** rng.uniform(-2.0, 3.0))
     f_n = float(10.0 ** rng.uniform(-0.5, 2.0))
     zeta = float(rng.uniform(0.02, 0.10))
@@ -137,13 +163,22 @@ def _with_own_nonlinearity(
     rng: np.random.Generator, base: Model, hidden: tuple[str, ...], drive: Floats, dt: float, quiet: Record
 ) -> tuple[Model, Record]:
     """Half of the systems have a known nonlinearity of the report's kind from the start."""
-    known = str(rng.choice(["none", "none", "cubic_stiffness", "van_der_pol_damping"]))
+    known = str(rng.choice(KNOWN))
     if known == "none" or known in hidden:
         return base, quiet
-    grown = _grow(base, free(get(known)), drive, dt, 0.15)
-    if grown is None:
+    found = grown(base, free(get(known)), drive, dt, KNOWN_SHARE)
+    if found is None:
         return base, quiet
-    return grown[0], simulate(grown[0], drive, dt, Integrator("rk4", 4))
+    return found[0], simulate(found[0], drive, dt, Integrator("rk4", 4))
+
+
+def _with_effect(
+    rng: np.random.Generator, model: Model, name: str, quiet: Record, scale: float, drive: Floats, dt: float
+) -> Model | None:
+    """The model and a hidden effect, as strong as is drawn; None where that cannot be."""
+    target = float(rng.uniform(*SHARE))
+    found = grown(model, _drawn(rng, get(name), quiet, scale), drive, dt, target)
+    return None if found is None else found[0]
 
 
 def _drawn(rng: np.random.Generator, term: Term, quiet: Record, scale: float) -> ModelTerm:
@@ -165,64 +200,6 @@ def _drawn(rng: np.random.Generator, term: Term, quiet: Record, scale: float) ->
             values = ()
     entry = free(term)
     angle = float(rng.uniform(0.0, 2.0 * np.pi))
-    shape = (np.cos(angle), np.sin(angle)) if len(term.components) == 2 else (1.0,)
+    sign = -1.0 if term.name in EITHER_WAY and angle > np.pi else 1.0
+    shape = (np.cos(angle), np.sin(angle)) if len(term.components) == 2 else (sign,)
     return replace(entry, coefficients=tuple(float(s) for s in shape), parameters=values)
-
-
-def _grow(model: Model, entry: ModelTerm, drive: Floats, dt: float, target: float) -> tuple[Model, float] | None:
-    """The amount of an effect at which it carries the target share, by iteration on the simulated motion."""
-    unit = tuple(c if c is not None else 1.0 for c in entry.coefficients)
-    amount, share = 0.0, 0.0
-    record = simulate(model, drive, dt, Integrator("rk4", 2))
-    for _ in range(12):
-        alone = _unshared(replace(entry, coefficients=unit), record)
-        restoring = drive - (model.values["m"] or 0.0) * record["acceleration"]
-        share = amount * alone / float(np.std(restoring))
-        if amount > 0.0 and abs(share / target - 1.0) < 0.05:
-            return model.with_term(replace(entry, coefficients=tuple(amount * c for c in unit))), share
-        if alone == 0.0:
-            return None
-        wanted = target * float(np.std(restoring)) / alone
-        amount = wanted if amount == 0.0 else float(np.sqrt(amount * wanted))
-        grown = model.with_term(replace(entry, coefficients=tuple(amount * c for c in unit)))
-        try:
-            record = simulate(grown, drive, dt, Integrator("rk4", 2))
-        except DivergenceError:
-            return None
-    return None
-
-
-def share_of(model: Model, name: str, record: Record) -> float:
-    """Share of the rms restoring force that a term carries and no linear model can take over."""
-    entry = next(t for t in model.terms if t.name == name)
-    restoring = record["force"] - (model.values["m"] or 0.0) * record["acceleration"]
-    return _unshared(entry, record) / float(np.std(restoring))
-
-
-def _unshared(entry: ModelTerm, record: Record) -> float:
-    """Root mean square of a term's force less its best fit by displacement, velocity and acceleration."""
-    own = _force(entry, record)
-    motion = np.column_stack([record[c] for c in ("displacement", "velocity", "acceleration")])
-    rest = own - motion @ least_squares(motion, own)
-    return float(np.sqrt(np.mean(rest**2)))
-
-
-def _force(entry: ModelTerm, record: Record) -> Floats:
-    """The force of one term along a record: what a system of this term and unit mass leaves of no force."""
-    total = np.zeros(len(record))
-    model = Model("alone", (entry,))
-    for item in reverse_inputs(model):
-        values = history(item, record)
-        for part in item.parts:
-            rate = values if part.order == 0 else _rate(item, record)
-            total = total + (model.values[part.symbol] or 0.0) * part.factor * rate
-    return total
-
-
-def _rate(item: Input, record: Record) -> Floats:
-    """Time derivative of a shape of displacement alone, by the chain rule on a fine difference."""
-    u = record["displacement"]
-    step = 1e-6 * float(np.std(u))
-    ahead = history(item, record.with_channels({"displacement": u + step}))
-    behind = history(item, record.with_channels({"displacement": u - step}))
-    return (ahead - behind) / (2.0 * step) * record["velocity"]

@@ -1,0 +1,6 @@
+"""Records with a hidden effect: the proof, and the practice ground, of ``diagnose``."""
+
+from study.trials.draw import HIDDEN, NOISES, Trial, make_trial
+from study.trials.strength import SHARE, share_of
+
+__all__ = ["HIDDEN", "NOISES", "SHARE", "Trial", "make_trial", "share_of"]

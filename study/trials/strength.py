@@ -1,0 +1,96 @@
+"""How strong is an effect: the share of the restoring force that it carries and no linear model can take over."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.errors import DivergenceError
+from study.inputs import Input, history, reverse_inputs
+from study.linear import least_squares
+from study.model import Model, ModelTerm
+from study.record import Record
+from study.simulate import Integrator, simulate
+
+Floats = NDArray[np.float64]
+SHARE = (0.10, 0.40)  # of the rms restoring force, in every trial
+ROUNDS = 12  # of the iteration on the amount
+CLOSE = 0.05  # relative distance from the wanted share at which it ends
+
+
+def grown(model: Model, entry: ModelTerm, drive: Floats, dt: float, target: float) -> tuple[Model, float] | None:
+    """The model with an effect that carries the target share, by iteration on the simulated motion.
+
+    Parameters
+    ----------
+    model : Model
+        The model without it, every value known.
+    entry : ModelTerm
+        The effect; its coefficients say in which proportion, and with which sign, they grow.
+    drive : array, shape (n,)
+        Force in N.
+    dt : float
+        Sampling interval in seconds.
+    target : float
+        Wanted share.
+
+    Returns
+    -------
+    Model and float, or None
+        With the share that was reached; None where the motion diverges or the share cannot be reached.
+    """
+    unit = tuple(c if c is not None else 1.0 for c in entry.coefficients)
+    amount, share = 0.0, 0.0
+    record = simulate(model, drive, dt, Integrator("rk4", 2))
+    for _ in range(ROUNDS):
+        alone = _unshared(replace(entry, coefficients=unit), record)
+        restoring = drive - (model.values["m"] or 0.0) * record["acceleration"]
+        share = amount * alone / float(np.std(restoring))
+        if amount > 0.0 and abs(share / target - 1.0) < CLOSE:
+            return model.with_term(replace(entry, coefficients=tuple(amount * c for c in unit))), share
+        if alone == 0.0:
+            return None
+        wanted = target * float(np.std(restoring)) / alone
+        amount = wanted if amount == 0.0 else float(np.sqrt(amount * wanted))
+        larger = model.with_term(replace(entry, coefficients=tuple(amount * c for c in unit)))
+        try:
+            record = simulate(larger, drive, dt, Integrator("rk4", 2))
+        except DivergenceError:
+            return None
+    return None
+
+
+def share_of(model: Model, name: str, record: Record) -> float:
+    """Share of the rms restoring force that a term carries and no linear model can take over."""
+    entry = next(t for t in model.terms if t.name == name)
+    restoring = record["force"] - (model.values["m"] or 0.0) * record["acceleration"]
+    return _unshared(entry, record) / float(np.std(restoring))
+
+
+def _unshared(entry: ModelTerm, record: Record) -> float:
+    """Root mean square of a term's force less its best fit by displacement, velocity and acceleration."""
+    own = _force(entry, record)
+    motion = np.column_stack([record[c] for c in ("displacement", "velocity", "acceleration")])
+    rest = own - motion @ least_squares(motion, own)
+    return float(np.sqrt(np.mean(rest**2)))
+
+
+def _force(entry: ModelTerm, record: Record) -> Floats:
+    """The force of one term along a record: what a system of this term and unit mass leaves of no force."""
+    total = np.zeros(len(record))
+    model = Model("alone", (entry,))
+    for item in reverse_inputs(model):
+        values = history(item, record)
+        for part in item.parts:
+            rate = values if part.order == 0 else _rate(item, record)
+            total = total + (model.values[part.symbol] or 0.0) * part.factor * rate
+    return total
+
+
+def _rate(item: Input, record: Record) -> Floats:
+    """Time derivative of a shape of displacement alone, by the chain rule on a fine difference."""
+    u = record["displacement"]
+    step = 1e-6 * float(np.std(u))
+    ahead = history(item, record.with_channels({"displacement": u + step}))
+    behind = history(item, record.with_channels({"displacement": u - step}))
+    return (ahead - behind) / (2.0 * step) * record["velocity"]
