@@ -111,7 +111,7 @@ def load(folder: Path) -> StudyConfig:
     """
     source = folder / "config.yaml"
     settings = read_yaml(source)
-    check(settings, folder / "schemas" / "config.schema.yaml", str(source))
+    check(settings, read_yaml(folder / "schemas" / "config.schema.yaml"), str(source))
     _check_settings(settings, str(source))
     cases: dict[str, Case] = {}
     figures: dict[str, str] = {}
@@ -120,8 +120,8 @@ def load(folder: Path) -> StudyConfig:
             raise StudyError(f"{where}: the case stands twice; each name may be used once")
         cases[row["case"]] = _case(row, where, settings, folder.parent / "models", figures)
     for name in settings["tolerances"].get("of_case", {}):
-        if name not in cases:
-            raise StudyError(f"{source}: tolerances.of_case names {name!r}; the cases are {', '.join(cases)}")
+        if name not in cases and not (folder.parent / "models" / f"{name}.yaml").is_file():
+            raise StudyError(f"{source}: tolerances.of_case names {name!r}, which is neither a case nor a system")
     return StudyConfig(settings, cases)
 
 

@@ -58,10 +58,10 @@ def numbered_rows(path: Path, schema: Path) -> list[tuple[str, Table]]:
     lines = [(number, row) for number, row in enumerate(cells, start=1) if any(c.strip() for c in row)]
     if len(lines) < 2:
         raise StudyError(f"{path} has no rows; a heading and at least one row are needed")
-    properties: Table = read_yaml(schema)["properties"]
+    rules = read_yaml(schema)
     heading = [name.strip() for name in lines[0][1]]
-    _check_heading(heading, properties, path)
-    return [_row(number, row, heading, path, schema, properties) for number, row in lines[1:]]
+    _check_heading(heading, rules["properties"], path)
+    return [_row(number, row, heading, path, rules) for number, row in lines[1:]]
 
 
 def _check_heading(heading: Sequence[str], properties: Table, path: Path) -> None:
@@ -76,9 +76,7 @@ def _check_heading(heading: Sequence[str], properties: Table, path: Path) -> Non
             raise StudyError(f"{path}: its heading lacks the column {name!r}; {known} are needed")
 
 
-def _row(
-    number: int, cells: Sequence[str], heading: Sequence[str], path: Path, schema: Path, properties: Table
-) -> tuple[str, Table]:
+def _row(number: int, cells: Sequence[str], heading: Sequence[str], path: Path, rules: Table) -> tuple[str, Table]:
     if len(cells) != len(heading):
         raise StudyError(
             f"{path}, row {number} has {len(cells)} cells where the heading has {len(heading)}; "
@@ -86,8 +84,8 @@ def _row(
         )
     where = f"{path}, row {number} ({heading[0]} {cells[0]!r})"
     pairs = zip(heading, cells, strict=True)
-    row = {column: _cell(text, properties[column], f"{where}: {column}") for column, text in pairs}
-    check(row, schema, where)
+    row = {column: _cell(text, rules["properties"][column], f"{where}: {column}") for column, text in pairs}
+    check(row, rules, where)
     return where, row
 
 
@@ -107,8 +105,8 @@ def _cell(text: str, rule: Table, where: str) -> object:
     return int(number) if "integer" in kinds and number == int(number) else number
 
 
-def check(value: object, schema: Path, where: str) -> None:
-    """Hold a value against a JSON Schema.
+def check(value: object, rules: Table, where: str) -> None:
+    """Hold a value against a JSON Schema, ``rules``; ``where`` begins the sentence.
 
     Raises
     ------
@@ -116,7 +114,7 @@ def check(value: object, schema: Path, where: str) -> None:
         With the fault that explains most, in one sentence; numbers must be finite.
     """
     library = cast(Any, jsonschema)  # its annotations are partial
-    validator = library.Draft202012Validator(read_yaml(schema))
+    validator = library.Draft202012Validator(rules)
     error = library.exceptions.best_match(validator.iter_errors(value))
     if error is not None:
         raise StudyError(f"{where}: {_sentence(error)}")

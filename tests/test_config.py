@@ -1,0 +1,190 @@
+"""The configuration: what the jobs are told, and one sentence for every fault before any of them starts."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from study.config import load
+from study.errors import StudyError
+from study.schema import read_table, read_yaml
+
+ROOT = Path(__file__).parent.parent
+ROW = "duffing\tduffing\treport\t1.0\t0\t\t21\t22\t23\t24\t3\t\t\t\tDuffing system"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A copy of config/ and models/, to be spoilt."""
+    shutil.copytree(ROOT / "config", tmp_path / "config")
+    shutil.copytree(ROOT / "models", tmp_path / "models")
+    return tmp_path / "config"
+
+
+def spoil(path, old, new):
+    text = path.read_text()
+    assert old in text, f"{path.name} no longer holds {old!r}"
+    path.write_text(text.replace(old, new, 1))
+
+
+def refused(folder):
+    """The sentence."""
+    with pytest.raises(StudyError) as caught:
+        load(folder)
+    sentence = str(caught.value)
+    assert "\n" not in sentence
+    assert len(sentence) < 600
+    return sentence
+
+
+def test_every_case_of_the_report_is_there():
+    study = load(ROOT / "config")
+    assert list(study.cases) == [
+        "linear", "duffing", "van_der_pol", "duffing_van_der_pol", "mathieu", "dead_band", "extreme",
+        "variance_0.2", "variance_0.5", "variance_2.0", "noise_5", "noise_10", "noise_20",
+    ]  # fmt: skip
+    stems = [stem for case in study.cases.values() for stem in case.figures.values()]
+    numbers = {int(stem.removeprefix("figure_")) for stem in stems if stem.startswith("figure_")}
+    assert numbers == {*range(2, 9), *range(16, 62)}
+
+
+def test_settings_of_a_case():
+    study = load(ROOT / "config")
+    record = study.record_settings("noise_10")
+    assert record["noise"] == 0.1
+    assert record["excitation"]["seed"] == study.settings["excitations"]["report"]["seed"]
+    assert study.identification_settings("dead_band")["relative"]["c"] == 0.05, "a case's own tolerance holds"
+    assert study.identification_settings("duffing")["relative"]["c"] == 0.02
+    assert study.identification_settings("linear")["also_assumed"] == "cubic_stiffness"
+
+
+def test_figures_without_a_number_are_named_after_the_case(folder):
+    with (folder / "cases.tsv").open("a") as table:
+        table.write("mine\tduffing\treport\t3\t0\t\t\t\t\t\t\t\t\t\tMy own system\n")
+    assert load(folder).cases["mine"].figures == {
+        kind: f"mine_{kind}" for kind in ("linear", "nonlinear", "coherence", "histogram")
+    }
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("samples: 8192", "samples: -5", "sampling.samples is not right: -5 is less than the minimum of 64"),
+        ("samples: 8192", "samples: many", "sampling.samples is not right: 'many' is not of type 'integer'"),
+        ("samples: 8192", "sample: 8192", "sampling: unknown key 'sample'; known are samples, dt"),
+        ("dt: 0.02 ", "dt: .nan ", "sampling.dt is nan; a finite number is right"),
+        ("dt: 0.02 ", "dt: 0.2 ", "fit_band is [0.3, 10.0]; it must rise and end below 2.5 Hz"),
+        ("length: 512", "length: 8193", "segments.length is 8193, longer than the record of 8192 samples"),
+        ("overlap: 0.5", "overlap: 1.5", "segments.overlap is not right"),
+        ("window: hann", "window: han", "segments.window is not right: 'han' is not one of"),
+        ("fit_band: [0.3, 10.0]", "fit_band: [0.3, 0.5]", "it must span four lines of 0.0976562 Hz or more"),
+        ("[siso, miso,", "[siso, mios,", "there is no estimator 'mios'; known are siso, miso"),
+        ("kind: gaussian_lowpass", "kind: gaussian", "excitations.report.kind is not right"),
+        ("cutoff: 12.5", "cutoff: 125", "excitations.report: the excitation reaches 125 Hz"),
+        ("cutoff: 12.5", "periods: 7", "excitations.report: 8192 samples do not hold 7 whole periods"),
+        ("seed: 1990", "seed: -1", "excitations.report.seed is not right: -1 is less than the minimum of 0"),
+        ("method: abm4", "method: abm5", "integrator.method is not right: 'abm5' is not one of"),
+        ("dead_band: {k", "deadband: {k", "of_case names 'deadband', which is neither a case nor a system"),
+        ("sampling:\n", "sampling: [\n", "config.yaml is not valid YAML"),
+        ("fit_band: [0.3, 10.0]", "", "'fit_band' is a required property"),
+    ],
+)
+def test_faults_of_the_settings(folder, old, new, says):
+    spoil(folder / "config.yaml", old, new)
+    sentence = refused(folder)
+    assert sentence.startswith(str(folder / "config.yaml"))
+    assert says in sentence
+
+
+@pytest.mark.parametrize(
+    ("new", "says"),
+    [
+        (ROW.replace("duffing\treport", "dufing\treport"), "there is no system 'dufing'; models/ holds dead_band"),
+        (ROW.replace("report", "reprot"), "there is no excitation 'reprot'; config.yaml names report"),
+        (ROW.replace("1.0", "-1.0"), "level is not right: -1.0 is less than or equal to the minimum of 0"),
+        (ROW.replace("1.0", "one"), "level is 'one', which is not a number"),
+        (ROW.replace("1.0", "nan"), "level is 'nan', which is not a number"),
+        (ROW.replace("\t0\t", "\t-0.1\t"), "noise is not right: -0.1 is less than the minimum of 0"),
+        (ROW.replace("\t21\t", "\t21.5\t"), "linear is not right: 21.5 is not"),
+        (ROW.replace("\t21\t", "\t18\t"), "linear is 18, a number that linear of the case 'linear' has already"),
+        (ROW.replace("\t22\t", "\t21\t"), "nonlinear is 21, a number that linear of the case 'duffing' has already"),
+        (ROW.replace("\t0\t\t", "\t0\tcubic\t"), "there is no term 'cubic'"),
+        (ROW.replace("\t0\t\t", "\t0\tdead_band\t"), "also_assumed 'dead_band' needs a value for u_g"),
+        (ROW.replace("\t0\t\t", "\t0\tcubic_stiffness\t"), "lists the term 'cubic_stiffness' twice"),
+        (ROW.replace("\t3\t\t", "\t3\t9\t"), "autospectrum is 9; its lines need a term periodic_stiffness"),
+        (ROW.replace("\t3\t", "\t"), "has 14 cells where the heading has 15"),
+        (ROW.replace("duffing\tduffing", "Duffing\tduffing"), "case is not right: 'Duffing' does not match"),
+        (ROW.replace("duffing\tduffing", "../up\tduffing"), "case is not right: '../up' does not match"),
+        (ROW + "\n" + ROW, "row 4 (case 'duffing'): the case stands twice"),
+    ],
+)
+def test_faults_of_a_row(folder, new, says):
+    spoil(folder / "cases.tsv", ROW, new)
+    sentence = refused(folder)
+    assert re.match(rf"{re.escape(str(folder / 'cases.tsv'))}, row [34]( \(case '.*'\))?:? ", sentence)
+    assert says in sentence
+
+
+def test_rows_are_counted_as_an_editor_counts_lines(folder):
+    spoil(folder / "cases.tsv", ROW, "\n\n" + ROW.replace("1.0", "-1.0"))
+    assert "row 5 (case 'duffing')" in refused(folder)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("\ttitle\n", "\ttitel\n", "its heading names 'titel', which is no column"),
+        ("\ttitle\n", "\tlevel\n", "its heading names 'level' twice"),
+        ("noise\talso", "also", "its heading lacks the column 'noise'"),
+    ],
+)
+def test_faults_of_the_heading(folder, old, new, says):
+    spoil(folder / "cases.tsv", old, new)
+    assert says in refused(folder)
+
+
+@pytest.mark.parametrize("name", ["config.yaml", "cases.tsv"])
+@pytest.mark.parametrize("content", [None, b"", b"\xff\xfe\x00", b"- a\n- b\n"])
+def test_files_that_are_none(folder, name, content):
+    if content is None:
+        (folder / name).unlink()
+    else:
+        (folder / name).write_bytes(content)
+    assert name in refused(folder)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("value: 2.0e7", "value: much", "value of cubic_stiffness is 'much'"),
+        ("cubic_stiffness", "cubic_stifness", "there is no term 'cubic_stifness'"),
+        (", value: 2.0e7", "", "gives no value for k3"),
+        ("value: 1.0", "value: -1.0", "has the mass -1"),
+        ("cubic_stiffness, value: 2.0e7", "own, force: 'u*tension', value: 1.0", "tension"),
+    ],
+)
+def test_faults_of_a_model(folder, old, new, says):
+    spoil(folder.parent / "models" / "duffing.yaml", old, new)
+    sentence = refused(folder)
+    assert "duffing.yaml" in sentence
+    assert says in sentence
+
+
+def test_more_inputs_than_segments(folder):
+    spoil(folder / "config.yaml", "samples: 8192", "samples: 512")
+    assert "cut the record into 1; 2 inputs need 3 or more" in refused(folder)
+
+
+def test_quotes_are_plain_text(tmp_path):
+    (tmp_path / "schema.yaml").write_text("type: object\nproperties: {a: {type: string}, b: {type: number}}\n")
+    (tmp_path / "table.tsv").write_text('a\tb\n"open\t1\nshut"\t2\n')
+    rows = read_table(tmp_path / "table.tsv", tmp_path / "schema.yaml")
+    assert [row["a"] for row in rows] == ['"open', 'shut"']
+
+
+def test_yaml_is_read_without_executing_anything(tmp_path):
+    (tmp_path / "a.yaml").write_text("a: !!python/object/apply:os.system ['touch done']\n")
+    with pytest.raises(StudyError, match="is not valid YAML"):
+        read_yaml(tmp_path / "a.yaml")
+    assert not (tmp_path / "done").exists()

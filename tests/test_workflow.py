@@ -1,0 +1,204 @@
+"""The whole workflow on a small configuration, in a copy of the project: what runs, runs again, is refused."""
+
+import hashlib
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+SNAKEMAKE = str(Path(sys.executable).parent / "snakemake")
+PARTS = ("Snakefile", "rules", "config", "models", "scripts", "study", "profiles")
+SMALL = [
+    (r"samples: 8192", "samples: 2048"),
+    (r"length: 512", "length: 256"),
+    (r"(?s)(monte_carlo:\n  seeds:) \d+", r"\1 3"),
+    (r"(?s)(ensembles:\n  seeds:) \d+", r"\1 2"),
+    (r"\nexcitations:\n", "\nexcitations:\n  other: {kind: gaussian_lowpass, seed: 7}\n"),
+]
+DUFFING = "duffing\tduffing\treport\t1.0\t0\t\t21\t22\t23\t24\t3\t\t\t\tDuffing system"
+NOISY = "noisy\tduffing_van_der_pol\tother\t1.0\t0.05\t\t53\t54\t55\t\t\t\t\t\tCombined system with noise"
+
+
+def project(folder, *rows):
+    """A copy of the project with a small configuration; modules keep their times."""
+    for part in PARTS:
+        source = ROOT / part
+        if source.is_dir():
+            shutil.copytree(source, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copy2(source, folder / part)
+    settings = folder / "config" / "config.yaml"
+    text = settings.read_text()
+    for pattern, put in SMALL:
+        text, count = re.subn(pattern, put, text)
+        assert count == 1, f"config.yaml no longer holds {pattern}"
+    settings.write_text(text)
+    heading = (ROOT / "config" / "cases.tsv").read_text().splitlines()[0]
+    (folder / "config" / "cases.tsv").write_text("\n".join([heading, *rows]) + "\n")
+    return folder
+
+
+def run(folder, *words, code=0):
+    """What Snakemake says."""
+    done = subprocess.run([SNAKEMAKE, *words], cwd=folder, capture_output=True, text=True, timeout=300)
+    assert done.returncode == code, done.stderr[-3000:]
+    return done.stderr + done.stdout
+
+
+def planned(folder, *targets):
+    """Jobs that would run, by rule."""
+    said = run(folder, "-n", *targets)
+    if "Nothing to be done" in said:
+        return {}
+    table = said.split("Job stats:")[1]
+    return {name: int(count) for name, count in re.findall(r"^(\S+) +(\d+)$", table, re.MULTILINE) if name != "total"}
+
+
+def digests(folder):
+    """Of every table in results."""
+    paths = sorted((folder / "results").rglob("*.csv"))
+    return {str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest() for p in paths}
+
+
+@contextmanager
+def edited(path, old, new):
+    """A file with a text replaced for a while; its time changes, then changes back."""
+    text, times = path.read_text(), path.stat()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    yield
+    path.write_text(text)
+    os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """The small study, complete: one case first, the second added as a row and nothing else."""
+    folder = project(tmp_path_factory.mktemp("study"), DUFFING)
+    run(folder, "-j2")
+    with (folder / "config" / "cases.tsv").open("a") as table:
+        table.write(NOISY + "\n")
+    jobs = planned(folder)
+    assert jobs == {
+        "record": 1, "identify": 1, "draw.noisy": 1, "parameters": 1, "pages": 1, "summary": 1, "all": 1
+    }, "a new row runs its own jobs and what joins all cases"  # fmt: skip
+    run(folder, "-j2")
+    return folder
+
+
+def test_a_row_of_the_table_gives_every_product(built):
+    for case in ("duffing", "noisy"):
+        for name in ("record.csv", "frequency_response.csv", "coherence.csv", "parameters.csv"):
+            assert (built / "results" / case / name).stat().st_size > 100
+    drawn = {path.name for path in (built / "figures").iterdir()}
+    stems = ["figure_21", "figure_22", "figure_23", "figure_24", "figure_3", "figure_53", "figure_54", "figure_55"]
+    assert drawn == {f"{stem}.{ending}" for stem in (*stems, "noisy_histogram") for ending in ("png", "svg")}
+    page = (built / "results" / "summary.md").read_text()
+    assert "| duffing " in page
+    assert "| noisy " in page
+    assert "## Run times" in page
+
+
+def test_a_second_run_finds_nothing_to_do(built):
+    assert planned(built) == {}
+
+
+def test_report_is_one_file_with_every_figure_and_table(built):
+    run(built, "--report", "report.html")
+    page = (built / "report.html").read_text()
+    for name in ("figure_21.png", "figure_55.png", "claims.html", "parameters.html", "summary.html"):
+        assert name in page
+    assert not re.search(r"<(script|link|img)[^>]+(src|href)=[\"']https?:", page)
+
+
+def test_touched_identification_runs_again_without_simulation(built):
+    module = built / "study" / "miso.py"
+    times = module.stat()
+    module.touch()
+    jobs = planned(built)
+    os.utime(module, ns=(times.st_atime_ns, times.st_mtime_ns))
+    assert jobs["identify"] == 2
+    assert {"draw.duffing", "draw.noisy", "claims", "parameters", "summary"} <= set(jobs)
+    assert not {"record", "draw_preliminary.duffing"} & set(jobs)
+
+
+def test_touched_style_draws_again_and_nothing_else(built):
+    with edited(built / "config" / "study.mplstyle", "font.size: 10", "font.size: 11"):
+        jobs = planned(built)
+    assert set(jobs) == {"draw.duffing", "draw.noisy", "draw_preliminary.duffing", "summary", "all"}
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new"),
+    [("config.yaml", "seed: 7", "seed: 8"), ("cases.tsv", "other\t1.0\t0.05", "other\t1.0\t0.06")],
+)
+def test_a_changed_seed_or_row_runs_its_case_alone(built, file, old, new):
+    with edited(built / "config" / file, old, new):
+        jobs = planned(built)
+    assert {name: jobs[name] for name in ("record", "identify", "draw.noisy")} == {
+        "record": 1, "identify": 1, "draw.noisy": 1
+    }  # fmt: skip
+    assert not {"draw.duffing", "draw_preliminary.duffing", "claims", "excitation_reading"} & set(jobs)
+
+
+def test_targets_by_name_and_by_number(built):
+    (built / "figures" / "figure_21.png").rename(built / "kept.png")
+    assert planned(built, "figures/figure_21.png") == {"draw.duffing": 1}
+    assert set(planned(built, "duffing")) == {"draw.duffing", "duffing"}
+    (built / "kept.png").rename(built / "figures" / "figure_21.png")
+    assert planned(built, "noisy") == {}
+    assert planned(built, "monte_carlo") == {"ensemble": 2, "rates": 1, "monte_carlo": 1}
+
+
+def test_killed_at_work_and_finished_on_one_core_gives_the_same_bytes(built, tmp_path):
+    folder = project(tmp_path, DUFFING, NOISY)
+    targets = ["results/parameters.csv", "results/claims.csv"]
+    process = subprocess.Popen(
+        [SNAKEMAKE, "-j2", *targets], cwd=folder, start_new_session=True,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    patience = time.monotonic() + 60.0
+    while not (folder / "results" / "duffing" / "record.csv").exists() and time.monotonic() < patience:
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    assert (folder / "results" / "duffing" / "record.csv").exists()
+    run(folder, "-j1", *targets)
+    expected = digests(built)
+    found = digests(folder)
+    assert len(found) > 8
+    assert found == {name: expected[name] for name in found}
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "says"),
+    [
+        ("cases.tsv", "\tduffing\treport", "\tdufing\treport", "row 2 (case 'duffing'): there is no system 'dufing'"),
+        ("config.yaml", "length: 256", "length: 4096", "segments.length is 4096, longer than the record of 2048"),
+        ("cases.tsv", "duffing\tduffing", "claims\tduffing", "'claims' is the name of a rule"),
+        ("reported.tsv", "table_1.duffing.k3\t", "table_1.duffing.c3\t", "'table_1.duffing.c3' stands twice"),
+    ],
+)
+def test_bad_configuration_is_refused_in_one_sentence(built, file, old, new, says):
+    with edited(built / "config" / file, old, new):
+        said = run(built, "-j2", code=2)
+    lines = [line for line in said.splitlines() if not line.startswith("Using workflow")]
+    assert len(lines) == 1
+    assert lines[0].startswith("study: config/")
+    assert says in lines[0]
+
+
+def test_a_fault_in_a_job_is_said_in_one_sentence(tmp_path):
+    folder = project(tmp_path, DUFFING.replace("report\t1.0", "report\t1e8"))
+    said = run(folder, "-j1", "results/duffing/record.csv", code=1)
+    assert "study: the simulation of 'duffing' diverged at t = " in said
+    assert "Traceback" not in said
+    assert not (folder / "results" / "duffing" / "record.csv").exists(), "a run that diverges leaves no record"
