@@ -1,0 +1,155 @@
+import numpy as np
+import pytest
+
+from study import fitting, noise_floor, trials
+from study.diagnose import report, score, steadiness
+from study.diagnose.says import sentences
+from study.diagnose.separate import separating_level
+from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN, diagnose
+from study.record import Record
+
+
+def found_in(trial: trials.Trial, **options: object):
+    how = fitting.plan(trial.record)
+    return diagnose(trial.believed, trial.record, how, **options), how
+
+
+@pytest.fixture(scope="module")
+def drag() -> trials.Trial:
+    return trials.make_trial(901, hidden=["quadratic_damping"], noise=0.01, response="displacement")
+
+
+@pytest.fixture(scope="module")
+def drag_found(drag: trials.Trial):
+    return found_in(drag)
+
+
+def test_the_hidden_effect_is_named_with_its_coefficient(drag, drag_found):
+    found, _ = drag_found
+    first = found.candidates[0]
+    assert found.verdict == MISSING
+    assert first.name == "quadratic_damping"
+    assert first.p_value < 1e-4
+    true = drag.truth.values["c2"]
+    assert true is not None
+    assert abs(first.coefficient - true) < 4.0 * first.error
+    assert first.error < 0.2 * abs(true)
+    assert first.response_error < found.response_error
+    assert first.response_error == pytest.approx(found.noise, rel=0.1)
+
+
+def test_adding_it_comes_as_near_as_the_true_model(drag, drag_found):
+    found, how = drag_found
+    start = {k: v for k, v in drag.truth.values.items() if v is not None}
+    true = fitting.fit(drag.truth, drag.record, how, (), start)
+    of_truth = np.std(fitting.held_out_residual(true, drag.record, how))
+    assert np.std(found.candidates[0].residual) < 1.05 * of_truth
+
+
+@pytest.mark.parametrize(("force", "motion"), [(1e-3, 1e3), (1e6, 1e-4)])
+def test_units_do_not_matter(drag, drag_found, force, motion):
+    found, how = drag_found
+    scaled = drag.record.with_channels(
+        {"force": force * drag.record["force"], "displacement": motion * drag.record["displacement"]}
+    )
+    again = diagnose(drag.believed, scaled, how)
+    assert again.verdict == found.verdict
+    assert [c.name for c in again.candidates[:3]] == [c.name for c in found.candidates[:3]]
+    assert again.candidates[0].response_error == pytest.approx(found.candidates[0].response_error, rel=1e-3)
+
+
+def test_nothing_missing_is_said_where_nothing_is():
+    trial = trials.make_trial(902, hidden=[], noise=0.05)
+    found, _ = found_in(trial)
+    assert found.verdict == NOTHING
+    assert found.response_error == pytest.approx(found.noise, rel=0.1)
+    assert "Nothing is missing" in sentences(found, "N", "m")[0]
+
+
+def test_an_effect_that_is_not_in_the_library_is_unknown_and_its_kind_is_said():
+    trial = trials.make_trial(903, hidden=["periodic_stiffness"], noise=0.0)
+    found, _ = found_in(trial, without=["periodic_stiffness"])
+    assert found.verdict == UNKNOWN
+    assert max(found.families, key=lambda name: found.families[name]) == "time"
+
+
+def test_the_fields_are_those_of_the_file(drag_found):
+    found, _ = drag_found
+    fields = report.fields(found)
+    assert set(fields) >= {"verdict", "error", "noise_floor", "candidates"}
+    wanted = {"term", "parameters", "coefficient", "interval", "response_error", "explained", "p_value", "tied_with"}
+    assert all(set(row) >= wanted for row in fields["candidates"])
+    assert "quadratic_damping" in report.table(found, "N", "m")
+
+
+def test_twins_are_told_apart_by_exciting_harder(drag, drag_found):
+    found, how = drag_found
+    rival = next(c for c in found.candidates if c.name == "cubic_damping")
+    assert separating_level(found.candidates[0], rival, drag.record, how) is not None
+
+
+def test_a_true_coefficient_is_flat_and_an_imitators_is_not():
+    rng = np.random.default_rng(1)
+    sensitivity = rng.standard_normal(8192) * (1.0 + 0.8 * np.sin(np.arange(8192) / 300.0))
+    noise = 0.05 * rng.standard_normal(8192)
+    flat = steadiness.along_amplitude(sensitivity, noise, 1.0)
+    bent = steadiness.along_amplitude(sensitivity, noise + 0.3 * sensitivity**3, 1.0)
+    assert flat.spread() < 0.02 < 0.1 < bent.spread()
+    filtered = np.convolve(sensitivity, [0.5, 0.3, 0.2], "same")
+    assert steadiness.along_frequency(sensitivity, noise, 1.0, 0.02).spread() < 0.02
+    assert steadiness.along_frequency(sensitivity, filtered, 1.0, 0.02).spread() > 0.1
+
+
+def test_gain_counts_the_blocks():
+    rng = np.random.default_rng(2)
+    before = rng.standard_normal(4096)
+    assert score.gain(before, 0.5 * before).explained == pytest.approx(0.75)
+    assert score.gain(before, 0.5 * before).p_value < 1e-6
+    assert score.gain(before, rng.standard_normal(4096)).p_value > 1e-3
+    assert score.gain(before, before).p_value == 1.0
+
+
+def test_false_alarms_of_a_gain_are_as_rare_as_its_p_value():
+    rng = np.random.default_rng(3)
+    p = [score.gain(*rng.standard_normal((2, 1536))).p_value for _ in range(400)]
+    assert np.mean(np.array(p) < 0.05) == pytest.approx(0.05, abs=0.04)
+
+
+def test_clustered_errors_match_the_scatter_for_correlated_noise():
+    rng = np.random.default_rng(4)
+    n, design = 4096, rng.standard_normal((4096, 2))
+    design = np.apply_along_axis(lambda c: np.convolve(c, np.ones(8), "same"), 0, design)
+    solve = np.linalg.pinv(design)
+    estimates, errors = [], []
+    for _ in range(150):
+        noise = np.convolve(rng.standard_normal(n), np.ones(8), "same")
+        amount = solve @ noise
+        estimates.append(amount)
+        errors.append(np.sqrt(np.diag(score.clustered_covariance(design, noise - design @ amount))))
+    ratio = np.mean(errors, axis=0) / np.std(estimates, axis=0)
+    assert np.all((ratio > 0.8) & (ratio < 1.25))
+
+
+def test_noise_floor_of_noise_and_of_noise_with_a_tone():
+    rng = np.random.default_rng(5)
+    noise = 0.3 * rng.standard_normal(8192)
+    alone = noise_floor.floor(noise, 0.01)
+    assert alone.noise == pytest.approx(0.3, rel=0.05)
+    assert alone.significance < 4.0
+    tone = 0.3 * np.sin(2 * np.pi * 7.0 * 0.01 * np.arange(8192))
+    both = noise_floor.floor(noise + tone, 0.01)
+    assert both.noise == pytest.approx(0.3, rel=0.05)
+    assert both.excess == pytest.approx(0.045, rel=0.2)
+    assert both.significance > 20.0
+
+
+def test_the_judging_part_is_never_fitted(drag):
+    how = fitting.plan(drag.record)
+    first, last = how.judge
+    changed = drag.record["displacement"].copy()
+    changed[first:last] *= 3.0
+    one = fitting.fit(drag.believed, drag.record, how, ())
+    other = fitting.fit(
+        drag.believed, Record(drag.record.dt, {**drag.record.channels, "displacement": changed}), how, ()
+    )
+    assert np.array_equal(one.values, other.values)
