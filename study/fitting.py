@@ -175,3 +175,8 @@ def linearise(found: FreeRunFit, record: Record, how: Plan) -> Floats:
     )  # fmt: skip
     values = dict(zip(found.keys, (float(v) for v in found.values), strict=True))
     return run.respond(values, found.initial, 2)[1]
+
+
+def with_steps(how: Plan, steps: int) -> Plan:
+    """The same plan with other steps per sample."""
+    return replace(how, steps_per_sample=steps)
