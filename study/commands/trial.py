@@ -1,0 +1,63 @@
+"""``study trial``: a record with a hidden effect, to try one's hand at."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from study.commands.command import Command, number, whole
+
+if TYPE_CHECKING:
+    from study.trials import Trial
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--seed", type=whole(0, 2**63 - 1), help="the same seed gives the same trial")
+    what.add_argument("--open", type=Path, metavar="FILE", help="show the sealed answer of a trial")
+    parser.add_argument(
+        "--hidden", metavar="NAMES", help="'none', or one or more effects (a,b) to hide; drawn if left out"
+    )
+    parser.add_argument(
+        "--noise", type=number(least=0.0), help="mean square of the noise over that of the response; drawn if left out"
+    )
+    parser.add_argument(
+        "--response", choices=("displacement", "velocity", "acceleration"), help="what is measured; drawn if left out"
+    )
+    parser.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="folder (default: this one)")
+
+
+def _run(arguments: argparse.Namespace) -> None:
+    from study.trials import make_trial, sealed
+
+    if arguments.open is not None:
+        print(sealed.sentences(sealed.unseal(arguments.open)))
+        return
+    trial = make_trial(arguments.seed, _names(arguments.hidden), arguments.noise, arguments.response)
+    print(_written(trial, *sealed.write(trial, arguments.out)))
+
+
+def _names(text: str | None) -> tuple[str, ...] | None:
+    if text is None:
+        return None
+    return () if text.strip() == "none" else tuple(name.strip() for name in text.split(","))
+
+
+def _written(trial: "Trial", record: Path, model: Path, answer: Path) -> str:
+    response = next(name for name in trial.record.channels if name != "force")
+    return "\n".join(
+        [
+            f"{record}: force and {response}, {len(trial.record)} samples at {trial.record.dt:.4g} s",
+            f"{model}: the model its owner believes in ({', '.join(t.name for t in trial.believed.terms)})",
+            f"{answer}: the answer, sealed; 'study trial --open {answer}' shows it",
+            "",
+            f"Try: study diagnose {record} --model {model}",
+        ]
+    )
+
+
+COMMAND = Command(
+    "trial", "write a record with a hidden effect, and its answer sealed apart",
+    "study trial --seed 7\n  study trial --seed 7 --hidden quadratic_damping --noise 0.05 --out trials\n"
+    "  study trial --open trial_7.answer.json",
+    _arguments, _run,
+)  # fmt: skip

@@ -1,0 +1,79 @@
+"""A trial on disk: the record, the model its owner believes in, and the answer, which no glance gives away."""
+
+import base64
+import binascii
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+from study.errors import StudyError
+from study.files import read_text, replace_file, replacing
+from study.modelfile import format_model
+from study.record import write_csv
+from study.trials.draw import Trial
+
+WANTED = "the answer file of a trial, as 'study trial' writes it"
+
+
+def write(trial: Trial, folder: Path) -> tuple[Path, Path, Path]:
+    """Write record, believed model and sealed answer; their paths in this order.
+
+    Raises
+    ------
+    StudyError
+        If a file cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StudyError(
+            f"{folder}: no such folder can be made ({error.strerror}); a writable place is right"
+        ) from None
+    stem = trial.record.name
+    record, model, answer = (folder / f"{stem}{ending}" for ending in (".csv", ".yaml", ".answer.json"))
+    with replacing(record) as beside:
+        write_csv(trial.record, beside)
+    replace_file(model, format_model(trial.believed).encode())
+    sealed = base64.b64encode(json.dumps(contents(trial)).encode()).decode()
+    page = {"trial": stem, "open_with": f"study trial --open {answer.name}", "answer": sealed}
+    replace_file(answer, (json.dumps(page, indent=1) + "\n").encode())
+    return record, model, answer
+
+
+def contents(trial: Trial) -> dict[str, Any]:
+    """What the answer holds: hidden effects, their shares of the restoring force, the noise, and the true model."""
+    return {
+        "hidden": list(trial.hidden),
+        "shares": list(trial.shares),
+        "noise": trial.noise,
+        "truth": format_model(trial.truth),
+    }
+
+
+def unseal(path: Path) -> dict[str, Any]:
+    """The answer of a trial.
+
+    Raises
+    ------
+    StudyError
+        If the file is no answer.
+    """
+    text = read_text(path, WANTED)
+    try:
+        page: object = json.loads(text)
+        sealed = cast(dict[str, Any], page)["answer"]
+        answer: object = json.loads(base64.b64decode(sealed, validate=True))
+    except (ValueError, KeyError, TypeError, RecursionError, binascii.Error):
+        raise StudyError(f"{path}: this holds no sealed answer; {WANTED} is right") from None
+    if not isinstance(answer, dict) or set(cast(dict[str, Any], answer)) != {"hidden", "shares", "noise", "truth"}:
+        raise StudyError(f"{path}: the answer in it is not that of a trial; {WANTED} is right")
+    return cast(dict[str, Any], answer)
+
+
+def sentences(answer: Mapping[str, Any]) -> str:
+    """An answer for people."""
+    hidden = [f"{name} ({100.0 * share:.0f} %)" for name, share in zip(answer["hidden"], answer["shares"], strict=True)]
+    what = f"hidden, with the share of the restoring force: {', '.join(hidden)}" if hidden else "nothing is hidden"
+    noise = f"noise: {100.0 * answer['noise']:g} % of the mean square of the response"
+    return f"{what}\n{noise}\nthe model that made the record:\n\n{answer['truth']}"
