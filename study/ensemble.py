@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
-import numpy as np
 import pandas as pd
 
 from study import tables
@@ -65,12 +64,15 @@ def estimates(
 def rates(table: pd.DataFrame) -> pd.DataFrame:
     """How often each tolerance is met, with the mean and scatter of each estimate.
 
-    ``rate_error`` is the binomial standard error of the rate; ``error_to_scatter`` is the mean
-    standard error over the scatter that the seeds show.
+    A seed that gives no estimate, because its run diverges or the recipe finds nothing, does not meet the
+    tolerance: ``found`` of ``seeds`` give one. ``rate_error`` is the binomial standard error of the rate;
+    ``error_to_scatter`` is the mean standard error over the scatter that the seeds show.
     """
     rows: list[dict[str, Any]] = []
+    seeds = table.groupby("case")["seed"].nunique()
     for (case, estimator, parameter), group in table.groupby(["case", "estimator", "parameter"], sort=False):
-        rate = float(group["within_tolerance"].mean())
+        count = int(seeds[case])
+        rate = float(group["within_tolerance"].astype(bool).sum()) / count
         scatter = float(group["estimate"].std(ddof=1))
         error = float(group["standard_error"].mean())
         rows.append(
@@ -83,9 +85,10 @@ def rates(table: pd.DataFrame) -> pd.DataFrame:
                 "scatter": scatter,
                 "error_to_scatter": error / scatter if scatter > 0.0 else math.nan,
                 "tolerance": float(group["tolerance"].iloc[0]),
-                "seeds": len(group),
+                "seeds": count,
+                "found": len(group),
                 "within_tolerance": rate,
-                "rate_error": math.sqrt(rate * (1.0 - rate) / len(group)),
+                "rate_error": math.sqrt(rate * (1.0 - rate) / count),
             }
         )
     return pd.DataFrame(rows)
@@ -113,9 +116,3 @@ def page(table: pd.DataFrame, noise: Mapping[str, float]) -> str:
         rate, error = 100.0 * row["within_tolerance"], 100.0 * row["rate_error"]
         lines.append(f"- {row['case']}: {row['parameter']} in {rate:.1f} ± {error:.1f} %")
     return "\n".join(lines) + "\n"
-
-
-def averages(values: Sequence[float]) -> tuple[float, float]:
-    """Mean and standard error of the mean."""
-    x = np.asarray(values, dtype=np.float64)
-    return float(np.mean(x)), float(np.std(x, ddof=1) / math.sqrt(len(x)))

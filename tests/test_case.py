@@ -1,0 +1,64 @@
+"""A case from settings to estimates."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study.case import assumed_model, estimator_settings, identify_case, make_record
+from study.config import load
+from study.errors import DivergenceError, StudyError
+
+CONFIG = load(Path(__file__).parent.parent / "config")
+
+
+def settings(case, **changed):
+    return {**CONFIG.record_settings(case), **changed}
+
+
+def test_the_record_is_the_models_response_to_the_configured_force(systems):
+    told = settings("duffing")
+    record = make_record(systems["duffing"], told)
+    assert record.name == "duffing"
+    assert len(record) == told["sampling"]["samples"]
+    u, v, a = (record[c] for c in ("displacement", "velocity", "acceleration"))
+    np.testing.assert_allclose(a + 3.77 * v + 355.3 * u + 2e7 * u**3, record["force"], atol=1e-9)
+
+
+def test_the_same_seed_gives_the_same_record_and_another_another(systems):
+    told = settings("linear")
+    one, same, other = (make_record(systems["linear"], told, seed=seed)["force"] for seed in (1, 1, 2))
+    np.testing.assert_array_equal(one, same)
+    assert abs(np.corrcoef(one, other)[0, 1]) < 0.1
+
+
+def test_noise_is_on_the_displacement_alone_and_has_the_asked_mean_square(systems):
+    quiet = make_record(systems["duffing_van_der_pol"], settings("noise_20", noise=0.0))
+    noisy = make_record(systems["duffing_van_der_pol"], settings("noise_20"))
+    for channel in ("force", "velocity", "acceleration"):
+        np.testing.assert_array_equal(quiet[channel], noisy[channel])
+    noise = noisy["displacement"] - quiet["displacement"]
+    assert np.mean(noise**2) / np.mean(quiet["displacement"] ** 2) == pytest.approx(0.2, rel=0.05)
+    again = make_record(systems["duffing_van_der_pol"], settings("noise_20"), noise_seed=999)
+    assert abs(np.corrcoef(noise, again["displacement"] - quiet["displacement"])[0, 1]) < 0.1
+
+
+def test_a_run_that_diverges_yields_no_record(systems):
+    with pytest.raises(DivergenceError, match=r"'duffing' diverged at t = .* mean square"):
+        make_record(systems["duffing"], settings("duffing", level=1e8))
+
+
+def test_a_term_may_be_assumed_beside_the_models_own(systems):
+    linear = systems["linear"]
+    assert assumed_model(linear, {"also_assumed": ""}) is linear
+    assert "cubic_stiffness" in assumed_model(linear, {"also_assumed": "cubic_stiffness"})
+    with pytest.raises(StudyError, match="there is no term 'cubic'"):
+        assumed_model(linear, {"also_assumed": "cubic"})
+
+
+def test_every_configured_estimator_is_asked(systems, records):
+    told = CONFIG.identification_settings("linear")
+    assert estimator_settings(told).segments.length == told["segments"]["length"]
+    found = identify_case(systems["linear"], records["linear"], told)
+    assert list(found) == told["estimators"]
+    assert [len(found[name].inputs) for name in ("siso", "miso")] == [1, 2], "the assumed cubic stiffness is an input"

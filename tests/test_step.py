@@ -1,0 +1,90 @@
+"""What the steps of the workflow share: one sentence for a fault, one run at a time, the modules they rest on."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from study.errors import StudyError
+from study.modules import rests_on
+from study.step import alone, one_sentence
+
+ROOT = Path(__file__).parent.parent
+
+
+def test_a_fault_is_one_sentence_and_an_exit_code(capsys):
+    with pytest.raises(SystemExit) as ended, one_sentence():
+        raise StudyError("a.yaml:\n  level is 'x'")
+    assert ended.value.code == 2
+    assert capsys.readouterr().err == "study: a.yaml: level is 'x'\n"
+
+
+def test_other_errors_pass():
+    with pytest.raises(KeyError), one_sentence():
+        raise KeyError("a")
+
+
+def test_one_run_at_a_time(tmp_path):
+    held = alone(tmp_path / "new" / "running")
+    with pytest.raises(StudyError, match="another run is at work"):
+        alone(tmp_path / "new" / "running")
+    held.close()
+    alone(tmp_path / "new" / "running").close()
+
+
+def test_a_killed_run_holds_nobody_up(tmp_path):
+    script = "import sys, time; from pathlib import Path; from study.step import alone\n"
+    script += "held = alone(Path(sys.argv[1])); print('held', flush=True); time.sleep(60)"
+    command = [sys.executable, "-c", script, str(tmp_path / "running")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "held\n"
+        with pytest.raises(StudyError):
+            alone(tmp_path / "running")
+        process.kill()
+    alone(tmp_path / "running").close()
+
+
+@pytest.fixture
+def package(tmp_path):
+    files = {
+        "scripts/go.py": "import json\nfrom study import a\nfrom study.b import c\n",
+        "study/a.py": "def f():\n    from study.deep import late\n    return late\n",
+        "study/b.py": "import study.d\nif TYPE_CHECKING:\n    from study import typed\n",
+        "study/d.py": "from study import b\n",
+        "study/deep/__init__.py": "",
+        "study/deep/late.py": "",
+        "study/typed.py": "",
+        "study/named.py": "",
+        "study/unused.py": "",
+    }
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def stems(package, **options):
+    return [
+        Path(p).relative_to(package / "study").as_posix() for p in rests_on(package / "scripts" / "go.py", **options)
+    ]
+
+
+def test_modules_are_followed_through_one_another(package):
+    assert stems(package) == ["a.py", "b.py", "d.py", "deep/__init__.py", "deep/late.py"]
+    assert "named.py" in stems(package, also=["study.named"])
+    assert stems(package, without=["study.b"]) == ["a.py", "deep/__init__.py", "deep/late.py"]
+
+
+def test_a_module_that_is_no_python_is_named(package):
+    (package / "study" / "a.py").write_text("def (\n")
+    with pytest.raises(StudyError, match=r"a\.py cannot be read as Python"):
+        stems(package)
+
+
+def test_simulation_does_not_rest_on_identification():
+    script, cut = Path("scripts/make_record.py"), ["study.estimators", "study.estimators.base", "study.spectra"]
+    found = rests_on(ROOT / script, without=cut)
+    names = {Path(p).name for p in found}
+    assert {"simulate.py", "kernels.py", "excitation.py", "terms.py", "record.py"} <= names
+    assert not {"miso.py", "parameters.py", "spectra.py", "inputs.py"} & names

@@ -1,0 +1,116 @@
+"""The page that a reader opens first, and documents as Markdown and as HTML."""
+
+from html.parser import HTMLParser
+
+import pandas as pd
+import pytest
+
+from study import document, summary
+
+PARAMETERS = pd.DataFrame(
+    [
+        ("quiet", "siso", "k", 355.3, 500.0, 4.0, 0.407, 0.005, False),
+        ("quiet", "miso", "k", 355.3, 355.0, 0.3, -0.0008, 0.005, True),
+        ("quiet", "miso", "k3", 0.0, 10.0, 20.0, None, 1e5, True),
+        ("noisy", "miso", "k", 355.3, 300.0, 4.0, -0.155, 0.005, False),
+    ],
+    columns=["case", "estimator", "parameter", "true", "estimate", "standard_error", "relative_error", "tolerance",
+             "within_tolerance"],
+)  # fmt: skip
+CLAIMS = pd.DataFrame(
+    [
+        ("a", "Section 1", "|A_1| <is> flat", "500 N/m", "512 +- 3; more", "c", "reproduced", ""),
+        ("b", "Section 2", "All is well", "as stated", "x", "c", "partly", "because of b"),
+        ("c", "Section 3", "Nothing is", "as stated", "y", "c", "not reproduced", "because of c"),
+    ],
+    columns=["id", "where", "claim", "reported", "measured", "criterion", "verdict", "why"],
+)
+READING = pd.DataFrame(
+    [("k", 500.0, 512.0, 3.0, 594.0, 5.0, "raw")],
+    columns=["quantity", "reported", "raw_mean", "raw_standard_error", "filtered_mean", "filtered_standard_error",
+             "nearer"],
+)  # fmt: skip
+TIMES = pd.DataFrame(
+    [("record", "quiet", 1.0), ("record", "noisy", 2.0), ("claims", "", 4.0)], columns=["stage", "case", "seconds"]
+)
+
+
+@pytest.fixture
+def tables():
+    return summary.Tables(PARAMETERS, CLAIMS, READING, TIMES, {"quiet": 0.0, "noisy": 0.05}, "raw")
+
+
+def flat(text):
+    return " ".join(text.split())
+
+
+def test_counts_are_counted(tables):
+    page = flat(document.markdown(summary.blocks(tables)))
+    assert "Of 3 statements of the report, **1 are reproduced**, 1 partly, 1 not" in page
+    assert "Without noise, MI/SO recovers 2 of 2 parameters of 1 cases" in page
+    assert "With noise on the displacement, 0 of 1 parameters of 1 cases" in page
+
+
+def test_a_study_without_noise_does_not_speak_of_it():
+    quiet = summary.Tables(PARAMETERS[:3], CLAIMS, READING, TIMES, {"quiet": 0.0}, "raw")
+    assert "With noise" not in document.markdown(summary.counts(quiet))
+
+
+def test_parameters_stand_side_by_side(tables):
+    page = flat(document.markdown(summary.parameters(tables)))
+    assert "| case | parameter | true | tolerance | siso | miso |" in page
+    assert "| quiet | k | 355.3 | 0.5 % | **500 ± 4 (+41 %)** | 355 ± 0.3 (-0.08 %) |" in page
+    assert "| quiet | k3 | 0 | 100000 | | 10 ± 20 |" in page
+
+
+def test_failing_claims_come_with_their_reasons_the_worst_first(tables):
+    page = document.markdown(summary.failing(tables))
+    assert page.index("because of c") < page.index("because of b")
+    assert "flat" not in page
+
+
+def test_numbers_show_what_was_stated_with_a_number(tables):
+    page = flat(document.markdown(summary.numbers(tables)))
+    assert "| 500 N/m | 512 +- 3 | reproduced |" in page
+    assert "All is well" not in page
+
+
+def test_run_times_add_up(tables):
+    page = flat(document.markdown(summary.run_times(tables)))
+    assert "| record | 2 | 3.0 | 2.0 |" in page
+    assert "| all | 3 | 7.0 | |" in page
+
+
+class Tags(HTMLParser):
+    """Sees to it that every tag is closed in its turn."""
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.words = [], []
+
+    def handle_starttag(self, tag, attrs):
+        assert not any(name in ("src", "href") for name, _ in attrs), "nothing is fetched"
+        if tag != "meta":
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+
+def test_html_is_whole_and_escapes_what_it_shows(tables):
+    tags = Tags()
+    tags.feed(document.page("A <title>", summary.blocks(tables)))
+    assert tags.open == []
+    assert "|A_1| <is> flat" in tags.words
+    assert "claims.md" in " ".join(tags.words), "links become words"
+
+
+def test_markdown_keeps_bars_within_their_cell(tables):
+    assert r"\|A_1\| <is> flat" in document.markdown(summary.numbers(tables))
+
+
+def test_an_empty_table_says_so():
+    assert document.markdown([document.table(["a"], [])]) == "None.\n"

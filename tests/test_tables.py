@@ -1,0 +1,114 @@
+"""Tables: columns, verdicts, exact functions, and files that are never half written."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from study import tables
+from study.case import identify_case
+from study.config import load
+from study.errors import StudyError
+from study.estimators.base import Identified, Parameter
+
+CONFIG = load(Path(__file__).parent.parent / "config")
+JUDGED = {"relative": {"k": 0.01}, "absolute": {"k": 2.0}}
+
+
+@pytest.fixture(scope="module")
+def found(systems, records):
+    """What is found in the combined system's record."""
+    return identify_case(systems["duffing_van_der_pol"], records["duffing_van_der_pol"], settings())
+
+
+def settings():
+    return CONFIG.identification_settings("duffing_van_der_pol")
+
+
+@pytest.mark.parametrize(
+    ("true", "value", "error", "within"),
+    [
+        (100.0, 100.9, 0.009, True),
+        (100.0, 98.9, -0.011, False),
+        (-100.0, -101.1, 0.011, False),
+        (0.0, 1.9, math.nan, True),
+        (0.0, -2.1, math.nan, False),
+        (100.0, math.nan, math.nan, False),
+    ],
+)
+def test_verdict(true, value, error, within):
+    judged = tables.judge("k", true, value, JUDGED)
+    assert judged["relative_error"] == pytest.approx(error, nan_ok=True)
+    assert judged["tolerance"] == (0.01 if true else 2.0)
+    assert judged["within_tolerance"] is within
+
+
+def test_what_has_no_tolerance_is_not_met():
+    assert tables.judge("own", 1.0, 1.0, JUDGED)["within_tolerance"] is False
+
+
+def test_parameters_in_long_form(systems, found):
+    table = tables.parameters("x", systems["duffing_van_der_pol"], found, settings())
+    assert list(table.columns) == [
+        "case", "estimator", "parameter", "true", "estimate", "standard_error",
+        "relative_error", "tolerance", "within_tolerance",
+    ]  # fmt: skip
+    assert list(table["estimator"].unique()) == ["siso", "miso", "miso_hand_read"]
+    own = table[table["estimator"] == "miso"].set_index("parameter")
+    assert list(own.index) == ["m", "c", "k", "f_n", "zeta", "k3", "c3"]
+    assert own["true"]["k3"] == 2.0e7
+    assert own["within_tolerance"].all()
+    assert not table[table["estimator"] == "siso"].set_index("parameter")["within_tolerance"]["k"]
+
+
+def test_a_system_without_stiffness_has_no_row_for_its_frequency(systems):
+    found = {"siso": Identified((), None, (Parameter("k", 1.0, 0.1), Parameter("f_n", 2.0, 0.1)))}
+    table = tables.parameters("extreme", systems["extreme"], found, settings())
+    assert list(table["parameter"]) == ["k"]
+
+
+def test_frequency_responses_stand_beside_the_exact_function(systems, found):
+    table = tables.frequency_responses(systems["duffing_van_der_pol"], found)
+    assert set(table["estimator"]) == {"siso", "miso"}
+    second = table[(table["estimator"] == "miso") & (table["input"] == 2)]
+    exact = 2e7 + 2e6 / 3.0 * 2j * np.pi * second["frequency"].to_numpy()
+    np.testing.assert_allclose(second["exact_real"] + 1j * second["exact_imag"], exact)
+    band = second[(second["frequency"] > 1.0) & (second["frequency"] < 6.0)]
+    off = np.hypot(band["real"] - band["exact_real"], band["imag"] - band["exact_imag"]) / band["standard_error"]
+    assert 0.5 < np.sqrt(np.mean(off**2)) < 2.0, "the errors are of the size of their standard errors"
+
+
+def test_coherences_name_their_terms(found):
+    table = tables.coherences(found)
+    own = table[table["estimator"] == "miso"]
+    assert set(own["terms"]) == {
+        "inertia + linear damping + linear stiffness", "cubic stiffness + van der pol damping"
+    }  # fmt: skip
+    last = own[own["input"] == 2]["cumulative"]
+    assert last.between(0.0, 1.0 + 1e-12).all()
+    assert (last.to_numpy() >= own[own["input"] == 1]["cumulative"].to_numpy() - 1e-12).all()
+
+
+def test_csv_has_twelve_digits_and_the_same_bytes_each_time(tmp_path):
+    table = pd.DataFrame({"a": [1.0 / 3.0, 2e7, math.nan], "b": [True, False, True]})
+    for name in ("one.csv", "two.csv"):
+        tables.write_csv(table, tmp_path / "new" / name)
+    assert (tmp_path / "new" / "one.csv").read_bytes() == b"a,b\n0.333333333333,True\n20000000,False\n,True\n"
+    assert (tmp_path / "new" / "one.csv").read_bytes() == (tmp_path / "new" / "two.csv").read_bytes()
+
+
+def test_a_table_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch):
+    path = tmp_path / "a.csv"
+    tables.write_csv(pd.DataFrame({"a": [1]}), path)
+
+    def full(_, target, **__):
+        target.write_text("a\n")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(pd.DataFrame, "to_csv", full)
+    with pytest.raises(StudyError, match="No space left"):
+        tables.write_csv(pd.DataFrame({"a": [2]}), path)
+    assert path.read_text() == "a\n1\n"
+    assert [p.name for p in tmp_path.iterdir()] == ["a.csv"]
