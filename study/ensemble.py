@@ -69,9 +69,9 @@ def rates(table: pd.DataFrame) -> pd.DataFrame:
     ``error_to_scatter`` is the mean standard error over the scatter that the seeds show.
     """
     rows: list[dict[str, Any]] = []
-    seeds = table.groupby("case")["seed"].nunique()
+    seeds = {str(case): int(group["seed"].nunique()) for case, group in table.groupby("case")}
     for (case, estimator, parameter), group in table.groupby(["case", "estimator", "parameter"], sort=False):
-        count = int(seeds[case])
+        count = seeds[str(case)]
         rate = float(group["within_tolerance"].astype(bool).sum()) / count
         scatter = float(group["estimate"].std(ddof=1))
         error = float(group["standard_error"].mean())
