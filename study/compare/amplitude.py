@@ -67,19 +67,17 @@ class Growths:
     margins: tuple[float, ...]
 
 
-def growths(found: Restoring, edge: int = 0) -> Growths | None:
+def growths(found: Restoring) -> Growths | None:
     """Hold the missing force against powers of displacement and velocity; None if there is nothing to explain.
 
     Parameters
     ----------
     found : Restoring
         The missing force.
-    edge : int
-        Samples at each end to leave out.
     """
-    keep = slice(edge, len(found.force) - edge)
+    keep = found.inner
     wanted = found.weighted(found.force)[keep]
-    basis = _basis([found.weighted(column)[keep] for column in found.free.T])
+    basis = _basis([found.weighted(column)[keep] for column in found.free.T], len(wanted))
     wanted = wanted - basis @ (basis.T @ wanted)
     power = float(wanted @ wanted)
     if not power > 0.0:
@@ -94,13 +92,12 @@ def growths(found: Restoring, edge: int = 0) -> Growths | None:
     return Growths(tuple(r[0] for r in ranked), tuple(margins))
 
 
-def _basis(columns: list[Floats]) -> Floats:
-    """Orthonormal basis of what the fitted coefficients could change."""
-    stack = np.stack(columns, axis=1) if columns else np.zeros((1, 0))
-    scale = np.linalg.norm(stack, axis=0)
-    if not np.any(scale > 0.0):
-        return np.zeros((len(stack), 0)) if columns else np.zeros((1, 0))
-    left, values, _ = np.linalg.svd(stack[:, scale > 0.0] / scale[scale > 0.0], full_matrices=False)
+def _basis(columns: list[Floats], samples: int) -> Floats:
+    """Orthonormal basis of what the fitted coefficients could change, shape (samples, p)."""
+    scaled = [c / np.sqrt(np.sum(c**2)) for c in columns if np.any(c != 0.0)]
+    if not scaled:
+        return np.zeros((samples, 0))
+    left, values, _ = np.linalg.svd(np.stack(scaled, axis=1), full_matrices=False)
     return left[:, values > 1e-8 * values[0]]
 
 
@@ -113,20 +110,21 @@ def _way(
     for power in POWERS[1:] if name == ("velocity", "even") else POWERS:  # a constant once is enough
         shape = found.weighted(WAYS[name](u, v, float(power)))[keep]
         rest = shape - basis @ (basis.T @ shape)
-        if np.linalg.norm(rest) > VISIBLE * np.linalg.norm(shape):
+        if np.sum(rest**2) > VISIBLE**2 * np.sum(shape**2):
             cross.append(_blocks(rest * wanted))
             own.append(_blocks(rest * rest))
             tried.append(float(power))
     if len(tried) < 3:
         return None
-    crosses, owns, powers = np.stack(cross, axis=1), np.stack(own, axis=1), np.array(tried)
+    crosses: Floats = np.stack(cross, axis=1)
+    owns: Floats = np.stack(own, axis=1)
+    powers: Floats = np.array(tried)
     blocks = len(crosses)
-    all_of_it = np.sum(crosses, axis=0) ** 2 / np.sum(owns, axis=0)
-    power, gain = _top(powers, all_of_it)
-    amount = float(np.interp(power, powers, np.sum(crosses, axis=0) / np.sum(owns, axis=0)))
-    left_out = [
-        _top(powers, (np.sum(crosses, axis=0) - crosses[b]) ** 2 / (np.sum(owns, axis=0) - owns[b]))
-        for b in range(blocks)
+    cross_sum, own_sum = np.asarray(np.sum(crosses, axis=0)), np.asarray(np.sum(owns, axis=0))
+    power, gain = _top(powers, cross_sum**2 / own_sum)
+    amount = float(np.interp(power, powers, cross_sum / own_sum))
+    left_out: list[tuple[float, float]] = [
+        _top(powers, (cross_sum - crosses[b]) ** 2 / (own_sum - owns[b])) for b in range(blocks)
     ]
     kept = blocks / (blocks - 1.0)
     shares = np.array([g for _, g in left_out]) * kept / explicable

@@ -37,7 +37,7 @@ class Comparison:
     record : Record
         With all three motions, in consistent units.
     how : Plan
-        What was fitted and what is judged.
+        What was fitted and what is judged, in how many steps per sample.
     found : FreeRunFit
         The fit.
     coefficients : tuple of Coefficient
@@ -129,7 +129,7 @@ def compare(
     told("motions")
     completed = complete(record, cutoff)
     told("fit")
-    found = fit_model(model, completed.record, how)
+    found, how = fit_model(model, completed.record, how)
     told("free run")
     judged = judge(found, completed.record, how, completed.band[0])
     noise = noise_of(judged, completed.record, how.judge[1])
@@ -148,16 +148,10 @@ def compare(
         force=force,
         bands=bands(noise, force, judged.low),
         restoring=lacking,
-        growths=None if noise.alone else growths(lacking, _edge(judged, noise)),
+        growths=None if noise.alone else growths(lacking),
         time=along_time(judged),
         notes=completed.says,
     )
-
-
-def _edge(judged: Judged, noise: Noise) -> int:
-    """Samples at each end which the filters leave unsure: half the memory of the spectral gain."""
-    memory = round(0.5 / (float(noise.frequency[1]) * judged.dt))
-    return min(memory, len(judged.measured) // 16)
 
 
 def across(comparisons: Sequence[Comparison]) -> tuple[Level, ...]:

@@ -6,17 +6,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study import fitting, units
+from study.chaotic import fit_in_pieces
 from study.diagnose import search
 from study.diagnose.score import clustered_covariance
 from study.errors import StudyError
 from study.fitting import Plan
+from study.free_run import prepare
 from study.model import Model, ModelTerm
 from study.output_error import FreeRunFit
+from study.pieces import angular_rate
 from study.record import Record
 from study.terms import QUANTITIES
 
 Floats = NDArray[np.float64]
 TWO_SIDED_95 = 1.959964  # standard errors
+POOR = 0.05  # of the rms response: a fit that leaves more is tried again from pieces
+PERIODS = 50.0  # of the motion, in the stretch that the pieces are cut from ...
+SHORT, LONG = 512, 2048  # ... and its limits in samples
+SHIFT = 0.3  # standard errors by which the integration may shift a coefficient
+MOST_STEPS = 8  # per sample
 
 
 @dataclass(frozen=True)
@@ -54,24 +62,73 @@ class Coefficient:
         return self.value - TWO_SIDED_95 * self.error, self.value + TWO_SIDED_95 * self.error
 
 
-def fit_model(model: Model, record: Record, how: Plan) -> FreeRunFit:
+def fit_model(model: Model, record: Record, how: Plan) -> tuple[FreeRunFit, Plan]:
     """Fit all that the model leaves open; shape parameters that it leaves out are searched for.
+
+    Returns
+    -------
+    FreeRunFit, Plan
+        The plan's steps are doubled until the error of the integration matters no more.
 
     Raises
     ------
     StudyError
         If the model cannot be fitted.
     """
+    if "inertia" not in model:
+        raise StudyError(f"model {model.name!r} has no inertia; a free run needs it")
     held = fitting.held_keys(model)
     unknown = tuple(t for t in model.terms if None in t.parameters)
-    if not unknown:
-        return fitting.fit(model, record, how, held)
     grown = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
-    found = fitting.fit(grown, record, how, _held(grown, held))
+    found = _from_afar(grown, record, how, _held(grown, held))
     for entry in unknown:
         found = _with_shape(found, entry, record, how, held)
     ordered = replace(model, terms=tuple(_named(found.model, t.name) for t in model.terms))
-    return replace(found, model=ordered)
+    return _refined(replace(found, model=ordered), record, how, held)
+
+
+def _from_afar(model: Model, record: Record, how: Plan, held: tuple[str, ...]) -> FreeRunFit:
+    """A fit from the linear start; if it is poor, also one that begins with pieces of a few periods.
+
+    A free run of a strongly nonlinear system with somewhat wrong coefficients drifts out of step with the
+    measured motion, and the sum of squares has side valleys there. Within pieces nothing drifts far.
+    """
+    found = fitting.fit(model, record, how, held)
+    measured = record[how.response][slice(*how.fit)]
+    if not found.keys or (found.converged and found.rms < POOR * float(np.std(measured))):
+        return found
+    length = round(PERIODS * 2.0 * np.pi / (angular_rate(measured, record.dt) * record.dt))
+    span = (how.fit[0], min(how.fit[0] + int(np.clip(length, SHORT, LONG)), how.fit[1]))
+    start = {key: v for key, v in fitting.linear_start(model, record, how).items() if key not in held}
+    try:
+        near = fit_in_pieces(model, record, start=start, held=held, response=how.response, span=span)
+        again = fitting.fit(model, record, how, held, dict(zip(near.keys, near.values.tolist(), strict=True)))
+    except StudyError:
+        return found
+    return again if again.rms < found.rms else found
+
+
+def _refined(found: FreeRunFit, record: Record, how: Plan, held: tuple[str, ...]) -> tuple[FreeRunFit, Plan]:
+    """The fit with so many steps per sample that halving them shifts no coefficient by what its error shows."""
+    while found.keys and how.steps_per_sample < MOST_STEPS:
+        jacobian = fitting.linearise(found, record, how)
+        finer = replace(how, steps_per_sample=2 * how.steps_per_sample)
+        runs = [
+            prepare(found.model, record, response=p.response, steps_per_sample=p.steps_per_sample, span=p.fit)
+            for p in (how, finer)
+        ]
+        coarse, fine = (run.respond({}, found.initial)[0] for run in runs)
+        scale = np.maximum(np.sqrt(np.sum(jacobian**2, axis=0)), 1e-300)
+        moved = np.asarray(
+            np.linalg.lstsq(jacobian / scale, np.subtract(coarse, fine), rcond=1e-12)[0], dtype=np.float64
+        )
+        deviations = np.sqrt(np.diag(clustered_covariance(jacobian, found.residual)))
+        if np.all(np.abs(moved / scale) <= SHIFT * deviations):
+            break
+        how = finer
+        start = dict(zip(found.keys, found.values.tolist(), strict=True))
+        found = fitting.fit(found.model, record, how, held, start)
+    return found, how
 
 
 def _held(model: Model, held: tuple[str, ...]) -> tuple[str, ...]:

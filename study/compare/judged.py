@@ -104,12 +104,14 @@ def judge(found: FreeRunFit, record: Record, how: Plan, low: float = 0.0) -> Jud
         )  # fmt: skip
         span, initial = how.judge, again.initial
     run = prepare(found.model, record, steps_per_sample=how.steps_per_sample, span=span)
-    motions = np.stack([replace(run, row=row).respond({}, initial)[0] for row in range(3)])[:, first - span[0] :]
+    whole = [replace(run, row=row).respond({}, initial)[0] for row in range(3)]
+    motions = np.asarray(whole, dtype=np.float64)[:, first - span[0] :]
     row = MOTIONS.index(how.response)
     twice = prepare(
         found.model, record, response=how.response, steps_per_sample=2 * how.steps_per_sample, span=span
     )  # fmt: skip
     finer, _ = twice.respond({}, initial)
-    numerical = float(np.sqrt(np.mean((finer[first - span[0] :] - motions[row]) ** 2)))
+    gap: Floats = np.subtract(finer[first - span[0] :], motions[row])
+    numerical = float(np.sqrt(np.mean(gap**2)))
     part = record.part(first, last)
     return Judged(part.time, motions, row, part[how.response], low, record.dt, numerical)

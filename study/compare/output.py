@@ -17,11 +17,10 @@ def check_folder(folder: Path) -> None:
     StudyError
         If not.
     """
-    try:
-        there = next((p for p in (folder, *folder.absolute().parents) if p.exists()), Path("/"))
-        usable = there.is_dir() and os.access(there, os.W_OK | os.X_OK)
-    except (OSError, ValueError) as error:  # ValueError: a path with a null byte
-        raise StudyError(f"{str(folder)!r}: no folder can be there ({reason(error)}); another --out is right") from None
+    if "\0" in str(folder):
+        raise StudyError(f"{str(folder)!r}: no folder has such a name; another --out is right")
+    there = next((p for p in (folder, *folder.absolute().parents) if p.exists()), Path("/"))
+    usable = there.is_dir() and os.access(there, os.W_OK | os.X_OK)
     if not usable:
         why = "it is write-protected" if there.is_dir() else "it is no folder"
         raise StudyError(f"{folder}: cannot be written to ({there}: {why}); a writable folder is right")

@@ -114,7 +114,7 @@ def missing_force(found: Comparison) -> Figure:
         f"{found.record.name}: the force that the model lacks", f"model {found.model.name}; {about}", rows=3,
         width=WIDE, panel=2.3, share=False,
     )  # fmt: skip
-    u, v, force = lacking.displacement, lacking.velocity, lacking.force
+    u, v, force = (x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force))
     misfit.missing_force(axes[0], surface(u, v, force), unit)
     misfit.force_curve(axes[1], curve(u, force), "displacement", unit)
     misfit.force_curve(axes[2], curve(v, force), "velocity", unit)

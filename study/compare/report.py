@@ -127,8 +127,6 @@ def _finite(value: object) -> object:
         return {str(key): _finite(item) for key, item in cast("dict[object, object]", value).items()}
     if isinstance(value, list | tuple):
         return [_finite(item) for item in cast("Sequence[object]", value)]
-    if isinstance(value, np.bool_ | np.integer):
-        return int(value) if isinstance(value, np.integer) else bool(value)
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -199,17 +197,18 @@ def _response_spectrum(found: Comparison) -> pd.DataFrame:
 
 def _curves(found: Comparison) -> pd.DataFrame:
     lacking = found.restoring
-    against = {"displacement": lacking.displacement, "velocity": lacking.velocity}
+    inner = lacking.inner
+    against = {"displacement": lacking.displacement[inner], "velocity": lacking.velocity[inner]}
     frames: list[pd.DataFrame] = []
     for name, values in against.items():
-        line = curve(values, lacking.force)
+        line = curve(values, lacking.force[inner])
         frames.append(pd.DataFrame({"against": name, "at": line.at, "mean": line.mean, "error": line.error}))
     return pd.concat(frames)
 
 
 def _map(found: Comparison) -> pd.DataFrame:
     lacking = found.restoring
-    plane = surface(lacking.displacement, lacking.velocity, lacking.force)
+    plane = surface(*(x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force)))
     i, j = np.nonzero(np.isfinite(plane.mean))
     u, v = (0.5 * (x[1:] + x[:-1]) for x in (plane.displacement, plane.velocity))
     return pd.DataFrame({"displacement": u[i], "velocity": v[j], "mean": plane.mean[i, j], "error": plane.error[i, j]})

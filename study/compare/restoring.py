@@ -21,7 +21,7 @@ from study.compare.noise import Noise
 from study.fitting import Plan
 from study.inputs import history, reverse_inputs
 from study.model import Model, forward_graph, free, with_registers
-from study.motion import CompletedRecord, derivative
+from study.motion import SETTLED, CompletedRecord, derivative
 from study.record import MOTIONS, Record
 from study.terms import get
 
@@ -53,6 +53,8 @@ class Restoring:
         Mean square of the noise that is left in :meth:`weighted` ``force``.
     dt : float
         Sampling interval in seconds.
+    edge : int
+        Samples at each end which filters and integrals leave unsure.
     """
 
     displacement: Floats
@@ -64,6 +66,12 @@ class Restoring:
     frequency: Floats
     noise: float
     dt: float
+    edge: int
+
+    @property
+    def inner(self) -> slice:
+        """The samples that filters and integrals leave sure."""
+        return slice(self.edge, len(self.force) - self.edge)
 
     def weighted(self, force: Floats) -> Floats:
         """A force as it shows in the response, in the bands that stand above the noise, shape (n,)."""
@@ -106,7 +114,15 @@ def restoring(
         frequency=noise.frequency,
         noise=float(np.sum(noise.density[gate]) * width),
         dt=judged.dt,
+        edge=_edge(judged, width),
     )
+
+
+def _edge(judged: Judged, width: float) -> int:
+    """Half the memory of the gate, and what an integration needs to settle; at most an eighth of all."""
+    memory = 0.5 / (width * judged.dt)
+    settling = SETTLED / (judged.low * judged.dt) if judged.low > 0.0 else 0.0
+    return min(round(max(memory, settling)), len(judged.measured) // 8)
 
 
 def above_noise(noise: Noise, low: float) -> NDArray[np.bool_]:
@@ -118,16 +134,17 @@ def above_noise(noise: Noise, low: float) -> NDArray[np.bool_]:
 
 
 def _motion(judged: Judged, gate: NDArray[np.bool_], frequency: Floats) -> Floats:
-    """Displacement, velocity and acceleration: free run plus what is sure of the difference, shape (3, n)."""
-    sure = _filtered(judged.difference, judged.dt, frequency, gate.astype(np.float64))
-    parts = [_shifted(sure, judged, row - judged.row) for row in range(3)]
+    """Displacement, velocity and acceleration: free run plus what is sure of the difference, shape (3, n).
+
+    The difference is integrated before it is gated: a gate blurs the ends, which an integration would blow up.
+    """
+    parts: list[Floats] = []
+    for row in range(3):
+        order = row - judged.row
+        low = judged.low if order < 0 else 0.0
+        moved = derivative(judged.difference, judged.dt, order, low) if order else judged.difference
+        parts.append(_filtered(moved, judged.dt, frequency, gate.astype(np.float64)))
     return judged.motion + np.stack(parts)
-
-
-def _shifted(values: Floats, judged: Judged, order: int) -> Floats:
-    if order == 0:
-        return values
-    return derivative(values, judged.dt, order, judged.low if order < 0 else 0.0)
 
 
 def missing_force(model: Model, keys: Sequence[str], record: Record) -> Floats:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as fisher
+from scipy.special import fdtrc
 
 from study.compare.judged import Judged
 
@@ -85,7 +85,7 @@ def along_time(judged: Judged) -> AlongTime:
     p_value = 1.0
     if freedom > 2 and sum_full > 0.0:
         ratio = (sum_plain - sum_full) / (STRETCHES - 1) / (sum_full / freedom)
-        p_value = float(fisher.sf(ratio, STRETCHES - 1, freedom))
+        p_value = float(np.asarray(fdtrc(STRETCHES - 1, freedom, ratio), dtype=np.float64))
     growth, growth_error = _slope(level, e)
     rows = tuple(_stretch(judged, residual, response, k, np.exp(e - usual), group) for k in range(STRETCHES))
     together = 1.0 - _regress(np.concatenate([plain[:, :1], stretch], axis=1), level)[1] / max(

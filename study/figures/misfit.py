@@ -21,8 +21,9 @@ from study.figures import labels
 
 Floats = NDArray[np.float64]
 COLUMNS = 1500  # of a panel: a longer history is drawn as its extremes in so many columns
+CLOSE = 1000  # samples: fewer are drawn so that one curve does not hide the other
 SURE = 2.0  # standard errors: cells whose mean is below are marked as not sure
-MEASURED: dict[str, Any] = {"color": "0.35", "label": "measured"}
+MEASURED: dict[str, Any] = {"color": "0.62", "label": "measured"}
 PREDICTED: dict[str, Any] = {"color": "C0", "label": "free run of the model"}
 RESIDUAL: dict[str, Any] = {"color": "C1", "label": "measured less predicted"}
 NOISE: dict[str, Any] = {"color": "black", "linestyle": (0, (1.0, 1.5)), "linewidth": 1.2}
@@ -37,15 +38,18 @@ def history(axes: Axes, time: Floats, values: Floats, look: dict[str, Any], **mo
         return axes
     bounds = np.linspace(0, len(values), COLUMNS + 1).astype(int)[:-1]
     low, high = np.minimum.reduceat(values, bounds), np.maximum.reduceat(values, bounds)
-    axes.fill_between(time[bounds], low, high, linewidth=0.3, **{**look, **more})
+    filled: dict[str, Any] = {**look, **more, "linewidth": 0.3}
+    axes.fill_between(time[bounds], low, high, **filled)
     return axes
 
 
 def response(axes: Axes, time: Floats, measured: Floats, predicted: Floats, unit: str) -> Axes:
     """Measured and predicted response."""
     factor, shown = labels.prefixed(unit, float(np.max(np.abs(measured))))
-    history(axes, time, measured / factor, MEASURED)
-    history(axes, time, predicted / factor, PREDICTED, alpha=0.8, linestyle="--")
+    close = len(time) <= CLOSE
+    history(axes, time, measured / factor, MEASURED, linewidth=2.6 if close else 0.6)
+    dashed = {"linestyle": (0, (3.0, 1.2)), "linewidth": 1.3} if close else {"alpha": 0.75, "linewidth": 0.6}
+    history(axes, time, predicted / factor, PREDICTED, **dashed)
     return _time_axis(axes, time, f"response ({units.pretty(shown)})")
 
 
