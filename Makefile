@@ -4,10 +4,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: study test lint clean
+.PHONY: study report test lint readme clean
 
 study: $(READY)
 	$(BIN)/snakemake -j2
+
+report: study
+	$(BIN)/snakemake --report report.html
 
 test: lint
 	$(BIN)/pytest
@@ -16,6 +19,9 @@ lint: $(READY)
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/pyright
+
+readme: study
+	$(BIN)/python scripts/readme.py
 
 $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
@@ -27,4 +33,4 @@ $(READY): requirements.lock pyproject.toml
 	@touch $@
 
 clean:
-	rm -rf results figures .snakemake
+	rm -rf results figures .snakemake report.html

@@ -100,15 +100,20 @@ def _met(table: pd.DataFrame) -> str:
 def numbers(tables: Tables) -> list[Block]:
     """Every statement with a number: reported, measured, verdict."""
     stated = tables.claims[~tables.claims["reported"].isin(["as stated", "as tabulated"])]
-    rows = [
-        [row["where"], row["claim"], row["reported"], str(row["measured"]).split("; ")[0], row["verdict"]]
-        for _, row in stated.iterrows()
-    ]
     note = (
         "Ours: mean over the seeds of an ensemble with its standard error, and the study's own record in brackets. "
         "Of statements with several conditions the first is shown; [claims.md](claims.md) has them all."
     )
-    return [Text(note), table(["where", "what", "report", "ours", "verdict"], rows)]
+    return [Text(note), statements(stated)]
+
+
+def statements(claims: pd.DataFrame) -> Block:
+    """One row a claim; of those with several conditions the first."""
+    rows = [
+        [row["where"], row["claim"], row["reported"], str(row["measured"]).split("; ")[0], row["verdict"]]
+        for _, row in claims.iterrows()
+    ]
+    return table(["where", "what", "report", "ours", "verdict"], rows)
 
 
 def parameters(tables: Tables) -> list[Block]:
