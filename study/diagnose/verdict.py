@@ -100,7 +100,9 @@ def diagnose(
         If the model cannot be fitted to the record.
     """
     held = fitting.held_keys(model)
-    found = fit_model(model, record, how)
+    found, finer = fit_model(model, record, how)
+    if finer != how:  # the candidates are told apart at the plan's own steps, and so is the model without them
+        found = fitting.fit(found.model, record, how, held, found.model.numbers())
     residual = fitting.held_out_residual(found, record, how)
     short = fitting.shortened(how, SEARCHED)
     base = search.baseline(_refitted(found, record, how, short, held), record, short)
