@@ -37,7 +37,7 @@ def _missing(found: Diagnosis, force: str, length: str) -> list[str]:
         f"{_words(first.name)} is missing ({first.term.meaning}).",
         f"With it the held-out error of the response falls from {_percent(found.response_error)} to "
         f"{_percent(first.response_error)}; the noise floor is {_percent(found.noise)}.",
-        f"Its coefficient is {_amount(first, force, length)}{_shape(first)}.",
+        f"Its coefficient is {_amount(first, force, length)}{_shape(first, length)}.",
     ]
     if found.pair:
         second = next(name for name in found.pair if name != first.name)
@@ -78,8 +78,13 @@ def _amount(row: Ranked, force: str, length: str) -> str:
     return f"{row.coefficient:.4g} {unit} (95 % interval {low:.4g} to {high:.4g})"
 
 
-def _shape(row: Ranked) -> str:
-    parts = [f"{name} = {value:.4g} +- {row.parameter_errors[name]:.2g}" for name, value in row.parameters.items()]
+def _shape(row: Ranked, length: str) -> str:
+    units = {"length": length, "time": "s", "frequency": "Hz", "1/length": f"1/{length}"}
+    known = {p.name: units[p.quantity] for p in row.term.parameters} | {"phase": "rad"}
+    parts = [
+        f"{name} = {value:.4g} +- {row.parameter_errors[name]:.2g} {known[name]}"
+        for name, value in row.parameters.items()
+    ]
     return f", with {', '.join(parts)}" if parts else ""
 
 
