@@ -17,6 +17,7 @@ EXPLAINS = 0.5  # of what stands above the noise: what a power must explain to b
 NEAR = 0.25  # how near to a whole number a power must lie to be called by it
 SURE = 0.4  # standard error of a power, at most, for it to be called by a whole number
 HARDLY = 0.6  # a power below this is a step that noise has rounded, or close to one
+HIGHEST = 5.9  # the powers that are tried end at six
 NAMES = {0: "constant size", 2: "square", 3: "cube", 4: "fourth power", 5: "fifth power"}
 PARITY = {"odd": "odd in it", "even": "even in it"}
 
@@ -118,6 +119,8 @@ def _whole(way: Growth) -> int | None:
 def _power(way: Growth, whole: int | None) -> str:
     if whole == 1:
         return "the size"
+    if way.power >= HIGHEST:
+        return "a power of six or more"
     return f"the {NAMES[whole]}" if whole in NAMES else f"about the power {way.power:.1f}"
 
 
