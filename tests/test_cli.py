@@ -3,8 +3,8 @@
 import argparse
 import os
 import resource
-import signal
 import shlex
+import signal
 import subprocess
 import sys
 import time
