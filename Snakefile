@@ -19,7 +19,9 @@ include: "rules/reproduce.smk"
 include: "rules/claims.smk"
 include: "rules/monte_carlo.smk"
 include: "rules/summary.smk"
+include: "rules/trials.smk"
 include: "rules/cases.smk"
+include: "rules/measured.smk"
 
 
 rule all:

@@ -1,0 +1,78 @@
+# Measured records of config/measurements.tsv. Their data are no part of the project, so `rule all` asks for none:
+#   snakemake -j2 results/silverbox/comparison.json    how good is the model, and where does it fail
+#   snakemake -j2 results/silverbox/diagnosis.json     which effect is missing
+#   snakemake -j2 silverbox_climb                      diagnose, add, and again; the ladder
+#   snakemake -j2 gallery                              all of that, with pictures, for every record
+from dataclasses import asdict
+
+from study import measurements
+
+with one_sentence():
+    MEASUREMENTS = measurements.load(Path("config"))
+    for _name in MEASUREMENTS:
+        if _name in STUDY.cases:
+            raise StudyError(f"config/measurements.tsv: {_name!r} is a case of config/cases.tsv; take another name")
+
+CODE["measured"] = rests_on(Path("scripts/measured.py"))
+SEEN = {
+    "comparison": ("response", "force_error", "missing_force", "error_in_time"),
+    "diagnosis": ("candidates", "constancy"),
+}
+
+
+def climbed(name):
+    """What a climb leaves beside its steps."""
+    return [f"results/{name}/{file}" for file in ("history.json", "ladder.png", "ladder.svg", "reached.yaml")]
+
+
+for _name, _row in MEASUREMENTS.items():
+    for _what, _file in (("compare", "comparison"), ("diagnose", "diagnosis")):
+
+        rule:
+            name:
+                f"{_what}.{_name}"
+            input:
+                model=_row.model,
+                code=CODE["measured"],
+            output:
+                f"results/{_name}/{_file}.json",
+                [f"results/{_name}/{stem}.{ending}" for stem in SEEN[_file] for ending in ENDINGS],
+            params:
+                what=_what,
+                row=asdict(_row),
+            threads: 2
+            benchmark:
+                f"results/benchmarks/{_what}.{_name}.tsv"
+            script:
+                "../scripts/measured.py"
+
+    rule:
+        name:
+            f"climb.{_name}"
+        input:
+            model=_row.model,
+            code=CODE["measured"],
+        output:
+            history=f"results/{_name}/history.json",
+            pictures=[f"results/{_name}/ladder.{ending}" for ending in ENDINGS],
+            reached=f"results/{_name}/reached.yaml",
+        params:
+            what="climb",
+            row=asdict(_row),
+        threads: 2
+        benchmark:
+            f"results/benchmarks/climb.{_name}.tsv"
+        script:
+            "../scripts/measured.py"
+
+    rule:
+        name:
+            f"{_name}_climb"
+        input:
+            climbed(_name),
+
+
+rule gallery:
+    input:
+        [path for name in MEASUREMENTS for path in climbed(name)],
+        [f"results/{name}/{file}.json" for name in MEASUREMENTS for file in SEEN],

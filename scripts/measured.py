@@ -1,0 +1,29 @@
+"""Snakemake step: a measured record and a model -> comparison, diagnosis, or a climb from model to model."""
+
+from pathlib import Path
+from typing import Any
+
+from study.climb import climb, run
+from study.errors import StudyError
+from study.files import replace_file
+from study.measurements import Measurement, check_present
+from study.step import one_sentence
+
+
+def main(what: str, row: Measurement, output: Any) -> None:
+    record, model = Path(row.path), Path(row.model)
+    check_present(record)
+    if what != "climb":
+        run(what, str(record), "--model", str(model), *row.options, "--out", str(Path(output[0]).parent))
+        return
+    target = Path(output.history)
+    steps = climb(record, model, row.options, row.steps, target.parent)
+    if not steps:
+        raise StudyError(f"{row.name}: nothing was added to {model}; {target.parent}/climb/step_0 says why")
+    replace_file(Path(output.reached), (target.parent / "climb" / model.name).read_bytes())
+
+
+if "snakemake" in globals():
+    step = globals()["snakemake"]
+    with one_sentence():
+        main(step.params.what, Measurement(**step.params.row), step.output)
