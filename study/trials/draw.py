@@ -26,6 +26,7 @@ NOISES = (0.0, 0.01, 0.05, 0.10)
 KNOWN = ("none", "none", "cubic_stiffness", "van_der_pol_damping")  # of which one is drawn
 KNOWN_SHARE = 0.15
 SAMPLES = 8192
+STEPS, ACCURATE = 32, 1e-3  # steps per sample of the record, and by how much halving them may change it
 PUSH, FORGOTTEN = 20, 1e-3  # samples at the start; share of the motion in the second half
 ATTEMPTS = 300  # systems drawn until one carries the effects at the wanted strength and stays finite
 
@@ -115,6 +116,8 @@ def _attempt(rng: np.random.Generator, seed: int, hidden: tuple[str, ...], noise
         quiet = simulate(base, drive, dt, Integrator("rk4", 4))
         scale = float(np.std(quiet["displacement"]))
         base, quiet = _with_own_nonlinearity(rng, base, hidden, drive, dt, quiet)
+        if _unseen(base, hidden, response):
+            return None
         truth: Model | None = base
         for name in hidden:
             truth = _with_effect(rng, truth, name, quiet, scale, drive, dt)
@@ -129,12 +132,25 @@ def _attempt(rng: np.random.Generator, seed: int, hidden: tuple[str, ...], noise
         return None
     if any(not SHARE[0] <= share <= SHARE[1] for share in shares):
         return None
-    values = predict(truth, record, response=response, steps_per_sample=8)  # exact at stick and slip too
+    values = _measured(truth, record, response)
+    if values is None:
+        return None
     if noise > 0.0:
         values = values + displacement_noise(values, noise, seed)
     measured = Record(dt, {"force": drive, response: values}, record.units, f"trial_{seed}")
     believed = replace(base, name=f"trial_{seed}").with_values(dict.fromkeys(base.values, None))
     return Trial(measured, believed, truth, hidden, noise, shares)
+
+
+def _unseen(base: Model, hidden: tuple[str, ...], response: str) -> bool:
+    """A steady force moves an otherwise linear system to another place, which only a displacement shows."""
+    return hidden == ("constant_force",) and response != "displacement" and len(base.terms) == len(LINEAR)
+
+
+def _measured(truth: Model, record: Record, response: str) -> Floats | None:
+    """The motion without visible error of integration; None where so many steps do not give it."""
+    coarse, fine = (predict(truth, record, response=response, steps_per_sample=n) for n in (STEPS // 2, STEPS))
+    return fine if float(np.std(fine - coarse)) < ACCURATE * float(np.std(fine)) else None
 
 
 def _forgets(model: Model, drive: Floats, dt: float) -> bool:

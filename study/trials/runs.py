@@ -7,7 +7,7 @@ effect hidden and taken out of the library (``removed``).
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations, product
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -26,8 +26,8 @@ Row = dict[str, Any]
 SINGLE, NONE, PAIR, REMOVED = "single", "none", "pair", "removed"
 RESPONSES = ("displacement", "acceleration")
 COLUMNS = (
-    "kind", "seed", "hidden", "noise", "response", "known", "share", "verdict", "named", "tied_with", "second_verdict",
-    "second_named", "second_tied_with", "pair", "error_before", "error_after", "error_after_two", "error_true",
+    "kind", "seed", "hidden", "noise", "response", "known", "share", "verdict", "first", "named", "tied_with",
+    "second_verdict", "second_named", "second_tied_with", "pair", "error_before", "error_after", "error_after_two", "error_true",
     "noise_floor", "left", "tie_with_hidden", "trouble",
 )  # fmt: skip
 
@@ -66,7 +66,8 @@ def orders(settings: Mapping[str, Any]) -> list[Order]:
         ``trials`` of the configuration: ``first_seed``, ``noises``, how many ``rounds`` of single effects and
         of ``none`` at each noise and response, and how many ``pairs`` and ``removed`` trials of each effect.
     """
-    grid = list(product(settings["noises"], RESPONSES))
+    noises: list[float] = settings["noises"]
+    grid = [(noise, response) for noise in noises for response in RESPONSES]
     wanted: list[tuple[str, tuple[str, ...], tuple[float, str]]] = []
     wanted += [(SINGLE, (name,), place) for _ in range(settings["rounds"]) for place in grid for name in HIDDEN]
     wanted += [(NONE, (), place) for _ in range(settings["none"]) for place in grid]
@@ -102,14 +103,16 @@ def _judged(order: Order, trial: Trial) -> Row:
     found = diagnose(trial.believed, trial.record, how, without=without)
     first = found.candidates[0]
     missing = found.verdict == MISSING
+    after, finer = _after_adding(trial, how, first.term) if missing else (found.response_error, how)
     row: Row = {
         "verdict": found.verdict,
+        "first": first.name,
         "named": first.name if missing else "",
         "tied_with": "+".join(first.tied_with),
         "pair": "+".join(found.pair),
         "error_before": found.response_error,
-        "error_after": _after_adding(trial, how, first.term) if missing else found.response_error,
-        "error_true": error_of_truth(trial, how),
+        "error_after": after,
+        "error_true": error_of_truth(trial, finer),
         "noise_floor": found.noise,
         "left": found.left,
     }
@@ -129,8 +132,10 @@ def _added(trial: Trial, *terms: Term) -> Model:
     return model
 
 
-def _after_adding(trial: Trial, how: Plan, *terms: Term) -> float:
-    return _held_out(fit_model(_added(trial, *terms), trial.record, how), trial, how)
+def _after_adding(trial: Trial, how: Plan, *terms: Term) -> tuple[float, Plan]:
+    """Held-out response error after adding, and the plan with the steps that the fit was refined to."""
+    found, finer = fit_model(_added(trial, *terms), trial.record, how)
+    return _held_out(found, trial, finer), finer
 
 
 def _second(trial: Trial, how: Plan, first: Term) -> Row:
@@ -142,7 +147,7 @@ def _second(trial: Trial, how: Plan, first: Term) -> Row:
         "second_verdict": found.verdict,
         "second_named": best.name if missing else "",
         "second_tied_with": "+".join(best.tied_with),
-        "error_after_two": _after_adding(trial, how, first, best.term) if missing else found.response_error,
+        "error_after_two": _after_adding(trial, how, first, best.term)[0] if missing else found.response_error,
     }
 
 

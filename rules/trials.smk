@@ -1,0 +1,37 @@
+# Trials with hidden effects, the proof of diagnose: `snakemake -j2 trials`, not part of `all`.
+TRIALS = STUDY.settings["trials"]
+TRIAL_SETTINGS = {key: value for key, value in TRIALS.items() if key != "wanted"}
+TRIAL_CODE = {name: rests_on(Path(f"scripts/{name}.py")) for name in ("trials", "trial_summary")}
+
+
+rule trial_runs:
+    input:
+        code=TRIAL_CODE["trials"],
+    output:
+        table="results/trials/part_{part}.csv",
+    params:
+        settings=TRIAL_SETTINGS,
+    wildcard_constraints:
+        part="[0-9]+",
+    benchmark:
+        "results/benchmarks/trials.{part}.tsv"
+    script:
+        "../scripts/trials.py"
+
+
+rule trials:
+    input:
+        parts=[f"results/trials/part_{part}.csv" for part in range(TRIALS["jobs"])],
+        style=STYLE,
+        code=TRIAL_CODE["trial_summary"],
+    output:
+        trials="results/trials/trials.csv",
+        confusion="results/trials/confusion.csv",
+        summary="results/trials/summary.csv",
+        ladder="results/trials/ladder.csv",
+        confusion_figure=pictures("trials_confusion"),
+        ladder_figure=pictures("trials_ladder"),
+    params:
+        wanted=TRIALS["wanted"],
+    script:
+        "../scripts/trial_summary.py"

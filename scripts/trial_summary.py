@@ -1,0 +1,64 @@
+"""Snakemake step: all trials -> one table, confusion, reach, ladder, and their pictures."""
+
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+from matplotlib import style as styles
+from matplotlib.figure import Figure
+
+from study import tables
+from study.figures import page
+from study.files import replace_file
+from study.step import one_sentence
+from study.trials import pictures, reach
+
+KINDS = {"single": "one effect hidden", "pair": "two effects hidden"}
+
+
+def main(
+    parts: Sequence[str], wanted: Mapping[str, float], outputs: Mapping[str, str],
+    drawings: Mapping[str, Sequence[str]], style: Path,
+) -> None:  # fmt: skip
+    table = pd.concat([pd.read_csv(path) for path in parts], ignore_index=True).sort_values("seed")
+    summary, confusion, ladder = reach.summary(table, wanted), reach.confusion(table), reach.ladder(table)
+    found = {"trials": table, "summary": summary, "confusion": confusion, "ladder": ladder}
+    for name, path in outputs.items():
+        tables.write_csv(found[name], Path(path))
+    print(summary.to_string(index=False), file=sys.stderr)
+    with styles.context(style):
+        figures = {"confusion": _confusion(confusion), "ladder": _ladder(ladder)}
+        for name, paths in drawings.items():
+            for path in paths:
+                replace_file(Path(path), page.rendered(figures[name], Path(path).suffix[1:]))
+
+
+def _confusion(counts: pd.DataFrame) -> Figure:
+    figure = Figure(figsize=(10.2, 8.6), layout="constrained")
+    axes = figure.subplots()
+    axes.set_title("Trials: which effect was hidden, and what diagnose said (% of each row)", fontweight="bold")
+    pictures.confusion(axes, counts)
+    return figure
+
+
+def _ladder(rows: pd.DataFrame) -> Figure:
+    figure, axes = page.page(
+        "Trials with hidden effects", "Mean held-out response error, with 95 % intervals", columns=2,
+        width=page.width(2), panel=2.9, legend_rows=1,
+    )  # fmt: skip
+    for panel, kind in zip(axes, KINDS, strict=True):
+        pictures.ladder(panel, rows[rows["kind"] == kind])
+    page.letter(axes, list(KINDS.values()))
+    page.legend(figure, axes[1:])
+    return figure
+
+
+if "snakemake" in globals():
+    step = globals()["snakemake"]
+    with one_sentence():
+        main(
+            step.input.parts, step.params.wanted,
+            {name: step.output[name] for name in ("trials", "summary", "confusion", "ladder")},
+            {"confusion": step.output.confusion_figure, "ladder": step.output.ladder_figure}, Path(step.input.style),
+        )  # fmt: skip
