@@ -20,8 +20,10 @@ HALF = 0.5  # what a named tie counts that holds the true effect
 
 def rows_of(table: pd.DataFrame) -> list[Row]:
     """The rows of ``trials.csv``, empty cells as empty words."""
-    words = ["hidden", "verdict", "first", "named", "tied_with", "second_verdict", "second_named", "second_tied_with", "pair",
-             "tie_with_hidden", "trouble"]  # fmt: skip
+    words = (
+        "hidden", "verdict", "first", "named", "tied_with", "second_verdict", "second_named", "second_tied_with",
+        "pair", "tie_with_hidden", "trouble",
+    )  # fmt: skip
     return cast(list[Row], table.assign(**{c: table[c].fillna("").astype(str) for c in words}).to_dict("records"))
 
 

@@ -26,9 +26,9 @@ Row = dict[str, Any]
 SINGLE, NONE, PAIR, REMOVED = "single", "none", "pair", "removed"
 RESPONSES = ("displacement", "acceleration")
 COLUMNS = (
-    "kind", "seed", "hidden", "noise", "response", "known", "share", "verdict", "first", "named", "tied_with",
-    "second_verdict", "second_named", "second_tied_with", "pair", "error_before", "error_after", "error_after_two", "error_true",
-    "noise_floor", "left", "tie_with_hidden", "trouble",
+    "kind", "seed", "hidden", "noise", "response", "known", "share",
+    "verdict", "first", "named", "tied_with", "second_verdict", "second_named", "second_tied_with", "pair",
+    "error_before", "error_after", "error_after_two", "error_true", "noise_floor", "left", "tie_with_hidden", "trouble",
 )  # fmt: skip
 
 
