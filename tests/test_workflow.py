@@ -24,6 +24,7 @@ SMALL = [
     (r"\nexcitations:\n", "\nexcitations:\n  other: {kind: gaussian_lowpass, seed: 7}\n"),
 ]
 DUFFING = "duffing\tduffing\treport\t1.0\t0\t\t21\t22\t23\t24\t3\t\t\t\tDuffing system"
+TAB = "\t"
 NOISY = "noisy\tduffing_van_der_pol\tother\t1.0\t0.05\t\t53\t54\t55\t\t\t\t\t\tCombined system with noise"
 
 
@@ -81,15 +82,8 @@ def edited(path, old, new):
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
-    """The small study, complete: one case first, the second added as a row and nothing else."""
-    folder = project(tmp_path_factory.mktemp("study"), DUFFING)
-    run(folder, "-j2")
-    with (folder / "config" / "cases.tsv").open("a") as table:
-        table.write(NOISY + "\n")
-    jobs = planned(folder)
-    assert jobs == {
-        "record": 1, "identify": 1, "draw.noisy": 1, "parameters": 1, "pages": 1, "summary": 1, "all": 1
-    }, "a new row runs its own jobs and what joins all cases"  # fmt: skip
+    """The small study, complete."""
+    folder = project(tmp_path_factory.mktemp("study"), DUFFING, NOISY)
     run(folder, "-j2")
     return folder
 
@@ -105,6 +99,13 @@ def test_a_row_of_the_table_gives_every_product(built):
     assert "| duffing " in page
     assert "| noisy " in page
     assert "## Run times" in page
+
+
+def test_a_new_row_runs_its_own_jobs_and_what_joins_all_cases(built):
+    with edited(built / "config" / "cases.tsv", DUFFING, f"{DUFFING}\nmine\tlinear\treport\t2\t0{10 * TAB}Mine"):
+        assert planned(built) == {
+            "record": 1, "identify": 1, "draw.mine": 1, "parameters": 1, "pages": 1, "summary": 1, "all": 1
+        }  # fmt: skip
 
 
 def test_a_second_run_finds_nothing_to_do(built):
@@ -160,7 +161,7 @@ def test_targets_by_name_and_by_number(built):
 
 def test_killed_at_work_and_finished_on_one_core_gives_the_same_bytes(built, tmp_path):
     folder = project(tmp_path, DUFFING, NOISY)
-    targets = ["results/parameters.csv", "results/claims.csv"]
+    targets = ["results/parameters.csv", "results/excitation_reading.csv"]
     process = subprocess.Popen(
         [SNAKEMAKE, "-j2", *targets], cwd=folder, start_new_session=True,
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
