@@ -24,7 +24,8 @@ def rows_of(table: pd.DataFrame) -> list[Row]:
         "hidden", "verdict", "first", "named", "tied_with", "second_verdict", "second_named", "second_tied_with",
         "pair", "tie_with_hidden", "trouble",
     )  # fmt: skip
-    return cast(list[Row], table.assign(**{c: table[c].fillna("").astype(str) for c in words}).to_dict("records"))
+    filled = {c: table[c].astype(object).where(table[c].notna(), "").astype(str) for c in words}
+    return cast(list[Row], table.assign(**filled).to_dict("records"))
 
 
 def first_score(row: Row) -> float:
@@ -127,7 +128,7 @@ def _others(table: pd.DataFrame) -> list[str]:
 
 def ladder(table: pd.DataFrame) -> pd.DataFrame:
     """Mean held-out response error before and after adding what was found, and that of the true model, by noise."""
-    good = table[table["trouble"].fillna("") == ""]
+    good = table[table["trouble"].isna() | (table["trouble"] == "")]
     rows: list[dict[str, Any]] = []
     for kind, steps in ((SINGLE, ("before", "after", "true")), (PAIR, ("before", "after", "after_two", "true"))):
         for noise, group in good[good["kind"] == kind].groupby("noise"):
