@@ -25,7 +25,7 @@ def diagnosed(trial: Trial, without: tuple[str, ...] = ()) -> Diagnosis:
     return diagnose(trial.believed, trial.record, fitting.plan(trial.record), without=without)
 
 
-@pytest.mark.parametrize(("place", "name"), enumerate(EFFECTS))
+@pytest.mark.parametrize(("place", "name"), list(enumerate(EFFECTS)))
 def test_hidden_effect_comes_first_or_is_named_in_the_tie(place: int, name: str) -> None:
     noise = NOISES[place % 3]
     trial = make_trial(FIRST_SEED + place, (name,), noise, RESPONSES[place % 2])
