@@ -3,12 +3,13 @@ import sys
 from pathlib import Path
 
 from study.config import load
-from study.step import alone, one_sentence
+from study.step import alone, one_sentence, sweep
 
 with one_sentence():
     STUDY = load(Path("config"))
     if workflow.is_main_process and not workflow.dryrun:
         LOCK = alone(Path(".snakemake/running"))  # held until this process ends
+        sweep(Path("results"), Path("figures"))
 
 
 report: "rules/captions/workflow.rst"

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from study.errors import StudyError
 
+BESIDE = ".study-"  # begins the name of a file that is still being written
 LARGEST = 1_000_000  # bytes; the longest sensible text file of a user has a few kilobytes
 
 
@@ -73,7 +74,7 @@ def replacing(path: Path) -> Generator[Path, None, None]:
         If it cannot be written (no permission, no space).
     """
     target = Path(os.path.realpath(path))
-    beside = target.with_name(f".study-{secrets.token_hex(8)}{target.suffix}")
+    beside = target.with_name(f"{BESIDE}{secrets.token_hex(8)}{target.suffix}")
     try:
         mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
         if mode is not None and not os.access(target, os.W_OK):

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TextIO
 
 from study.errors import StudyError
+from study.files import BESIDE
 
 FAILED = 2  # as the command line ends on input that cannot be used
 
@@ -38,3 +39,10 @@ def alone(path: Path) -> TextIO:
         held.close()
         raise StudyError(f"another run is at work in {Path.cwd()}; wait for its end, or stop it") from None
     return held
+
+
+def sweep(*folders: Path) -> None:
+    """Remove what killed runs left half written. Only who runs alone may do this."""
+    for folder in folders:
+        for path in folder.rglob(f"{BESIDE}*"):
+            path.unlink(missing_ok=True)

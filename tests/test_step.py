@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from study.errors import StudyError
+from study.files import replacing
 from study.modules import rests_on
-from study.step import alone, one_sentence
+from study.step import alone, one_sentence, sweep
 
 ROOT = Path(__file__).parent.parent
 
@@ -43,6 +44,18 @@ def test_a_killed_run_holds_nobody_up(tmp_path):
             alone(tmp_path / "running")
         process.kill()
     alone(tmp_path / "running").close()
+
+
+def test_what_killed_runs_left_half_written_is_swept(tmp_path):
+    path = tmp_path / "results" / "a" / "b.csv"
+    path.parent.mkdir(parents=True)
+    path.write_text("whole")
+    with replacing(path) as beside:
+        beside.write_text("half")
+        left = beside.with_name(beside.name + ".csv")
+        left.write_text("as a killed run leaves it")
+    sweep(tmp_path / "results", tmp_path / "missing")
+    assert [p.name for p in path.parent.iterdir()] == ["b.csv"]
 
 
 @pytest.fixture
