@@ -192,7 +192,7 @@ def test_summary_confusion_and_ladder_of_a_table(tmp_path: Path) -> None:
     pd.DataFrame(table, columns=list(COLUMNS)).to_csv(tmp_path / "trials.csv", index=False)
     read = pd.read_csv(tmp_path / "trials.csv")
     rates = reach.summary(read, {"first": 0.95, "nothing": 0.95, "both": 0.85, "removed": 0.8})
-    assert rates["trials"].tolist() == [3, 1, 3, 1, 1, 0, 4]
+    assert rates["trials"].tolist() == [3, 1, 3, 1, 1, 0, 4, 1]
     assert rates["rate"].tolist()[:2] == pytest.approx([1.0 / 3.0, 1.0])
     assert rates["standard_error"][0] == pytest.approx(np.sqrt(2.0 / 27.0))
     assert rates["met"].tolist()[3] == "yes"

@@ -80,6 +80,7 @@ TARGETS: tuple[tuple[str, Callable[[Row], bool], Callable[[Row], float], str], .
     ("both of two found by diagnosing and adding twice", _kind(PAIR), pair_score, "both"),
     ("effect out of the library called unknown, or its tie named", _kind(REMOVED), removed_score, "removed"),
     ("error after adding within 5 % of the true model's", _kind(SINGLE), as_good_as_truth, "first"),
+    ("the same, of the trials with noise", _kind(SINGLE, lambda r: r["noise"] > 0.0), as_good_as_truth, ""),
 )  # fmt: skip
 
 
