@@ -58,7 +58,7 @@ def load(folder: Path) -> Mapping[str, Measurement]:
             raise StudyError(f"{where}: the record stands twice; each name may be used once")
         model = folder.parent / "models" / f"{row['model']}.yaml"
         if not model.is_file():
-            known = ", ".join(sorted(p.stem for p in model.parent.glob("*.yaml")))
+            known = ", ".join(sorted(p.stem for p in (folder.parent / "models").rglob("*.yaml")))
             raise StudyError(f"{where}: there is no model {row['model']!r}; models/ holds {known}")
         path = row["path"].replace(VARIABLE, str(data_folder()), 1)
         options = _options(row["options"], where)
