@@ -31,6 +31,12 @@ def test_every_effect_can_be_hidden_at_its_share(name: str) -> None:
     assert SHARE[0] <= trial.shares[0] <= SHARE[1]
 
 
+@pytest.mark.parametrize("seed", range(820, 828))
+def test_shares_of_two_effects_are_those_of_the_final_motion(seed: int) -> None:
+    trial = make_trial(seed, ("cubic_stiffness", "quadratic_damping"), noise=0.0, response="displacement")
+    assert all(SHARE[0] <= share <= SHARE[1] for share in trial.shares)
+
+
 def test_share_is_what_no_linear_model_can_take_over() -> None:
     trial = make_trial(4, ("cubic_stiffness",), noise=0.0, response="displacement")
     record = simulate(trial.truth, trial.record["force"], trial.record.dt, Integrator("rk4", 8))
@@ -86,8 +92,9 @@ def test_what_cannot_be_hidden_is_refused(hidden: tuple[str, ...], response: str
         make_trial(1, hidden, response=response)
 
 
-def test_steady_force_is_hidden_behind_acceleration_only_where_it_shows() -> None:
-    trial = make_trial(31, ("constant_force",), 0.0, "acceleration")
+@pytest.mark.parametrize("seed", [31, 32, 33, 34, 35])
+def test_steady_force_is_hidden_behind_acceleration_only_where_it_shows(seed: int) -> None:
+    trial = make_trial(seed, ("constant_force",), 0.0, "acceleration")
     without = replace(trial.truth, terms=tuple(t for t in trial.truth.terms if t.name != "constant_force"))
     still = simulate(without, trial.record["force"], trial.record.dt, Integrator("rk4", 8))["acceleration"]
     measured = trial.record["acceleration"]
