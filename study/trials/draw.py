@@ -118,11 +118,9 @@ def _attempt(rng: np.random.Generator, seed: int, hidden: tuple[str, ...], noise
         base, quiet = _with_own_nonlinearity(rng, base, hidden, drive, dt, quiet)
         if _unseen(base, hidden, response):
             return None
-        truth: Model | None = base
-        for name in hidden:
-            truth = _with_effect(rng, truth, name, quiet, scale, drive, dt)
-            if truth is None:
-                return None
+        truth = _with_effects(rng, base, hidden, quiet, drive, dt)
+        if truth is None:
+            return None
         record = simulate(truth, drive, dt, Integrator("rk4", 8))
         forgets = _forgets(truth, drive, dt)
     except DivergenceError:
@@ -188,18 +186,27 @@ def _with_own_nonlinearity(
     return found[0], simulate(found[0], drive, dt, Integrator("rk4", 4))
 
 
-def _with_effect(
-    rng: np.random.Generator, model: Model, name: str, quiet: Record, scale: float, drive: Floats, dt: float
+def _with_effects(
+    rng: np.random.Generator, model: Model, hidden: tuple[str, ...], quiet: Record, drive: Floats, dt: float
 ) -> Model | None:
-    """The model and a hidden effect, as strong as is drawn; None where that cannot be."""
-    target = float(rng.uniform(*SHARE))
-    found = grown(model, _drawn(rng, get(name), quiet, scale), drive, dt, target)
-    return None if found is None else found[0]
+    """The model and the hidden effects, as strong as is drawn; None where that cannot be.
+
+    What comes later changes the motion, and so the share of what came before: that is sized again at the end.
+    """
+    wanted = {name: (float(rng.uniform(*SHARE)), _drawn(rng, get(name), quiet)) for name in hidden}
+    for name in (*hidden, *hidden[:-1]):
+        target, entry = wanted[name]
+        found = grown(model.without_term(name), entry, drive, dt, target)
+        if found is None:
+            return None
+        model = found[0]
+    return model
 
 
-def _drawn(rng: np.random.Generator, term: Term, quiet: Record, scale: float) -> ModelTerm:
+def _drawn(rng: np.random.Generator, term: Term, quiet: Record) -> ModelTerm:
     """Shape parameters in the range where the effect shows, in the units of the system."""
-    omega = float(np.std(quiet["velocity"]) / np.std(quiet["displacement"]))
+    scale = float(np.std(quiet["displacement"]))
+    omega = float(np.std(quiet["velocity"])) / scale
     match term.name:
         case "dead_band" | "one_sided_contact":
             values = (float(rng.uniform(0.3, 1.2)) * scale,)
