@@ -216,6 +216,8 @@ def _check_settings(settings: Table, where: str) -> None:
     for name in settings["estimators"]:
         if name not in ESTIMATORS:
             raise StudyError(f"{where}: there is no estimator {name!r}; known are {', '.join(ESTIMATORS)}")
+    if "miso" not in settings["estimators"]:
+        raise StudyError(f"{where}: estimators lacks 'miso', whose coherences are drawn of every case")
     for name, described in settings["excitations"].items():
         try:
             excitation = Excitation(**{key: value for key, value in described.items() if key != "seed"})

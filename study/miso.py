@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.errors import StudyError
+from study.responses import Responses
 from study.spectra import SpectralMatrix
 
 Floats = NDArray[np.float64]
@@ -20,19 +21,13 @@ SILENT = 1e-13  # a line below this fraction of an input's largest amplitude is 
 
 
 @dataclass(frozen=True)
-class MisoResult:
+class MisoResult(Responses):
     """What each input contributes, at each frequency line; q inputs, arrays of shape (q, lines).
 
     Attributes
     ----------
-    frequency : array, shape (lines,)
-        In hertz.
     conditioned : complex array
         ``L_j``, frequency response function from the conditioned input j.
-    response : complex array
-        ``A_j``, frequency response function from the input j itself: output unit per input unit.
-    covariance : complex array, shape (lines, q, q)
-        Random-error covariance ``E[dA dA^H]`` of the estimates of A.
     ordinary : array
         Ordinary coherence of each raw input with the output.
     partial : array
@@ -42,22 +37,18 @@ class MisoResult:
         and the nonlinear coherence functions q^2, (4.31).
     cumulative : array
         Running sums of ``contribution``; the last is the multiple coherence, (4.38).
-    output, noise : arrays, shape (lines,)
-        G_yy and G_nn, (4.44).
+    output : array, shape (lines,)
+        G_yy; ``noise`` is G_nn of (4.44).
     averages : float
         Effective number of averages.
     """
 
-    frequency: Floats
     conditioned: Complexes
-    response: Complexes
-    covariance: Complexes
     ordinary: Floats
     partial: Floats
     contribution: Floats
     cumulative: Floats
     output: Floats
-    noise: Floats
     averages: float
 
     @property

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.inputs import Input
-from study.miso import MisoResult
+from study.responses import Responses
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -51,7 +51,7 @@ class Estimate:
         return float(np.sqrt(max(g @ self.covariance @ g, 0.0)))
 
 
-def fit(result: MisoResult, inputs: Sequence[Input], band: tuple[float, float], line_inflation: float) -> Estimate:
+def fit(result: Responses, inputs: Sequence[Input], band: tuple[float, float], line_inflation: float) -> Estimate:
     """Weighted least squares of A_j(f) on powers of j 2 pi f.
 
     Each input is fitted by itself, every line weighted by the inverse of its random-error variance
@@ -59,7 +59,7 @@ def fit(result: MisoResult, inputs: Sequence[Input], band: tuple[float, float], 
 
     Parameters
     ----------
-    result : MisoResult
+    result : Responses
         Estimates of A_j(f) with their covariance.
     inputs : sequence of Input
         What each A_j is made of, in the order of ``result.response``.

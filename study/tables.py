@@ -1,7 +1,7 @@
 """Tables: what was estimated beside what is true, the tolerance, and the verdict."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +11,19 @@ import pandas as pd
 from study.estimators.base import Identified, true_parameters
 from study.files import replacing
 from study.inputs import Input
+from study.miso import MisoResult
 from study.model import Model
 
 Table = Mapping[str, Any]
 PARAMETER_COLUMNS = [
     "case", "estimator", "parameter", "true", "estimate", "standard_error",
     "relative_error", "tolerance", "within_tolerance",
+]  # fmt: skip
+RESPONSE_COLUMNS = [
+    "frequency", "estimator", "input", "shape", "real", "imag", "standard_error", "exact_real", "exact_imag",
+]  # fmt: skip
+COHERENCE_COLUMNS = [
+    "frequency", "estimator", "input", "shape", "terms", "ordinary", "partial", "contribution", "cumulative",
 ]  # fmt: skip
 
 
@@ -51,12 +58,12 @@ def judge(name: str, true: float, estimate: float, settings: Table) -> dict[str,
 
 
 def frequency_responses(model: Model, found: Mapping[str, Identified]) -> pd.DataFrame:
-    """A_j(f) of each estimator with its standard error and the exact function, in long form."""
+    """A_j(f) of each estimator that has it, with its standard error and the exact function, in long form."""
     values = {key: value for key, value in model.values.items() if value is not None}
     frames: list[pd.DataFrame] = []
     for estimator, identified in found.items():
         result = identified.responses
-        if result is None or estimator == "miso_hand_read":
+        if result is None:
             continue
         for j, item in enumerate(identified.inputs):
             exact = item.response(result.frequency, values)
@@ -75,15 +82,15 @@ def frequency_responses(model: Model, found: Mapping[str, Identified]) -> pd.Dat
                     }
                 )
             )
-    return pd.concat(frames, ignore_index=True)
+    return _together(frames, RESPONSE_COLUMNS)
 
 
 def coherences(found: Mapping[str, Identified]) -> pd.DataFrame:
-    """Ordinary, partial, nonlinear and cumulative coherence of each input, in long form."""
+    """Ordinary, partial, nonlinear and cumulative coherence of each input, in long form; some estimators have none."""
     frames: list[pd.DataFrame] = []
     for estimator, identified in found.items():
         result = identified.responses
-        if result is None or estimator == "miso_hand_read":
+        if not isinstance(result, MisoResult):
             continue
         for j, item in enumerate(identified.inputs):
             frames.append(
@@ -101,7 +108,12 @@ def coherences(found: Mapping[str, Identified]) -> pd.DataFrame:
                     }
                 )
             )
-    return pd.concat(frames, ignore_index=True)
+    return _together(frames, COHERENCE_COLUMNS)
+
+
+def _together(frames: Sequence[pd.DataFrame], columns: list[str]) -> pd.DataFrame:
+    """One table of all; with a heading alone where no estimator has such a thing."""
+    return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=columns)
 
 
 def label(item: Input) -> str:

@@ -80,6 +80,7 @@ def test_figures_without_a_number_are_named_after_the_case(folder):
         ("window: hann", "window: han", "segments.window is not right: 'han' is not one of"),
         ("fit_band: [0.3, 10.0]", "fit_band: [0.3, 0.5]", "it must span four lines of 0.0976562 Hz or more"),
         ("[siso, miso,", "[siso, mios,", "there is no estimator 'mios'; known are siso, miso"),
+        ("[siso, miso, miso_hand_read", "[siso, miso_hand_read", "estimators lacks 'miso', whose coherences are drawn"),
         ("kind: gaussian_lowpass", "kind: gaussian", "excitations.report.kind is not right"),
         ("cutoff: 12.5", "cutoff: 125", "excitations.report: the excitation reaches 125 Hz"),
         ("cutoff: 12.5", "periods: 7", "excitations.report: 8192 samples do not hold 7 whole periods"),

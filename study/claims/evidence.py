@@ -16,6 +16,7 @@ from study.errors import StudyError
 from study.estimators import miso, siso
 from study.estimators.base import Identified, Settings
 from study.estimators.hand_read import read_curve
+from study.miso import MisoResult
 from study.model import Model
 from study.record import Record
 from study.spectra import Segments
@@ -274,7 +275,7 @@ def identify(model: Model, record: Record, assumed: Assumed, settings: Table) ->
 
 def _analysis(found: Identified, told: Settings) -> Analysis:
     result = found.responses
-    assert result is not None  # both estimators give frequency response functions
+    assert isinstance(result, MisoResult)  # both estimators give coherences
     keep = (result.frequency >= told.band[0]) & (result.frequency <= told.band[1])
     return Analysis(
         frequency=result.frequency[keep],

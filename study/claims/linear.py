@@ -11,6 +11,7 @@ from study.claims.reported import Reported
 from study.claims.sample import Sample, average
 from study.claims.verdict import Claim, Condition, at_most, close, conclude, significant
 from study.estimators.base import Identified
+from study.miso import MisoResult
 from study.spectra import Segments
 
 Floats = NDArray[np.float64]
@@ -102,7 +103,7 @@ def coherence_forms(evidence: Evidence, reported: Reported) -> Claim:
     low, high = evidence.settings["fit_band"]
     told = Settings(Segments(**evidence.settings["segments"]), (low, high))
     found: Identified = miso.identify(evidence.model(drive), evidence.records(drive)[0], told)
-    assert found.responses is not None
+    assert isinstance(found.responses, MisoResult)
     product = 1.0 - np.prod(1.0 - found.responses.partial, axis=0)
     worst = float(np.max(np.abs(product - np.sum(found.responses.contribution, axis=0))))
     return conclude(

@@ -8,10 +8,10 @@ from typing import Protocol
 import numpy as np
 
 from study.inputs import Input
-from study.miso import MisoResult
 from study.model import Model
 from study.parameters import Estimate
 from study.record import Record
+from study.responses import Responses
 from study.spectra import Segments
 
 
@@ -48,14 +48,15 @@ class Identified:
     ----------
     inputs : tuple of Input
         Inputs of the reverse system.
-    responses : MisoResult or None
-        Frequency response functions and coherences, for estimators that have them.
+    responses : Responses or None
+        Frequency response functions, for estimators that have some of their own; a ``MisoResult`` has
+        coherences too.
     parameters : tuple of Parameter
         Named parameters.
     """
 
     inputs: tuple[Input, ...]
-    responses: MisoResult | None
+    responses: Responses | None
     parameters: tuple[Parameter, ...]
 
 

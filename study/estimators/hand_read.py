@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from study.estimators import miso
 from study.estimators.base import Identified, Parameter, Settings
 from study.inputs import Input
-from study.miso import MisoResult
 from study.model import Model
 from study.record import Record
+from study.responses import Responses
 
 LOWEST_LINES = 3  # "the asymptotic behavior of A_1 for f -> 0": the first lines of the band
 
@@ -25,7 +25,7 @@ def identify(model: Model, record: Record, settings: Settings) -> Identified:
     values: list[tuple[str, float]] = []
     for item, response in zip(found.inputs, responses.response[:, keep], strict=True):
         values += read_linear(frequency, response) if item.shape == "u" else _plateaus(item, frequency, response)
-    return Identified(found.inputs, responses, tuple(Parameter(n, v, math.nan) for n, v in _renamed(values)))
+    return Identified(found.inputs, None, tuple(Parameter(n, v, math.nan) for n, v in _renamed(values)))
 
 
 def read_linear(frequency: NDArray[np.float64], response: NDArray[np.complex128]) -> list[tuple[str, float]]:
@@ -44,7 +44,7 @@ def read_linear(frequency: NDArray[np.float64], response: NDArray[np.complex128]
     return [("m", m), ("c", c), ("k", k), ("f_n", f_n), ("zeta", c / (2.0 * omega * m))]
 
 
-def read_curve(result: MisoResult, band: tuple[float, float]) -> dict[str, float]:
+def read_curve(result: Responses, band: tuple[float, float]) -> dict[str, float]:
     """The same for the first response function of any analysis, the SI/SO curve included."""
     keep = (result.frequency >= band[0]) & (result.frequency <= band[1])
     return dict(read_linear(result.frequency[keep], result.response[0][keep]))
