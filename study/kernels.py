@@ -76,46 +76,49 @@ def evaluate(code: Ints, first: int, r: Floats, columns: Ints, data: Floats, out
 
 @compiled
 def _slope(
-    code: Ints, first: int, r: Floats, outputs: Ints, time: float,
-    drive: Floats, j: int, x: Floats, k: Floats, row: int,
+    code: Ints, first: int, r: Floats, outputs: Ints, time: float, drive: Floats, j: int, w: Floats, at: int, to: int
 ) -> None:  # fmt: skip
-    """Derivative of the state into k[row]: outputs[0] is the acceleration, the rest those of z.
+    """Derivative of the state ``w[at]`` into ``w[to]``: outputs[0] is the acceleration, the rest those of z.
 
-    Rows are passed by number, not as views: making a view costs as much as three instructions.
+    Rows are passed by number, not as views: making a view costs as much as three instructions. All of
+    them stand in one array, because every array passed to a function costs as much as an instruction.
     """
     channels = drive.shape[1]
-    r[0] = x[0]
-    r[1] = x[1]
+    r[0] = w[at, 0]
+    r[1] = w[at, 1]
     r[2] = time
     for c in range(channels):
         r[3 + c] = drive[j, c]
-    for i in range(2, x.shape[0]):
-        r[1 + channels + i] = x[i]
+    for i in range(2, w.shape[1]):
+        r[1 + channels + i] = w[at, i]
     run(code, first, r)
-    k[row, 0] = x[1]
-    for i in range(1, x.shape[0]):
-        k[row, i] = r[outputs[i - 1]]
+    w[to, 0] = w[at, 1]
+    for i in range(1, w.shape[1]):
+        w[to, i] = r[outputs[i - 1]]
 
 
 @compiled
 def _rk4_step(
-    code: Ints, first: int, r: Floats, outputs: Ints, time: float, h: float,
-    drive: Floats, j: int, x: Floats, k: Floats, trial: Floats,
+    code: Ints, first: int, r: Floats, outputs: Ints, time: float, h: float, drive: Floats, j: int, w: Floats
 ) -> None:  # fmt: skip
-    """One classical Runge-Kutta step in place; drive[j], drive[j+1], drive[j+2] stand half a step apart."""
-    n = x.shape[0]
-    _slope(code, first, r, outputs, time, drive, j, x, k, 0)
+    """One classical Runge-Kutta step of ``w[0]`` in place; drive[j], drive[j+1], drive[j+2] stand half a step apart.
+
+    ``w[1]`` to ``w[3]`` are room for trial, slope and their sum.
+    """
+    n = w.shape[1]
     for i in range(n):
-        trial[i] = x[i] + 0.5 * h * k[0, i]
-    _slope(code, first, r, outputs, time + 0.5 * h, drive, j + 1, trial, k, 1)
+        w[1, i] = w[0, i]
+        w[3, i] = w[0, i]
+    for stage in range(4):
+        late = (stage + 1) // 2
+        _slope(code, first, r, outputs, time + 0.5 * h * late, drive, j + late, w, 1, 2)
+        weight = h / 3.0 if late == 1 else h / 6.0
+        ahead = h if stage == 2 else 0.5 * h
+        for i in range(n):
+            w[3, i] += weight * w[2, i]
+            w[1, i] = w[0, i] + ahead * w[2, i]
     for i in range(n):
-        trial[i] = x[i] + 0.5 * h * k[1, i]
-    _slope(code, first, r, outputs, time + 0.5 * h, drive, j + 1, trial, k, 2)
-    for i in range(n):
-        trial[i] = x[i] + h * k[2, i]
-    _slope(code, first, r, outputs, time + h, drive, j + 2, trial, k, 3)
-    for i in range(n):
-        x[i] += h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
+        w[0, i] = w[3, i]
 
 
 @compiled
@@ -127,31 +130,30 @@ def integrate_rk4(
 
     ``out`` gets (u, v, a, z...) of each sample. Returns the first non-finite sample, or -1.
     """
-    n = x.shape[0]
     h = dt / steps
-    k = np.zeros((4, n))
-    trial = np.zeros(n)
+    w = np.zeros((4, x.shape[0]))
+    w[0] = x
     for sample in range(out.shape[0]):
         j = 2 * steps * sample
-        _slope(code, first, r, outputs, start + sample * dt, drive, j, x, k, 0)
-        if not _write(x, k[0, 1], out, sample):
+        _slope(code, first, r, outputs, start + sample * dt, drive, j, w, 0, 2)
+        if not _write(w, 2, out, sample):
             return sample
         if sample + 1 < out.shape[0]:
             for s in range(steps):
                 time = start + sample * dt + s * h
-                _rk4_step(code, first, r, outputs, time, h, drive, j + 2 * s, x, k, trial)
+                _rk4_step(code, first, r, outputs, time, h, drive, j + 2 * s, w)
     return -1
 
 
 @compiled
-def _write(x: Floats, acceleration: float, out: Floats, sample: int) -> bool:
+def _write(w: Floats, slope: int, out: Floats, sample: int) -> bool:
     """Keep one sample; False where it is not finite (1e150 squared still is, its cube is not)."""
-    out[sample, 0] = x[0]
-    out[sample, 1] = x[1]
-    out[sample, 2] = acceleration
-    for i in range(2, x.shape[0]):
-        out[sample, i + 1] = x[i]
-    return bool(abs(x[0]) < 1e150 and abs(x[1]) < 1e150 and math.isfinite(acceleration))
+    out[sample, 0] = w[0, 0]
+    out[sample, 1] = w[0, 1]
+    out[sample, 2] = w[slope, 1]
+    for i in range(2, w.shape[1]):
+        out[sample, i + 1] = w[0, i]
+    return bool(abs(w[0, 0]) < 1e150 and abs(w[0, 1]) < 1e150 and math.isfinite(w[slope, 1]))
 
 
 @compiled
@@ -165,28 +167,27 @@ def integrate_abm4(
     """
     n = x.shape[0]
     h = dt / steps
-    history = np.zeros((4, n))  # slopes at this step and the three before it, a ring
-    k = np.zeros((4, n))
-    trial = np.zeros(n)
+    w = np.zeros((8, n))  # state, trial, slope, room; then the slopes of this step and the three before it, a ring
+    w[0] = x
     total = (out.shape[0] - 1) * steps
     for step in range(total + 1):
         time = start + step * h
-        f0, f1, f2, f3 = step & 3, (step + 3) & 3, (step + 2) & 3, (step + 1) & 3
-        _slope(code, first, r, outputs, time, drive, 2 * step, x, history, f0)
-        if step % steps == 0 and not _write(x, history[f0, 1], out, step // steps):
+        f0, f1, f2, f3 = 4 + (step & 3), 4 + ((step + 3) & 3), 4 + ((step + 2) & 3), 4 + ((step + 1) & 3)
+        _slope(code, first, r, outputs, time, drive, 2 * step, w, 0, f0)
+        if step % steps == 0 and not _write(w, f0, out, step // steps):
             return step // steps
         if step == total:
             break
         if step < 3:
-            _rk4_step(code, first, r, outputs, time, h, drive, 2 * step, x, k, trial)
+            _rk4_step(code, first, r, outputs, time, h, drive, 2 * step, w)
             continue
         for i in range(n):
-            past = -59.0 * history[f1, i] + 37.0 * history[f2, i] - 9.0 * history[f3, i]
-            trial[i] = x[i] + h / 24.0 * (55.0 * history[f0, i] + past)
-        _slope(code, first, r, outputs, time + h, drive, 2 * step + 2, trial, k, 0)
+            past = -59.0 * w[f1, i] + 37.0 * w[f2, i] - 9.0 * w[f3, i]
+            w[1, i] = w[0, i] + h / 24.0 * (55.0 * w[f0, i] + past)
+        _slope(code, first, r, outputs, time + h, drive, 2 * step + 2, w, 1, 2)
         for i in range(n):
-            past = 19.0 * history[f0, i] - 5.0 * history[f1, i] + history[f2, i]
-            x[i] += h / 24.0 * (9.0 * k[0, i] + past)
+            past = 19.0 * w[f0, i] - 5.0 * w[f1, i] + w[f2, i]
+            w[0, i] += h / 24.0 * (9.0 * w[2, i] + past)
     return -1
 
 
