@@ -19,6 +19,7 @@ from study.terms import Term
 
 Floats = NDArray[np.float64]
 TIE = 2.0  # candidates closer than this many standard errors of their difference are a tie
+ALIKE = 0.01  # ... and so are two whose predictions differ by less than this share of what either leaves
 UNSTEADY = 0.3  # relative change of its coefficient at which a candidate is no longer believed ...
 NEARLY = 0.9  # ... if a steadier one explains at least so much of what it does
 PRACTICALLY = 0.99  # of what an effect of three unknowns explains: enough for one of a single unknown
@@ -219,8 +220,23 @@ def _distance(row: Ranked, other: Ranked) -> float:
 def _tied(row: Ranked, rows: Sequence[Ranked]) -> tuple[str, ...]:
     if row.gain.explained <= 0.0 or row.p_value > 0.05:
         return ()
-    near = [o for o in rows if o is not row and abs(_distance(o, row)) < TIE and abs(_distance(row, o)) < TIE]
-    return tuple(o.name for o in near)
+    return tuple(o.name for o in rows if o is not row and _level(o, row))
+
+
+def _level(one: Ranked, other: Ranked) -> bool:
+    """Whether the record cannot tell two candidates apart.
+
+    Two forms of the same equation (a steady force and u^2 beside u^3, where the rest position is not
+    measured) leave residuals that differ by rounding alone, and that very evenly.
+    """
+    if _alike(one.residual, other.residual):
+        return True
+    return abs(_distance(one, other)) < TIE and abs(_distance(other, one)) < TIE
+
+
+def _alike(one: Floats, other: Floats) -> bool:
+    smaller = min(float(one @ one), float(other @ other))
+    return float(np.sum((one - other) ** 2)) < ALIKE**2 * smaller
 
 
 def _examined(row: Ranked, record: Record, how: Plan) -> Ranked:

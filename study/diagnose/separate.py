@@ -51,7 +51,6 @@ def advice(rows: Sequence[Ranked], record: Record, how: Plan) -> str:
     level = separating_level(rows[0], rival, record, how)
     names = f"{rows[0].name} and {rival.name}"
     if level is None:
-        return (
-            f"No level from a quarter to five times this one would tell {names} apart; another kind of test is needed."
-        )
+        other = "another kind of test" if how.response == "displacement" else "the displacement, its mean included,"
+        return f"No level from a quarter to five times this one would tell {names} apart; {other} is needed."
     return f"To tell {names} apart, excite at {level:g} times this level."
