@@ -7,6 +7,7 @@ from typing import Any
 from study import estimators
 from study.estimators.base import Identified, Settings
 from study.excitation import Excitation, displacement_noise, force
+from study.local_polynomial import LocalPolynomial
 from study.model import Model
 from study.record import Record
 from study.simulate import Integrator, simulate
@@ -59,7 +60,7 @@ def assumed_model(model: Model, settings: Table) -> Model:
 def estimator_settings(settings: Table) -> Settings:
     """The estimators' settings from a case's identification settings."""
     low, high = settings["fit_band"]
-    return Settings(Segments(**settings["segments"]), (low, high))
+    return Settings(Segments(**settings["segments"]), (low, high), LocalPolynomial(**settings["local_polynomial"]))
 
 
 def identify_case(model: Model, record: Record, settings: Table) -> dict[str, Identified]:

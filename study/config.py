@@ -94,6 +94,7 @@ class StudyConfig:
             "estimators": self.settings["estimators"],
             "segments": self.settings["segments"],
             "fit_band": self.settings["fit_band"],
+            "local_polynomial": self.settings["local_polynomial"],
             "relative": {**tolerances["relative"], **own},
             "absolute": tolerances["absolute"],
         }
@@ -185,6 +186,7 @@ def _complete_model(path: Path) -> Model:
 
 def _check_assumed(model: Model, extra: str, settings: Table) -> None:
     """Whether the record can tell the inputs of the assumed model apart."""
+    from study.local_polynomial import LocalPolynomial
     from study.spectra import Segments  # a second of SciPy, for those alone who load a configuration
 
     if extra:
@@ -198,6 +200,7 @@ def _check_assumed(model: Model, extra: str, settings: Table) -> None:
         raise StudyError(
             f"segments of config.yaml cut the record into {count}; {inputs} inputs need {inputs + 1} or more"
         )
+    LocalPolynomial(**settings["local_polynomial"]).check(inputs)
 
 
 def _check_settings(settings: Table, where: str) -> None:
@@ -213,6 +216,12 @@ def _check_settings(settings: Table, where: str) -> None:
         raise StudyError(f"{where}: fit_band is [{low}, {high}]; it must rise and end below {nyquist:g} Hz")
     if high - low < 4.0 * resolution:
         raise StudyError(f"{where}: fit_band is [{low}, {high}]; it must span four lines of {resolution:g} Hz or more")
+    width = 2 * settings["local_polynomial"]["half_width"] + 1
+    if (high - low) * sampling["samples"] * sampling["dt"] < width:
+        raise StudyError(
+            f"{where}: local_polynomial.half_width makes bands of {width} lines; fit_band [{low}, {high}] of "
+            f"{sampling['samples']} samples holds fewer"
+        )
     for name in settings["estimators"]:
         if name not in ESTIMATORS:
             raise StudyError(f"{where}: there is no estimator {name!r}; known are {', '.join(ESTIMATORS)}")

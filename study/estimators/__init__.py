@@ -14,6 +14,7 @@ ESTIMATORS = {
     "siso": "study.estimators.siso",
     "miso": "study.estimators.miso",
     "miso_hand_read": "study.estimators.hand_read",
+    "local_polynomial": "study.estimators.local_polynomial",
 }
 
 

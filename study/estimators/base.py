@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 
 from study.inputs import Input
+from study.local_polynomial import LocalPolynomial
 from study.model import Model
 from study.parameters import Estimate
 from study.record import Record
@@ -25,10 +26,13 @@ class Settings:
         How the record is cut, for those that cut it.
     band : pair of float
         Lines that the parameters are fitted to, in hertz.
+    local_polynomial : LocalPolynomial
+        Bands and degree, for the estimator of this name.
     """
 
     segments: Segments
     band: tuple[float, float]
+    local_polynomial: LocalPolynomial = field(default_factory=LocalPolynomial)
 
 
 @dataclass(frozen=True)
@@ -53,11 +57,14 @@ class Identified:
         coherences too.
     parameters : tuple of Parameter
         Named parameters.
+    estimate : Estimate or None
+        The coefficients themselves, as the model names them, for estimators that find them together.
     """
 
     inputs: tuple[Input, ...]
     responses: Responses | None
     parameters: tuple[Parameter, ...]
+    estimate: Estimate | None = None
 
 
 class Estimator(Protocol):

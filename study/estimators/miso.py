@@ -13,4 +13,4 @@ def identify(model: Model, record: Record, settings: Settings) -> Identified:
     matrix = spectra.cross_spectra([*histories(inputs, record), record["force"]], record.dt, settings.segments)
     result = miso.analyse(matrix)
     estimate = parameters.fit(result, inputs, settings.band, settings.segments.line_inflation())
-    return Identified(inputs, result, named_parameters(estimate))
+    return Identified(inputs, result, named_parameters(estimate), estimate)

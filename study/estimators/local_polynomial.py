@@ -1,0 +1,16 @@
+"""Local polynomials: one transform of the whole record, no window, and no leakage of the record's ends."""
+
+from study.estimators.base import Identified, Settings, named_parameters
+from study.inputs import histories, reverse_inputs
+from study.local_fit import fit
+from study.local_polynomial import responses, transform
+from study.model import Model
+from study.record import Record
+
+
+def identify(model: Model, record: Record, settings: Settings) -> Identified:
+    """A_j(f) of every input in narrow bands, and coefficients from all lines of the band that is fitted."""
+    inputs, how = reverse_inputs(model), settings.local_polynomial
+    lines = transform([*histories(inputs, record), record["force"]], record.dt)
+    estimate = fit(lines, inputs, settings.band, how)
+    return Identified(inputs, responses(lines, how), named_parameters(estimate), estimate)
