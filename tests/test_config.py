@@ -81,11 +81,6 @@ def test_figures_without_a_number_are_named_after_the_case(folder):
         ("fit_band: [0.3, 10.0]", "fit_band: [0.3, 0.5]", "it must span four lines of 0.0976562 Hz or more"),
         ("[siso, miso,", "[siso, mios,", "there is no estimator 'mios'; known are siso, miso"),
         ("[siso, miso, miso_hand_read", "[siso, miso_hand_read", "estimators lacks 'miso', whose coherences are drawn"),
-        (
-            "half_width: 20",
-            "half_width: 5",
-            "half_width is 5; 2 inputs of degree 2 have 9 unknowns in a band, which needs 8",
-        ),
         ("half_width: 20", "half_width: 800", "half_width makes bands of 1601 lines; fit_band [0.3, 10.0] of 8192"),
         ("degree: 2", "degree: 2.5", "local_polynomial.degree is not right"),
         ("kind: gaussian_lowpass", "kind: gaussian", "excitations.report.kind is not right"),
@@ -182,6 +177,11 @@ def test_faults_of_a_model(folder, old, new, says):
 def test_more_inputs_than_segments(folder):
     spoil(folder / "config.yaml", "samples: 8192", "samples: 512")
     assert "cut the record into 1; 2 inputs need 3 or more" in refused(folder)
+
+
+def test_more_inputs_than_a_band_tells_apart(folder):
+    spoil(folder / "config.yaml", "half_width: 20", "half_width: 5")
+    assert "half_width is 5; 2 inputs of degree 2 have 9 unknowns in a band, which needs 8 or more" in refused(folder)
 
 
 def test_quotes_are_plain_text(tmp_path):
