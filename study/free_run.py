@@ -94,29 +94,47 @@ class FreeRun:
         StudyError
             If there is not one initial state a piece.
         """
+        response, own, _ = self.respond_by_piece(values, initial, free_states)
+        if not self.cuts:
+            return response, own
+        keys, bounds = len(self.keys), (0, *self.cuts, self.samples)
+        jacobian = np.zeros((self.samples, keys + (len(bounds) - 1) * free_states))
+        jacobian[:, :keys] = own[:, :keys]
+        for i, (begin, end) in enumerate(pairwise(bounds)):
+            jacobian[begin:end, keys + i * free_states : keys + (i + 1) * free_states] = own[begin:end, keys:]
+        return response, jacobian
+
+    def respond_by_piece(
+        self, values: Mapping[str, float], initial: Sequence[float] | Floats, free_states: int = 0
+    ) -> tuple[Floats, Floats, Floats]:
+        """As :meth:`respond`, the derivatives by the initial state of each sample's own piece alone.
+
+        Returns
+        -------
+        response : array, shape (samples,)
+        jacobian : array, shape (samples, keys + free_states)
+        arrivals : array, shape (cuts, states, 1 + keys + free_states)
+            State in which each piece but the last arrives where the next begins, beside its derivatives.
+        """
         states, bounds = np.atleast_2d(initial), (0, *self.cuts, self.samples)
         if len(states) != len(bounds) - 1:
             raise StudyError(f"{len(states)} initial states were given; {len(bounds) - 1} pieces need one each")
         program = with_registers(self.program, {key: values[key] for key in self.keys})
-        if not self.cuts:
-            out = self._piece(program, 0, self.samples, states[0], free_states)
-            return out[:, 0], out[:, 1:]
-        keys = len(self.keys)
-        response, jacobian = np.empty(self.samples), np.zeros((self.samples, keys + len(states) * free_states))
-        for i, state in enumerate(states):
-            piece = slice(bounds[i], bounds[i + 1])
-            out = self._piece(program, piece.start, piece.stop, state, free_states)
-            response[piece], jacobian[piece, :keys] = out[:, 0], out[:, 1 : keys + 1]
-            jacobian[piece, keys + i * free_states : keys + (i + 1) * free_states] = out[:, keys + 1 :]
-        return response, jacobian
+        out = np.empty((self.samples + 1, 1 + len(self.keys) + free_states))
+        arrivals = np.empty((len(self.cuts), len(self.slots) + 1, out.shape[1]))
+        for i, (begin, end) in enumerate(pairwise(bounds)):
+            last = min(end + 1, self.samples)  # the next piece writes over the sample at which this one arrives
+            arrived = self._piece(program, begin, states[i], free_states, out[begin:last])
+            if i < len(arrivals):
+                arrivals[i] = arrived
+        return out[:-1, 0], out[:-1, 1:], arrivals
 
-    def _piece(self, program: Program, first: int, last: int, initial: Floats, free_states: int) -> Floats:
-        """Response beside its derivatives from one sample to another, shape (last - first, 1 + columns)."""
+    def _piece(self, program: Program, first: int, initial: Floats, free_states: int, out: Floats) -> Floats:
+        """Response beside its derivatives from one sample on, into ``out``; returns the state at the end like it."""
         first_free = 1 + len(self.keys)
         state = np.zeros((len(self.slots) + 1, first_free + free_states))
         state[: len(initial), 0] = initial
         state[range(free_states), range(first_free, first_free + free_states)] = 1.0
-        out = np.empty((last - first, state.shape[1]))
         begin = self.start + first * self.dt
         failed = kernels.integrate_variation(
             program.code, program.first, program.registers, self.slots, self.side,
@@ -125,7 +143,7 @@ class FreeRun:
         if failed >= 0:
             time = begin + failed * self.dt
             raise DivergenceError(f"the free run diverged at t = {time:.4g} s", time)
-        return out
+        return state
 
 
 def prepare(

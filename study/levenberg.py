@@ -5,23 +5,24 @@ error or with the size of the data: nothing changes with the units. A trial with
 rejected step.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from study.normal import INDISTINCT, Normal, Ties, normal_equations
 
 Floats = NDArray[np.float64]
 OFFSET = 1e-4  # converged when the next step is below this many standard errors (Bates and Watts, 1981)
 ROUNDING = 1e-11  # ... or changes the response by less than this share of it
 PATIENCE = 8  # trials that may pass without lowering the error by what matters
 MATTERS = 1e-3  # ... as a share of what one standard error brings
-INDISTINCT = 1e-12  # eigenvalue of the scaled normal matrix below which variables cannot be told apart
 
 
 @dataclass(frozen=True)
 class Point:
-    """A point of the search; p variables, n samples.
+    """A point of the search; n samples, p variables: shared ones, then piece by piece its own.
 
     Attributes
     ----------
@@ -33,48 +34,45 @@ class Point:
         Sum of squares of the residual.
     scale : array, shape (p,)
         Length of each column of the Jacobian, one where it is zero.
-    normal : array, shape (p, p)
-        J^T J of the Jacobian with columns of unit length.
-    gradient : array, shape (p,)
-        J^T residual of the same.
+    normal : Normal
+        Normal equations of the Jacobian with columns of unit length.
     """
 
     x: Floats
     residual: Floats
     cost: float
     scale: Floats
-    normal: Floats
-    gradient: Floats
-
-    def decrement(self) -> float:
-        """How much the sum of squares would fall in a full Gauss-Newton step, were the model linear."""
-        values, vectors = np.linalg.eigh(self.normal)
-        known = values > INDISTINCT
-        return float(np.sum((vectors.T @ self.gradient)[known] ** 2 / values[known]))
+    normal: Normal
 
     def covariance(self) -> Floats:
-        """``s^2 (J^T J)^-1`` with s^2 from the residual; very large where the data do not decide, shape (p, p)."""
+        """Of the k shared variables, s^2 from the residual; very large where the data do not decide, shape (k, k)."""
         variance = self.cost / max(len(self.residual) - len(self.x), 1)
-        values, vectors = np.linalg.eigh(self.normal)
+        values, vectors = np.linalg.eigh(self.normal.reduced())
         inverse = (vectors / np.maximum(values, np.finfo(float).eps)) @ vectors.T
-        return np.asarray(variance * inverse / np.outer(self.scale, self.scale), dtype=np.float64)
+        scale = self.scale[: len(values)]
+        return np.asarray(variance * inverse / np.outer(scale, scale), dtype=np.float64)
 
     def undecided(self) -> NDArray[np.bool_]:
-        """Which variables the data do not show, or cannot tell apart from others, shape (p,)."""
-        values, vectors = np.linalg.eigh(self.normal)
+        """Which shared variables the data do not show, or cannot tell apart from others, shape (k,)."""
+        values, vectors = np.linalg.eigh(self.normal.reduced())
         return np.max(np.abs(vectors[:, values <= INDISTINCT]), axis=1, initial=0.0) > 0.1
 
 
-def point_at(x: Floats, residual: Floats, jacobian: Floats) -> Point | None:
-    """The point with this residual and Jacobian (which is scaled in place); None if they are not finite."""
+def point_at(
+    x: Floats, residual: Floats, jacobian: Floats, shared: int, begins: Sequence[int], ties: Ties | None = None
+) -> Point | None:
+    """The point with this residual and Jacobian (``study.normal``); None if they are not finite.
+
+    The gaps of ties count among the residual.
+    """
     with np.errstate(over="ignore", invalid="ignore"):  # on its way out of range: refused below
-        scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian))
+        scale, normal = normal_equations(residual, jacobian, shared, begins, ties)
+        if ties is not None:
+            residual = np.concatenate([residual, -ties.gaps.ravel()])
         cost = float(residual @ residual)
-    if not (np.isfinite(cost) and np.all(np.isfinite(scale))):
+    if not (np.isfinite(cost) and np.all(np.isfinite(scale)) and np.all(np.isfinite(normal.shared))):
         return None
-    scale[scale == 0.0] = 1.0
-    jacobian /= scale
-    return Point(x, residual, cost, scale, jacobian.T @ jacobian, jacobian.T @ residual)
+    return Point(x, residual, cost, scale, normal)
 
 
 @dataclass(frozen=True)
@@ -106,15 +104,15 @@ def minimise(linearise: Callable[[Floats], Point | None], point: Point, size: fl
     damping, growth, costs = 1e-3, 2.0, list[float]()
     for iteration in range(1, max_iterations + 1):
         one = count * point.cost / freedom  # what a step of one standard error brings
-        fall = point.decrement()
+        fall = point.normal.decrement()
         if fall <= OFFSET**2 * one or fall <= (ROUNDING * size) ** 2:
             return End(point, True, iteration, f"converged after {iteration} free runs")
         costs.append(point.cost)
         if len(costs) > PATIENCE and costs[-1 - PATIENCE] - point.cost < MATTERS * one:
             return _stalled(point, iteration, float(np.sqrt(fall / one)))
-        step = np.linalg.solve(point.normal + damping * np.eye(count), point.gradient)
+        step = point.normal.step(damping)
         trial = linearise(point.x + step / point.scale)
-        expected = float(step @ (damping * step + point.gradient))
+        expected = float(step @ (damping * step + point.normal.gradient()))
         gain = -1.0 if trial is None else (point.cost - trial.cost) / expected
         if trial is not None and gain > 0.0:
             point = trial

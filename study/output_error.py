@@ -16,6 +16,7 @@ from study.errors import DivergenceError, StudyError
 from study.free_run import FreeRun, prepare
 from study.levenberg import End, Point, minimise, point_at
 from study.model import Model
+from study.normal import Ties
 from study.parameters import Estimate
 from study.pieces import starting_state
 from study.record import Record
@@ -85,6 +86,7 @@ def fit_free_run(
     restarts: Sequence[int] = (),
     max_iterations: int = 60,
     initial: str | Floats = "estimate",
+    tie: float = 0.0,
 ) -> FreeRunFit:
     """Fit a model in free run.
 
@@ -112,6 +114,9 @@ def fit_free_run(
     initial : str or array, shape (pieces, states)
         ``estimate`` displacement, velocity and the terms' own states at the first sample, or take them
         as zero: ``rest``. An array is estimated too and gives the starting values.
+    tie : float
+        Weight of the gaps between pieces, as shares of the spread of the states, beside that of the
+        residual as a share of the response's. From 100 on the pieces are one motion, all but exactly.
 
     Returns
     -------
@@ -143,8 +148,17 @@ def fit_free_run(
         states[:] = initial
     elif free:
         states[:, :2] = [starting_state(record, response, sample) for sample in (first, *restarts)]
-    problem = _Problem(run, record[response][first : first + run.samples], free)
+    measured = record[response][first : first + run.samples]
+    problem = _Problem(run, measured, free, _weights(tie, measured, states))
     return _result(model, problem, problem.search(np.array([*begin.values(), *states.ravel()]), max_iterations))
+
+
+def _weights(tie: float, measured: Floats, states: Floats) -> Floats | None:
+    """Weight of a gap in each state, None where nothing is tied."""
+    if tie <= 0.0 or len(states) < 2:
+        return None
+    spread = np.std(states, axis=0)
+    return tie * float(np.std(measured)) / np.where(spread > 0.0, spread, np.inf)
 
 
 def _starting_values(model: Model, start: Mapping[str, float], held: Collection[str]) -> dict[str, float]:
@@ -169,6 +183,7 @@ class _Problem:
     run: FreeRun
     measured: Floats
     free_states: int
+    weights: Floats | None
 
     def states(self, x: Floats) -> Floats:
         """Initial states in the variables, shape (pieces, states)."""
@@ -182,10 +197,16 @@ class _Problem:
         if any(v <= 0.0 and key.rpartition(".")[2] in POSITIVE for key, v in values.items()):
             return None
         try:
-            response, jacobian = self.run.respond(values, self.states(x), self.free_states)
+            states = self.states(x)
+            response, jacobian, arrivals = self.run.respond_by_piece(values, states, self.free_states)
         except DivergenceError:
             return None
-        return point_at(x, self.measured - response, jacobian)
+        ties = None
+        if self.weights is not None:
+            gaps = self.weights * (arrivals[:, :, 0] - states[1:])
+            ties = Ties(gaps, self.weights[:, None] * arrivals[:, :, 1:], self.weights)
+        begins = (0, *self.run.cuts)
+        return point_at(x, self.measured - response, jacobian, len(self.run.keys), begins, ties)
 
     def search(self, x: Floats, max_iterations: int) -> End:
         """The minimum near x."""
@@ -208,9 +229,9 @@ def _result(model: Model, problem: _Problem, end: End) -> FreeRunFit:
         model=model.with_values(dict(zip(keys, (float(v) for v in point.x), strict=False))),
         keys=keys,
         values=point.x[:p],
-        covariance=point.covariance()[:p, :p],
+        covariance=point.covariance(),
         initial=states if problem.run.cuts else states[0],
-        residual=point.residual,
+        residual=point.residual[: problem.run.samples],
         converged=end.converged,
         iterations=end.iterations,
         message=message,

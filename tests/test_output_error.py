@@ -350,7 +350,7 @@ def test_a_trial_that_diverges_is_a_rejected_step(
     systems: dict[str, Model], records: dict[str, Record], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     diverged: list[float] = []
-    respond = FreeRun.respond
+    respond = FreeRun.respond_by_piece
 
     def watched(self: FreeRun, *arguments: object) -> tuple[Floats, Floats]:
         try:
@@ -359,7 +359,7 @@ def test_a_trial_that_diverges_is_a_rejected_step(
             diverged.append(error.time)
             raise
 
-    monkeypatch.setattr(FreeRun, "respond", watched)
+    monkeypatch.setattr(FreeRun, "respond_by_piece", watched)
     model, record = systems["duffing_van_der_pol"], records["duffing_van_der_pol"]
     fit = fit_free_run(model, record, start={"m": 0.3, "c3": 0.0, "k3": 5e7})
     assert diverged

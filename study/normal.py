@@ -1,0 +1,171 @@
+"""Normal equations of least squares over pieces of a record.
+
+Some variables are shared by all samples (coefficients), others belong to one piece each (the state that it
+begins with). Those are eliminated piece by piece, so that a fit in hundreds of pieces costs no more linear
+algebra than one in a single piece.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solveh_banded
+
+Floats = NDArray[np.float64]
+INDISTINCT = 1e-12  # eigenvalue of a scaled normal matrix below which variables cannot be told apart
+
+
+@dataclass(frozen=True)
+class Normal:
+    """``J^T J`` and ``J^T residual`` for columns of unit length; k shared variables, f own ones of each of N pieces.
+
+    Attributes
+    ----------
+    shared : array, shape (k, k)
+        Products of the shared columns.
+    cross : array, shape (N, k, f)
+        Those of the shared with the own columns of each piece.
+    own : array, shape (N, f, f)
+        Those of the own columns.
+    links : array, shape (N - 1, f, f), or None
+        Those of the own columns of each piece but the first (rows) with those of the piece before.
+    right : array, shape (k,)
+        Products of the shared columns with the residual.
+    own_right : array, shape (N, f)
+        Those of the own columns.
+    """
+
+    shared: Floats
+    cross: Floats
+    own: Floats
+    links: Floats | None
+    right: Floats
+    own_right: Floats
+
+    def _own_solved(self, damping: float, right: Floats) -> Floats:
+        """Solution of the equations of the own variables alone for right sides of shape (N, f, m)."""
+        if self.links is not None:
+            return _tridiagonal(self.own, self.links, damping, right)
+        values, vectors = np.linalg.eigh(self.own)
+        known = values + damping > INDISTINCT  # a piece may not show every direction
+        inverse = np.where(known, 1.0 / np.where(known, values + damping, 1.0), 0.0)
+        return (vectors * inverse[:, None, :]) @ (vectors.transpose(0, 2, 1) @ right)
+
+    def _eliminated(self, damping: float) -> tuple[Floats, Floats]:
+        """The own variables' answer to a change of each shared one, (N, f, k), and to their right side, (N, f)."""
+        right = np.concatenate([self.cross.transpose(0, 2, 1), self.own_right[:, :, None]], axis=2)
+        solved = self._own_solved(damping, right)
+        return solved[:, :, :-1], solved[:, :, -1]
+
+    def _left(self, damping: float, answers: Floats, alone: Floats) -> tuple[Floats, Floats]:
+        matrix = self.shared + damping * np.eye(len(self.right)) - np.einsum("nif,nfj->ij", self.cross, answers)
+        return matrix, self.right - np.einsum("nif,nf->i", self.cross, alone)
+
+    def reduced(self) -> Floats:
+        """What is left of the shared variables' matrix with the own ones eliminated, shape (k, k)."""
+        return self._left(0.0, *self._eliminated(0.0))[0]
+
+    def step(self, damping: float) -> Floats:
+        """Solution with ``damping`` added to the diagonal: shared variables, then piece by piece the own ones."""
+        answers, alone = self._eliminated(damping)
+        shared = np.linalg.solve(*self._left(damping, answers, alone))
+        return np.concatenate([shared, (alone - answers @ shared).ravel()])
+
+    def gradient(self) -> Floats:
+        """Right side of all variables, in the order of :meth:`step`."""
+        return np.concatenate([self.right, self.own_right.ravel()])
+
+    def decrement(self) -> float:
+        """How much the sum of squares would fall in a full Gauss-Newton step, were the model linear."""
+        answers, alone = self._eliminated(0.0)
+        matrix, right = self._left(0.0, answers, alone)
+        values, vectors = np.linalg.eigh(matrix)
+        known = values > INDISTINCT
+        return float(np.sum(self.own_right * alone) + np.sum((vectors.T @ right)[known] ** 2 / values[known]))
+
+
+@dataclass(frozen=True)
+class Ties:
+    """What holds the pieces together: the state in which each arrives is to be that in which the next begins.
+
+    Attributes
+    ----------
+    gaps : array, shape (N - 1, f)
+        By how much it is not, times the weight.
+    jacobian : array, shape (N - 1, f, k + f)
+        Derivatives of the gaps by the shared variables and by those of the piece before.
+    weight : array, shape (f,)
+        Derivative by the state after, with its sign turned.
+    """
+
+    gaps: Floats
+    jacobian: Floats
+    weight: Floats
+
+
+def _tridiagonal(own: Floats, links: Floats, damping: float, right: Floats) -> Floats:
+    """Solve the block tridiagonal equations of pieces that are tied to their neighbours, right sides (N, f, m)."""
+    count, f, m = right.shape
+    bands = np.zeros((2 * f, count * f))
+    for row in range(f):
+        for column in range(f):
+            if row >= column:
+                bands[row - column, column::f] = own[:, row, column]
+            bands[f + row - column, column : (count - 1) * f : f] = links[:, row, column]
+    bands[0] += max(damping, INDISTINCT)
+    solved = solveh_banded(bands, right.reshape(count * f, m), lower=True, check_finite=False)
+    return np.asarray(solved, dtype=np.float64).reshape(count, f, m)
+
+
+def normal_equations(
+    residual: Floats, jacobian: Floats, shared: int, begins: Sequence[int], ties: Ties | None = None
+) -> tuple[Floats, Normal]:
+    """Normal equations of a residual, and the lengths of the columns.
+
+    Parameters
+    ----------
+    residual : array, shape (n,)
+        Measured minus predicted.
+    jacobian : array, shape (n, k + f)
+        Derivatives of what is predicted: by the shared variables, then by those of the sample's own piece.
+    shared : int
+        k.
+    begins : sequence of int
+        First sample of each piece.
+    ties : Ties, optional
+        Gaps between the pieces, which are to vanish too.
+
+    Returns
+    -------
+    scale : array, shape (k + N f,)
+        Length of each column, one where it is zero.
+    normal : Normal
+    """
+    bounds = (*begins, len(residual))
+    grams = np.stack([jacobian[a:b].T @ jacobian[a:b] for a, b in pairwise(bounds)])
+    rights = np.stack([jacobian[a:b].T @ residual[a:b] for a, b in pairwise(bounds)])
+    links = None
+    if ties is not None:
+        turned = ties.jacobian.transpose(0, 2, 1)
+        after = -ties.weight[:, None] * ties.jacobian  # rows: the state after
+        grams[:-1] += turned @ ties.jacobian
+        grams[1:, shared:, :shared] += after[:, :, :shared]
+        grams[1:, :shared, shared:] += after[:, :, :shared].transpose(0, 2, 1)
+        grams[1:, shared:, shared:] += np.diag(ties.weight**2)
+        rights[:-1] -= (turned @ ties.gaps[:, :, None])[:, :, 0]
+        rights[1:, shared:] += ties.weight * ties.gaps
+        links = after[:, :, shared:]
+    lengths = np.sqrt(np.einsum("nii->ni", grams))
+    together, own = np.sqrt(np.sum(lengths[:, :shared] ** 2, axis=0)), lengths[:, shared:]
+    together, own = (np.where(x == 0.0, 1.0, x) for x in (together, own))
+    normal = Normal(
+        shared=np.sum(grams[:, :shared, :shared], axis=0) / np.outer(together, together),
+        cross=grams[:, :shared, shared:] / (together[:, None] * own[:, None, :]),
+        own=grams[:, shared:, shared:] / (own[:, :, None] * own[:, None, :]),
+        links=None if links is None else links / (own[1:, :, None] * own[:-1, None, :]),
+        right=np.sum(rights[:, :shared], axis=0) / together,
+        own_right=rights[:, shared:] / own,
+    )
+    return np.concatenate([together, own.ravel()]), normal
