@@ -34,6 +34,7 @@ for _case in STUDY.cases:
             **figures_of(_case, IDENTIFIED, DESCRIBED),
         params:
             title=STUDY.cases[_case].title,
+            drawn=STUDY.drawn(_case),
         benchmark:
             f"results/benchmarks/draw.{_case}.tsv"
         script:

@@ -5,7 +5,7 @@ from study.modules import rests_on
 
 # Touching study/miso.py re-runs identification and what follows, not simulation, though the two share
 # study/case.py: what only identification uses is not followed from there.
-IDENTIFICATION_ONLY = ["study.estimators", "study.estimators.base", "study.spectra"]
+IDENTIFICATION_ONLY = ["study.estimators", "study.estimators.base", "study.spectra", "study.local_polynomial"]
 CODE = {
     "record": rests_on(Path("scripts/make_record.py"), without=IDENTIFICATION_ONLY),
     "identify": rests_on(Path("scripts/identify.py"), also=ESTIMATORS.values()),

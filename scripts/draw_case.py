@@ -18,9 +18,9 @@ HIGHEST = 10.0  # hertz: the report's systems have their dynamics below it (Sect
 PARTS = ("real part", "imaginary part")
 
 
-def linear(response_csv: Path, title: str, highest: float = HIGHEST) -> Figure:
+def linear(response_csv: Path, title: str, highest: float = HIGHEST, drawn: Sequence[str] | None = None) -> Figure:
     """Magnitude and phase of A_1."""
-    first = curves.responses(pd.read_csv(response_csv), highest)[0]
+    first = curves.responses(pd.read_csv(response_csv), highest, drawn)[0]
     figure, axes = page.page(
         title, "Linear frequency response function $A_1(f)$", rows=2,
         legend_rows=page.rows_for(len(first.curves) + 2),
@@ -32,9 +32,9 @@ def linear(response_csv: Path, title: str, highest: float = HIGHEST) -> Figure:
     return figure
 
 
-def nonlinear(response_csv: Path, title: str, highest: float = HIGHEST) -> Figure:
+def nonlinear(response_csv: Path, title: str, highest: float = HIGHEST, drawn: Sequence[str] | None = None) -> Figure:
     """Real and imaginary part of A_2 and every further one, side by side."""
-    shown = curves.responses(pd.read_csv(response_csv), highest)[1:]
+    shown = curves.responses(pd.read_csv(response_csv), highest, drawn)[1:]
     if not shown:
         figure, axes = page.page(title, "No nonlinear input is assumed")
         axes[0].set_axis_off()
@@ -74,7 +74,7 @@ def histogram(record_csv: Path, title: str, channel: str = "displacement") -> Fi
 
 def draw(
     record_csv: Path, response_csv: Path, coherence_csv: Path, outputs: Mapping[str, Sequence[Path]],
-    *, title: str, style: Path, highest: float = HIGHEST,
+    *, title: str, style: Path, highest: float = HIGHEST, drawn: Sequence[str] | None = None,
 ) -> None:  # fmt: skip
     """Draw the wanted kinds of picture of a case.
 
@@ -90,6 +90,8 @@ def draw(
         The style sheet.
     highest : float
         Where the frequency axis ends, in hertz.
+    drawn : sequence of str, optional
+        Estimators whose frequency response functions are shown; all of them if left out.
 
     Raises
     ------
@@ -97,8 +99,8 @@ def draw(
         If a kind of picture is asked for that there is not.
     """
     kinds = {
-        "linear": lambda: linear(response_csv, title, highest),
-        "nonlinear": lambda: nonlinear(response_csv, title, highest),
+        "linear": lambda: linear(response_csv, title, highest, drawn),
+        "nonlinear": lambda: nonlinear(response_csv, title, highest, drawn),
         "coherence": lambda: cumulative(coherence_csv, title, highest),
         "histogram": lambda: histogram(record_csv, title),
     }
@@ -117,5 +119,5 @@ if "snakemake" in globals():
         draw(
             Path(step.input.record), Path(step.input.responses), Path(step.input.coherences),
             {kind: [Path(p) for p in paths] for kind, paths in step.output.items()},
-            title=step.params.title, style=Path(step.input.style),
+            title=step.params.title, style=Path(step.input.style), drawn=step.params.drawn,
         )  # fmt: skip

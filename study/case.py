@@ -58,9 +58,10 @@ def assumed_model(model: Model, settings: Table) -> Model:
 
 
 def estimator_settings(settings: Table) -> Settings:
-    """The estimators' settings from a case's identification settings."""
+    """The estimators' settings from a case's identification settings; what these leave out is as by default."""
     low, high = settings["fit_band"]
-    return Settings(Segments(**settings["segments"]), (low, high), LocalPolynomial(**settings["local_polynomial"]))
+    bands = LocalPolynomial(**settings.get("local_polynomial", {}))
+    return Settings(Segments(**settings["segments"]), (low, high), bands)
 
 
 def identify_case(model: Model, record: Record, settings: Table) -> dict[str, Identified]:

@@ -99,6 +99,10 @@ class StudyConfig:
             "absolute": tolerances["absolute"],
         }
 
+    def drawn(self, case: str) -> list[str]:
+        """The estimators that a case's figures show."""
+        return self.settings["drawn"]["with_noise" if self.cases[case].noise > 0.0 else "without_noise"]
+
 
 def load(folder: Path) -> StudyConfig:
     """Read ``config.yaml`` and ``cases.tsv`` of a folder, and the models that they name, and check them all.
@@ -227,6 +231,10 @@ def _check_settings(settings: Table, where: str) -> None:
             raise StudyError(f"{where}: there is no estimator {name!r}; known are {', '.join(ESTIMATORS)}")
     if "miso" not in settings["estimators"]:
         raise StudyError(f"{where}: estimators lacks 'miso', whose coherences are drawn of every case")
+    for kind, names in settings["drawn"].items():
+        for name in names:
+            if name not in settings["estimators"]:
+                raise StudyError(f"{where}: drawn.{kind} names {name!r}, which is not among the estimators")
     for name, described in settings["excitations"].items():
         try:
             excitation = Excitation(**{key: value for key, value in described.items() if key != "seed"})

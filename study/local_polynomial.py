@@ -39,7 +39,7 @@ class LocalPolynomial:
     """
 
     degree: int = 2
-    half_width: int = 20
+    half_width: int = 40
 
     def __post_init__(self) -> None:
         """Refuse what is no polynomial or no band."""

@@ -53,6 +53,8 @@ def test_settings_of_a_case():
     study = load(ROOT / "config")
     record = study.record_settings("noise_10")
     assert record["noise"] == 0.1
+    assert study.drawn("noise_10") == study.settings["drawn"]["with_noise"]
+    assert study.drawn("linear") == study.settings["drawn"]["without_noise"]
     assert record["excitation"]["seed"] == study.settings["excitations"]["report"]["seed"]
     assert study.identification_settings("dead_band")["relative"]["c"] == 0.05, "a case's own tolerance holds"
     assert study.identification_settings("duffing")["relative"]["c"] == 0.02
@@ -81,7 +83,8 @@ def test_figures_without_a_number_are_named_after_the_case(folder):
         ("fit_band: [0.3, 10.0]", "fit_band: [0.3, 0.5]", "it must span four lines of 0.0976562 Hz or more"),
         ("[siso, miso,", "[siso, mios,", "there is no estimator 'mios'; known are siso, miso"),
         ("[siso, miso, miso_hand_read", "[siso, miso_hand_read", "estimators lacks 'miso', whose coherences are drawn"),
-        ("half_width: 20", "half_width: 800", "half_width makes bands of 1601 lines; fit_band [0.3, 10.0] of 8192"),
+        ("half_width: 40", "half_width: 800", "half_width makes bands of 1601 lines; fit_band [0.3, 10.0] of 8192"),
+        ("with_noise: [siso, miso]", "with_noise: [siso, instrument]", "drawn.with_noise names 'instrument', which"),
         ("degree: 2", "degree: 2.5", "local_polynomial.degree is not right"),
         ("kind: gaussian_lowpass", "kind: gaussian", "excitations.report.kind is not right"),
         ("cutoff: 12.5", "cutoff: 125", "excitations.report: the excitation reaches 125 Hz"),
@@ -180,7 +183,7 @@ def test_more_inputs_than_segments(folder):
 
 
 def test_more_inputs_than_a_band_tells_apart(folder):
-    spoil(folder / "config.yaml", "half_width: 20", "half_width: 5")
+    spoil(folder / "config.yaml", "half_width: 40", "half_width: 5")
     assert "half_width is 5; 2 inputs of degree 2 have 9 unknowns in a band, which needs 8 or more" in refused(folder)
 
 

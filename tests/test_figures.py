@@ -180,6 +180,8 @@ def test_responses_are_sorted_by_input_and_estimator_and_leave_out_zero_frequenc
     assert first.frequency[-1] == pytest.approx(10.0)
     np.testing.assert_allclose(first.exact, LINEAR[1:101])
     assert one(exact=False).exact is None
+    chosen = curves.responses(response_table("duffing"), 10.0, ["siso"])
+    assert [[c.estimator for c in item.curves] for item in chosen] == [["siso"]]
 
 
 def test_the_band_holds_95_percent_of_real_parts_and_of_magnitudes():

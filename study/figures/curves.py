@@ -1,5 +1,6 @@
 """What the figures draw: frequency response functions by input and estimator, and coherences by input."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Any
@@ -89,7 +90,9 @@ class InputCoherence:
     cumulative: Floats
 
 
-def responses(table: pd.DataFrame, highest: float) -> tuple[InputResponse, ...]:
+def responses(
+    table: pd.DataFrame, highest: float, drawn: Sequence[str] | None = None
+) -> tuple[InputResponse, ...]:  # fmt: skip
     """Frequency response functions of ``frequency_response.csv``, one entry an input.
 
     Parameters
@@ -98,8 +101,10 @@ def responses(table: pd.DataFrame, highest: float) -> tuple[InputResponse, ...]:
         Columns ``frequency, estimator, input, shape, real, imag, standard_error, exact_real, exact_imag``.
     highest : float
         Lines above this frequency (Hz) are left out, as is the line at zero, which has no phase.
+    drawn : sequence of str, optional
+        Estimators that are shown; all of them if left out.
     """
-    table = _lines(table, highest)
+    table = _lines(table if drawn is None else table[table["estimator"].isin(drawn)], highest)
     return tuple(_response(int(number), part) for number, part in _groups(table, "input"))
 
 
