@@ -13,13 +13,13 @@ from typing import NoReturn
 
 from study import __doc__ as summary
 from study import __version__
-from study.commands import add, compare, diagnose, history, simulate, terms, trial
+from study.commands import add, compare, diagnose, explore, history, simulate, terms, trial
 from study.commands.command import Command
 from study.errors import StudyError
 
 COMMANDS: tuple[Command, ...] = (
-    compare.COMMAND, diagnose.COMMAND, add.COMMAND, history.COMMAND, terms.COMMAND, simulate.COMMAND,
-    trial.COMMAND,
+    compare.COMMAND, diagnose.COMMAND, add.COMMAND, history.COMMAND, explore.COMMAND, terms.COMMAND,
+    simulate.COMMAND, trial.COMMAND,
 )  # fmt: skip
 
 BAD_INPUT, FAULT, INTERRUPTED, PIPE_CLOSED = 2, 1, 130, 141  # the last two as shells report SIGINT and SIGPIPE

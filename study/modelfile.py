@@ -128,6 +128,34 @@ def add_term(path: Path, entry: Term | ModelTerm) -> Model:
     return after
 
 
+def revised(text: str, source: str, model: Model) -> str:
+    """The text of a model file with what has become of its model; comments, order and quoting stay.
+
+    Parameters
+    ----------
+    text : str
+        The file as it was read.
+    source : str
+        Its name, for messages.
+    model : Model
+        The terms of the file in their order, values held or freed, and perhaps further terms.
+
+    Raises
+    ------
+    StudyError
+        If the layout of the text leaves no clear place for a change.
+    """
+    before = parse_model(text, Path(source)).terms
+    for number, entry in enumerate(model.terms):
+        if number >= len(before):
+            text = yamltext.with_entry(text, "terms", format_entry(entry))
+        elif entry != before[number]:
+            text = yamltext.with_changed(text, "terms", number, format_entry(entry))
+    if not _holds(text, Path(source), model):
+        raise StudyError(f"{source}: its layout leaves no clear place for a change; one entry a line is right")
+    return text
+
+
 def _model(document: object, stem: str) -> Model:
     if document is None:
         raise StudyError("is empty; a mapping of 'name' and 'terms' is right")

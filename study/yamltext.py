@@ -125,6 +125,26 @@ def with_entry(text: str, key: str, entry: str) -> str:
     return f"{text[: end + 1]}{line}{newline}{text[end + 1 :]}"
 
 
+def with_changed(text: str, key: str, number: int, entry: str) -> str:
+    """The text with one entry of the top-level list ``key`` replaced; nothing around it changes.
+
+    Parameters
+    ----------
+    text : str
+        YAML that :func:`read_plain` accepts, whose ``key`` is a list.
+    key : str
+        Name of the list.
+    number : int
+        Which entry, counted from zero; comments between its own lines go with it.
+    entry : str
+        YAML on one line.
+    """
+    root = _yaml().compose(text)
+    sequence = next(value for name, value in root.value if name.value == key)
+    node = sequence.value[number]
+    return text[: node.start_mark.index] + entry + text[_last_leaf(node).end_mark.index :]
+
+
 def _last_leaf(node: Any) -> Any:
     """The node at the very end of a block, whose end mark is exact (a block's own lies behind its comments)."""
     if node.id == "scalar" or node.flow_style or not node.value:

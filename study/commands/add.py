@@ -29,7 +29,7 @@ def _run(arguments: argparse.Namespace) -> None:
     from study import ladder
     from study.compare.comparison import compare
     from study.compare.output import check_folder, write_files
-    from study.compare.report import as_json, document, summary
+    from study.compare.report import as_json, document, rung, summary
     from study.modelfile import add_term, read_model
 
     folder = out_folder(arguments)
@@ -48,7 +48,7 @@ def _run(arguments: argparse.Namespace) -> None:
             pairs.append((before, compare(model.with_term(term), record, how, cutoff=arguments.cutoff)))
             bar.update()
     for before, after in pairs:
-        steps = ladder.climbed(steps, _step(before, None), _step(after, term.name))
+        steps = ladder.climbed(steps, rung(before), rung(after, term.name))
     ladder.write(arguments.model, steps)
     add_term(arguments.model, term)
     write_files(folder, {"comparison.json": as_json(document([after for _, after in pairs]))})
@@ -69,23 +69,6 @@ def _refuse_second(path: Path, entries: Any, name: str) -> None:
 
     if any(entry.name == name for entry in entries):
         raise StudyError(f"{path}: {name} is in the model already; an effect can be added once")
-
-
-def _step(found: "Comparison", added: str | None) -> dict[str, Any]:
-    """A comparison as a rung of the ladder."""
-    from study.compare.report import coefficient_row
-
-    return {
-        "terms": [t.name for t in found.model.terms],
-        "added": added,
-        "record": found.record.name,
-        "error": {"force": found.force.total, "response": found.response_error},
-        "rms": float(found.response_error * found.judged.size),
-        "unit": found.record.units.get(found.how.response, ""),
-        "noise_floor": {"response": found.noise_floor},
-        "converged": found.found.converged,
-        "coefficients": [coefficient_row(c) for c in found.coefficients],
-    }
 
 
 COMMAND = Command(

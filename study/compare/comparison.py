@@ -1,6 +1,6 @@
 """Compare a model with measured records: how good it is, and where it fails."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -101,6 +101,7 @@ def compare(
     how: Plan | None = None,
     *,
     cutoff: float | None = None,
+    start: Mapping[str, float] | None = None,
     progress: Progress | None = None,
 ) -> Comparison:
     """Fit what a model leaves open to one part of a record and judge it on the other.
@@ -116,6 +117,8 @@ def compare(
     cutoff : float, optional
         Frequency in hertz above which a measured velocity or acceleration is integrated; what lies below is
         not judged. Found from the record if left out.
+    start : mapping of float, optional
+        Values to begin the fit from, one for each that is fitted; searched for if left out.
     progress : callable, optional
         Called with what is being done, ``STEPS`` times.
 
@@ -129,7 +132,7 @@ def compare(
     told("motions")
     completed = complete(record, cutoff)
     told("fit")
-    found, how = fit_model(model, completed.record, how)
+    found, how = fit_model(model, completed.record, how, start)
     told("free run")
     judged = judge(found, completed.record, how, completed.band[0])
     noise = noise_of(judged, completed.record, how.judge[1])

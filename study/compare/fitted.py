@@ -1,5 +1,6 @@
 """The fit that a comparison stands on: what the model leaves open, estimated on the fitting part."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -62,8 +63,12 @@ class Coefficient:
         return self.value - TWO_SIDED_95 * self.error, self.value + TWO_SIDED_95 * self.error
 
 
-def fit_model(model: Model, record: Record, how: Plan) -> tuple[FreeRunFit, Plan]:
+def fit_model(
+    model: Model, record: Record, how: Plan, start: Mapping[str, float] | None = None
+) -> tuple[FreeRunFit, Plan]:
     """Fit all that the model leaves open; shape parameters that it leaves out are searched for.
+
+    With ``start``, a value for everything that is left open, the fit begins there and nothing is searched for.
 
     Returns
     -------
@@ -78,6 +83,8 @@ def fit_model(model: Model, record: Record, how: Plan) -> tuple[FreeRunFit, Plan
     if "inertia" not in model:
         raise StudyError(f"model {model.name!r} has no inertia; a free run needs it")
     held = fitting.held_keys(model)
+    if start is not None:
+        return _refined(fitting.fit(model, record, how, held, start), record, how, held)
     unknown = tuple(t for t in model.terms if None in t.parameters)
     grown = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
     found = _from_afar(grown, record, how, _held(grown, held))

@@ -12,6 +12,7 @@ from study.output_error import FreeRunFit, fit_free_run
 from study.record import MOTIONS, Record
 
 Floats = NDArray[np.float64]
+CYCLES = 12  # of the response, in a close-up
 
 
 @dataclass(frozen=True)
@@ -57,19 +58,29 @@ class Judged:
     @property
     def residual(self) -> Floats:
         """The difference without what lies below ``low``, shape (n,)."""
-        return self._above(self.difference)
+        return self.above(self.difference)
 
     @property
     def size(self) -> float:
         """Rms of the measured response about its mean, without what lies below ``low``."""
-        return float(np.std(self._above(self.measured)))
+        return float(np.std(self.above(self.measured)))
 
     @property
     def error(self) -> float:
         """Rms of the residual over that of the response."""
         return float(np.sqrt(np.mean(self.residual**2))) / self.size
 
-    def _above(self, values: Floats) -> Floats:
+    @property
+    def closeup(self) -> slice:
+        """Some cycles of the response about the stretch where the residual is largest."""
+        centred = self.measured - np.mean(self.measured)
+        crossings = max(int(np.count_nonzero(np.diff(np.signbit(centred)))), 2)
+        length = int(np.clip(2 * CYCLES * len(centred) / crossings, 32, len(centred)))
+        first = int(np.argmax(np.convolve(self.residual**2, np.ones(length), "valid")))
+        return slice(first, first + length)
+
+    def above(self, values: Floats) -> Floats:
+        """Values without what lies below ``low``, shape (n,)."""
         return motion.derivative(values, self.dt, 0, self.low) if self.low > 0.0 else values
 
 

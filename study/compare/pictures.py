@@ -23,8 +23,6 @@ Floats = NDArray[np.float64]
 SHEET = Path(__file__).parent.parent.parent / "config" / "study.mplstyle"
 KINDS = ("png", "svg")
 WIDE = 7.2  # inches
-CYCLES = 12  # of the response, in the close-up
-HEARD = 1e-4  # of its largest density: pictures end where the force has no more than that
 
 
 def pictures(found: Comparison) -> dict[str, bytes]:
@@ -59,27 +57,17 @@ def response(found: Comparison) -> Figure:
     )  # fmt: skip
     misfit.response(axes[0], judged.time, judged.measured, judged.predicted, unit)
     misfit.residual(axes[1], judged.time, judged.residual, found.noise.rms, unit)
-    near = _worst(judged.residual, judged.measured)
+    near = judged.closeup
     misfit.response(axes[2], judged.time[near], judged.measured[near], judged.predicted[near], unit)
     page.letter(axes, ("all that is judged", "the difference", "close-up of (a) where the difference is largest"))
     page.legend(figure, axes, columns=2)
     return figure
 
 
-def _worst(residual: Floats, measured: Floats) -> slice:
-    """Some cycles about the stretch with the largest error."""
-    centred = measured - np.mean(measured)
-    crossings = max(int(np.count_nonzero(np.diff(np.signbit(centred)))), 2)
-    length = int(np.clip(2 * CYCLES * len(measured) / crossings, 32, len(measured)))
-    power = np.convolve(residual**2, np.ones(length), "valid")
-    first = int(np.argmax(power))
-    return slice(first, first + length)
-
-
 def force_error(found: Comparison) -> Figure:
     """Unexplained share of the force by frequency, and what each input explains."""
     force = found.force
-    highest = _highest(force.frequency, force.force)
+    highest = force.highest
     low, high = force.frequency[force.band][[0, -1]]
     about = f"{percent(force.total)} of its power from {low:.3g} to {high:.3g} Hz"
     figure, axes = page.page(
@@ -98,11 +86,6 @@ def force_error(found: Comparison) -> Figure:
     page.letter(axes, ("what is left of the force", "what the inputs explain, one after the other"))
     page.legend(figure, axes[:1], columns=2)
     return figure
-
-
-def _highest(frequency: Floats, density: Floats) -> float:
-    heard = np.flatnonzero(density > HEARD * float(np.max(density)))
-    return float(frequency[heard[-1]])
 
 
 def missing_force(found: Comparison) -> Figure:

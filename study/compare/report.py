@@ -117,6 +117,21 @@ def level_row(found: Level) -> Row:
     }  # fmt: skip
 
 
+def rung(found: Comparison, added: str | None = None) -> Row:
+    """A comparison as a rung of the ladder (``study.ladder``); ``added`` names the term that is new in it."""
+    return {
+        "terms": [t.name for t in found.model.terms],
+        "added": added,
+        "record": found.record.name,
+        "error": {"force": found.force.total, "response": found.response_error},
+        "rms": float(found.response_error * found.judged.size),
+        "unit": found.record.units.get(found.how.response, ""),
+        "noise_floor": {"response": found.noise_floor},
+        "converged": found.found.converged,
+        "coefficients": [coefficient_row(c) for c in found.coefficients],
+    }
+
+
 def as_json(content: Row) -> bytes:
     """A document as JSON; what is not finite becomes null."""
     return (json.dumps(_finite(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()

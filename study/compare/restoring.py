@@ -37,7 +37,7 @@ class Restoring:
 
     Attributes
     ----------
-    displacement, velocity : arrays, shape (n,)
+    displacement, velocity, acceleration : arrays, shape (n,)
         The motion, free of noise.
     force : array, shape (n,)
         Measured force less inertia and all forces of the model, in the unit of force.
@@ -59,6 +59,7 @@ class Restoring:
 
     displacement: Floats
     velocity: Floats
+    acceleration: Floats
     force: Floats
     free: Floats
     gate: NDArray[np.bool_]
@@ -107,6 +108,7 @@ def restoring(
     return Restoring(
         displacement=motion[0],
         velocity=motion[1],
+        acceleration=motion[2],
         force=forces[:, 0],
         free=forces[:, 1:],
         gate=gate,

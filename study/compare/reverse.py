@@ -23,6 +23,7 @@ from study.spectra import Segments, SpectralMatrix, cross_spectra
 Floats = NDArray[np.float64]
 FEWEST_AVERAGES = 4  # for each input
 AUDIBLE = 1e-6  # of its largest density: the force has no power on lines below
+HEARD = 1e-4  # of its largest density
 ABOVE = 2.0  # the motion stands above its noise where its density is at least so many times that of the noise
 
 
@@ -58,6 +59,11 @@ class ForceError:
     cumulative: Floats
     inputs: tuple[Input, ...]
     band: NDArray[np.bool_]
+
+    @property
+    def highest(self) -> float:
+        """Frequency in hertz above which the force has hardly any power: pictures end there."""
+        return float(self.frequency[np.flatnonzero(self.force > HEARD * float(np.max(self.force)))[-1]])
 
     def _over_band(self, share: Floats) -> float:
         weight = self.force[self.band]

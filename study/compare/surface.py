@@ -49,8 +49,8 @@ class Surface:
 
 def curve(at: Floats, force: Floats) -> Curve:
     """Mean force against a quantity, in classes of equal width that hold enough visits."""
-    edges = _edges(at, CLASSES)
-    place = np.searchsorted(edges, at) - 1
+    bounds = edges(at, CLASSES)
+    place = np.searchsorted(bounds, at) - 1
     inside = (place >= 0) & (place < CLASSES)
     mean, error, visits = _means(place, force, inside, CLASSES)
     centre = _means(place, at, inside, CLASSES)[0]
@@ -60,16 +60,17 @@ def curve(at: Floats, force: Floats) -> Curve:
 
 def surface(u: Floats, v: Floats, force: Floats) -> Surface:
     """Mean force over the (u, v) plane in cells of equal size."""
-    edges = [_edges(x, CELLS) for x in (u, v)]
-    i, j = (np.searchsorted(e, x) - 1 for e, x in zip(edges, (u, v), strict=True))
+    bounds = [edges(x, CELLS) for x in (u, v)]
+    i, j = (np.searchsorted(e, x) - 1 for e, x in zip(bounds, (u, v), strict=True))
     inside = (i >= 0) & (i < CELLS) & (j >= 0) & (j < CELLS)
     mean, error, visits = _means(i * CELLS + j, force, inside, CELLS * CELLS)
     seen = visits >= FEWEST
     grids = [np.where(seen, x, np.nan).reshape(CELLS, CELLS) for x in (mean, error)]
-    return Surface(edges[0], edges[1], grids[0], grids[1])
+    return Surface(bounds[0], bounds[1], grids[0], grids[1])
 
 
-def _edges(values: Floats, classes: int) -> Floats:
+def edges(values: Floats, classes: int) -> Floats:
+    """Edges of classes of equal width, shape (classes + 1,), from which a few extreme samples stand out."""
     low, high = (float(q) for q in np.quantile(values, [REACH, 1.0 - REACH]))
     return np.linspace(low, high, classes + 1)
 

@@ -1,0 +1,111 @@
+"""What belongs together: for each block of time, in which bands the difference lies and which motions were visited.
+
+A stretch of time, a band of frequency and a range of amplitudes are tied to each other through blocks of the
+judging part: a band through the power of the difference in each block, an amplitude through the samples of each
+block that reach it. The sums over blocks are those of the spectra, maps and curves of a comparison.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import rfft, rfftfreq
+
+from study.compare.comparison import Comparison
+from study.compare.surface import CELLS, CLASSES, edges
+from study.spectra import Segments
+
+Floats = NDArray[np.float64]
+BLOCKS = 64  # at most
+SHORTEST = 16  # samples in a block
+WINDOW = 256  # samples in the spectrum of a block, at most
+
+
+@dataclass(frozen=True)
+class Classes:
+    """Visits and missing force in classes of a quantity, block by block.
+
+    Attributes
+    ----------
+    edges : array, shape (classes + 1,)
+        Of the classes: those of ``surface.curve``.
+    visits, force : arrays, shape (blocks, classes)
+        Samples in the class, and their sum of the missing force.
+    """
+
+    edges: Floats
+    visits: Floats
+    force: Floats
+
+
+@dataclass(frozen=True)
+class Links:
+    """Blocks of the judging part.
+
+    Attributes
+    ----------
+    edges : array, shape (blocks + 1,)
+        Times in seconds.
+    frequency : array, shape (lines,)
+        In hertz.
+    power : array, shape (blocks, lines)
+        Autospectral density of the difference around the middle of each block.
+    displacement, velocity : Classes
+        What each block holds of the curves.
+    cells : array, shape (blocks, CELLS * CELLS)
+        Samples of each block in the cells of the map, by displacement, then velocity.
+    """
+
+    edges: Floats
+    frequency: Floats
+    power: Floats
+    displacement: Classes
+    velocity: Classes
+    cells: Floats
+
+
+def links(found: Comparison) -> Links:
+    """Tie the stretches, bands and amplitudes of a comparison to each other."""
+    n = len(found.judged.residual)
+    count = int(np.clip(n // SHORTEST, 1, BLOCKS))
+    bounds = np.linspace(0, n, count + 1).round().astype(np.int64)
+    lacking = found.restoring
+    block = np.searchsorted(bounds, np.arange(n), side="right") - 1
+    u, v, force, place = (x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force, block))
+    frequency, power = _spectra(found.judged.residual, found.judged.dt, bounds)
+    first = float(found.judged.time[0])
+    return Links(
+        first + bounds * found.judged.dt, frequency, power, _classes(u, force, place, count),
+        _classes(v, force, place, count), _cells(u, v, place, count),
+    )  # fmt: skip
+
+
+def _spectra(values: Floats, dt: float, bounds: NDArray[np.int64]) -> tuple[Floats, Floats]:
+    """Density around the middle of each block, from a window that may reach beyond it."""
+    length = min(WINDOW, 2 ** int(np.log2(len(values))))
+    taper = Segments(length).taper()
+    first = np.clip((bounds[1:] + bounds[:-1] - length) // 2, 0, len(values) - length)
+    cut = np.lib.stride_tricks.sliding_window_view(values, length)[first] * taper
+    density = 2.0 * dt / np.sum(taper**2) * np.abs(np.asarray(rfft(cut, axis=1))) ** 2
+    return np.asarray(rfftfreq(length, dt)), density
+
+
+def _place(values: Floats, bounds: Floats) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    place = np.searchsorted(bounds, values) - 1
+    return place, (place >= 0) & (place < len(bounds) - 1)
+
+
+def _classes(values: Floats, force: Floats, block: NDArray[np.int64], count: int) -> Classes:
+    bounds = edges(values, CLASSES)
+    place, inside = _place(values, bounds)
+    where = (block * CLASSES + place)[inside]
+    visits = np.bincount(where, minlength=count * CLASSES).astype(np.float64)
+    sums = np.bincount(where, force[inside], minlength=count * CLASSES)
+    return Classes(bounds, visits.reshape(count, CLASSES), sums.reshape(count, CLASSES))
+
+
+def _cells(u: Floats, v: Floats, block: NDArray[np.int64], count: int) -> Floats:
+    (i, in_u), (j, in_v) = (_place(x, edges(x, CELLS)) for x in (u, v))
+    inside = in_u & in_v
+    where = (block * CELLS * CELLS + i * CELLS + j)[inside]
+    return np.bincount(where, minlength=count * CELLS * CELLS).astype(np.float64).reshape(count, CELLS * CELLS)

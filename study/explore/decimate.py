@@ -1,0 +1,43 @@
+"""Long records for a narrow screen: the least and the greatest value of each bucket, so that no peak is lost."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+BUCKETS = 1200  # about one for each column of pixels
+
+
+def extremes(values: Floats, buckets: int = BUCKETS) -> Floats:
+    """Two values a bucket, its least and its greatest, in the order in which they come.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        What is to be drawn as a line.
+    buckets : int
+        How many; a record of no more than twice as many samples stays as it is.
+
+    Returns
+    -------
+    array, shape (min(n, 2 buckets),)
+    """
+    if len(values) <= 2 * buckets:
+        return values
+    starts = _starts(len(values), buckets)
+    low, high = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
+    ends = np.append(starts[1:], len(values))
+    rising = np.array([np.argmin(values[a:b]) <= np.argmax(values[a:b]) for a, b in zip(starts, ends, strict=True)])
+    return np.where(rising, [low, high], [high, low]).T.ravel()
+
+
+def times(time: Floats, buckets: int = BUCKETS) -> Floats:
+    """The times that belong to :func:`extremes`: first sample and middle of each bucket."""
+    if len(time) <= 2 * buckets:
+        return time
+    starts = _starts(len(time), buckets)
+    ends = np.append(starts[1:], len(time))
+    return np.stack([time[starts], time[(starts + ends) // 2]], axis=1).ravel()
+
+
+def _starts(samples: int, buckets: int) -> NDArray[np.int64]:
+    return np.linspace(0, samples, buckets + 1).astype(np.int64)[:-1]

@@ -1,0 +1,42 @@
+"""What Save writes: the model file with its comments, the ladder, the pictures, and the session as one page."""
+
+from study import ladder, modelfile
+from study.compare.pictures import pictures
+from study.compare.report import as_json, document
+from study.diagnose import pages
+from study.explore.saved import saved
+from study.explore.session import Session
+from study.figures.ladder import files as ladder_pictures
+
+PAGE = "explore.html"
+
+
+def files(session: Session, name: str, text: str) -> dict[str, bytes]:
+    """Contents by file name.
+
+    Parameters
+    ----------
+    session : Session
+        What is to be kept.
+    name : str
+        File name of the model.
+    text : str
+        The model file as it was read: its comments and order stay.
+
+    Raises
+    ------
+    StudyError
+        If the model's layout leaves no place for a change.
+    """
+    now, steps = session.now, session.steps
+    stem = name.rpartition(".")[0] or name
+    found = {
+        name: modelfile.revised(text, name, now.model).encode(),
+        f"{stem}.history.json": ladder.as_bytes(steps),
+        "comparison.json": as_json(document([now.comparison])),
+        PAGE: saved(session),
+    }
+    found |= pictures(now.comparison) | ladder_pictures(steps, stem)
+    if now.diagnosis is not None:
+        found |= pages.files(now.diagnosis, session.record.name)
+    return found

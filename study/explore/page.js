@@ -1,0 +1,226 @@
+// What the page does by itself: join selections, preview candidates, step through the ladder, pass on what is
+// clicked. It draws from tables that Python has filled, so that a saved page does the same without a server.
+window.study = (() => {
+  const model = (name) => Bokeh.documents[0].get_model_by_name(name)
+  const column = (name, key) => model(name).get_column(key)
+  const put = (name, data) => { model(name).data = data }
+  const place = (id) => document.getElementById(id)
+
+  // ---- words and axes of the present rung
+  function words() {
+    const source = model("words"), places = source.get_column("place"), html = source.get_column("html")
+    for (let i = 0; i < places.length; i++) {
+      const element = place(places[i])
+      if (element) element.innerHTML = html[i]
+    }
+    const frame = model("frame")
+    const [who, what, value] = ["model", "property", "value"].map((key) => frame.get_column(key))
+    for (let i = 0; i < who.length; i++) {
+      const target = model(who[i])
+      if (target && target[what[i]] !== value[i]) target[what[i]] = value[i]
+    }
+    far = null
+    clear()
+    kept = null
+    preview(null)
+  }
+
+  // ---- what one candidate would leave
+  let kept = null
+  function preview(i) {
+    const has = i !== null && model("would_time").get_column(String(i)) !== null
+    const ghost = (name, x, y) => put(name, has ? {[x[0]]: column(x[1], x[2]), y: column(y, String(i))} : {[x[0]]: [], y: []})
+    ghost("ghost_time", ["t", "time", "t"], "would_time")
+    ghost("ghost_spectrum", ["f", "spectrum", "f"], "would_spectrum")
+    ghost("ghost_u", ["at", "against_u", "at"], "would_u")
+    ghost("ghost_v", ["at", "against_v", "at"], "would_v")
+    if (has && kept === null) kept = column("plane", "mean")
+    if (kept !== null) {
+      const mean = has ? column("would_plane", String(i)) : kept
+      put("plane", {...model("plane").data, mean, hatch: Array.from(mean, (m) => (m < 0 ? "-" : " "))})
+      if (!has) kept = null
+    }
+    for (const name of ["difference", "spectrum", "against_u", "against_v"]) entry(name, "candidate", has)
+    constancy(has ? i : 0)
+  }
+
+  const entry = (name, what, on) => { const item = model(`panel_${name}_${what}`); if (item) item.visible = on }
+
+  function constancy(i) {
+    const rows = column("constancy", "row"), shown = {f: [], value: [], low: [], high: []}
+    for (let k = 0; k < rows.length; k++)
+      if (rows[k] === i) for (const key in shown) shown[key].push(column("constancy", key)[k])
+    const none = [NaN, NaN]  // two points without a value: an axis needs some
+    put("shown", shown.f.length ? {...shown, zero: shown.f.map(() => 0)} : {f: [0, 1], value: none, low: none, high: none, zero: [0, 0]})
+    const element = document.querySelector(`[data-candidate="${i}"]`)
+    if (element) model("constancy_y").axis_label = element.dataset.label
+    const title = place("constancy-of")
+    if (title) title.textContent = element ? element.querySelector(".name b").textContent : ""
+    const empty = place("constancy-none")
+    if (empty) empty.hidden = !element || shown.f.length > 0
+    for (const row of document.querySelectorAll("[data-candidate]")) row.classList.toggle("shown", row === element)
+  }
+
+  // ---- selections: whatever is selected weighs the blocks of time, and these weigh everything else
+  const KINDS = {
+    time: ["box_response", "box_difference"], band: ["box_force", "box_coherence", "box_spectrum"],
+    u: ["box_against_u"], v: ["box_against_v"],
+  }
+
+  function weights(kind, from, to) {
+    const left = column("blocks", "left"), right = column("blocks", "right"), w = new Float64Array(left.length)
+    const inside = (a, b) => Math.max(0, Math.min(b, to) - Math.max(a, from)) / (b - a)
+    for (let b = 0; b < w.length; b++) {
+      if (kind === "time") { w[b] = inside(left[b], right[b]); continue }
+      if (kind === "band") {
+        const f = column("lines", "f"), p = column("lines", `p${b}`)
+        for (let i = 0; i < f.length; i++) if (f[i] >= from && f[i] <= to) w[b] += p[i]
+        continue
+      }
+      const low = column(`classes_${kind}`, "left"), high = column(`classes_${kind}`, "right")
+      const n = column(`classes_${kind}`, `n${b}`)
+      let all = 0
+      for (let i = 0; i < n.length; i++) { w[b] += n[i] * inside(low[i], high[i]); all += n[i] }
+      w[b] = all > 0 ? w[b] / all : 0
+    }
+    const most = Math.max(...w)
+    return most > 0 ? w.map((x) => x / most) : w
+  }
+
+  function sums(name, prefix, w) {
+    const total = new Float64Array(column(name, `${prefix}0`).length)
+    for (let b = 0; b < w.length; b++) {
+      const row = column(name, prefix + b)
+      for (let i = 0; i < total.length; i++) total[i] += w[b] * row[i]
+    }
+    return total
+  }
+
+  function curve(kind, w) {
+    const low = column(`classes_${kind}`, "left"), high = column(`classes_${kind}`, "right")
+    const n = sums(`classes_${kind}`, "n", w), s = sums(`classes_${kind}`, "s", w), data = {at: [], y: []}
+    for (let i = 0; i < n.length; i++)
+      if (n[i] >= 8) { data.at.push(0.5 * (low[i] + high[i])); data.y.push(s[i] / n[i]) }
+    return data
+  }
+
+  function cells(kind, from, to, w) {
+    const seen = column("plane", "seen"), middle = kind === "u" || kind === "v" ? column("plane", `middle_${kind}`) : null
+    const mine = sums("cells", "n", w), all = sums("cells", "n", w.map(() => 1))
+    const usual = w.reduce((a, b) => a + b, 0) / w.length
+    return Float32Array.from(seen, (s, i) => {
+      if (!s) return 0
+      if (middle) return middle[i] >= from && middle[i] <= to ? 1 : 0
+      return kind === "time" ? (mine[i] >= 1 ? 1 : 0) : (mine[i] > 1.1 * usual * all[i] ? 1 : 0)
+    })
+  }
+
+  function selected(kind, from, to) {
+    clear()
+    for (const name of KINDS[kind]) { const box = model(name); box.left = from; box.right = to; box.visible = true }
+    const w = weights(kind, from, to), total = w.reduce((a, b) => a + b, 0)
+    if (!(total > 0)) return
+    if (kind !== "time") put("blocks", {...model("blocks").data, weight: Float32Array.from(w, (x) => 0.65 * x)})
+    if (kind !== "band")
+      put("picked_spectrum", {f: column("lines", "f"), y: sums("lines", "p", w).map((x) => Math.sqrt(x / total))})
+    for (const other of ["u", "v"]) if (other !== kind) put(`picked_${other}`, curve(other, w))
+    put("plane", {...model("plane").data, picked: cells(kind, from, to, w)})
+    for (const name of ["spectrum", "against_u", "against_v"])
+      entry(name, "selected", model(`picked_${name.split("_")[1] ?? name}`).get_length() > 0)
+    if (kind === "time") near(from, to)
+    tell(kind, from, to)
+  }
+
+  // the close-up moves to a stretch that was selected
+  let far = null
+  function near(from, to) {
+    const t = column("time", "t"), first = t.findIndex((x) => x >= from), last = t.findLastIndex((x) => x <= to)
+    if (last - first < 2) return
+    far ??= model("close").data
+    const cut = (key) => column("time", key).slice(first, last + 1)
+    put("close", {t: cut("t"), measured: cut("measured"), predicted: cut("predicted")})
+  }
+
+  function tell(kind, from, to) {
+    const axis = {time: "difference_x", band: "force_x", u: "against_u_x", v: "against_v_x"}[kind]
+    const [what, unit] = model(axis).axis_label.split(" / ")
+    const element = place("selection")
+    if (!element) return
+    element.textContent = `Selected: ${what} from ${Number(from.toPrecision(3))} to ${Number(to.toPrecision(3))} ${unit}; ` +
+      "all panels show what belongs to it. Escape clears."
+    element.classList.add("on")
+  }
+
+  function clear() {
+    for (const names of Object.values(KINDS)) for (const name of names) model(name).visible = false
+    const blocks = model("blocks"), plane = model("plane")
+    put("blocks", {...blocks.data, weight: new Float32Array(blocks.get_length() ?? 0)})
+    put("plane", {...plane.data, picked: new Float32Array(plane.get_length() ?? 0)})
+    put("picked_spectrum", {f: [], y: []})
+    for (const kind of ["u", "v"]) put(`picked_${kind}`, {at: [], y: []})
+    for (const name of ["spectrum", "against_u", "against_v"]) entry(name, "selected", false)
+    if (far !== null) put("close", far)
+    far = null
+    const element = place("selection")
+    if (element) { element.textContent = element.dataset.hint; element.classList.remove("on") }
+  }
+
+  // ---- steps of a saved page
+  function step(k) {
+    for (const source of Bokeh.documents[0].all_models) {
+      const [name, number] = (source.name ?? "").split("@")
+      if (number === String(k)) model(name).data = source.data
+    }
+    words()
+    for (const button of document.querySelectorAll("[data-act=step]"))
+      button.classList.toggle("now", button.dataset.name === String(k))
+  }
+
+  // ---- what is clicked goes to Python
+  let count = 0
+  function act(what, name) {
+    if (what === "step") return step(Number(name))
+    if (document.body.classList.contains("busy") && what !== "try") return
+    put("asked", {act: [what], name: [String(name)], count: [++count]})
+  }
+
+  function state() {
+    const told = (key) => column("state", key)[0]
+    document.body.classList.toggle("busy", told("busy") !== "")
+    for (const [id, key] of [["busy", "doing"], ["answer", "answer"], ["notice", "notice"]]) {
+      const element = place(id)
+      if (element) element.textContent = told(key)
+    }
+    document.body.classList.toggle("working", told("doing") !== "")
+    const undo = document.querySelector("[data-act=undo]")
+    if (undo) undo.disabled = !told("undo")
+    const field = place("formula")
+    if (field) {
+      field.setAttribute("aria-invalid", told("answer") !== "" ? "true" : "false")
+      if (told("accepted") && field.value === told("accepted")) field.value = ""
+    }
+  }
+
+  const found = (event, key) => event.composedPath().find((e) => e.dataset && e.dataset[key] !== undefined)
+  let hovered = null
+  document.addEventListener("click", (event) => {
+    const element = found(event, "act")
+    if (element && !element.disabled)
+      act(element.dataset.act, element.dataset.act === "try" ? place("formula").value : element.dataset.name ?? "")
+  })
+  document.addEventListener("mouseover", (event) => {
+    const element = found(event, "candidate"), next = element ? Number(element.dataset.candidate) : null
+    if (next !== hovered && place("candidates") && window.study.ready) preview((hovered = next))
+  })
+  document.addEventListener("focusin", (event) => {
+    const element = found(event, "candidate")
+    if (element) preview((hovered = Number(element.dataset.candidate)))
+  })
+  document.addEventListener("keydown", (event) => {
+    if (event.key === "Escape") { clear(); preview((hovered = null)) }
+    if (event.key === "Enter" && event.target.id === "formula") act("try", event.target.value)
+  })
+
+  const begin = () => { words(); if (model("state")) state(); window.study.ready = true }
+  return {words, state, selected, clear, step, begin, ready: false}
+})()

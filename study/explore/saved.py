@@ -1,0 +1,75 @@
+"""A session as one HTML file: every rung of the ladder, no server, no network, the same bytes from the same input."""
+
+import json
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+from bokeh.document import Document
+from bokeh.models import ColumnDataSource, CustomJS
+from bokeh.resources import Resources
+
+from study.explore import page
+from study.explore.session import Session
+from study.explore.view import Columns, view
+
+EMBED = "Bokeh.safely(() => Bokeh.embed.embed_items({docs}, {items}))"
+
+
+def saved(session: Session) -> bytes:
+    """The whole session as a file that a browser opens; it shows the last rung first."""
+    views = [view(rung, number, live=False) for number, rung in enumerate(session.rungs)]
+    ladder = page.ladder_columns(session)
+    stores: list[ColumnDataSource] = []
+    if len(views) > 1:
+        for number, seen in enumerate(views):
+            columns: dict[str, Columns] = {
+                **seen.columns, "frame": page.frame(seen), "ladder": _marked(ladder, number - len(views))
+            }  # fmt: skip
+            stores += [ColumnDataSource(c, name=f"{name}@{number}") for name, c in columns.items()]
+    made = page.build(views[-1], ladder, stores)
+    values = page.variables(session, live=False)
+    shown = page.placed(made, values["diagnosed"])
+    document = Document()
+    for panel in shown:
+        document.add_root(panel)
+    document.js_on_event("document_ready", CustomJS(code="window.study.begin()"))
+    content, ids = _numbered(document.to_json(deferred=False))
+    roots = {p.name: SimpleNamespace(id=ids[p.id], elementid=f"study-{p.name}") for p in shown}
+    items = [{"docid": "study", "roots": {r.id: r.elementid for r in roots.values()},
+              "root_ids": [r.id for r in roots.values()]}]  # fmt: skip
+    script = EMBED.format(docs=_in_script({"study": content}), items=_in_script(items))
+    text = page.template().render(
+        **values, title=page.title(session), roots=roots, plot_script=f"<script>{script}</script>",
+        bokeh_js=Resources(mode="inline", components=["bokeh"], minified=True, log_level="error").render_js(),
+    )  # fmt: skip
+    return text.encode()
+
+
+def _marked(ladder: Columns, place: int) -> Columns:
+    """The ladder with a larger dot where the page stands."""
+    size = [6.0] * len(ladder["size"])
+    size[place] = 10.0
+    return {**ladder, "size": size}
+
+
+def _in_script(content: object) -> str:
+    """JSON within a script: nothing in it can end the script."""
+    return json.dumps(content, ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")
+
+
+def _numbered(content: Any) -> tuple[Any, dict[str, str]]:
+    """The document with its ids counted from one, in the order in which they come: Bokeh's depend on the past."""
+    known: dict[str, str] = {}
+
+    def walk(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: name(item) if key == "id" else walk(item) for key, item in value.items()}
+        if isinstance(value, Sequence) and not isinstance(value, str | bytes):
+            return [walk(item) for item in value]
+        return value
+
+    def name(item: Any) -> Any:
+        return known.setdefault(item, f"e{len(known) + 1}") if isinstance(item, str) else walk(item)
+
+    return walk(content), known

@@ -1,0 +1,74 @@
+"""The server: bound to this machine alone, and open to no page but its own."""
+
+import errno
+from collections.abc import Callable
+
+from bokeh.application import Application
+from bokeh.application.handlers import FunctionHandler
+from bokeh.server.server import Server
+
+from study.errors import StudyError
+from study.explore.desk import Desk
+from study.explore.live import Watcher
+
+HOST = "127.0.0.1"
+USUAL = 5006
+
+
+def serve(desk: Desk, port: int | None, ready: Callable[[str], None]) -> None:
+    """Serve a desk until interrupted.
+
+    Parameters
+    ----------
+    desk : Desk
+        What pages look at.
+    port : int or None
+        Where; zero takes any that is free, None the usual one or, if that is taken, any.
+    ready : callable
+        Called with the address once it can be opened.
+
+    Raises
+    ------
+    StudyError
+        If the port is taken.
+    """
+    application = Application(FunctionHandler(lambda document: _watched(desk, document)))
+    server = _bound(application, port)
+    server.start()
+    desk.diagnose()
+    server.io_loop.add_callback(ready, f"http://{HOST}:{server.port}/")
+    try:
+        server.io_loop.start()
+    finally:
+        desk.close()
+        server.stop()
+
+
+def _watched(desk: Desk, document: object) -> None:
+    from bokeh.document import Document
+
+    assert isinstance(document, Document)
+    Watcher(desk, document)
+
+
+def _bound(application: Application, port: int | None) -> Server:
+    """A server on a port; Bokeh lets a browser's page open the socket only if its origin is one of these two."""
+    try:
+        wanted = USUAL if port is None else port
+        return _server(application, wanted)
+    except OSError as error:
+        if error.errno not in (errno.EADDRINUSE, errno.EACCES):
+            raise
+        if port is not None:
+            raise StudyError(f"port {port} is taken or not allowed; another --port is right, or 0 for any") from None
+        return _server(application, 0)
+
+
+def _server(application: Application, port: int) -> Server:
+    from bokeh.server.util import bind_sockets
+
+    sockets, bound = bind_sockets(HOST, port)
+    for socket in sockets:
+        socket.close()
+    origins = [f"{host}:{bound}" for host in (HOST, "localhost")]
+    return Server({"/": application}, address=HOST, port=bound, allow_websocket_origin=origins, session_token_expiration=86400)

@@ -1,0 +1,240 @@
+"""The state of a session: the models tried so far and what was found of each. Nothing here knows of a browser.
+
+Every function gives a new session; what was found of a model stays with its rung, so that undoing computes nothing.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from study import fitting
+from study.compare.comparison import Comparison, compare
+from study.compare.report import rung as ladder_step
+from study.diagnose import candidates, search
+from study.diagnose.candidates import Trial
+from study.diagnose.ranking import Ranked, rank
+from study.diagnose.says import sentences
+from study.diagnose.separate import advice
+from study.diagnose.verdict import MISSING, Diagnosis, diagnose
+from study.errors import StudyError
+from study.fitting import Plan
+from study.model import Model
+from study.record import Record
+from study.terms import Term, custom
+
+Step = dict[str, Any]
+Told = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A model and what was found of it.
+
+    Attributes
+    ----------
+    model : Model
+        Values that it gives are held.
+    label : str
+        What was done to arrive at it.
+    added : str or None
+        The term that is new in it.
+    comparison : Comparison
+        How good it is, and where it fails.
+    diagnosis : Diagnosis or None
+        What is missing; None as long as nobody has asked.
+    said : str
+        The diagnosis in words.
+    """
+
+    model: Model
+    label: str
+    added: str | None
+    comparison: Comparison
+    diagnosis: Diagnosis | None = None
+    said: str = ""
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Every value as fitted or held."""
+        return self.comparison.found.model.numbers()
+
+
+@dataclass(frozen=True)
+class Session:
+    """A record, and the models tried on it.
+
+    Attributes
+    ----------
+    record : Record
+        As it was read.
+    how : Plan
+        What is fitted and what is judged.
+    cutoff : float or None
+        Frequency in hertz above which motions are integrated; None to have it found.
+    rungs : tuple of Rung
+        From the model as given to the present one.
+    own : tuple of Term
+        The user's own candidates.
+    earlier : tuple of dict
+        Steps of the ladder that was kept beside the model file.
+    """
+
+    record: Record
+    how: Plan
+    cutoff: float | None
+    rungs: tuple[Rung, ...]
+    own: tuple[Term, ...] = ()
+    earlier: tuple[Step, ...] = ()
+
+    @property
+    def now(self) -> Rung:
+        """The present model."""
+        return self.rungs[-1]
+
+    @property
+    def steps(self) -> list[Step]:
+        """The ladder, the steps before this session included."""
+        own = [ladder_step(r.comparison, r.added) for r in self.rungs]
+        last = self.earlier[-1] if self.earlier else None
+        known = last is not None and last["terms"] == own[0]["terms"] and last["record"] == own[0]["record"]
+        return [*self.earlier, *own[1 if known else 0 :]]
+
+
+def begin(
+    model: Model,
+    record: Record,
+    how: Plan,
+    *,
+    cutoff: float | None = None,
+    earlier: Sequence[Step] = (),
+    progress: Told | None = None,
+) -> Session:
+    """A session with the model as given.
+
+    Raises
+    ------
+    StudyError
+        If the model cannot be compared with the record.
+    """
+    found = compare(model, record, how, cutoff=cutoff, progress=progress)
+    return Session(record, how, cutoff, (Rung(model, "as given", None, found),), earlier=tuple(earlier))
+
+
+def climbed(session: Session, model: Model, label: str, start: Mapping[str, float], added: str | None) -> Session:
+    """The session with a model more, fitted from these values."""
+    found = compare(model, session.record, session.how, cutoff=session.cutoff, start=start)
+    return replace(session, rungs=(*session.rungs, Rung(model, label, added, found)))
+
+
+def candidate(session: Session, name: str) -> Ranked:
+    """A candidate of the present diagnosis.
+
+    Raises
+    ------
+    StudyError
+        If there is none of this name.
+    """
+    found = session.now.diagnosis
+    for row in found.candidates if found is not None else ():
+        if row.name == name:
+            return row
+    raise StudyError(f"{name!r} is no candidate of the present model; one of the list is right")
+
+
+def with_added(session: Session, name: str) -> Session:
+    """The session with a candidate added to the model, fitted from where its diagnosis left it."""
+    row = candidate(session, name)
+    model = session.now.model.with_term(row.term)
+    return climbed(session, model, f"+ {name}", row.found.model.numbers(), name)
+
+
+def undone(session: Session) -> Session:
+    """The session before its last change; the model as given stays."""
+    return replace(session, rungs=session.rungs[:-1]) if len(session.rungs) > 1 else session
+
+
+def with_held(session: Session, key: str, hold: bool) -> Session:
+    """The session with a value held where it stands, or freed.
+
+    Raises
+    ------
+    StudyError
+        If the model has no such value, or it is held, or free, already.
+    """
+    values = session.now.model.values
+    if key not in values:
+        raise StudyError(f"{key!r} is no value of this model; it has {', '.join(values)}")
+    if (values[key] is not None) == hold:
+        raise StudyError(f"{key} is {'held' if hold else 'free'} already")
+    if not hold and key == "m" and len(session.now.model.terms) == 1:
+        raise StudyError("m alone cannot be freed; a model of inertia alone has nothing to be fitted to")
+    now = session.now.values
+    model = session.now.model.with_values({**values, key: now[key] if hold else None})
+    return climbed(session, model, f"{key} {'held' if hold else 'free'}", now, None)
+
+
+def examined(session: Session, progress: Callable[[int], None] | None = None) -> tuple[Diagnosis, str]:
+    """Diagnose the present model: what is missing, and the same in words."""
+    record, how = session.record, session.how
+    found = diagnose(session.now.model, record, how, extra=session.own, progress=progress)
+    return found, in_words(found, record, how)
+
+
+def in_words(found: Diagnosis, record: Record, how: Plan) -> str:
+    """A diagnosis in sentences, with the test that would part a tie."""
+    said = sentences(found, record.units.get("force", "N"), record.units.get("displacement", "m"))
+    if found.verdict == MISSING:
+        said.append(advice(found.candidates, record, how))
+    return " ".join(s for s in said if s)
+
+
+def with_diagnosis(session: Session, model: Model, found: Diagnosis, said: str) -> Session:
+    """The session with a diagnosis at the rungs of its model; unchanged if that was undone meanwhile."""
+    rungs = (replace(r, diagnosis=found, said=said) if r.model == model else r for r in session.rungs)
+    return replace(session, rungs=tuple(rungs))
+
+
+def own_term(session: Session, text: str) -> Term:
+    """A user's formula, or ``NAME=FORMULA``, as a term.
+
+    Raises
+    ------
+    StudyError
+        If it is no formula of the whitelisted kind, or the name is taken.
+    """
+    name, sign, formula = text.partition("=")
+    taken = {t.name for t in (*session.own, *session.now.model.terms)}
+    if not sign:
+        name = next(f"own_{i}" for i in range(1, len(taken) + 2) if f"own_{i}" not in taken)
+        formula = text
+    term = custom(name.strip(), formula.strip())
+    if term.name in taken:
+        raise StudyError(f"the name {term.name!r} is taken; another name is right")
+    return term
+
+
+def tried(session: Session, text: str) -> Session:
+    """The session with a formula of the user's among the candidates, fitted and ranked with them.
+
+    The verdict is left as it was; :func:`examined` weighs it again.
+
+    Raises
+    ------
+    StudyError
+        If the formula is refused, or has no finite response on this record.
+    """
+    term, now = own_term(session, text), session.now
+    found = now.diagnosis
+    if found is None:
+        raise StudyError("the present model is still being diagnosed; a formula can be tried when that is done")
+    held, record, how = fitting.held_keys(now.model), session.record, session.how
+    short = fitting.shortened(how, len(found.candidates[-1].found.residual)) if found.candidates else how
+    fit = found.found if short == how else fitting.fit(found.found.model, record, short, held, now.values)
+    trial = candidates.attempt(term, search.baseline(fit, record, short), record, short, held)
+    if trial is None:
+        raise StudyError(f"the expression {term.components[0].shape!r} has no finite response on this record")
+    if short != how:
+        trial = candidates.refitted(trial, record, how, held)
+    rows = rank([*(Trial(r.term, r.found, r.residual) for r in found.candidates), trial], found.residual, record, how)
+    ranked = replace(found, candidates=tuple(rows))
+    return replace(with_diagnosis(session, now.model, ranked, now.said), own=(*session.own, term))

@@ -1,0 +1,135 @@
+"""The look of every panel: one place for colours, fonts and tools. Lines differ in weight and dash, not in colour alone."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from bokeh.models import (
+    BoxAnnotation,
+    BoxSelectTool,
+    DataRange1d,
+    GlyphRenderer,
+    Legend,
+    LegendItem,
+    PanTool,
+    Range1d,
+    ResetTool,
+    SaveTool,
+    WheelZoomTool,
+)
+from bokeh.plotting import figure
+
+FONT = "Helvetica Neue, Helvetica, Arial, Liberation Sans, sans-serif"
+INK, QUIET, RULE = "#1f2933", "#5c6873", "#e4e7eb"
+MEASURED: dict[str, Any] = {"line_color": "#a3adb7", "line_width": 2.4}
+PREDICTED: dict[str, Any] = {"line_color": "#0b5394", "line_width": 1.2}
+DIFFERENCE: dict[str, Any] = {"line_color": "#d1600a", "line_width": 1.0}
+NOISE: dict[str, Any] = {"line_color": "#000000", "line_width": 1.3, "line_dash": "dotted"}
+WOULD: dict[str, Any] = {"line_color": "#111111", "line_width": 1.3}
+PICKED: dict[str, Any] = {"line_color": "#7a1fa2", "line_width": 2.0, "line_dash": "dashed"}
+BAND = "#f5c04a"
+PASSING = ("candidate", "selected")  # entries of legends
+
+
+def panel(
+    name: str, height: int, x: str, y: str, *, select: str = "", ranges: tuple[Any, Any] = (None, None),
+    narrow: bool = False, **more: Any
+) -> Any:
+    """A figure in the page's style.
+
+    Parameters
+    ----------
+    name : str
+        Of its place in the page, where the figure is ``panel_name`` and its axes ``name_x`` and ``name_y``.
+    height : int
+        In pixels; the width is that of its place.
+    x, y : str
+        Labels, units included.
+    select : str
+        ``width`` if a range of x can be selected.
+    ranges : pair
+        Ranges of x and y; found from the data if None.
+    narrow : bool
+        Whether the panel shares its row: fewer ticks.
+    more : keyword arguments
+        Of ``bokeh.plotting.figure``.
+    """
+    tools: list[Any] = [PanTool(dimensions="width"), WheelZoomTool(dimensions="width"), ResetTool(), SaveTool()]
+    if select:
+        tools.insert(0, BoxSelectTool(dimensions="width", renderers=[]))
+    drawn = figure(
+        name=f"panel_{name}", height=height, sizing_mode="stretch_width", min_width=140, tools=tools, x_axis_label=x, y_axis_label=y,
+        x_range=ranges[0] or DataRange1d(range_padding=0.0), y_range=ranges[1] or DataRange1d(range_padding=0.06),
+        active_drag=tools[0] if select else None, active_scroll=None, toolbar_location="right", min_border_right=6,
+        **more,
+    )  # fmt: skip
+    drawn.toolbar.autohide = True
+    drawn.toolbar.logo = None
+    drawn.outline_line_color = None
+    drawn.background_fill_color = None
+    drawn.border_fill_color = None
+    for axis, side in ((drawn.xaxis[0], "x"), (drawn.yaxis[0], "y")):
+        _axis(axis, f"{name}_{side}")
+    if narrow and "x_axis_type" not in more:
+        drawn.xaxis[0].ticker.desired_num_ticks = 4
+    for grid in drawn.grid:
+        grid.grid_line_color = RULE
+    return drawn
+
+
+def _axis(axis: Any, name: str) -> None:
+    axis.name = name
+    axis.axis_label_text_font = axis.major_label_text_font = FONT
+    axis.axis_label_text_font_style = "normal"
+    axis.axis_label_text_font_size, axis.major_label_text_font_size = "12px", "11px"
+    axis.axis_label_text_color, axis.major_label_text_color = INK, QUIET
+    axis.axis_label_standoff = 4
+    axis.axis_line_color = axis.major_tick_line_color = "#9aa5b1"
+    axis.minor_tick_line_color = None
+    axis.major_tick_in, axis.major_tick_out = 0, 4
+
+
+def legend(drawn: Any, items: Sequence[tuple[str | dict[str, str], list[Any]]], place: str = "above", **more: Any) -> Any:
+    """A legend above the panel, or within it at ``place``."""
+    words = Legend(
+        items=[_item(label, renderers, drawn.name) for label, renderers in items],
+        orientation="horizontal" if place == "above" else "vertical", label_text_font=FONT,
+        label_text_font_size="11px", label_text_color=INK, label_standoff=4, border_line_color=None,
+        background_fill_alpha=0.8, padding=0, margin=5, spacing=9 if place == "above" else 0, glyph_width=20,
+        glyph_height=14, label_height=14, **more,
+    )  # fmt: skip
+    if place == "above":
+        words.location = (-34, 0)
+        drawn.add_layout(words, "above")
+    else:
+        words.location = place
+        drawn.add_layout(words)
+    return words
+
+
+def _item(label: str | dict[str, str], renderers: list[Any], panel: str) -> LegendItem:
+    """An entry; that of what comes and goes is shown by the page's script when it is there."""
+    item = LegendItem(label=label, renderers=renderers)
+    if label in PASSING:
+        item.name, item.visible = f"{panel}_{label}", False
+    return item
+
+
+def chosen(drawn: Any, name: str) -> BoxAnnotation:
+    """The range that was selected in a panel, hidden until there is one."""
+    box = BoxAnnotation(
+        name=name, visible=False, fill_color=BAND, fill_alpha=0.35, line_color="#8a6d00", line_dash="dashed",
+        line_width=1.0, level="underlay", propagate_hover=True,
+    )  # fmt: skip
+    drawn.add_layout(box)
+    return box
+
+
+def follows(drawn: Any, renderers: Sequence[GlyphRenderer]) -> None:
+    """Let the range of y follow these alone: what is previewed or highlighted does not move an axis."""
+    if isinstance(drawn.y_range, DataRange1d):
+        drawn.y_range.renderers = list(renderers)
+
+
+def fixed(name: str, start: float, end: float) -> Range1d:
+    """A range that panels share."""
+    return Range1d(start, end, name=name)

@@ -1,0 +1,158 @@
+"""The words of a page as fragments of HTML, by the name of their place; whatever a user typed is escaped."""
+
+from collections.abc import Sequence
+from html import escape
+from typing import Any
+
+from study.compare.comparison import Comparison
+from study.compare.fitted import Coefficient
+from study.compare.says import percent, says
+from study.diagnose.ranking import Ranked
+from study.diagnose.verdict import MISSING, NOTHING
+from study.explore.session import Rung
+from study.explore.units import in_text, length, number, rate
+from study.figures.labels import power_of_ten, term_names
+
+VERDICTS = {MISSING: "An effect is missing", NOTHING: "Nothing is missing"}
+UNKNOWN = "Something is missing that no candidate explains"
+WAITING = "Candidates are being tried …"
+NOT_ASKED = "Not asked for here: <code>study diagnose</code> or <code>study explore</code> tells which effect is missing."
+TIES = 2  # that a row names
+
+
+def words(rung: Rung, rows: Sequence[Ranked], step: int, live: bool) -> dict[str, Any]:
+    """Every fragment of a rung, as columns ``place`` and ``html``."""
+    found = rung.comparison
+    fragments = {
+        "figures": _figures(found),
+        "says": escape(says(found)),
+        "verdict": _verdict(rung, live),
+        "candidates": _candidates(rung, rows, live),
+        "coefficients": _coefficients(found, live),
+        "equation": equation(rung),
+        "notes": escape("; ".join(found.notes)),
+        "step": escape(name(rung, step)),
+        "force-unit": escape(in_text(found.record.units.get("force", ""))),
+    }
+    return {"place": list(fragments), "html": list(fragments.values())}
+
+
+def name(rung: Rung, step: int) -> str:
+    """A rung as the ladder names it."""
+    return f"{step} {in_words(rung.label)}"
+
+
+def in_words(label: str) -> str:
+    """The name of a term as people write it."""
+    return term_names(label)
+
+
+def equation(rung: Rung) -> str:
+    """The equation of motion with its symbols."""
+    parts: list[str] = []
+    for entry in rung.model.terms:
+        symbols = ", ".join(f"<i>{escape(s)}</i>" for s in entry.term.symbols)
+        shape = escape(in_text(entry.term.formula).replace("d2u/dt2", "d²u/dt²"))
+        parts.append(f"{symbols} {shape}" if shape.isalpha() or "d²" in shape else f"{symbols} [{shape}]")
+    return " + ".join(parts) + " = F(t)"
+
+
+def _figures(found: Comparison) -> str:
+    size = found.response_error * found.judged.size
+    shown = (length if found.how.response == "displacement" else rate)(found.record.units.get(found.how.response, ""), size)
+    rms = f"rms {size / shown.factor:.3g} {in_text(shown.unit)}"
+    cells = (
+        ("error", "Error of the response", percent(found.response_error), f"{rms}, free run, held out"),
+        ("floor", "Noise floor", percent(found.noise_floor), "what no model could explain"),
+        ("force", "Error of the force", percent(found.force.total), "share of its power unexplained"),
+    )
+    return "".join(
+        f'<div class="figure" id="figure-{key}"><span>{what}</span><b>{value}</b><small>{escape(about)}</small></div>'
+        for key, what, value, about in cells
+    )
+
+
+def _verdict(rung: Rung, live: bool) -> str:
+    if rung.diagnosis is None:
+        return f"<p class='waiting'>{WAITING if live else NOT_ASKED}</p>"
+    head = VERDICTS.get(rung.diagnosis.verdict, UNKNOWN)
+    return f"<h3 class='{rung.diagnosis.verdict}'>{head}</h3><p>{escape(rung.said)}</p>"
+
+
+def _candidates(rung: Rung, rows: Sequence[Ranked], live: bool) -> str:
+    if rung.diagnosis is None:
+        return ""
+    scale = "".join(f"<span style='left:{x}%'>{x}</span>" for x in (0, 50, 100))
+    head = f"<li class='scale'><span class='head'>effect, and the share of the difference that it explains / %</span><i class='axis'>{scale}</i></li>"
+    more = len(rung.diagnosis.candidates) - len(rows)
+    rest = f"<li class='more'>{more} more explain less</li>" if more > 0 else ""
+    return f"<ol>{head}{''.join(_row(i, row, rung, live) for i, row in enumerate(rows))}{rest}</ol>"
+
+
+def _row(place: int, row: Ranked, rung: Rung, live: bool) -> str:
+    units = rung.comparison.record.units
+    unit = row.term.unit(row.term.symbols[0], units.get("force", "N"), units.get("displacement", "m"))
+    add = f"<button data-act='add' data-name='{escape(row.name)}'>Add</button>" if live else ""
+    explained = f"{100.0 * row.gain.explained:.1f} ± {100.0 * row.gain.error:.1f} %"
+    formula = escape(in_text(row.term.formula))
+    what = f"<b>{escape(in_words(row.name))}</b>"
+    size = f"{number(row.coefficient)} ± {number(1.96 * row.error, 2)} {in_text(unit)}"
+    return (
+        f"<li class='candidate' data-candidate='{place}' data-label='{escape(_label(row, unit))}' tabindex='0'>"
+        f"<span class='rank'>{_rank(place, row, rung)}</span><span class='name'>{what}</span>"
+        f"{_bar(row)}<span class='explained'>{explained}</span>{add}"
+        f"<small>{_ties(row)}<i>{formula}</i>; <em>{escape(size)}</em>, error with it {percent(row.response_error)}. "
+        f"{escape(row.term.meaning[0].upper() + row.term.meaning[1:])}; common cause: {escape(row.term.cause)}.</small></li>"
+    )
+
+
+def _label(row: Ranked, unit: str) -> str:
+    """Label of the axis on which the candidate's coefficient is drawn."""
+    symbol = "|" + ", ".join(row.term.symbols) + "|" if len(row.term.symbols) > 1 else row.term.symbols[0]
+    return f"{symbol} / {in_text(power_of_ten(abs(row.coefficient))[1] + unit)}"
+
+
+def _rank(place: int, row: Ranked, rung: Rung) -> str:
+    """The place; a tie with the first is no place of its own."""
+    assert rung.diagnosis is not None
+    first = rung.diagnosis.candidates[0]
+    return "=" if place and row.name in first.tied_with else str(place + 1)
+
+
+def _ties(row: Ranked) -> str:
+    if not row.tied_with:
+        return ""
+    named = ", ".join(in_words(n) for n in row.tied_with[:TIES])
+    more = f" +{len(row.tied_with) - TIES}" if len(row.tied_with) > TIES else ""
+    everyone = ", ".join(in_words(n) for n in row.tied_with)
+    return f"<span class='tie' title='cannot be told from {escape(everyone)}'>tie: {escape(named)}{more}</span>"
+
+
+def _bar(row: Ranked) -> str:
+    """Explained share with its standard error; what reaches beyond the axis is cut."""
+    share, error = 100.0 * row.gain.explained, 100.0 * row.gain.error
+    low, high = (min(max(x, 0.0), 100.0) for x in (share - error, share + error))
+    grid = "".join(f"<line class='grid' x1='{x}' x2='{x}' y1='0' y2='16'/>" for x in (0, 25, 50, 75, 100))
+    whisker = (
+        f"<path class='whisker' d='M{low:.2f} 8H{high:.2f}M{low:.2f} 5V11M{high:.2f} 5V11' vector-effect='non-scaling-stroke'/>"
+    )
+    return (
+        f"<svg class='bar' viewBox='0 0 100 16' preserveAspectRatio='none'>{grid}"
+        f"<rect x='0' y='3' width='{min(max(share, 0.0), 100.0):.2f}' height='10'/>{whisker}</svg>"
+    )
+
+
+def _coefficients(found: Comparison, live: bool) -> str:
+    head = "<tr><th></th><th>term</th><th>value</th><th>95 % interval</th><th>unit</th><th></th></tr>"
+    return f"<table>{head}{''.join(_coefficient(c, live) for c in found.coefficients)}</table>"
+
+
+def _coefficient(found: Coefficient, live: bool) -> str:
+    half = "held" if found.error is None else f"± {number(1.96 * found.error, 2)}"
+    act, label = ("free", "Free") if found.held else ("hold", "Hold")
+    button = f"<button data-act='{act}' data-name='{escape(found.key)}'>{label}</button>" if live else ""
+    return (
+        f"<tr data-key='{escape(found.key)}'><td><i>{escape(found.key.rpartition('.')[2])}</i></td>"
+        f"<td>{escape(in_words(found.term))}</td>"
+        f"<td class='number'>{number(found.value, 5)}</td><td>{half}</td><td>{escape(in_text(found.unit))}</td><td>{button}</td></tr>"
+    )
