@@ -10,8 +10,12 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.signal import csd
 
+from study import miso
 from study.excitation import Excitation, force
+from study.inputs import histories, reverse_inputs
 from study.interpolation import between_samples
+from study.local_fit import fit
+from study.local_polynomial import LocalPolynomial, responses, transform
 from study.model import Model, forward_program
 from study.modelfile import read_model
 from study.simulate import METHODS, Integrator, simulate
@@ -100,3 +104,30 @@ def test_bare_ffts(benchmark):
                 np.fft.rfft(view[first : first + 256] * taper)
 
     benchmark.pedantic(run, rounds=3, warmup_rounds=1)
+
+
+def reverse_channels(samples: int):
+    """Inputs of the reverse Duffing system, and the force."""
+    model = read_model(MODELS[0].parent / "duffing.yaml")
+    record = simulate(model, force(Excitation(), samples, DT, 1), DT, Integrator("abm4", STEPS))
+    inputs = reverse_inputs(model)
+    return inputs, [*histories(inputs, record), record["force"]]
+
+
+@pytest.mark.benchmark(group="a Duffing record of 100,000 samples in reverse")
+def test_local_polynomial(benchmark):
+    """Transforms, A_j(f) in every band, coefficients with their errors."""
+    inputs, data = reverse_channels(100_000)
+
+    def run():
+        lines = transform(data, DT)
+        return responses(lines, LocalPolynomial()), fit(lines, inputs, (0.3, 10.0), LocalPolynomial())
+
+    benchmark.pedantic(run, rounds=3, warmup_rounds=1)
+
+
+@pytest.mark.benchmark(group="a Duffing record of 100,000 samples in reverse")
+def test_miso(benchmark):
+    """The report's estimator on the same record."""
+    _, data = reverse_channels(100_000)
+    benchmark.pedantic(lambda: miso.analyse(cross_spectra(data, DT)), rounds=3, warmup_rounds=1)

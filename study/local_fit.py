@@ -10,7 +10,7 @@ and comes in bursts where the motion is large; with noise on the motion, it is t
 then not independent, and inverse variances say too little by up to ten times. The influence of each line on a
 coefficient is therefore carried back to time, where sums of influence times residual over stretches that are
 longer than the system's memory are independent; their scatter gives the covariance (a sandwich estimate with
-clusters: Liang and Zeger, Biometrika 73, 1986).
+clusters, by jackknife: Bell and McCaffrey, Survey Methodology 28, 2002).
 """
 
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ from study.parameters import Estimate
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
-STRETCHES = 64  # of the record, that errors are judged by
+STRETCHES = 32  # of the record, that errors are judged by
 
 
 def fit(lines: Lines, inputs: Sequence[Input], band: tuple[float, float], how: LocalPolynomial) -> Estimate:
@@ -61,21 +61,25 @@ def fit(lines: Lines, inputs: Sequence[Input], band: tuple[float, float], how: L
     omega = 2j * np.pi * lines.frequency[index]
     columns = [_clean(p.factor * omega**p.order * lines.inputs[j][index], basis) * weight for j, p in parts]
     design = np.stack([c.ravel() for c in columns], axis=1)
-    size = np.linalg.norm(design, axis=0)
-    heard = size > 0.0
-    design = design[:, heard] / size[heard]
     target = (_clean(lines.output[index], basis) * weight).ravel()
-    stacked = np.concatenate([design.real, design.imag])
-    inverse = np.linalg.pinv(stacked, rcond=EXACT)
-    values = inverse @ np.concatenate([target.real, target.imag])
-    residual = (target - design @ values) / np.broadcast_to(weight, index.shape).ravel()
-    half = design.shape[0]
-    influence = (inverse[:, :half] + 1j * inverse[:, half:]) * np.broadcast_to(weight, index.shape).ravel()
-    free = (index.size - index.shape[0] * basis.shape[1]) - 0.5 * len(values)
-    covariance = _scatter(influence, residual, index.ravel(), lines.samples)
-    covariance *= (free + 0.5 * len(values)) / free
+    size = np.linalg.norm(design, axis=0)
+    heard, size = size > 0.0, size[size > 0.0]
+    design = design[:, heard] / size
+    inverse = _inverse(design)
+    values = (inverse.conj() @ target).real
+    each = np.broadcast_to(weight, index.shape).ravel()
+    residual = (target - design @ values) / each
+    covariance = _scatter(inverse * each, design.T / each, residual, index.ravel(), lines.samples)
     symbols = tuple(p.symbol for (_, p), known in zip(parts, heard, strict=True) if known)
-    return Estimate(symbols, values / size[heard], covariance / np.outer(size[heard], size[heard]))
+    return Estimate(symbols, values / size, covariance / np.outer(size, size))
+
+
+def _inverse(design: Complexes) -> Complexes:
+    """The influence of each line: real coefficients are ``Re(conj(influence) . target)``, shape (p, lines)."""
+    stacked = np.concatenate([design.real, design.imag])
+    inverse: Floats = np.asarray(np.linalg.pinv(stacked, rcond=EXACT), dtype=np.float64)
+    half = design.shape[0]
+    return inverse[:, :half] + 1j * inverse[:, half:]
 
 
 def _bands(lines: Lines, band: tuple[float, float], how: LocalPolynomial) -> NDArray[np.int64]:
@@ -102,14 +106,22 @@ def _clean(values: Complexes, basis: Floats) -> Complexes:
     return values - (values @ basis) @ basis.T
 
 
-def _scatter(influence: Complexes, residual: Complexes, index: NDArray[np.int64], samples: int) -> Floats:
-    """Covariance of ``Re(conj(influence) . residual)`` from its sums over stretches of time, shape (p, p)."""
-    spectra = np.zeros((len(influence) + 1, samples // 2 + 1), dtype=np.complex128)
-    spectra[:-1, index + 1] = influence
-    spectra[-1, index + 1] = residual
+def _scatter(
+    influence: Complexes, design: Complexes, residual: Complexes, index: NDArray[np.int64], samples: int
+) -> Floats:  # fmt: skip
+    """Covariance of ``Re(conj(influence) . noise)`` by leaving out one stretch of time after the other, (p, p).
+
+    Over a stretch, influence times residual sums to s and influence times design to H; all H sum to the
+    identity. Without the stretch the coefficients would be ``(1 - H)^-1 s`` away: H stands for the share of the
+    stretch's own noise that they have followed, much where a single burst of motion tells most of a coefficient.
+    """
+    count = len(influence)
+    spectra = np.zeros((2 * count + 1, samples // 2 + 1), dtype=np.complex128)
+    spectra[:, index + 1] = np.concatenate([influence, design, residual[None]])
     histories = np.asarray(irfft(spectra, samples, axis=1), dtype=np.float64)
-    stretches = min(STRETCHES, samples)
-    each = samples // stretches
-    products = (histories[:-1] * histories[-1] * (0.5 * samples))[:, : stretches * each]
-    sums = products.reshape(len(influence), stretches, each).sum(axis=2)
-    return sums @ sums.T * (stretches / (stretches - 1.0))
+    long = samples // STRETCHES
+    cut = histories[:, : STRETCHES * long].reshape(-1, STRETCHES, long).transpose(1, 0, 2) * np.sqrt(0.5 * samples)
+    sums = cut[:, :count] @ cut[:, count:].transpose(0, 2, 1)
+    remaining = np.eye(count) - sums[:, :, :count]
+    shifts: Floats = np.asarray(np.linalg.solve(remaining, sums[:, :, count:]), dtype=np.float64)[:, :, 0]
+    return shifts.T @ shifts * ((STRETCHES - 1.0) / STRETCHES)

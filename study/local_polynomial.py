@@ -195,7 +195,8 @@ def _middles(
     projected = np.einsum("blp,bl->bp", left.conj(), output) * kept
     rest = output - np.einsum("blp,bp->bl", left, projected)
     variance = np.sum(np.abs(rest) ** 2, axis=1) / (index.shape[1] - np.count_nonzero(kept, axis=1))
-    middle = right.conj().transpose(0, 2, 1)[:, : terms * count : terms] * inverse[:, None, :] / scale.T[:, :, None]
+    middle = right.conj().transpose(0, 2, 1)[:, : terms * count : terms] * inverse[:, None, :]
+    middle = np.where(size.T > 0.0, 1.0 / scale.T, 0.0)[:, :, None] * middle
     values = np.einsum("bjp,bp->bj", middle, projected)
     covariance = middle @ middle.conj().transpose(0, 2, 1) * variance[:, None, None]
     return values, covariance, variance
