@@ -1,7 +1,6 @@
 """Fitting a system in free run that is chaotic, or from starting values that are far off."""
 
-from collections.abc import Collection, Mapping
-from dataclasses import replace
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +11,10 @@ from study.pieces import Pieces, even_restarts, needed_restarts
 from study.record import Record
 
 Floats = NDArray[np.float64]
-ROUNDS = 4  # times that a fit and the repair of its initial states take turns
+TIES = (0.3, 1.0, 3.0, 10.0)  # ever tighter, see ``fit_free_run``: each step is small enough to find its way
+TIGHT = 30.0  # tied so, pieces know of each other all that the noise lets them
+TRIALS, FIRMER = 8, 30  # free runs at each step of the way, and in the last two
 DEVIATIONS = 3.0  # by how many standard deviations the misfit may exceed what fewer unknowns explain
-FEWEST = 4  # pieces, at least: two are not worth doubling
 
 
 def fit_in_pieces(
@@ -30,10 +30,12 @@ def fit_in_pieces(
 ) -> FreeRunFit:
     """Fit a model in free run when it is chaotic, or the start is far off.
 
-    The record is cut into pieces of a few periods, each from an initial state of its own: no error grows
-    far within them, and the search finds its way from poorer starting values. If the fitted system needs no
-    cuts, as most do, the whole record is fitted from there in one free run. Otherwise the pieces are
-    doubled for as long as the misfit grows by no more than the initial states explain that are given up.
+    The record is cut into pieces of about a period, each from an initial state of its own: no error grows
+    far within them, and the search finds its way from poor starting values. If the fitted system needs no
+    cuts, as most do, the whole record is fitted from there in one free run. Otherwise the pieces are tied
+    to one another ever more tightly, until they are one motion that stays beside the measured one (multiple
+    shooting; H. G. Bock, 1983). That is done twice: the first time poor coefficients bend some pieces into
+    motions of their own; with good ones, held for a while, they begin anew.
 
     Parameters, result and errors are those of :func:`study.output_error.fit_free_run`; ``initial`` of the
     result has one row a piece.
@@ -41,52 +43,47 @@ def fit_in_pieces(
     whole = span or (0, len(record))
     pieces = Pieces(record, response, whole, even_restarts(record, response, whole), steps_per_sample)
     begun = model.with_values(dict(start or {}))
-    found, pieces = _settled(begun, pieces, pieces.first_states(begun), held, max_iterations)
-    states = np.atleast_2d(found.initial)
-    if not needed_restarts(found.model, record, states, whole, pieces.restarts, steps_per_sample):
+    loose = _fit(begun, pieces, pieces.first_states(begun), held, 0.0, max_iterations)
+    states = np.atleast_2d(loose.initial)
+    if not needed_restarts(loose.model, record, states, whole, pieces.restarts, steps_per_sample):
         return fit_free_run(
-            found.model, record, held=held, response=response, steps_per_sample=steps_per_sample,
+            loose.model, record, held=held, response=response, steps_per_sample=steps_per_sample,
             span=whole, max_iterations=max_iterations,
         )  # fmt: skip
-    while len(states) >= FEWEST:
-        longer = replace(pieces, restarts=pieces.restarts[1::2])
-        trial, longer = _settled(found.model, longer, states[::2], held, max_iterations)
-        if not _as_good(trial, found, len(states) - len(longer.restarts) - 1):
+    near = _tightened(begun, pieces, states, held, TIES)
+    again = _tightened(near.model, pieces, pieces.first_states(near.model), tuple(near.model.values), TIES)
+    found = loose
+    states = again.initial
+    for tie in (TIES[-1], TIGHT):
+        trial = _fit(again.model, pieces, states, held, tie, FIRMER)
+        if not _as_good(trial, loose):
             break
-        found, pieces, states = trial, longer, np.atleast_2d(trial.initial)
+        found, states = trial, trial.initial
     return found
 
 
-def _settled(
-    model: Model, pieces: Pieces, states: Floats, held: Collection[str], max_iterations: int
-) -> tuple[FreeRunFit, Pieces]:
-    """Fit, put pieces right that ended in a motion of their own, and fit again until there are none."""
-    found = _fit(model, pieces, states, held, max_iterations)
-    for _ in range(ROUNDS - 1):
-        if not pieces.restarts:
-            break
-        states = np.atleast_2d(found.initial)
-        repaired = pieces.joined(found.model, states)
-        if np.array_equal(repaired, states):
-            break
-        again = _fit(found.model, pieces, repaired, held, max_iterations)
-        if again.rms >= found.rms:
-            break
-        found = again
-    return found, pieces
+def _tightened(
+    model: Model, pieces: Pieces, states: Floats, held: Collection[str], ties: Sequence[float]
+) -> FreeRunFit:  # fmt: skip
+    """The fit with the last of these ties, by way of the ones before."""
+    found = _fit(model, pieces, states, held, ties[0], TRIALS)
+    for tie in ties[1:]:
+        found = _fit(found.model, pieces, found.initial, held, tie, TRIALS)
+    return found
 
 
-def _fit(model: Model, pieces: Pieces, states: Floats, held: Collection[str], max_iterations: int) -> FreeRunFit:
+def _fit(
+    model: Model, pieces: Pieces, states: Floats, held: Collection[str], tie: float, max_iterations: int
+) -> FreeRunFit:  # fmt: skip
     return fit_free_run(
         model, pieces.record, held=held, response=pieces.response, steps_per_sample=pieces.steps_per_sample,
-        span=pieces.span, restarts=pieces.restarts, max_iterations=max_iterations, initial=states,
+        span=pieces.span, restarts=pieces.restarts, max_iterations=max_iterations, initial=states, tie=tie,
     )  # fmt: skip
 
 
-def _as_good(trial: FreeRunFit, found: FreeRunFit, fewer: int) -> bool:
-    """Whether the misfit of a fit with fewer initial states is what their number leads one to expect."""
-    unknowns = len(found.keys) + np.size(found.initial)
-    cost, before = (float(np.sum(fit.residual**2)) for fit in (trial, found))
-    variance = before / max(len(found.residual) - unknowns, 1)
-    given_up = fewer * np.atleast_2d(found.initial).shape[1]
+def _as_good(tied: FreeRunFit, loose: FreeRunFit) -> bool:
+    """Whether the misfit of tied pieces is what the loss of their freedom leads one to expect."""
+    given_up = np.size(loose.initial)
+    cost, before = (float(np.sum(fit.residual**2)) for fit in (tied, loose))
+    variance = before / max(len(loose.residual) - len(loose.keys) - given_up, 1)
     return cost - before < variance * (given_up + DEVIATIONS * np.sqrt(2.0 * given_up))

@@ -51,7 +51,8 @@ class Normal:
         values, vectors = np.linalg.eigh(self.own)
         known = values + damping > INDISTINCT  # a piece may not show every direction
         inverse = np.where(known, 1.0 / np.where(known, values + damping, 1.0), 0.0)
-        return (vectors * inverse[:, None, :]) @ (vectors.transpose(0, 2, 1) @ right)
+        solved = (vectors * inverse[:, None, :]) @ (vectors.transpose(0, 2, 1) @ right)
+        return np.asarray(solved, dtype=np.float64)
 
     def _eliminated(self, damping: float) -> tuple[Floats, Floats]:
         """The own variables' answer to a change of each shared one, (N, f, k), and to their right side, (N, f)."""

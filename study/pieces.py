@@ -7,7 +7,6 @@ growth, each with an initial state of its own, keep the fit well posed (multiple
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +14,11 @@ from numpy.typing import NDArray
 from study.errors import DivergenceError
 from study.free_run import prepare
 from study.model import Model
-from study.record import MOTIONS, Record
+from study.record import Record
 
 Floats = NDArray[np.float64]
 GROWTH = 10.0  # by how much a disturbance may be magnified within a piece
-PERIODS = 3.0  # length of the pieces that a search from afar begins with
+PERIODS = 1.0  # length of the pieces that a search from afar begins with
 REACH = 0.2  # of a period: half width of the cubic that smooths a displacement into a state
 REACHES = (0.07, 0.15, REACH, 0.3)  # those that are tried where it matters
 
@@ -80,23 +79,20 @@ def needed_restarts(
     steps_per_sample : int
         Runge-Kutta steps in each sampling interval.
     """
-    motions = [
-        prepare(
-            model, record, response=motion, steps_per_sample=steps_per_sample, span=span, restarts=restarts
-        ).respond({}, states, 2)
-        for motion in ("displacement", "velocity")
-    ]  # fmt: skip
-    rate = angular_rate(motions[0][0], record.dt)
-    bounds = (span[0], *restarts, span[1])
+    run = prepare(model, record, steps_per_sample=steps_per_sample, span=span, restarts=restarts)
+    motion, _, arrivals = run.respond_by_piece({}, states, 2)
+    rate = angular_rate(motion, record.dt)
+    weighed = arrivals[:, :2, 1:] * np.array([[1.0, rate], [1.0 / rate, 1.0]])
     kept: list[int] = []
-    products: list[Floats] = []
-    for i, (begin, end) in enumerate(pairwise(bounds)):
-        rows = [jacobian[end - 1 - span[0], 2 * i : 2 * i + 2] for _, jacobian in motions]
-        through = np.stack(rows) * np.array([[1.0, rate], [1.0 / rate, 1.0]])
-        products = [through @ p for p in products] + [through]
-        if max(float(np.linalg.norm(p, 2)) for p in products) > GROWTH and len(products) > 1:
+    grown: list[Floats] = []  # from each restart that matters to where the piece at hand ends
+    for begin, through in zip((span[0], *restarts[:-1]), weighed, strict=True):
+        grown = [through @ p for p in grown] + [through]
+        sizes = [float(np.linalg.norm(p, 2)) for p in grown]
+        if max(sizes) > GROWTH and len(grown) > 1:
             kept.append(begin)
-            products = [through]
+            grown, sizes = [through], sizes[-1:]
+        # What has shrunk can grow no further than what begins here will.
+        grown = [p for p, size in zip(grown, sizes, strict=True) if size > 1.0]
     return tuple(kept)
 
 
@@ -124,44 +120,29 @@ class Pieces:
     restarts: tuple[int, ...]
     steps_per_sample: int
 
-    def motions(self, model: Model, states: Floats) -> list[Floats]:
-        """Displacement, velocity and acceleration of the free run, each of shape (samples,)."""
-        return [
-            prepare(
-                model, self.record, response=motion, steps_per_sample=self.steps_per_sample,
-                span=self.span, restarts=self.restarts,
-            ).respond({}, states)[0]
-            for motion in MOTIONS
-        ]  # fmt: skip
-
-    def misfits(self, motions: list[Floats]) -> Floats:
+    def misfits(self, model: Model, states: Floats) -> Floats:
         """Sum of squares of the residual of each piece, shape (pieces,)."""
-        residual = self.record[self.response][slice(*self.span)] - motions[MOTIONS.index(self.response)]
+        run = prepare(
+            model, self.record, response=self.response, steps_per_sample=self.steps_per_sample,
+            span=self.span, restarts=self.restarts,
+        )  # fmt: skip
+        residual = self.record[self.response][slice(*self.span)] - run.respond_by_piece({}, states)[0]
         return np.add.reduceat(residual**2, [0, *(r - self.span[0] for r in self.restarts)])
 
-    def better(self, model: Model, one: Floats, other: Floats) -> Floats:
-        """Piece by piece the states that fit better, shape (pieces, states); ``one`` where the other diverges."""
-        try:
-            first, second = (self.misfits(self.motions(model, states)) for states in (one, other))
-        except DivergenceError:
-            return one
-        return np.where((second < first)[:, None], other, one)
-
     def first_states(self, model: Model) -> Floats:
-        """Initial states as the record shows them, smoothed as widely as fits each piece best."""
-        states = np.zeros((len(self.restarts) + 1, 2 + len(model.states)))
-        for i, reach in enumerate(REACHES):
-            tried = np.zeros_like(states)
-            begins = (self.span[0], *self.restarts)
-            tried[:, :2] = [starting_state(self.record, self.response, sample, reach) for sample in begins]
-            states = tried if i == 0 else self.better(model, states, tried)
-        return states
+        """Initial states as the record shows them, smoothed as widely as fits each piece best.
 
-    def joined(self, model: Model, states: Floats) -> Floats:
-        """States at which the piece before arrives, where they fit better than those given."""
-        u, v, a = self.motions(model, states)
-        ends, dt = np.array(self.restarts, dtype=np.int64) - self.span[0] - 1, self.record.dt
-        arrived = states.copy()
-        arrived[1:, 0] = u[ends] + dt * v[ends] + 0.5 * dt**2 * a[ends]
-        arrived[1:, 1] = v[ends] + dt * a[ends]
-        return self.better(model, states, arrived)
+        Shape (pieces, states). A width with which the model diverges is left out.
+        """
+        begins = (self.span[0], *self.restarts)
+        best, least = np.zeros((len(begins), 2 + len(model.states))), np.full(len(begins), np.inf)
+        for reach in REACHES:
+            tried = np.zeros_like(best)
+            tried[:, :2] = [starting_state(self.record, self.response, sample, reach) for sample in begins]
+            try:
+                misfits = self.misfits(model, tried)
+            except DivergenceError:
+                continue
+            best = np.where((misfits < least)[:, None], tried, best)
+            least = np.minimum(misfits, least)
+        return best

@@ -254,21 +254,28 @@ def test_a_regular_system_needs_no_pieces(systems: dict[str, Model], records: di
     assert fit.initial.shape == (2,)
 
 
-def test_a_piece_gone_astray_is_joined_to_the_one_before(systems: dict[str, Model], records: dict[str, Record]) -> None:
-    model, record, cuts = systems["duffing"], records["duffing"], (100, 200, 300)
+def test_first_states_are_the_best_of_several_widths(systems: dict[str, Model], records: dict[str, Record]) -> None:
+    model, record, cuts = systems["duffing"], noisy(records["duffing"], 0.05, 2), (100, 200, 300)
     pieces = Pieces(record, "displacement", (0, 400), cuts, 4)
-    true = np.stack([record["displacement"][[0, *cuts]], record["velocity"][[0, *cuts]]], axis=1)
-    astray = true.copy()
-    astray[2] = [0.01, -0.2]
-    joined = pieces.joined(model, astray)
-    np.testing.assert_array_equal(joined[[0, 1, 3]], true[[0, 1, 3]])
-    size = [np.std(record["displacement"]), np.std(record["velocity"])]
-    assert np.all(np.abs(joined[2] - true[2]) < 0.2 * np.array(size))
-    assert np.all(np.abs(astray[2] - true[2]) > np.array(size))
-    begun = pieces.misfits(pieces.motions(model, pieces.first_states(model)))
+    begun = pieces.misfits(model, pieces.first_states(model))
     for reach in REACHES:
         one = np.array([starting_state(record, "displacement", sample, reach) for sample in (0, *cuts)])
-        assert np.all(begun <= pieces.misfits(pieces.motions(model, one)) * (1.0 + 1e-12))
+        assert np.all(begun <= pieces.misfits(model, one))
+
+
+def test_tied_pieces_are_one_motion(systems: dict[str, Model], records: dict[str, Record]) -> None:
+    """... with the estimates and the covariance of a free run; loose ones know less."""
+    model, record = systems["duffing"], noisy(records["duffing"], 0.05, 2).part(0, 2048)
+    whole, cuts = fit_free_run(model, record), tuple(range(128, 2048, 128))
+    states = np.array([starting_state(record, "displacement", sample) for sample in (0, *cuts)])
+    loose = fit_free_run(model, record, restarts=cuts, initial=states)
+    tied = fit_free_run(model, record, restarts=cuts, initial=loose.initial, tie=1000.0)
+    assert tied.converged
+    deviations = np.sqrt(np.diag(whole.covariance))
+    assert np.max(np.abs(tied.values - whole.values) / deviations) < 0.01
+    np.testing.assert_allclose(np.sqrt(np.diag(tied.covariance)), deviations, rtol=0.01)
+    assert np.all(np.sqrt(np.diag(loose.covariance)) > deviations)
+    assert tied.residual.shape == whole.residual.shape
 
 
 def test_chaotic_system_is_fitted_in_pieces(systems: dict[str, Model], records: dict[str, Record]) -> None:
@@ -282,7 +289,7 @@ def test_chaotic_system_is_fitted_in_pieces(systems: dict[str, Model], records: 
     assert fit.rms < 1.05 * noise
     assert fit.initial.ndim == 2
     assert np.max(np.abs(error_in_standard_errors(model, fit))) < 4.0
-    assert fit.estimate["dead_band.u_g"] == pytest.approx(0.0025, rel=0.03)
+    assert fit.estimate["dead_band.u_g"] == pytest.approx(0.0025, rel=0.02)
 
 
 SHAPES = {

@@ -1,0 +1,37 @@
+"""Normal equations of pieces against those of the whole matrix."""
+
+import numpy as np
+import pytest
+
+from study.levenberg import point_at
+from study.normal import Ties
+
+
+def test_own_variables_are_eliminated_exactly() -> None:
+    """Steps, decrement and covariance of pieces, loose and tied, are those of the whole matrix."""
+    random, k, f, count = np.random.default_rng(4), 3, 2, 5
+    jacobian, residual = random.standard_normal((40, k + f)), random.standard_normal(40)
+    ties = Ties(random.standard_normal((4, f)), random.standard_normal((4, f, k + f)), np.array([2.0, 3.0]))
+    for tied in (None, ties):
+        whole = np.zeros((48, k + count * f))
+        for i in range(count):
+            rows = slice(8 * i, 8 * i + 8)
+            whole[rows, :k], whole[rows, k + f * i : k + f * i + f] = jacobian[rows, :k], jacobian[rows, k:]
+        right = np.concatenate([residual, np.zeros(8)])
+        for i in range(4 if tied else 0):
+            rows = slice(40 + 2 * i, 42 + 2 * i)
+            whole[rows, :k], whole[rows, k + f * i : k + f * i + f] = ties.jacobian[i, :, :k], ties.jacobian[i, :, k:]
+            whole[rows, k + f * (i + 1) : k + f * (i + 2)] = -np.diag(ties.weight)
+            right[rows] = -ties.gaps[i]
+        x = np.zeros(k + count * f)
+        point = point_at(x, residual, jacobian, k, range(0, 40, 8), tied)
+        assert point is not None
+        scaled = whole / point.scale
+        np.testing.assert_allclose(point.scale, np.linalg.norm(whole, axis=0), rtol=1e-12)
+        for damping in (0.0, 0.1):
+            step = np.linalg.solve(scaled.T @ scaled + damping * np.eye(len(x)), scaled.T @ right)
+            np.testing.assert_allclose(point.normal.step(damping), step, rtol=1e-8, atol=1e-9)
+        fall = right @ right - np.sum((right - whole @ np.linalg.lstsq(whole, right)[0]) ** 2)
+        assert point.normal.decrement() == pytest.approx(fall, rel=1e-9)
+        variance = np.sum(right**2) / ((48 if tied else 40) - len(x))
+        np.testing.assert_allclose(point.covariance(), variance * np.linalg.inv(whole.T @ whole)[:k, :k], rtol=1e-7)
