@@ -15,6 +15,7 @@ from study.fitting import Plan
 from study.model import Model, free
 from study.output_error import FreeRunFit
 from study.record import Record
+from study.reverse_start import reverse_start
 from study.terms import LIBRARY, Term
 
 Floats = NDArray[np.float64]
@@ -111,19 +112,30 @@ def _fit(
 
 
 def _starts(term: Term, base: Baseline, record: Record, how: Plan) -> list[dict[str, float]]:
-    """Where fits begin: points of the search beside the fitted model, and the best one beside a linear model.
+    """Where fits begin: points of the search beside the fitted model, and the best one of them anew.
 
-    The last kind matters where the model without the candidate was driven to a far corner by its lack.
+    Anew is with all coefficients from the reverse system, or beside a linear model where it has no solution.
+    That matters where the model without the candidate was driven to a far corner by its lack.
     """
     fitted = {key: v for key, v in base.found.model.values.items() if v is not None}
     points = search.starts(term, base, record, how)
     keys = free(term).keys
     begins = [fitted | dict(zip(keys, p.coefficients + p.parameters, strict=True)) for p in points]
     if points:
-        anew = {k: v for k, v in base.linear.items() if k in base.found.keys and "." not in k}
         still = dict(zip(keys, (0.0,) * len(term.components) + points[0].parameters, strict=True))
-        begins.append(fitted | anew | still)
+        grown = base.found.model.with_term(free(term)).with_values(fitted | still)
+        anew = _reversed(grown, record, how) or base.linear
+        begins.append(fitted | still | {k: v for k, v in anew.items() if k in (*base.found.keys, *term.symbols)})
     return begins
+
+
+def _reversed(model: Model, record: Record, how: Plan) -> dict[str, float]:
+    """Coefficients from the reverse system; none where it has no solution, or one that cannot run."""
+    try:
+        found = reverse_start(model, record, how)
+    except StudyError:
+        return {}
+    return found if found["m"] > 0.0 else {}
 
 
 def refitted(trial: Trial, record: Record, how: Plan, held: tuple[str, ...]) -> Trial:

@@ -176,7 +176,9 @@ def _ties_by_simplicity(rows: list[Ranked]) -> list[Ranked]:
     """
     if not rows:
         return rows
-    level = [r for r in rows if _distance(r, rows[0]) < TIE and _unknowns(r) <= _unknowns(rows[0])]
+    first = rows[0]
+    level = [r for r in rows if _distance(r, first) < TIE or _alike(r.residual, first.residual)]
+    level = [r for r in level if _unknowns(r) <= _unknowns(first)]
     first = min(level, key=_misfit)
     return [first] + [r for r in rows if r is not first]
 

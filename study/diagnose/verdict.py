@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from study import fitting, noise_floor
 from study.compare.fitted import fit_model
-from study.diagnose import candidates, nature, search
+from study.diagnose import candidates, nature, pairs, search
 from study.diagnose.ranking import Ranked, rank
 from study.diagnose.search import Baseline
 from study.fitting import Plan
@@ -115,7 +115,7 @@ def diagnose(
     rows = rank(trials, residual, record, how)
     size = float(np.std(record[how.response][how.judge[0] : how.judge[1]]))
     noise = _floor([residual, *(r.residual for r in rows[:3])], record.dt)
-    verdict, rows, left, pair = _decide(rows, residual, size, record, how, held)
+    verdict, rows, left, pair = _decide(rows, base, residual, size, record, how, held)
     families = _families(base, record, short) if verdict == UNKNOWN else {}
     return Diagnosis(
         verdict, found, residual, float(np.sqrt(np.mean(residual**2))) / size,
@@ -134,7 +134,7 @@ def _floor(residuals: Sequence[Floats], dt: float) -> float:
 
 
 def _decide(
-    rows: list[Ranked], residual: Floats, size: float, record: Record, how: Plan, held: tuple[str, ...]
+    rows: list[Ranked], base: Baseline, residual: Floats, size: float, record: Record, how: Plan, held: tuple[str, ...]
 ) -> tuple[str, list[Ranked], float, tuple[str, ...]]:
     """Verdict, candidates in their final order, what is left, and the pair that explains it if none does alone."""
     credible = [r for r in rows if _credible(r, residual, size)]
@@ -144,7 +144,7 @@ def _decide(
     left = _left(credible[0].residual, size, record.dt)
     if left <= LEFT:
         return MISSING, rows, left, ()
-    pair, remaining = _best_pair(rows, size, record, how, held)
+    pair, remaining = _best_pair(rows, base, size, record, how, held)
     if remaining <= LEFT:
         first = next(r for r in rows if r.name == pair[0])
         return MISSING, [first] + [r for r in rows if r is not first], remaining, pair
@@ -163,21 +163,27 @@ def _left(residual: Floats, size: float, dt: float) -> float:
 
 
 def _best_pair(
-    rows: list[Ranked], size: float, record: Record, how: Plan, held: tuple[str, ...]
+    rows: list[Ranked], base: Baseline, size: float, record: Record, how: Plan, held: tuple[str, ...]
 ) -> tuple[tuple[str, ...], float]:
-    """Two effects that explain together, and the structure they leave; pairs with the first candidate are preferred."""
-    terms = [row.term for row in rows]
+    """Two effects that explain together, and the structure they leave.
+
+    First those that the reverse system puts first; if none explains, the first candidates with every other.
+    """
     short = fitting.shortened(how, SEARCHED)
+    found = pairs.best_pair(rows, base, record, short, held)
     best: tuple[tuple[str, ...], float] = ((), np.inf)
+    if found is not None:
+        best = (found.names, _left(found.residual, size, record.dt))
     for row in rows[:PAIRED]:
+        if best[1] <= LEFT:
+            break
         beside = search.baseline(_refitted(row.found, record, how, short, held), record, short)
-        seconds = candidates.try_all([t for t in terms if t.name != row.name], beside, record, short, held)
+        others = [r.term for r in rows if r.name != row.name]
+        seconds = candidates.try_all(others, beside, record, short, held)
         second = min(seconds, key=lambda t: float(t.residual @ t.residual), default=None)
         if second is not None:
             left = _left(second.residual, size, record.dt)
             best = min(best, ((row.name, second.term.name), left), key=lambda pair: pair[1])
-        if best[1] <= LEFT:
-            break
     return best
 
 
