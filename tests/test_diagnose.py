@@ -153,3 +153,12 @@ def test_the_judging_part_is_never_fitted(drag):
         drag.believed, Record(drag.record.dt, {**drag.record.channels, "displacement": changed}), how, ()
     )
     assert np.array_equal(one.values, other.values)
+
+
+def test_a_model_that_runs_away_is_diagnosed_all_the_same() -> None:
+    made = trials.make_trial(7_000_122, ("displacement_damping", "quadratic_damping"), 0.0, "acceleration")
+    found = diagnose(made.believed, made.record, fitting.plan(made.record))
+    assert found.diverged
+    assert found.response_error == pytest.approx(1.0)
+    assert set(found.pair) == {"displacement_damping", "quadratic_damping"}
+    assert "does not stay finite" in sentences(found, "N", "m")[0]

@@ -19,9 +19,10 @@ def sentences(found: Diagnosis, force: str, length: str) -> list[str]:
     """
     if found.verdict == NOTHING:
         return [_nothing(found)]
-    if found.verdict == MISSING:
-        return _missing(found, force, length)
-    return _unknown(found)
+    said = _missing(found, force, length) if found.verdict == MISSING else _unknown(found)
+    if found.diverged:
+        said.insert(0, "The free run of the model does not stay finite: its error counts as 100 %.")
+    return said
 
 
 def _nothing(found: Diagnosis) -> str:

@@ -11,6 +11,7 @@ from study.compare.fitted import fit_model
 from study.diagnose import candidates, nature, pairs, search
 from study.diagnose.ranking import Ranked, rank
 from study.diagnose.search import Baseline
+from study.errors import DivergenceError
 from study.fitting import Plan
 from study.free_run import prepare
 from study.model import Model
@@ -42,7 +43,7 @@ class Diagnosis:
     found : FreeRunFit
         The model as it was given, fitted.
     residual : array, shape (samples to judge,)
-        Its held-out residual.
+        Its held-out residual; the response itself where its free run does not stay finite.
     response_error : float
         Its rms over that of the response.
     noise : float
@@ -55,6 +56,8 @@ class Diagnosis:
         Two effects that explain together what none does alone; empty otherwise.
     families : dict
         For an unknown effect: held-out share that functions of displacement, velocity, ... explain.
+    diverged : bool
+        Whether the free run of the model as it was given does not stay finite.
     """
 
     verdict: str
@@ -66,7 +69,7 @@ class Diagnosis:
     left: float
     pair: tuple[str, ...]
     families: dict[str, float]
-
+    diverged: bool = False
 
 def diagnose(
     model: Model,
@@ -103,7 +106,7 @@ def diagnose(
     found, finer = fit_model(model, record, how)
     if finer != how:  # the candidates are told apart at the plan's own steps, and so is the model without them
         found = fitting.fit(found.model, record, how, held, found.model.numbers())
-    residual = fitting.held_out_residual(found, record, how)
+    residual, diverged = _held_out(found, record, how)
     short = fitting.shortened(how, SEARCHED)
     base = search.baseline(_refitted(found, record, how, short, held), record, short)
     terms = candidates.candidate_terms(base, extra, without)
@@ -119,8 +122,17 @@ def diagnose(
     families = _families(base, record, short) if verdict == UNKNOWN else {}
     return Diagnosis(
         verdict, found, residual, float(np.sqrt(np.mean(residual**2))) / size,
-        noise / size, tuple(rows), left, pair, families,
+        noise / size, tuple(rows), left, pair, families, diverged,
     )  # fmt: skip
+
+
+def _held_out(found: FreeRunFit, record: Record, how: Plan) -> tuple[Floats, bool]:
+    """Held-out residual; all of the response where the free run does not stay finite: then it predicts nothing."""
+    try:
+        return fitting.held_out_residual(found, record, how), False
+    except DivergenceError:
+        measured = record[how.response][slice(*how.judge)]
+        return measured - float(np.mean(measured)), True
 
 
 def _refitted(found: FreeRunFit, record: Record, how: Plan, short: Plan, held: tuple[str, ...]) -> FreeRunFit:
