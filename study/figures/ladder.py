@@ -21,7 +21,7 @@ def ladder(axes: Axes, steps: Sequence[dict[str, Any]]) -> Axes:
         values = [100.0 * s["error"][key] if s["error"][key] else np.nan for s in steps]
         axes.plot(place, values, style, color=colour, label=f"error of the {key}")
     floor = [100.0 * s["noise_floor"]["response"] for s in steps]
-    axes.plot(place, floor, ":", color="0.1", label="noise floor of the response")
+    axes.plot(place, floor, ":", color="0.1", label="noise floor")
     axes.set_yscale("log")
     names = [f"+ {s['added']}".replace("_", " ") if s.get("added") else "as given" for s in steps]
     axes.set_xticks(place, names, rotation=20, ha="right")
