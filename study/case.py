@@ -61,10 +61,11 @@ def estimator_settings(settings: Table) -> Settings:
     """The estimators' settings from a case's identification settings; what these leave out is as by default."""
     low, high = settings["fit_band"]
     bands = LocalPolynomial(**settings.get("local_polynomial", {}))
-    return Settings(Segments(**settings["segments"]), (low, high), bands)
+    return Settings(Segments(**settings["segments"]), (low, high), bands, settings.get("settle_periods", 1))
 
 
 def identify_case(model: Model, record: Record, settings: Table) -> dict[str, Identified]:
     """What each of the configured estimators finds in a record, by the estimator's name."""
     assumed, told = assumed_model(model, settings), estimator_settings(settings)
+    record = replace(record, period=settings.get("period", record.period))
     return {name: estimators.identify(name, assumed, record, told) for name in settings["estimators"]}

@@ -95,9 +95,16 @@ class StudyConfig:
             "segments": self.settings["segments"],
             "fit_band": self.settings["fit_band"],
             "local_polynomial": self.settings["local_polynomial"],
+            "settle_periods": self.settings["settle_periods"],
+            "period": self.period(case),
             "relative": {**tolerances["relative"], **own},
             "absolute": tolerances["absolute"],
         }
+
+    def period(self, case: str) -> int | None:
+        """Samples in a period of a case's force, where it repeats."""
+        periods = self.cases[case].excitation.get("periods", 1)
+        return self.settings["sampling"]["samples"] // periods if periods > 1 else None
 
     def drawn(self, case: str) -> list[str]:
         """The estimators that a case's figures show."""
@@ -141,6 +148,7 @@ def _case(row: Table, where: str, settings: Table, models: Path, taken: dict[str
     try:
         model = _complete_model(path)
         _check_assumed(model, row["also_assumed"], settings)
+        _check_periods(settings["excitations"][row["excitation"]], settings)
     except StudyError as error:
         raise StudyError(f"{where}: {error}") from None
     figures = _figures(row, where, taken)
@@ -205,6 +213,16 @@ def _check_assumed(model: Model, extra: str, settings: Table) -> None:
             f"segments of config.yaml cut the record into {count}; {inputs} inputs need {inputs + 1} or more"
         )
     LocalPolynomial(**settings["local_polynomial"]).check(inputs)
+
+
+def _check_periods(excitation: Table, settings: Table) -> None:
+    """Whether there are periods for those estimators that stand on them."""
+    needed, periods = settings["settle_periods"] + 4, excitation.get("periods", 1)
+    if "errors_in_variables" in settings["estimators"] and periods < needed:
+        raise StudyError(
+            f"the excitation has {periods} period{'s' if periods > 1 else ''}; the estimator errors_in_variables needs "
+            f"settle_periods and four more, {needed}"
+        )
 
 
 def _check_settings(settings: Table, where: str) -> None:

@@ -187,6 +187,17 @@ def test_more_inputs_than_a_band_tells_apart(folder):
     assert "half_width is 5; 2 inputs of degree 2 have 9 unknowns in a band, which needs 8 or more" in refused(folder)
 
 
+def test_an_estimator_that_needs_periods(folder):
+    spoil(folder / "config.yaml", "miso_hand_read, local", "miso_hand_read, errors_in_variables, local")
+    assert "the excitation has 1 period; the estimator errors_in_variables needs settle_periods and four" in refused(
+        folder
+    )
+    spoil(folder / "config.yaml", "kind: gaussian_lowpass", "kind: gaussian_lowpass\n    periods: 8")
+    study = load(folder)
+    assert study.identification_settings("linear")["period"] == 1024
+    assert load(ROOT / "config").identification_settings("linear")["period"] is None
+
+
 def test_quotes_are_plain_text(tmp_path):
     (tmp_path / "schema.yaml").write_text("type: object\nproperties: {a: {type: string}, b: {type: number}}\n")
     (tmp_path / "table.tsv").write_text('a\tb\n"open\t1\nshut"\t2\n')

@@ -15,6 +15,7 @@ ESTIMATORS = {
     "miso": "study.estimators.miso",
     "miso_hand_read": "study.estimators.hand_read",
     "local_polynomial": "study.estimators.local_polynomial",
+    "errors_in_variables": "study.estimators.errors_in_variables",
 }
 
 

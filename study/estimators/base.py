@@ -28,11 +28,14 @@ class Settings:
         Lines that the parameters are fitted to, in hertz.
     local_polynomial : LocalPolynomial
         Bands and degree, for the estimator of this name.
+    settle_periods : int
+        Periods at the beginning of a periodic record that ``errors_in_variables`` leaves out.
     """
 
     segments: Segments
     band: tuple[float, float]
     local_polynomial: LocalPolynomial = field(default_factory=LocalPolynomial)
+    settle_periods: int = 1
 
 
 @dataclass(frozen=True)

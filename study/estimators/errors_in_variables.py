@@ -1,0 +1,14 @@
+"""Noise on force and response: records with several periods of the same excitation."""
+
+from study.estimators.base import Identified, Settings, named_parameters
+from study.inputs import reverse_inputs
+from study.model import Model
+from study.periods import fit, steady
+from study.record import Record
+
+
+def identify(model: Model, record: Record, settings: Settings) -> Identified:
+    """Coefficients by averages of periods, instruments from other periods, weights from the scatter between them."""
+    inputs = reverse_inputs(model)
+    estimate = fit(steady(record, settings.settle_periods), inputs, settings.band)
+    return Identified(inputs, None, named_parameters(estimate), estimate)

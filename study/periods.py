@@ -1,0 +1,237 @@
+"""Coefficients from several periods of the same excitation, with noise on the force and on the response.
+
+Periods of one steady motion differ by noise alone, and that noise is independent from one period to another.
+Three things follow for the reverse system ``Y = sum_j A_j X_j``, none of which asks for the noise to be known:
+
+- A period closes on itself: its lines have no leakage, and derivatives are products with ``j 2 pi f``.
+- Products of two different periods have the mean of the products without noise (what makes least squares of
+  noisy inputs too low are the products of a period's noise with itself). So half of the periods, averaged,
+  tell the equations, the other half are their instruments; then they change places.
+- A shape of an average of n periods, ``g(u + noise)``, is wrong by ``b / n`` on average: a cube brings
+  ``3 sigma^2 u / n``. The same shape of averages that leave out one period each is wrong by ``b / (n - 1)``, and
+  ``n g_n - (n - 1) g_(n-1)`` is right to the next order; for powers up to the third it is right (Quenouille,
+  Biometrika 43, 1956).
+
+Lines are weighted by the scatter between periods of what the equation leaves, which holds the noise of force and
+response, and their correlation; standard errors come from the same scatter.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import rfft
+
+from study import expression
+from study.errors import StudyError
+from study.inputs import Input, histories
+from study.parameters import Estimate
+from study.record import Record
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Chosen = tuple[int, ...]
+MOST = 12  # periods that are told apart; of more, neighbours are averaged first
+NEIGHBOURS = 10  # lines on either side that a variance is averaged over, without its own: a weight must not
+# know the noise that it weighs
+PASSES = 4  # of weights and coefficients
+DIFFERENT = 0.5  # share of a force's power that may differ between periods
+EXACT = 1e-12  # variances below this share of the largest are rounding
+
+
+def steady(record: Record, settle: int) -> Record:
+    """The whole periods of a record, counted back from its end, less the first ``settle``.
+
+    Raises
+    ------
+    StudyError
+        If the record has no period, holds too few, or its force does not repeat.
+    """
+    period = record.period
+    if period is None:
+        raise StudyError(f"{record.name} has no period; errors_in_variables needs the samples of one period")
+    whole = len(record) // period
+    count = whole - settle
+    if count < 2:
+        raise StudyError(
+            f"{record.name} holds {whole} periods of {period} samples; errors_in_variables needs {settle} to settle "
+            "and 2 or more beside"
+        )
+    kept = record.part(len(record) - count * period, len(record))
+    force = kept["force"].reshape(count, period)
+    mean: Floats = np.mean(force, axis=0)
+    size = float(np.mean((force - np.mean(force)) ** 2))
+    between = float(np.mean((force - mean) ** 2)) * count / (count - 1.0)
+    share = between / size if size > 0.0 else 0.0
+    if share > DIFFERENT:
+        raise StudyError(
+            f"{100.0 * min(share, 1.0):.0f} % of the force of {record.name} differs between periods of {period} "
+            "samples; errors_in_variables needs the same excitation in each"
+        )
+    return kept
+
+
+def fit(record: Record, inputs: Sequence[Input], band: tuple[float, float]) -> Estimate:
+    """Coefficients of all inputs together.
+
+    Parameters
+    ----------
+    record : Record
+        Whole periods of a steady motion, as :func:`steady` gives them.
+    inputs : sequence of Input
+        Of the reverse system.
+    band : pair of float
+        Lines of a period from the first to the second frequency (Hz) are used.
+
+    Returns
+    -------
+    Estimate
+        Coefficients of all inputs that have power in the band; the others are not known. The covariance
+        rests on as many degrees of freedom as there are periods, less one.
+
+    Raises
+    ------
+    StudyError
+        If there are too few periods or lines, or an input is not the same in every period.
+    """
+    periods = Periods.of(record, inputs, band)
+    count = len(periods.force)
+    _check(inputs, count, record.name)
+    own = np.stack([periods.columns((p,)) for p in range(count)])
+    size = np.linalg.norm(own, axis=(0, 1))
+    heard = size > 0.0
+    scale = size[heard]
+    equations = [
+        _Equation(
+            periods.unbiased(a)[:, heard] / scale, periods.unbiased(b)[:, heard] / scale,
+            np.mean(periods.force[list(a)], axis=0),
+        )
+        for a, b in _halves(count)
+    ]  # fmt: skip
+    values, covariance = _solve(equations, own[:, :, heard] / scale, periods.force)
+    symbols = [p.symbol for item in inputs for p in item.parts]
+    known = tuple(s for s, h in zip(symbols, heard, strict=True) if h)
+    return Estimate(known, values / scale, covariance / np.outer(scale, scale))
+
+
+@dataclass(frozen=True)
+class _Equation:
+    """Columns and output of one half of the periods, columns of the other half as instruments; rows are lines."""
+
+    columns: Complexes
+    instruments: Complexes
+    output: Complexes
+
+
+@dataclass(frozen=True)
+class Periods:
+    """Channels by period (periods, samples), lines of the force in the band (periods, lines), powers of j 2 pi f."""
+
+    record: Record
+    channels: dict[str, Floats]
+    inputs: Sequence[Input]
+    keep: NDArray[np.int64]
+    force: Complexes
+    powers: tuple[Complexes, ...]
+
+    @staticmethod
+    def of(record: Record, inputs: Sequence[Input], band: tuple[float, float]) -> "Periods":
+        channels = _grouped(record)
+        samples = channels["force"].shape[1]
+        frequency: Floats = np.arange(samples // 2 + 1, dtype=np.float64) / (samples * record.dt)
+        keep = np.flatnonzero((frequency >= band[0]) & (frequency <= band[1]))
+        if len(keep) <= 2 * NEIGHBOURS:
+            raise StudyError(
+                f"a period of {record.name} has {len(keep)} lines from {band[0]:g} to {band[1]:g} Hz; "
+                f"errors_in_variables needs {2 * NEIGHBOURS + 1} or more"
+            )
+        force = np.asarray(rfft(channels["force"]), dtype=np.complex128)[:, keep]
+        powers = tuple(item.powers(frequency[keep]) for item in inputs)
+        return Periods(record, channels, inputs, keep, force, powers)
+
+    def columns(self, chosen: Chosen) -> Complexes:
+        """Lines of each shape of the average of some periods, times its parts' powers, (lines, parts)."""
+        mean = {name: np.mean(values[list(chosen)], axis=0) for name, values in self.channels.items()}
+        shapes = histories(self.inputs, replace(self.record, channels=mean))
+        lines = [np.asarray(rfft(h), dtype=np.complex128)[self.keep] for h in shapes]
+        return np.concatenate([x[:, None] * p for x, p in zip(lines, self.powers, strict=True)], axis=1)
+
+    def unbiased(self, chosen: Chosen) -> Complexes:
+        """The same without what noise adds to the shapes on average, to first order."""
+        n = len(chosen)
+        if n == 1:
+            return self.columns(chosen)
+        left = np.mean([self.columns(tuple(c for c in chosen if c != out)) for out in chosen], axis=0)
+        return np.asarray(n * self.columns(chosen) - (n - 1) * left, dtype=np.complex128)
+
+
+def _grouped(record: Record) -> dict[str, Floats]:
+    """Channels by period, (periods, samples); of many periods, averages of neighbours."""
+    assert record.period is not None, "steady() has seen to it"
+    periods = len(record) // record.period
+    each = -(-periods // MOST)
+    count = periods // each
+    return {
+        name: values[len(values) - count * each * record.period :].reshape(count, each, record.period).mean(axis=1)
+        for name, values in record.channels.items()
+    }
+
+
+def _check(inputs: Sequence[Input], count: int, name: str) -> None:
+    for item in inputs:
+        if item.state is not None or "t" in expression.names(item.shape):
+            raise StudyError(
+                f"the input {item.shape!r} of {', '.join(item.terms)} is not the same in every period; "
+                "errors_in_variables needs shapes of the motion alone"
+            )
+    if count < 4 and any(i.shape != "u" for i in inputs):
+        raise StudyError(
+            f"{name} holds {count} steady periods; errors_in_variables needs 4 or more for nonlinear shapes: "
+            "how noise distorts them is seen from averages of two and more"
+        )
+
+
+def _halves(count: int) -> list[tuple[Chosen, Chosen]]:
+    """Ways to cut the periods, as if they stood in a circle, in two runs; every run comes first once."""
+    half = count // 2
+    turned = [tuple((shift + i) % count for i in range(count)) for shift in range(count)]
+    cuts = [(order[:half], order[half:]) for order in turned]
+    return cuts if count % 2 == 0 else cuts + [(b, a) for a, b in cuts]
+
+
+def _solve(equations: Sequence[_Equation], own: Complexes, force: Complexes) -> tuple[Floats, Floats]:
+    """Coefficients and their covariance; ``own`` and ``force`` are of each period by itself, for the scatter."""
+    count = len(force)
+    instruments = np.mean([e.instruments for e in equations], axis=0)
+    weight = np.ones(force.shape[1])
+    values, covariance = _weighted(equations, instruments, weight, own, force)
+    for _ in range(PASSES):
+        left = force - own @ values
+        weight = _weights(np.sum(np.abs(left - np.mean(left, axis=0)) ** 2, axis=0))
+        values, covariance = _weighted(equations, instruments, weight, own, force)
+    return values, covariance / (count * (count - 1.0))
+
+
+def _weighted(
+    equations: Sequence[_Equation], instruments: Complexes, weight: Floats, own: Complexes, force: Complexes
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Coefficients by instruments, and the sum of squares of what each period would shift them by."""
+    tested = [(e.instruments * weight[:, None]).conj().T for e in equations]
+    normal = np.mean([(z @ e.columns).real for z, e in zip(tested, equations, strict=True)], axis=0)
+    right = np.mean([(z @ e.output).real for z, e in zip(tested, equations, strict=True)], axis=0)
+    inverse: Floats = np.asarray(np.linalg.pinv(normal), dtype=np.float64)
+    values: Floats = inverse @ np.asarray(right, dtype=np.float64)
+    left = force - own @ values
+    left = left - np.mean(left, axis=0)
+    shifts: Floats = inverse @ ((instruments * weight[:, None]).conj().T @ left.T).real
+    return values, shifts @ shifts.T
+
+
+def _weights(scatter: Floats) -> Floats:
+    """Inverse of the mean of each line's neighbours, to a common factor."""
+    kernel = np.ones(2 * NEIGHBOURS + 1)
+    kernel[NEIGHBOURS] = 0.0
+    variance = np.convolve(scatter, kernel, "same") / np.convolve(np.ones_like(scatter), kernel, "same")
+    largest = float(np.max(variance))
+    return largest / np.maximum(variance, EXACT * largest) if largest > 0.0 else np.ones_like(variance)
