@@ -1,7 +1,7 @@
 # Measured records of config/measurements.tsv. Their data are no part of the project, so `rule all` asks for none:
 #   snakemake -j2 results/silverbox/comparison.json    how good is the model, and where does it fail
 #   snakemake -j2 results/silverbox/diagnosis.json     which effect is missing
-#   snakemake -j2 silverbox_climb                      diagnose, add, and again; the ladder
+#   snakemake -j2 silverbox_climb                      diagnose, add, and again; the ladder, and climb.html to step through it
 #   snakemake -j2 gallery                              all of that, with pictures, for every record
 from dataclasses import asdict
 
@@ -14,6 +14,7 @@ with one_sentence():
             raise StudyError(f"config/measurements.tsv: {_name!r} is a case of config/cases.tsv; take another name")
 
 CODE["measured"] = rests_on(Path("scripts/measured.py"))
+CODE["measured"] += [f"study/explore/page.{ending}" for ending in ("html", "css", "js")]
 SEEN = {
     "comparison": ("response", "force_error", "missing_force", "error_in_time"),
     "diagnosis": ("candidates", "constancy"),
@@ -22,7 +23,7 @@ SEEN = {
 
 def climbed(name):
     """What a climb leaves beside its steps."""
-    return [f"results/{name}/{file}" for file in ("history.json", "ladder.png", "ladder.svg", "reached.yaml")]
+    return [f"results/{name}/{file}" for file in ("history.json", "ladder.png", "ladder.svg", "reached.yaml", "climb.html")]
 
 
 for _name, _row in MEASUREMENTS.items():
@@ -56,6 +57,7 @@ for _name, _row in MEASUREMENTS.items():
             history=f"results/{_name}/history.json",
             pictures=[f"results/{_name}/ladder.{ending}" for ending in ENDINGS],
             reached=f"results/{_name}/reached.yaml",
+            page=f"results/{_name}/climb.html",
         params:
             what="climb",
             row=asdict(_row),

@@ -1,14 +1,24 @@
 """A climb: diagnose, add what is missing, and again, until nothing is missing that has a name."""
 
-import json
 import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from study import cli, ladder
-from study.diagnose.verdict import MISSING
-from study.errors import StudyError
+from study.commands.records import plan_of, read_records
+from study.compare.output import write_files
+from study.diagnose import report
+from study.diagnose.files import files as diagnosis_files
+from study.diagnose.verdict import MISSING, Diagnosis
+from study.explore import session as sessions
+from study.explore.files import PAGE, files
+from study.explore.session import Session
+from study.figures.ladder import files as ladder_pictures
+from study.files import read_text
+from study.modelfile import WANTED, parse_model
+
+SAVED = "climb.html"  # the whole climb as one page
 
 
 def run(*words: str) -> None:
@@ -25,7 +35,7 @@ def run(*words: str) -> None:
 
 
 def climb(record: Path, model: Path, options: Sequence[str], steps: int, folder: Path) -> list[ladder.Step]:
-    """Begin with a copy of a model and add the first candidate of each diagnosis to it.
+    """Begin with a model and add the first candidate of each diagnosis to it, as a user of ``study explore`` would.
 
     Parameters
     ----------
@@ -36,8 +46,8 @@ def climb(record: Path, model: Path, options: Sequence[str], steps: int, folder:
     steps : int
         Effects to add at most.
     folder : Path
-        Gets ``climb/`` (the model as it grows, its ladder and a folder for each diagnosis),
-        ``history.json`` and the ladder's picture. What an earlier climb left there is removed.
+        Gets ``climb/`` (the model reached, its ladder and pictures, and a folder for each diagnosis),
+        ``climb.html``, ``history.json`` and the ladder's picture. What an earlier climb left there is removed.
 
     Returns
     -------
@@ -49,21 +59,31 @@ def climb(record: Path, model: Path, options: Sequence[str], steps: int, folder:
     StudyError
         If a file cannot be read or written.
     """
+    arguments = cli.parser().parse_args(["explore", str(record), "--model", str(model), *options])
+    text = read_text(model, WANTED)
+    (data,) = read_records(arguments)
     work = folder / "climb"
-    own = work / model.name
-    try:
-        shutil.rmtree(work, ignore_errors=True)
-        work.mkdir(parents=True)
-        shutil.copyfile(model, own)
-    except OSError as error:
-        raise StudyError(f"{own} cannot be written: {error.strerror}; a writable folder is right") from None
+    shutil.rmtree(work, ignore_errors=True)
+    session = sessions.begin(parse_model(text, model), data, plan_of(arguments, data), cutoff=arguments.cutoff)
     for number in range(steps + 1):
-        step = work / f"step_{number}"
-        run("diagnose", str(record), "--model", str(own), *options, "--out", str(step))
-        found = json.loads((step / "diagnosis.json").read_text(encoding="utf-8"))
-        if found["verdict"] != MISSING or number == steps:
+        session, found = _diagnosed(session, work / f"step_{number}")
+        if found.verdict != MISSING or number == steps:
             break
-        term = found["candidates"][0]["term"]
-        run("add", str(own), term, "--data", str(record), *options, "--out", str(step))
-    run("history", str(own), "--out", str(folder))
-    return ladder.read(own)
+        session = sessions.with_added(session, found.candidates[0].name)
+    made = files(session, model.name, text)
+    write_files(folder, {SAVED: made.pop(PAGE), "history.json": ladder.as_bytes(session.steps)})
+    write_files(folder, ladder_pictures(session.steps, model.stem))
+    write_files(work, made)
+    print(ladder.table(session.steps))
+    return session.steps
+
+
+def _diagnosed(session: Session, folder: Path) -> tuple[Session, Diagnosis]:
+    """The session with its present model diagnosed, printed and written into a folder; and the diagnosis."""
+    now, found = sessions.examined(session)
+    units = now.comparison.record.units
+    print(f"{now.label}: {found.verdict.replace('_', ' ')}")
+    print(report.table(found, units.get("force", "N"), units.get("displacement", "m")))
+    print(f"\n{now.said}\n", flush=True)
+    write_files(folder, diagnosis_files(found, now.comparison, now.said))
+    return sessions.with_rung(session, now), found

@@ -6,12 +6,18 @@ from pathlib import Path
 from study.commands.command import Command
 from study.commands.records import add_record_arguments, out_folder, plan_of, read_records
 
+ESTIMATORS = ("output_error", "miso", "local_polynomial", "errors_in_variables")
 QUIET = 2.0  # seconds of work before progress is shown
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     add_record_arguments(parser)
     parser.add_argument("--model", type=Path, required=True, help="model file (YAML); what it gives is held")
+    parser.add_argument(
+        "--estimator", choices=ESTIMATORS, default=ESTIMATORS[0],
+        help="what finds the coefficients: a fit in free run (default), or in reverse from the frequency response "
+        "functions; errors_in_variables is for several periods (--period) with noise on the force as well",
+    )  # fmt: skip
     parser.add_argument("--out", type=Path, help="folder for results (default results/RECORD)")
 
 
@@ -22,6 +28,8 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.compare.output import check_folder, write_files
     from study.compare.pictures import level_pictures, pictures
     from study.compare.report import as_json, document, summary, tables
+    from study.explore.files import PAGE
+    from study.explore.saved import of_comparison
     from study.modelfile import read_model
 
     folder = out_folder(arguments)
@@ -38,22 +46,23 @@ def _run(arguments: argparse.Namespace) -> None:
             bar.update()
 
         found = [
-            compare(model, record, how, cutoff=arguments.cutoff, progress=told)
+            compare(model, record, how, cutoff=arguments.cutoff, estimator=arguments.estimator, progress=told)
             for record, how in zip(records, plans, strict=True)
         ]
         for one in found:
             told("pictures")
             prefix = f"{one.record.name}_" if many else ""
             files |= {prefix + name: content for name, content in pictures(one).items()}
+            files[prefix + PAGE] = of_comparison(one)
     moving = across(found)
     files |= level_pictures(moving, found[0].record.units.get("force", "N"))
     files |= {f"{name}.csv": content for name, content in tables(found, moving).items()}
     files["comparison.json"] = as_json(document(found, moving))
     write_files(folder, files)
     print(summary(found, moving))
-    print(
-        f"\n{folder}: comparison.json, {_count(files, '.csv')} tables, {_count(files, '.png')} pictures (PNG and SVG)"
-    )
+    page = "a page for each record" if many else PAGE
+    what = f"{_count(files, '.csv')} tables, {_count(files, '.png')} pictures (PNG and SVG)"
+    print(f"\n{folder}: {page}, comparison.json, {what}")
 
 
 def _count(files: dict[str, bytes], kind: str) -> int:

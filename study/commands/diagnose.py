@@ -2,15 +2,15 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from study.commands.command import Command
 from study.commands.records import add_record_arguments, out_folder, plan_of, read_records
 
 if TYPE_CHECKING:
-    from study.diagnose.verdict import Diagnosis
     from study.model import Model
     from study.record import Record
+    from study.terms import Term
 
 QUIET = 2.0  # seconds of work before progress is shown
 
@@ -28,7 +28,6 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> None:
     from study import terms
     from study.compare.output import check_folder, write_files
-    from study.compare.report import as_json
     from study.diagnose.sources import own_candidates
     from study.modelfile import read_model
 
@@ -41,24 +40,19 @@ def _run(arguments: argparse.Namespace) -> None:
     files: dict[str, bytes] = {}
     records = read_records(arguments)
     for record in records:
-        content, pictures = _one(model, record, arguments, own)
         prefix = f"{record.name}_" if len(records) > 1 else ""
-        files[f"{prefix}diagnosis.json"] = as_json(content)
-        files |= {prefix + name: data for name, data in pictures.items()}
+        files |= {prefix + name: data for name, data in _one(model, record, arguments, own).items()}
     write_files(folder, files)
     print(f"\n{folder}: {', '.join(name for name in files if not name.endswith('.svg'))}")
 
 
-def _one(
-    model: "Model", record: "Record", arguments: argparse.Namespace, own: list[Any]
-) -> tuple[dict[str, Any], dict[str, bytes]]:
+def _one(model: "Model", record: "Record", arguments: argparse.Namespace, own: "list[Term]") -> dict[str, bytes]:
     """Diagnose one record, print what was found, and give the files' contents."""
     from tqdm import tqdm
 
     from study.compare.comparison import compare
-    from study.compare.report import where
     from study.diagnose import report
-    from study.diagnose.pages import files
+    from study.diagnose.files import files, in_words
     from study.diagnose.verdict import diagnose
 
     how = plan_of(arguments, record)
@@ -69,27 +63,12 @@ def _one(
 
         compared = compare(model, record, how, cutoff=arguments.cutoff)
         found = diagnose(model, record, how, extra=own, without=tuple(arguments.without), progress=one_more)
-        said = _said(found, record, how)
+        said = in_words(found, record, how)
     force, length = record.units.get("force", "N"), compared.record.units.get("displacement", "m")
     print(f"{record.name}: {found.verdict.replace('_', ' ')}")
     print(report.table(found, force, length))
     print("\n" + said)
-    content = report.fields(found)
-    content["error"]["force"] = compared.force.total
-    content |= {"record": record.name, "where": where(compared), "says": said}
-    return content, files(found, record.name)
-
-
-def _said(found: "Diagnosis", record: "Record", how: Any) -> str:
-    from study.diagnose.says import sentences
-    from study.diagnose.separate import advice
-    from study.diagnose.verdict import MISSING
-
-    force, length = record.units.get("force", "N"), record.units.get("displacement", "m")
-    said = sentences(found, force, length)
-    if found.verdict == MISSING:
-        said.append(advice(found.candidates, record, how))
-    return " ".join(s for s in said if s)
+    return files(found, compared, said)
 
 
 COMMAND = Command(

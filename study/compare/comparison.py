@@ -7,6 +7,7 @@ import numpy as np
 
 from study import fitting
 from study.compare.amplitude import Growths, growths
+from study.compare.chosen import FREE_RUN, fit_by
 from study.compare.fitted import Coefficient, coefficients, fit_model
 from study.compare.frequency import Band, bands
 from study.compare.judged import Judged, judge
@@ -58,6 +59,8 @@ class Comparison:
         Whether the error changes along the record.
     notes : tuple of str
         What was converted, integrated or left out.
+    estimator : str
+        What found the coefficients.
     """
 
     model: Model
@@ -73,6 +76,7 @@ class Comparison:
     growths: Growths | None
     time: AlongTime
     notes: tuple[str, ...]
+    estimator: str = FREE_RUN
 
     @property
     def response_error(self) -> float:
@@ -102,6 +106,7 @@ def compare(
     *,
     cutoff: float | None = None,
     start: Mapping[str, float] | None = None,
+    estimator: str = FREE_RUN,
     progress: Progress | None = None,
 ) -> Comparison:
     """Fit what a model leaves open to one part of a record and judge it on the other.
@@ -119,6 +124,8 @@ def compare(
         not judged. Found from the record if left out.
     start : mapping of float, optional
         Values to begin the fit from, one for each that is fitted; searched for if left out.
+    estimator : str
+        What finds the coefficients: the fit in free run, or one of ``study.estimators``.
     progress : callable, optional
         Called with what is being done, ``STEPS`` times.
 
@@ -132,20 +139,24 @@ def compare(
     told("motions")
     completed = complete(record, cutoff)
     told("fit")
-    found, how = fit_model(model, completed.record, how, start)
+    errors: Mapping[str, float] = {}
+    if estimator == FREE_RUN:
+        found, how = fit_model(model, completed.record, how, start)
+    else:
+        found, how, errors = fit_by(estimator, model, completed, how)
     told("free run")
     judged = judge(found, completed.record, how, completed.band[0])
     noise = noise_of(judged, completed.record, how.judge[1])
     told("force")
     force = force_error(found.model, completed, how, noise)
     told("where it fails")
-    lacking = restoring(found.model, found.keys, judged, noise, completed, how)
+    lacking = restoring(found.model, (*found.keys, *errors), judged, noise, completed.record, how)
     return Comparison(
         model=model,
         record=completed.record,
         how=how,
         found=found,
-        coefficients=coefficients(found, completed.record, how),
+        coefficients=coefficients(found, completed.record, how, errors),
         judged=judged,
         noise=noise,
         force=force,
@@ -154,7 +165,21 @@ def compare(
         growths=None if noise.alone else growths(lacking),
         time=along_time(judged),
         notes=completed.says,
+        estimator=estimator,
     )
+
+
+def lacking_with(found: Comparison, fit: FreeRunFit) -> Restoring:
+    """The force that another model, fitted to the same part of the same record, lacks.
+
+    Raises
+    ------
+    StudyError
+        If the free run of that model leaves the range of finite numbers.
+    """
+    judged = judge(fit, found.record, found.how, found.judged.low)
+    noise = noise_of(judged, found.record, found.how.judge[1])
+    return restoring(fit.model, (), judged, noise, found.record, found.how)
 
 
 def across(comparisons: Sequence[Comparison]) -> tuple[Level, ...]:

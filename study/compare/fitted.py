@@ -166,13 +166,18 @@ def _with_shape(
     return min(fits, key=lambda f: f.rms)
 
 
-def coefficients(found: FreeRunFit, record: Record, how: Plan) -> tuple[Coefficient, ...]:
-    """Every coefficient with its standard error and unit, in the order of the model."""
-    errors: dict[str, float] = {}
+def coefficients(
+    found: FreeRunFit, record: Record, how: Plan, known: Mapping[str, float] | None = None
+) -> tuple[Coefficient, ...]:
+    """Every coefficient with its standard error and unit, in the order of the model.
+
+    ``known`` holds the standard errors of what was not found in free run.
+    """
+    errors = dict(known or {})
     if found.keys:
         covariance = clustered_covariance(fitting.linearise(found, record, how), found.residual)
         deviations = np.sqrt(np.diag(covariance))
-        errors = {key: float(deviations[i]) for i, key in enumerate(found.keys)}
+        errors |= {key: float(deviations[i]) for i, key in enumerate(found.keys)}
     force, length = record.units.get("force", "N"), record.units.get("displacement", "m")
     return tuple(
         Coefficient(key, entry.name, float(value), errors.get(key), _unit(entry, key, force, length))

@@ -71,11 +71,12 @@ def links(found: Comparison) -> Links:
     bounds = np.linspace(0, n, count + 1).round().astype(np.int64)
     lacking = found.restoring
     block = np.searchsorted(bounds, np.arange(n), side="right") - 1
-    u, v, force, place = (x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force, block))
+    place = block[lacking.inner]
+    u, v, force = (x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force))
     frequency, power = _spectra(found.judged.residual, found.judged.dt, bounds)
-    first = float(found.judged.time[0])
+    times = np.asarray(float(found.judged.time[0]) + bounds * found.judged.dt, dtype=np.float64)
     return Links(
-        first + bounds * found.judged.dt, frequency, power, _classes(u, force, place, count),
+        times, frequency, power, _classes(u, force, place, count),
         _classes(v, force, place, count), _cells(u, v, place, count),
     )  # fmt: skip
 
@@ -100,7 +101,7 @@ def _classes(values: Floats, force: Floats, block: NDArray[np.int64], count: int
     place, inside = _place(values, bounds)
     where = (block * CLASSES + place)[inside]
     visits = np.bincount(where, minlength=count * CLASSES).astype(np.float64)
-    sums = np.bincount(where, force[inside], minlength=count * CLASSES)
+    sums = np.asarray(np.bincount(where, force[inside], minlength=count * CLASSES), dtype=np.float64)
     return Classes(bounds, visits.reshape(count, CLASSES), sums.reshape(count, CLASSES))
 
 

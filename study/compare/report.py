@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from study import modelfile
+from study.compare.chosen import FREE_RUN
 from study.compare.comparison import Comparison
 from study.compare.fitted import Coefficient
 from study.compare.levels import Level
@@ -66,7 +67,7 @@ def _one(found: Comparison) -> Row:
         "coefficients": [coefficient_row(c) for c in found.coefficients],
         "fit": {
             "samples": list(found.how.fit), "judged": list(found.how.judge), "response": found.how.response,
-            "converged": found.found.converged, "message": found.found.message,
+            "estimator": found.estimator, "converged": found.found.converged, "message": found.found.message,
         },
         "where": where(found),
         "test": {
@@ -261,8 +262,9 @@ def _in_units(found: Comparison) -> str:
 
 def _headline(found: Comparison) -> str:
     low, high = found.force.frequency[found.force.band][[0, -1]]
+    by = "" if found.estimator == FREE_RUN else f" by {found.estimator}"
     return (
-        f"model {found.model.name}: fitted to samples {found.how.fit[0]} to {found.how.fit[1]}, "
+        f"model {found.model.name}: fitted to samples {found.how.fit[0]} to {found.how.fit[1]}{by}, "
         f"judged on {found.how.judge[0]} to {found.how.judge[1]}\n"
         f"response: free run, rms difference over rms {found.how.response}; "
         f"force: share of power unexplained, {low:.3g} to {high:.3g} Hz"

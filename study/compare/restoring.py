@@ -21,7 +21,7 @@ from study.compare.noise import Noise
 from study.fitting import Plan
 from study.inputs import history, reverse_inputs
 from study.model import Model, forward_graph, free, with_registers
-from study.motion import SETTLED, CompletedRecord, derivative
+from study.motion import SETTLED, derivative
 from study.record import MOTIONS, Record
 from study.terms import get
 
@@ -37,7 +37,7 @@ class Restoring:
 
     Attributes
     ----------
-    displacement, velocity, acceleration : arrays, shape (n,)
+    displacement, velocity : arrays, shape (n,)
         The motion, free of noise.
     force : array, shape (n,)
         Measured force less inertia and all forces of the model, in the unit of force.
@@ -59,7 +59,6 @@ class Restoring:
 
     displacement: Floats
     velocity: Floats
-    acceleration: Floats
     force: Floats
     free: Floats
     gate: NDArray[np.bool_]
@@ -79,9 +78,7 @@ class Restoring:
         return _filtered(force, self.dt, self.frequency, self.weight * self.gate)
 
 
-def restoring(
-    model: Model, keys: Sequence[str], judged: Judged, noise: Noise, completed: CompletedRecord, how: Plan
-) -> Restoring:
+def restoring(model: Model, keys: Sequence[str], judged: Judged, noise: Noise, record: Record, how: Plan) -> Restoring:
     """The missing force on the judging part.
 
     Parameters
@@ -94,25 +91,24 @@ def restoring(
         Free run and measured response.
     noise : Noise
         Noise of the response.
-    completed : CompletedRecord
-        Record in consistent units.
+    record : Record
+        With all three motions in consistent units.
     how : Plan
         What was fitted and judged.
     """
     gate = above_noise(noise, judged.low)
     motion = _motion(judged, gate, noise.frequency)
-    part = completed.record.part(*how.judge)
+    part = record.part(*how.judge)
     named = part.with_channels(dict(zip(MOTIONS, motion, strict=True)))
     forces = missing_force(model, keys, named)
     width = float(noise.frequency[1])
     return Restoring(
         displacement=motion[0],
         velocity=motion[1],
-        acceleration=motion[2],
         force=forces[:, 0],
         free=forces[:, 1:],
         gate=gate,
-        weight=_weight(completed.record, how, noise.frequency),
+        weight=_weight(record, how, noise.frequency),
         frequency=noise.frequency,
         noise=float(np.sum(noise.density[gate]) * width),
         dt=judged.dt,

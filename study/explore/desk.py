@@ -17,6 +17,8 @@ from study.explore import session as sessions
 from study.explore.files import PAGE, files
 from study.explore.session import Session
 
+SETTLE = 0.4  # seconds in which pages are drawn, before a diagnosis takes the processors
+
 
 @dataclass(frozen=True)
 class State:
@@ -43,7 +45,7 @@ class State:
     notice: str = ""
 
 
-class Overtaken(Exception):
+class OvertakenError(Exception):
     """The model that is being diagnosed is no longer the present one."""
 
 
@@ -56,6 +58,7 @@ class Desk:
         self.model, self.text, self.folder = model, text, folder
         self.watchers: dict[object, Callable[[bool], None]] = {}
         self._lock = threading.RLock()
+        self._rest = threading.Event()  # never set but to end
         self._hand = ThreadPoolExecutor(1, "change")
         self._behind = ThreadPoolExecutor(1, "diagnosis")
         self._actions: Mapping[str, tuple[str, Callable[[str], None]]] = {
@@ -89,6 +92,7 @@ class Desk:
 
     def close(self) -> None:
         """End the threads; work that waits is dropped."""
+        self._rest.set()
         self._hand.shutdown(wait=False, cancel_futures=True)
         self._behind.shutdown(wait=False, cancel_futures=True)
 
@@ -135,29 +139,34 @@ class Desk:
 
     def _save(self, _: str) -> None:
         write_files(self.folder, files(self.session, self.model.name, self.text))
-        self._tell(replace(self.state, notice=f"Saved in {self.folder}: {self.model.name}, {PAGE}, pictures and tables"))
+        self._tell(
+            replace(self.state, notice=f"Saved in {self.folder}: {self.model.name}, {PAGE}, pictures and tables")
+        )
 
     def _examine(self, own: object = None) -> None:
+        self._rest.wait(SETTLE)
         asked = self.session
         model = asked.now.model
         if asked.now.diagnosis is not None and own is None:
             return
 
         def one_more(count: int) -> None:
-            if self.session.now.model != model:
-                raise Overtaken
+            if self.session.now.model != model or self._rest.is_set():
+                raise OvertakenError
             self._tell(replace(self.state, diagnosing=f"diagnosing: {count} candidates tried"))
 
         try:
             self._tell(replace(self.state, diagnosing="diagnosing"))
-            found, said = sessions.examined(asked, one_more)
+            rung, _ = sessions.examined(asked, one_more)
             with self._lock:
-                current = sessions.with_diagnosis(self.session, model, found, said)
+                current = sessions.with_rung(self.session, rung)
                 self._tell(replace(self.state, diagnosing=""), current)
-        except Overtaken:
+        except OvertakenError:
             self._tell(replace(self.state, diagnosing=""))
         except StudyError as error:
             self._tell(replace(self.state, diagnosing="", notice=str(error)))
         except Exception as error:
             traceback.print_exc()
-            self._tell(replace(self.state, diagnosing="", notice=f"the diagnosis failed ({type(error).__name__}: {error})"))
+            self._tell(
+                replace(self.state, diagnosing="", notice=f"the diagnosis failed ({type(error).__name__}: {error})")
+            )

@@ -3,7 +3,7 @@
 from study import ladder, modelfile
 from study.compare.pictures import pictures
 from study.compare.report import as_json, document
-from study.diagnose import pages
+from study.diagnose.files import files as diagnosis_files
 from study.explore.saved import saved
 from study.explore.session import Session
 from study.figures.ladder import files as ladder_pictures
@@ -38,5 +38,5 @@ def files(session: Session, name: str, text: str) -> dict[str, bytes]:
     }
     found |= pictures(now.comparison) | ladder_pictures(steps, stem)
     if now.diagnosis is not None:
-        found |= pages.files(now.diagnosis, session.record.name)
+        found |= diagnosis_files(now.diagnosis, now.comparison, now.said)
     return found

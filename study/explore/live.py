@@ -9,7 +9,7 @@ from bokeh.models import ColumnDataSource, CustomJS
 
 from study.explore import decimate, page, preview
 from study.explore.desk import Desk
-from study.explore.view import View, over_time, scales_of, shown, view, within
+from study.explore.view import View, over_time, scales_of, view, within
 
 
 class Watcher:
@@ -41,7 +41,7 @@ class Watcher:
         rungs = self.desk.session.rungs
         return view(rungs[-1], len(rungs) - 1)
 
-    def _state(self) -> dict[str, list[Any]]:
+    def _state(self) -> dict[str, Any]:
         state, many = self.desk.state, len(self.desk.session.rungs) > 1
         return {
             "busy": [state.busy], "doing": [state.busy or state.diagnosing], "answer": [state.answer],
@@ -79,6 +79,6 @@ class Watcher:
         self.span = span
         rung = self.desk.session.now
         found, scales = rung.comparison, scales_of(rung.comparison)
-        rows = preview.difference(found, shown(rung), scales, within(found, span))
+        rows = preview.difference(found, rung.shown, scales, within(found, span))
         self.page.sources["would_time"].data = rows
         self.page.sources["time"].data = over_time(found, scales, span)

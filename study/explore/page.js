@@ -32,8 +32,10 @@ window.study = (() => {
     const ghost = (name, x, y) => put(name, has ? {[x[0]]: column(x[1], x[2]), y: column(y, String(i))} : {[x[0]]: [], y: []})
     ghost("ghost_time", ["t", "time", "t"], "would_time")
     ghost("ghost_spectrum", ["f", "spectrum", "f"], "would_spectrum")
-    ghost("ghost_u", ["at", "against_u", "at"], "would_u")
-    ghost("ghost_v", ["at", "against_v", "at"], "would_v")
+    for (const of of ["u", "v"]) {
+      const [at, y] = has ? [column(`would_${of}`, `at${i}`), column(`would_${of}`, `y${i}`)] : [[], []]
+      put(`ghost_${of}`, {at, y})
+    }
     if (has && kept === null) kept = column("plane", "mean")
     if (kept !== null) {
       const mean = has ? column("would_plane", String(i)) : kept
@@ -56,7 +58,8 @@ window.study = (() => {
     if (element) model("constancy_y").axis_label = element.dataset.label
     const title = place("constancy-of")
     if (title) title.textContent = element ? element.querySelector(".name b").textContent : ""
-    const empty = place("constancy-none")
+    const card = place("constancy-card"), empty = place("constancy-none")
+    if (card) card.hidden = !element
     if (empty) empty.hidden = !element || shown.f.length > 0
     for (const row of document.querySelectorAll("[data-candidate]")) row.classList.toggle("shown", row === element)
   }

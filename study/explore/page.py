@@ -83,7 +83,7 @@ def build(seen: View, ladder: Columns, stores: Sequence[ColumnDataSource] = ()) 
         panels[name].js_on_event("selectiongeometry", CustomJS(args={"kind": kind}, code=SELECTED))
         panels[name].js_on_event("reset", CustomJS(code="window.study.clear()"))
     # What no panel draws has to hang on one all the same, to be part of the document.
-    panels["response"].tags = [*(s for n, s in sources.items()), *stores]
+    panels["response"].tags = [*sources.values(), *stores]
     return Page(sources, panels)
 
 

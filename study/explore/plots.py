@@ -33,9 +33,7 @@ def difference(s: Sources, time: Any) -> Any:
     noise = drawn.multi_line("t", "level", source=s["noise"], **style.NOISE)
     style.chosen(drawn, "box_difference")
     style.follows(drawn, [line, noise])
-    style.legend(
-        drawn, [("measured less predicted", [line]), ("± twice the noise", [noise]), ("candidate", [would])]
-    )
+    style.legend(drawn, [("measured less predicted", [line]), ("± twice the noise", [noise]), ("candidate", [would])])
     return drawn
 
 

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from study.compare.comparison import Comparison
 from study.compare.noise import segments_of
-from study.compare.restoring import missing_force
-from study.compare.surface import curve, surface
+from study.compare.restoring import Restoring
+from study.compare.surface import CLASSES, curve, surface
 from study.diagnose.ranking import Ranked
-from study.errors import StudyError
 from study.explore import decimate
+from study.explore.session import Rung
 from study.spectra import autospectrum
 
 if TYPE_CHECKING:
@@ -22,18 +22,31 @@ Floats = NDArray[np.float64]
 Columns = dict[str, Any]
 
 
-def columns(found: Comparison, rows: Sequence[Ranked], scales: "Scales") -> dict[str, Columns]:
-    """For each candidate a column, named by its place: difference, its spectrum, and the missing force."""
-    forces = [_force(found, row) for row in rows]
-    lacking, keep = found.restoring, found.restoring.inner
-    u, v = lacking.displacement[keep], lacking.velocity[keep]
+def columns(rung: Rung, scales: "Scales") -> dict[str, Columns]:
+    """For each candidate what it would leave, under its place: difference, its spectrum, and the missing force."""
+    found, rows = rung.comparison, rung.shown
+    lacking = [rung.would[row.name] for row in rows]
     return {
         "would_time": difference(found, rows, scales),
         "would_spectrum": {str(i): _spectrum(found, row, scales) for i, row in enumerate(rows)},
-        "would_u": {str(i): curve(u, f[keep]).mean / scales.force.factor for i, f in enumerate(forces)},
-        "would_v": {str(i): curve(v, f[keep]).mean / scales.force.factor for i, f in enumerate(forces)},
-        "would_plane": {str(i): surface(u, v, f[keep]).mean.ravel() for i, f in enumerate(forces)},
+        "would_u": _curves([(r.displacement, r) for r in lacking], scales.displacement.factor, scales.force.factor),
+        "would_v": _curves([(r.velocity, r) for r in lacking], scales.velocity.factor, scales.force.factor),
+        "would_plane": {str(i): _map(r) for i, r in enumerate(lacking)},
     }
+
+
+def _curves(lacking: Sequence[tuple[Floats, Restoring]], along: float, factor: float) -> Columns:
+    """A curve for each candidate, all of one length: what is short ends without value."""
+    found: Columns = {}
+    for i, (values, force) in enumerate(lacking):
+        line = curve(values[force.inner], force.force[force.inner])
+        for name, column in ((f"at{i}", line.at / along), (f"y{i}", line.mean / factor)):
+            found[name] = np.pad(column, (0, CLASSES - len(column)), constant_values=np.nan)
+    return found
+
+
+def _map(lacking: Restoring) -> Floats:
+    return surface(*(x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force))).mean.ravel()
 
 
 def difference(found: Comparison, rows: Sequence[Ranked], scales: "Scales", part: slice = slice(None)) -> Columns:
@@ -47,14 +60,3 @@ def _spectrum(found: Comparison, row: Ranked, scales: "Scales") -> Floats:
     frequency, density = autospectrum(row.residual, found.judged.dt, cut)
     keep = (frequency > 0.0) & (frequency <= found.force.highest)
     return np.sqrt(density[keep]) / scales.difference.factor
-
-
-def _force(found: Comparison, row: Ranked) -> Floats:
-    """The missing force with a candidate in the model, along the same motion; as it is where that has no value."""
-    lacking = found.restoring
-    motion = {name: getattr(lacking, name) for name in ("displacement", "velocity", "acceleration")}
-    record = found.record.part(*found.how.judge).with_channels(motion)
-    try:
-        return missing_force(row.found.model, (), record)[:, 0]
-    except StudyError:
-        return lacking.force

@@ -3,14 +3,15 @@
 import json
 from collections.abc import Sequence
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 from bokeh.document import Document
 from bokeh.models import ColumnDataSource, CustomJS
 from bokeh.resources import Resources
 
+from study.compare.comparison import Comparison
 from study.explore import page
-from study.explore.session import Session
+from study.explore.session import Rung, Session
 from study.explore.view import Columns, view
 
 EMBED = "Bokeh.safely(() => Bokeh.embed.embed_items({docs}, {items}))"
@@ -46,6 +47,12 @@ def saved(session: Session) -> bytes:
     return text.encode()
 
 
+def of_comparison(found: Comparison) -> bytes:
+    """The same of a comparison alone, which nobody has diagnosed."""
+    rung = Rung(found.model, "as given", None, found)
+    return saved(Session(found.record, found.how, None, (rung,)))
+
+
 def _marked(ladder: Columns, place: int) -> Columns:
     """The ladder with a larger dot where the page stands."""
     size = [6.0] * len(ladder["size"])
@@ -64,9 +71,10 @@ def _numbered(content: Any) -> tuple[Any, dict[str, str]]:
 
     def walk(value: Any) -> Any:
         if isinstance(value, dict):
-            return {key: name(item) if key == "id" else walk(item) for key, item in value.items()}
-        if isinstance(value, Sequence) and not isinstance(value, str | bytes):
-            return [walk(item) for item in value]
+            pairs = cast("dict[str, Any]", value).items()
+            return {key: name(item) if key == "id" else walk(item) for key, item in pairs}
+        if isinstance(value, list | tuple):
+            return [walk(item) for item in cast("Sequence[Any]", value)]
         return value
 
     def name(item: Any) -> Any:

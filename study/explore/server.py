@@ -2,10 +2,13 @@
 
 import errno
 from collections.abc import Callable
+from typing import Any
 
 from bokeh.application import Application
 from bokeh.application.handlers import FunctionHandler
+from bokeh.document import Document
 from bokeh.server.server import Server
+from bokeh.server.util import bind_sockets
 
 from study.errors import StudyError
 from study.explore.desk import Desk
@@ -13,6 +16,7 @@ from study.explore.live import Watcher
 
 HOST = "127.0.0.1"
 USUAL = 5006
+DAY = 86400  # seconds within which a page that was fetched must open its socket
 
 
 def serve(desk: Desk, port: int | None, ready: Callable[[str], None]) -> None:
@@ -36,18 +40,16 @@ def serve(desk: Desk, port: int | None, ready: Callable[[str], None]) -> None:
     server = _bound(application, port)
     server.start()
     desk.diagnose()
-    server.io_loop.add_callback(ready, f"http://{HOST}:{server.port}/")
+    loop: Any = server.io_loop  # Tornado leaves what its callbacks give back untyped
+    loop.add_callback(ready, f"http://{HOST}:{server.port}/")
     try:
-        server.io_loop.start()
+        loop.start()
     finally:
         desk.close()
         server.stop()
 
 
-def _watched(desk: Desk, document: object) -> None:
-    from bokeh.document import Document
-
-    assert isinstance(document, Document)
+def _watched(desk: Desk, document: Document) -> None:
     Watcher(desk, document)
 
 
@@ -65,10 +67,10 @@ def _bound(application: Application, port: int | None) -> Server:
 
 
 def _server(application: Application, port: int) -> Server:
-    from bokeh.server.util import bind_sockets
-
     sockets, bound = bind_sockets(HOST, port)
     for socket in sockets:
         socket.close()
     origins = [f"{host}:{bound}" for host in (HOST, "localhost")]
-    return Server({"/": application}, address=HOST, port=bound, allow_websocket_origin=origins, session_token_expiration=86400)
+    return Server(
+        {"/": application}, address=HOST, port=bound, allow_websocket_origin=origins, session_token_expiration=DAY
+    )

@@ -4,26 +4,27 @@ Every function gives a new session; what was found of a model stays with its run
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from study import fitting
-from study.compare.comparison import Comparison, compare
+from study import expression, fitting
+from study.compare.comparison import Comparison, compare, lacking_with
 from study.compare.report import rung as ladder_step
+from study.compare.restoring import Restoring
 from study.diagnose import candidates, search
 from study.diagnose.candidates import Trial
+from study.diagnose.files import in_words
 from study.diagnose.ranking import Ranked, rank
-from study.diagnose.says import sentences
-from study.diagnose.separate import advice
-from study.diagnose.verdict import MISSING, Diagnosis, diagnose
+from study.diagnose.verdict import Diagnosis, diagnose
 from study.errors import StudyError
 from study.fitting import Plan
 from study.model import Model
 from study.record import Record
-from study.terms import Term, custom
+from study.terms import LIBRARY, Term, custom
 
 Step = dict[str, Any]
 Told = Callable[[str], None]
+SHOWN = 8  # candidates
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,8 @@ class Rung:
         What is missing; None as long as nobody has asked.
     said : str
         The diagnosis in words.
+    would : dict
+        By the name of a candidate: the force that the model would lack with it.
     """
 
     model: Model
@@ -52,6 +55,13 @@ class Rung:
     comparison: Comparison
     diagnosis: Diagnosis | None = None
     said: str = ""
+    would: Mapping[str, Restoring] = field(default_factory=dict[str, Restoring])
+
+    @property
+    def shown(self) -> tuple[Ranked, ...]:
+        """The candidates that a page lists: the best, and all of the user's own."""
+        rows = self.diagnosis.candidates if self.diagnosis is not None else ()
+        return (*rows[:SHOWN], *(r for r in rows[SHOWN:] if r.name not in LIBRARY))
 
     @property
     def values(self) -> dict[str, float]:
@@ -173,24 +183,31 @@ def with_held(session: Session, key: str, hold: bool) -> Session:
     return climbed(session, model, f"{key} {'held' if hold else 'free'}", now, None)
 
 
-def examined(session: Session, progress: Callable[[int], None] | None = None) -> tuple[Diagnosis, str]:
-    """Diagnose the present model: what is missing, and the same in words."""
+def examined(session: Session, progress: Callable[[int], None] | None = None) -> tuple[Rung, Diagnosis]:
+    """The present rung with its diagnosis, and that: what is missing, the same in words, and what each candidate would leave."""
     record, how = session.record, session.how
     found = diagnose(session.now.model, record, how, extra=session.own, progress=progress)
-    return found, in_words(found, record, how)
+    return _foreseen(replace(session.now, diagnosis=found, said=in_words(found, record, how))), found
 
 
-def in_words(found: Diagnosis, record: Record, how: Plan) -> str:
-    """A diagnosis in sentences, with the test that would part a tie."""
-    said = sentences(found, record.units.get("force", "N"), record.units.get("displacement", "m"))
-    if found.verdict == MISSING:
-        said.append(advice(found.candidates, record, how))
-    return " ".join(s for s in said if s)
+def _foreseen(rung: Rung) -> Rung:
+    """The rung with what each candidate that is shown would leave; one that cannot run leaves what there is."""
+    would = dict(rung.would)
+    for row in rung.shown:
+        if row.name not in would:
+            try:
+                would[row.name] = lacking_with(rung.comparison, row.found)
+            except StudyError:
+                would[row.name] = rung.comparison.restoring
+    return replace(rung, would=would)
 
 
-def with_diagnosis(session: Session, model: Model, found: Diagnosis, said: str) -> Session:
-    """The session with a diagnosis at the rungs of its model; unchanged if that was undone meanwhile."""
-    rungs = (replace(r, diagnosis=found, said=said) if r.model == model else r for r in session.rungs)
+def with_rung(session: Session, rung: Rung) -> Session:
+    """The session with a diagnosed rung in place of those of its model; unchanged if that was undone meanwhile."""
+    rungs = (
+        replace(r, diagnosis=rung.diagnosis, said=rung.said, would=rung.would) if r.model == rung.model else r
+        for r in session.rungs
+    )
     return replace(session, rungs=tuple(rungs))
 
 
@@ -208,6 +225,12 @@ def own_term(session: Session, text: str) -> Term:
         name = next(f"own_{i}" for i in range(1, len(taken) + 2) if f"own_{i}" not in taken)
         formula = text
     term = custom(name.strip(), formula.strip())
+    known = ("u", "v", "t", *session.record.extra)
+    for used in expression.names(formula.strip()):
+        if used not in known:
+            raise StudyError(
+                f"the expression {formula.strip()!r} uses the name {used!r}; it may use {', '.join(known)}"
+            )
     if term.name in taken:
         raise StudyError(f"the name {term.name!r} is taken; another name is right")
     return term
@@ -237,4 +260,4 @@ def tried(session: Session, text: str) -> Session:
         trial = candidates.refitted(trial, record, how, held)
     rows = rank([*(Trial(r.term, r.found, r.residual) for r in found.candidates), trial], found.residual, record, how)
     ranked = replace(found, candidates=tuple(rows))
-    return replace(with_diagnosis(session, now.model, ranked, now.said), own=(*session.own, term))
+    return replace(with_rung(session, _foreseen(replace(now, diagnosis=ranked))), own=(*session.own, term))

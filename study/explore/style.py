@@ -1,4 +1,4 @@
-"""The look of every panel: one place for colours, fonts and tools. Lines differ in weight and dash, not in colour alone."""
+"""The look of every panel: colours, fonts and tools. Lines differ in weight and dash, not in colour alone."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,7 +7,6 @@ from bokeh.models import (
     BoxAnnotation,
     BoxSelectTool,
     DataRange1d,
-    GlyphRenderer,
     Legend,
     LegendItem,
     PanTool,
@@ -31,8 +30,15 @@ PASSING = ("candidate", "selected")  # entries of legends
 
 
 def panel(
-    name: str, height: int, x: str, y: str, *, select: str = "", ranges: tuple[Any, Any] = (None, None),
-    narrow: bool = False, **more: Any
+    name: str,
+    height: int,
+    x: str,
+    y: str,
+    *,
+    select: str = "",
+    ranges: tuple[Any, Any] = (None, None),
+    narrow: bool = False,
+    **more: Any,
 ) -> Any:
     """A figure in the page's style.
 
@@ -56,9 +62,10 @@ def panel(
     tools: list[Any] = [PanTool(dimensions="width"), WheelZoomTool(dimensions="width"), ResetTool(), SaveTool()]
     if select:
         tools.insert(0, BoxSelectTool(dimensions="width", renderers=[]))
-    drawn = figure(
-        name=f"panel_{name}", height=height, sizing_mode="stretch_width", min_width=140, tools=tools, x_axis_label=x, y_axis_label=y,
-        x_range=ranges[0] or DataRange1d(range_padding=0.0), y_range=ranges[1] or DataRange1d(range_padding=0.06),
+    drawn: Any = figure(
+        name=f"panel_{name}", height=height, sizing_mode="stretch_width", min_width=140, tools=tools,
+        x_axis_label=x, y_axis_label=y, x_range=ranges[0] or DataRange1d(range_padding=0.0),
+        y_range=ranges[1] or DataRange1d(range_padding=0.06),
         active_drag=tools[0] if select else None, active_scroll=None, toolbar_location="right", min_border_right=6,
         **more,
     )  # fmt: skip
@@ -70,7 +77,8 @@ def panel(
     for axis, side in ((drawn.xaxis[0], "x"), (drawn.yaxis[0], "y")):
         _axis(axis, f"{name}_{side}")
     if narrow and "x_axis_type" not in more:
-        drawn.xaxis[0].ticker.desired_num_ticks = 4
+        ticker: Any = drawn.xaxis[0].ticker
+        ticker.desired_num_ticks = 4
     for grid in drawn.grid:
         grid.grid_line_color = RULE
     return drawn
@@ -88,25 +96,25 @@ def _axis(axis: Any, name: str) -> None:
     axis.major_tick_in, axis.major_tick_out = 0, 4
 
 
-def legend(drawn: Any, items: Sequence[tuple[str | dict[str, str], list[Any]]], place: str = "above", **more: Any) -> Any:
-    """A legend above the panel, or within it at ``place``."""
-    words = Legend(
+def legend(drawn: Any, items: Sequence[tuple[Any, list[Any]]], place: Any = "above") -> None:
+    """A legend above the panel, or within it at ``place``; a label is a text or a field of the source."""
+    words: Any = Legend(
         items=[_item(label, renderers, drawn.name) for label, renderers in items],
         orientation="horizontal" if place == "above" else "vertical", label_text_font=FONT,
         label_text_font_size="11px", label_text_color=INK, label_standoff=4, border_line_color=None,
-        background_fill_alpha=0.8, padding=0, margin=5, spacing=9 if place == "above" else 0, glyph_width=20,
-        glyph_height=14, label_height=14, **more,
+        background_fill_alpha=0.8, margin=5, spacing=9 if place == "above" else 0, glyph_width=20,
+        glyph_height=14, label_height=14,
     )  # fmt: skip
+    words.padding = 0
     if place == "above":
-        words.location = (-34, 0)
+        words.location = (-34, 5)
         drawn.add_layout(words, "above")
     else:
         words.location = place
         drawn.add_layout(words)
-    return words
 
 
-def _item(label: str | dict[str, str], renderers: list[Any], panel: str) -> LegendItem:
+def _item(label: Any, renderers: list[Any], panel: str) -> LegendItem:
     """An entry; that of what comes and goes is shown by the page's script when it is there."""
     item = LegendItem(label=label, renderers=renderers)
     if label in PASSING:
@@ -124,7 +132,7 @@ def chosen(drawn: Any, name: str) -> BoxAnnotation:
     return box
 
 
-def follows(drawn: Any, renderers: Sequence[GlyphRenderer]) -> None:
+def follows(drawn: Any, renderers: Sequence[Any]) -> None:
     """Let the range of y follow these alone: what is previewed or highlighted does not move an axis."""
     if isinstance(drawn.y_range, DataRange1d):
         drawn.y_range.renderers = list(renderers)
@@ -132,4 +140,4 @@ def follows(drawn: Any, renderers: Sequence[GlyphRenderer]) -> None:
 
 def fixed(name: str, start: float, end: float) -> Range1d:
     """A range that panels share."""
-    return Range1d(start, end, name=name)
+    return Range1d(start=start, end=end, name=name)

@@ -14,15 +14,13 @@ from study.diagnose.ranking import Ranked
 from study.diagnose.steadiness import Curve as Steadiness
 from study.explore import decimate, preview, words
 from study.explore.session import Rung
-from study.terms import LIBRARY
-from study.figures.labels import power_of_ten
 from study.explore.units import Scale, in_text, length, rate
+from study.figures.labels import power_of_ten
 
 Floats = NDArray[np.float64]
 Columns = dict[str, Any]
 NINETY_FIVE = 1.96  # standard errors to each side
 SURE = 2.0  # standard errors: cells whose mean is below may be noise
-SHOWN = 8  # candidates
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,7 @@ def view(rung: Rung, step: int, live: bool = True) -> View:
         Whether the page can act (a saved one cannot).
     """
     found, scales = rung.comparison, scales_of(rung.comparison)
-    rows = shown(rung)
+    rows = rung.shown
     columns = {
         "time": over_time(found, scales),
         "close": _close(found, scales),
@@ -83,23 +81,17 @@ def view(rung: Rung, step: int, live: bool = True) -> View:
         "against_u": _against(found, "displacement", scales.displacement, scales.force),
         "against_v": _against(found, "velocity", scales.velocity, scales.force),
         "constancy": _constancy(rows),
-        **preview.columns(found, rows, scales),
+        **preview.columns(rung, scales),
         **_links(found, scales),
         "words": words.words(rung, rows, step, live),
     }
     return View({name: _small(c) for name, c in columns.items()}, scales, found.force.highest, found.how.response)
 
 
-def shown(rung: Rung) -> tuple[Ranked, ...]:
-    """The candidates that a page lists: the best, and all of the user's own."""
-    rows = rung.diagnosis.candidates if rung.diagnosis is not None else ()
-    return (*rows[:SHOWN], *(r for r in rows[SHOWN:] if r.name not in LIBRARY))
-
-
 def _small(columns: Columns) -> Columns:
     """Single precision: a screen shows no more, and a saved page is half as large."""
     return {
-        name: c.astype(np.float32) if isinstance(c, np.ndarray) and c.dtype == np.float64 else c
+        name: np.asarray(c, dtype=np.float32) if getattr(c, "dtype", None) == np.float64 else c
         for name, c in columns.items()
     }
 

@@ -16,7 +16,9 @@ from study.figures.labels import power_of_ten, term_names
 VERDICTS = {MISSING: "An effect is missing", NOTHING: "Nothing is missing"}
 UNKNOWN = "Something is missing that no candidate explains"
 WAITING = "Candidates are being tried …"
-NOT_ASKED = "Not asked for here: <code>study diagnose</code> or <code>study explore</code> tells which effect is missing."
+NOT_ASKED = (
+    "Not asked for here: <code>study diagnose</code> or <code>study explore</code> tells which effect is missing."
+)
 TIES = 2  # that a row names
 
 
@@ -59,7 +61,8 @@ def equation(rung: Rung) -> str:
 
 def _figures(found: Comparison) -> str:
     size = found.response_error * found.judged.size
-    shown = (length if found.how.response == "displacement" else rate)(found.record.units.get(found.how.response, ""), size)
+    scaled = length if found.how.response == "displacement" else rate
+    shown = scaled(found.record.units.get(found.how.response, ""), size)
     rms = f"rms {size / shown.factor:.3g} {in_text(shown.unit)}"
     cells = (
         ("error", "Error of the response", percent(found.response_error), f"{rms}, free run, held out"),
@@ -83,7 +86,8 @@ def _candidates(rung: Rung, rows: Sequence[Ranked], live: bool) -> str:
     if rung.diagnosis is None:
         return ""
     scale = "".join(f"<span style='left:{x}%'>{x}</span>" for x in (0, 50, 100))
-    head = f"<li class='scale'><span class='head'>effect, and the share of the difference that it explains / %</span><i class='axis'>{scale}</i></li>"
+    what = "effect, and the share of the difference that it explains / %"
+    head = f"<li class='scale'><span class='head'>{what}</span><i class='axis'>{scale}</i></li>"
     more = len(rung.diagnosis.candidates) - len(rows)
     rest = f"<li class='more'>{more} more explain less</li>" if more > 0 else ""
     return f"<ol>{head}{''.join(_row(i, row, rung, live) for i, row in enumerate(rows))}{rest}</ol>"
@@ -96,27 +100,28 @@ def _row(place: int, row: Ranked, rung: Rung, live: bool) -> str:
     explained = f"{100.0 * row.gain.explained:.1f} ± {100.0 * row.gain.error:.1f} %"
     formula = escape(in_text(row.term.formula))
     what = f"<b>{escape(in_words(row.name))}</b>"
+    meaning = row.term.meaning[0].upper() + row.term.meaning[1:]
     size = f"{number(row.coefficient)} ± {number(1.96 * row.error, 2)} {in_text(unit)}"
     return (
         f"<li class='candidate' data-candidate='{place}' data-label='{escape(_label(row, unit))}' tabindex='0'>"
         f"<span class='rank'>{_rank(place, row, rung)}</span><span class='name'>{what}</span>"
         f"{_bar(row)}<span class='explained'>{explained}</span>{add}"
         f"<small>{_ties(row)}<i>{formula}</i>; <em>{escape(size)}</em>, error with it {percent(row.response_error)}. "
-        f"{escape(row.term.meaning[0].upper() + row.term.meaning[1:])}; common cause: {escape(row.term.cause)}.</small></li>"
+        f"{escape(meaning)}; common cause: {escape(row.term.cause)}.</small></li>"
     )
 
 
 def _label(row: Ranked, unit: str) -> str:
     """Label of the axis on which the candidate's coefficient is drawn."""
-    symbol = "|" + ", ".join(row.term.symbols) + "|" if len(row.term.symbols) > 1 else row.term.symbols[0]
+    symbols = ", ".join(row.term.symbols)
+    symbol = f"|{symbols}|" if "," in symbols else symbols
     return f"{symbol} / {in_text(power_of_ten(abs(row.coefficient))[1] + unit)}"
 
 
 def _rank(place: int, row: Ranked, rung: Rung) -> str:
     """The place; a tie with the first is no place of its own."""
-    assert rung.diagnosis is not None
-    first = rung.diagnosis.candidates[0]
-    return "=" if place and row.name in first.tied_with else str(place + 1)
+    ties = next((r.tied_with for r in (rung.diagnosis.candidates if rung.diagnosis else ())), ())
+    return "=" if place and row.name in ties else str(place + 1)
 
 
 def _ties(row: Ranked) -> str:
@@ -133,9 +138,8 @@ def _bar(row: Ranked) -> str:
     share, error = 100.0 * row.gain.explained, 100.0 * row.gain.error
     low, high = (min(max(x, 0.0), 100.0) for x in (share - error, share + error))
     grid = "".join(f"<line class='grid' x1='{x}' x2='{x}' y1='0' y2='16'/>" for x in (0, 25, 50, 75, 100))
-    whisker = (
-        f"<path class='whisker' d='M{low:.2f} 8H{high:.2f}M{low:.2f} 5V11M{high:.2f} 5V11' vector-effect='non-scaling-stroke'/>"
-    )
+    ends = f"M{low:.2f} 8H{high:.2f}M{low:.2f} 5V11M{high:.2f} 5V11"
+    whisker = f"<path class='whisker' d='{ends}' vector-effect='non-scaling-stroke'/>"
     return (
         f"<svg class='bar' viewBox='0 0 100 16' preserveAspectRatio='none'>{grid}"
         f"<rect x='0' y='3' width='{min(max(share, 0.0), 100.0):.2f}' height='10'/>{whisker}</svg>"
@@ -154,5 +158,6 @@ def _coefficient(found: Coefficient, live: bool) -> str:
     return (
         f"<tr data-key='{escape(found.key)}'><td><i>{escape(found.key.rpartition('.')[2])}</i></td>"
         f"<td>{escape(in_words(found.term))}</td>"
-        f"<td class='number'>{number(found.value, 5)}</td><td>{half}</td><td>{escape(in_text(found.unit))}</td><td>{button}</td></tr>"
+        f"<td class='number'>{number(found.value, 5)}</td><td>{half}</td><td>{escape(in_text(found.unit))}</td>"
+        f"<td>{button}</td></tr>"
     )

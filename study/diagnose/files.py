@@ -1,0 +1,36 @@
+"""A diagnosis in words, and as the files that a command writes."""
+
+from study.compare.comparison import Comparison
+from study.compare.report import as_json, where
+from study.diagnose import pages, report
+from study.diagnose.says import sentences
+from study.diagnose.separate import advice
+from study.diagnose.verdict import MISSING, Diagnosis
+from study.fitting import Plan
+from study.record import Record
+
+
+def in_words(found: Diagnosis, record: Record, how: Plan) -> str:
+    """A diagnosis in sentences, with the test that would part a tie."""
+    said = sentences(found, record.units.get("force", "N"), record.units.get("displacement", "m"))
+    if found.verdict == MISSING:
+        said.append(advice(found.candidates, record, how))
+    return " ".join(s for s in said if s)
+
+
+def files(found: Diagnosis, compared: Comparison, said: str) -> dict[str, bytes]:
+    """``diagnosis.json`` and the pictures by file name.
+
+    Parameters
+    ----------
+    found : Diagnosis
+        What is missing.
+    compared : Comparison
+        The same model held against the same record.
+    said : str
+        The diagnosis in words.
+    """
+    content = report.fields(found)
+    content["error"]["force"] = compared.force.total
+    content |= {"record": compared.record.name, "where": where(compared), "says": said}
+    return {"diagnosis.json": as_json(content)} | pages.files(found, compared.record.name)

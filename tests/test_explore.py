@@ -1,0 +1,277 @@
+"""``study explore`` without a browser: decimation, the session, what is saved, and the desk that runs it all."""
+
+import re
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study import cli, fitting, ladder, modelfile, trials
+from study.compare.links import links
+from study.compare.surface import curve, surface
+from study.errors import StudyError
+from study.explore import decimate, page, units, view, words
+from study.explore import session as sessions
+from study.explore.desk import Desk
+from study.explore.files import PAGE, files
+from study.explore.saved import saved
+from study.model import Model, free
+from study.terms import get
+
+TEXT = """# the rig in hall 3
+name: rig
+terms:
+  - inertia            # weighed
+  - linear_damping
+  - {term: linear_stiffness}   # from the drawing
+"""
+
+
+@pytest.fixture(scope="module")
+def trial() -> trials.Trial:
+    return trials.make_trial(911, hidden=["quadratic_damping"], noise=0.01, response="displacement")
+
+
+@pytest.fixture(scope="module")
+def begun(trial: trials.Trial) -> sessions.Session:
+    record = replace(trial.record.part(0, 4096), name="rig")
+    return sessions.begin(trial.believed, record, fitting.plan(record))
+
+
+@pytest.fixture(scope="module")
+def asked(begun: sessions.Session) -> sessions.Session:
+    return sessions.with_rung(begun, sessions.examined(begun)[0])
+
+
+@pytest.fixture(scope="module")
+def grown(asked: sessions.Session) -> sessions.Session:
+    return sessions.with_added(asked, "quadratic_damping")
+
+
+@pytest.mark.parametrize("samples", [7, 100, 101, 999, 65536])
+def test_decimation_keeps_every_peak(samples):
+    values = np.random.default_rng(samples).standard_normal(samples)
+    values[samples // 3], values[samples // 2] = 40.0, -50.0
+    shown = decimate.extremes(values, 50)
+    assert len(shown) == min(samples, 100) == len(decimate.times(np.arange(samples), 50))
+    assert (shown.max(), shown.min()) == (40.0, -50.0)
+    assert np.all(np.isin(shown, values))
+
+
+def test_decimated_peaks_stand_where_they_are():
+    values = np.zeros(10000)
+    values[[1234, 7777]] = 5.0, -5.0
+    time = decimate.times(np.arange(10000.0), 100)
+    shown = decimate.extremes(values, 100)
+    assert abs(time[np.argmax(shown)] - 1234) <= 100
+    assert abs(time[np.argmin(shown)] - 7777) <= 100
+
+
+def test_adding_what_is_missing_lets_the_error_fall_and_undoing_brings_it_back(asked, grown):
+    before, after = asked.now.comparison, grown.now.comparison
+    assert asked.now.diagnosis.candidates[0].name == "quadratic_damping"
+    assert before.response_error > 1.4 * before.noise_floor
+    assert after.response_error == pytest.approx(after.noise_floor, rel=0.1)
+    assert [s["added"] for s in grown.steps] == [None, "quadratic_damping"]
+    assert sessions.undone(grown) == asked
+    assert sessions.undone(asked) is asked
+    with pytest.raises(StudyError, match="no candidate of the present model"):
+        sessions.with_added(grown, "quadratic_damping")
+
+
+def test_an_added_term_is_what_add_would_have_found(grown):
+    from study.compare.comparison import compare
+
+    anew = compare(grown.now.model, grown.record, grown.how)
+    assert grown.now.comparison.response_error == pytest.approx(anew.response_error, rel=1e-3)
+
+
+def test_a_value_is_held_where_it_stands_and_freed_again(grown):
+    held = sessions.with_held(grown, "k", True)
+    assert held.now.model.values["k"] == grown.now.values["k"] == held.now.values["k"]
+    assert next(c for c in held.now.comparison.coefficients if c.key == "k").held
+    freed = sessions.with_held(held, "k", False)
+    assert freed.now.model == grown.now.model
+    assert freed.now.comparison.response_error == pytest.approx(grown.now.comparison.response_error, rel=1e-3)
+    for key, hold, said in (("k", True, "held already"), ("no", True, "no value of this model"), ("m", False, "free")):
+        with pytest.raises(StudyError, match=said):
+            sessions.with_held(held, key, hold)
+
+
+def test_a_formula_is_tried_beside_the_library(asked):
+    tried = sessions.tried(asked, "mine = v*abs(v)")
+    row = sessions.candidate(tried, "mine")
+    drag = sessions.candidate(tried, "quadratic_damping")
+    assert row.gain.explained == pytest.approx(drag.gain.explained, rel=1e-3)
+    assert "mine" in drag.tied_with
+    assert [t.name for t in tried.own] == ["mine"]
+    assert "mine" in [r.name for r in tried.now.shown]
+    assert sessions.tried(tried, "u*u*v").own[-1].name == "own_1"
+    after = sessions.with_added(tried, "mine").now.comparison
+    assert after.response_error == pytest.approx(after.noise_floor, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("__import__('os').system('true')", "the functions are"), ("(lambda: 0)()", "expression"), ("", "formula"),
+        ("u**99", "power"), ("x*u", "uses the name 'x'"), ("quadratic_damping=u", "belongs to the library"),
+        ("<b>=u", "not a name"), ("u" * 400, "characters"), ("1e300*u**9*u**9", "finite response"),
+    ],
+)  # fmt: skip
+def test_a_bad_formula_gets_its_sentence(asked, text, said):
+    with pytest.raises(StudyError, match=re.escape(said)) as caught:
+        sessions.tried(asked, text)
+    assert "\n" not in str(caught.value)
+
+
+def test_links_add_up_to_the_curves_and_the_map(grown):
+    found = grown.rungs[0].comparison
+    tied, lacking = links(found), found.restoring
+    u, v, force = (x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force))
+    for classes, values in ((tied.displacement, u), (tied.velocity, v)):
+        visits, sums = classes.visits.sum(axis=0), classes.force.sum(axis=0)
+        mean = (sums / np.maximum(visits, 1))[visits > 0]
+        line = curve(values, force)
+        assert np.all(np.isclose(line.mean[:, None], mean[None, :], rtol=1e-9).any(axis=1))
+    cells = tied.cells.sum(axis=0)
+    assert np.all(cells[np.isfinite(surface(u, v, force).mean.ravel())] > 0)
+    assert cells.sum() == pytest.approx(len(u), rel=0.01)
+    width = tied.frequency[1]
+    assert tied.power.sum() * width / len(tied.power) == pytest.approx(np.mean(found.judged.residual**2), rel=0.1)
+
+
+def test_what_a_candidate_would_leave_is_what_its_diagnosis_found(asked):
+    columns = view.view(asked.now, 0).columns
+    first = asked.now.diagnosis.candidates[0]
+    shown = columns["would_time"]["0"]
+    scale = view.scales_of(asked.now.comparison).difference.factor
+    assert np.allclose(shown * scale, first.residual, rtol=1e-5, atol=1e-12)
+    with_it, without = (np.nanmax(np.abs(columns[a][b])) for a, b in (("would_v", "y0"), ("against_v", "mean")))
+    assert with_it < 0.1 * without
+
+
+def test_the_ladder_goes_on_where_the_file_left_it(begun):
+    step = begun.steps[0]
+    earlier = ({**step, "terms": ["inertia"]}, {**step, "added": "linear_damping"})
+    assert len(replace(begun, earlier=earlier).steps) == 2
+    names = page.ladder_columns(replace(begun, earlier=earlier[:1]))["name"]
+    assert names == ["0 as given", "1 as given"]
+
+
+def test_the_saved_page_is_the_same_twice_and_asks_for_nothing(grown):
+    once = saved(grown)
+    assert once == saved(grown)
+    text = once.decode()
+    tags = re.findall(
+        r"<(?:script|link|img|iframe)\b[^>]*>", text.split("<style>")[0] + text[text.rindex("</style>") :]
+    )
+    assert not [t for t in tags if "src=" in t or "http" in t]
+    assert [f"{i} {what}" in text for i, what in enumerate(("as given", "+ quadratic damping"))] == [True, True]
+
+
+def test_the_saved_page_stays_small_however_long_record_and_ladder(asked):
+    """Judged are 2,048 samples, drawn at most 2,400: seven rungs take what they would of a record of 131,072."""
+    seven = replace(asked, rungs=asked.rungs * 7)
+    assert len(saved(seven)) < 5e6
+    long = np.zeros(131072)
+    assert len(decimate.extremes(long)) == 2 * decimate.BUCKETS
+
+
+def test_what_a_user_named_cannot_leave_its_place(asked):
+    evil = "</script><script>alert(1)</script>"
+    record = replace(asked.record, name=evil, units={**asked.record.units, "force": "<b>N"})
+    now = replace(asked.now, comparison=replace(asked.now.comparison, record=record))
+    hostile = saved(replace(asked, record=record, rungs=(now,))).decode()
+    assert "alert(1)</script>" not in hostile
+    assert "<b>N" not in hostile
+    assert "&lt;b&gt;N" in hostile or "\\u003cb>N" in hostile
+
+
+def test_units_are_written_as_people_write_them():
+    assert units.in_text("N s^2/m^2") == "N s²/m²"
+    assert units.in_text("u**3*v") == "u³·v"
+    assert units.number(4.897e5) == "4.897·10⁵"
+    assert units.number(-0.012) == "-0.012"
+    assert units.rate("m/s^2", 0.02) == units.Scale(1e-3, "mm/s^2")
+    assert units.length("V", 0.02) == units.Scale(1.0, "V")
+
+
+def test_ties_are_shown_as_ties(asked):
+    rows = asked.now.diagnosis.candidates[:2]
+    tied = (replace(rows[0], tied_with=(rows[1].name,)), replace(rows[1], tied_with=(rows[0].name,)))
+    rung = replace(asked.now, diagnosis=replace(asked.now.diagnosis, candidates=tied))
+    html = dict(zip(*words.words(rung, tied, 0, True).values(), strict=True))["candidates"]
+    assert re.findall(r"class='rank'>(.)<", html) == ["1", "="]
+    assert html.count("class='tie'") == 2
+
+
+def test_saving_keeps_the_users_comments(asked, grown, tmp_path):
+    given = Model("rig", tuple(free(get(n)) for n in ("inertia", "linear_damping", "linear_stiffness")))
+    model = given.with_term(get("quadratic_damping")).with_values({"k": 355.0})
+    text = modelfile.revised(TEXT, "rig.yaml", model)
+    assert text.splitlines()[-2:] == [
+        "  - {term: linear_stiffness, value: 355.0}   # from the drawing",
+        "  - quadratic_damping",
+    ]
+    assert text.startswith("# the rig in hall 3\n")
+    assert "# weighed" in text
+    own = modelfile.format_model(asked.rungs[0].model)
+    made = files(grown, "rig.yaml", own)
+    assert {"rig.yaml", "rig.history.json", "comparison.json", PAGE, "response.png", "ladder.png"} <= set(made)
+    for name, content in made.items():
+        (tmp_path / name).write_bytes(content)
+    assert modelfile.read_model(tmp_path / "rig.yaml") == grown.now.model
+    assert len(ladder.read(tmp_path / "rig.yaml")) == 2
+
+
+def test_the_desk_does_one_thing_at_a_time_and_says_what_went_wrong(asked, tmp_path):
+    desk = Desk(asked, tmp_path / "rig.yaml", modelfile.format_model(asked.rungs[0].model), tmp_path / "out")
+    done = threading.Event()
+    busy: list[str] = []
+
+    def told(_: bool) -> None:
+        busy.append(desk.state.busy)
+        if not desk.state.busy:
+            done.set()
+
+    def wait(action: str, name: str) -> None:
+        done.clear()
+        desk.ask(action, name)
+        assert done.wait(20.0)
+
+    desk.watch(told, told)
+    wait("try", "__import__('os')")
+    assert "__import__" in desk.state.answer
+    wait("add", "no_such_thing")
+    assert "no candidate" in desk.state.notice
+    assert desk.session is asked
+    desk.ask("format the disk", "now")
+    assert desk.state.busy == ""
+    wait("save", "")
+    assert "Saved in" in desk.state.notice
+    assert (tmp_path / "out" / PAGE).stat().st_size > 1e6
+    wait("add", "quadratic_damping")
+    assert desk.session.now.label == "+ quadratic_damping"
+    assert "adding quadratic_damping" in busy
+    desk.close()
+
+
+@pytest.mark.parametrize(
+    ("words_", "said"),
+    [
+        (["rig.csv", "--model", "none.yaml"], "none.yaml"), (["none.csv", "--model", "rig.yaml"], "none.csv"),
+        (["rig.csv", "--model", "rig.yaml", "--port", "70000"], "65535"),
+        (["rig.csv", "--model", "rig.yaml", "--out", "rig.csv/deeper"], "cannot be written"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_one_sentence_and_serves_nothing(words_, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("rig.yaml").write_text(TEXT)
+    Path("rig.csv").write_text("force,displacement\n1,2\n")
+    assert cli.main(["explore", *words_]) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1
