@@ -5,10 +5,12 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from study.errors import DivergenceError
+from study.free_run import prepare
 from study.model import Model
 from study.output_error import FreeRunFit, fit_free_run
 from study.pieces import Pieces, even_restarts, needed_restarts
-from study.record import Record
+from study.record import MOTIONS, Record
 
 Floats = NDArray[np.float64]
 TIES = (0.3, 1.0, 3.0, 10.0)  # ever tighter, see ``fit_free_run``: each step is small enough to find its way
@@ -60,6 +62,57 @@ def fit_in_pieces(
             break
         found, states = trial, trial.initial
     return found
+
+
+def fit_record(
+    model: Model,
+    record: Record,
+    *,
+    start: Mapping[str, float] | None = None,
+    held: Collection[str] = (),
+    response: str = "displacement",
+    steps_per_sample: int = 4,
+    max_iterations: int = 60,
+) -> FreeRunFit:
+    """Fit a model to a whole record: in one free run where that holds, in pieces where it does not.
+
+    One free run is believed if the fit converges and the fitted system does not magnify a disturbance
+    tenfold anywhere on its way (``study.pieces.needed_restarts``, from the exact sensitivities). A system that
+    does loses the record however true the model, and its sum of squares is full of side valleys; in pieces
+    it takes half the steps, which are many enough for their length. Parameters and result are those of
+    :func:`study.output_error.fit_free_run`.
+
+    Raises
+    ------
+    DivergenceError
+        If the model diverges within a period of its start.
+    StudyError
+        As :func:`study.output_error.fit_free_run`.
+    """
+    try:
+        found = fit_free_run(
+            model, record, start=start, held=held, response=response, steps_per_sample=steps_per_sample,
+            max_iterations=max_iterations,
+        )  # fmt: skip
+        if found.converged and not _magnifies(found, record, response, steps_per_sample):
+            return found
+    except DivergenceError:
+        pass
+    return fit_in_pieces(
+        model, record, start=start, held=held, response=response, steps_per_sample=max(steps_per_sample // 2, 1),
+        max_iterations=max_iterations,
+    )  # fmt: skip
+
+
+def _magnifies(found: FreeRunFit, record: Record, response: str, steps: int) -> bool:
+    """Whether disturbances of a fitted free run grow, as those of a chaotic one do."""
+    whole = (0, len(record))
+    restarts = even_restarts(record, response, whole)
+    states = np.zeros((len(restarts) + 1, len(found.initial)))
+    for i, motion in enumerate(MOTIONS[:2]):
+        run = prepare(found.model, record, response=motion, steps_per_sample=steps)
+        states[:, i] = run.respond({}, found.initial)[0][[0, *restarts]]
+    return bool(needed_restarts(found.model, record, states, whole, restarts, steps))
 
 
 def _tightened(

@@ -71,7 +71,7 @@ class Normal:
     def step(self, damping: float) -> Floats:
         """Solution with ``damping`` added to the diagonal: shared variables, then piece by piece the own ones."""
         answers, alone = self._eliminated(damping)
-        shared = np.linalg.solve(*self._left(damping, answers, alone))
+        shared = np.asarray(np.linalg.solve(*self._left(damping, answers, alone)), dtype=np.float64)
         return np.concatenate([shared, (alone - answers @ shared).ravel()])
 
     def gradient(self) -> Floats:

@@ -7,7 +7,7 @@ minimised by the method of Levenberg and Marquardt (``study.levenberg``) with ex
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from study.levenberg import End, Point, minimise, point_at
 from study.model import Model
 from study.normal import Ties
 from study.parameters import Estimate
-from study.pieces import starting_state
+from study.pieces import starting_states
 from study.record import Record
 
 Floats = NDArray[np.float64]
@@ -51,6 +51,10 @@ class FreeRunFit:
         Free runs that were made.
     message : str
         How the fit ended, in a sentence.
+    restarts : tuple of int
+        Samples of the record at which pieces after the first begin.
+    steps_per_sample : int
+        Runge-Kutta steps that were taken in each sampling interval.
     """
 
     model: Model
@@ -62,6 +66,8 @@ class FreeRunFit:
     converged: bool
     iterations: int
     message: str
+    restarts: tuple[int, ...] = ()
+    steps_per_sample: int = 2
 
     @property
     def rms(self) -> float:
@@ -147,10 +153,11 @@ def fit_free_run(
     if not isinstance(initial, str):
         states[:] = initial
     elif free:
-        states[:, :2] = [starting_state(record, response, sample) for sample in (first, *restarts)]
+        states[:, :2] = starting_states(record, response, (first, *restarts))
     measured = record[response][first : first + run.samples]
     problem = _Problem(run, measured, free, _weights(tie, measured, states))
-    return _result(model, problem, problem.search(np.array([*begin.values(), *states.ravel()]), max_iterations))
+    end = problem.search(np.array([*begin.values(), *states.ravel()]), max_iterations)
+    return replace(_result(model, problem, end), restarts=tuple(restarts), steps_per_sample=steps_per_sample)
 
 
 def _weights(tie: float, measured: Floats, states: Floats) -> Floats | None:

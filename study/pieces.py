@@ -7,6 +7,7 @@ growth, each with an initial state of its own, keep the fit well posed (multiple
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,22 +30,34 @@ def angular_rate(values: Floats, dt: float) -> float:
     return float(np.sqrt(np.mean(np.diff(values) ** 2))) / (dt * size) if size > 0.0 else 1.0 / dt
 
 
-def starting_state(record: Record, response: str, sample: int, reach: float = REACH) -> Floats:
-    """Displacement and velocity at a sample, as well as the record shows them, shape (2,).
+def starting_states(record: Record, response: str, samples: Sequence[int], reach: float = REACH) -> Floats:
+    """Displacement and velocity at some samples, as well as the record shows them, shape (samples, 2).
 
     A displacement is smoothed by a cubic over a part of its period, which yields the velocity too; what
     neither it nor a channel of the record shows is taken as zero.
     """
     if response != "displacement":
-        return np.array([record[c][sample] if c in record else 0.0 for c in ("displacement", "velocity")])
+        columns = [
+            record[c][list(samples)] if c in record else np.zeros(len(samples)) for c in ("displacement", "velocity")
+        ]
+        return np.column_stack(columns)
     values = record[response]
     half = round(reach * 2.0 * np.pi / (angular_rate(values, record.dt) * record.dt))
     half = int(np.clip(half, 2, max((len(values) - 1) // 2, 1)))
-    first = max(0, min(sample - half, len(values) - 2 * half - 1))
-    window = values[first : first + 2 * half + 1]
-    offset = (first - sample + np.arange(len(window))) / half
-    coefficients = np.polynomial.polynomial.polyfit(offset, window, min(3, len(window) - 1))
-    return np.array([coefficients[0], coefficients[1] / (half * record.dt)])
+    states = np.empty((len(samples), 2))
+    for i, sample in enumerate(samples):
+        first = max(0, min(sample - half, len(values) - 2 * half - 1))
+        window = values[first : first + 2 * half + 1]
+        states[i] = _smoothing(first - sample, len(window), half) @ window
+    return states / np.array([1.0, half * record.dt])
+
+
+@lru_cache(maxsize=256)
+def _smoothing(first: int, count: int, half: int) -> Floats:
+    """The linear map from a window to the value and slope of its cubic at zero, shape (2, count)."""
+    offset = (first + np.arange(count)) / half
+    inverse = np.linalg.pinv(np.vander(offset, min(4, count), increasing=True))
+    return np.asarray(inverse[:2], dtype=np.float64)
 
 
 def even_restarts(record: Record, response: str, span: tuple[int, int]) -> tuple[int, ...]:
@@ -138,7 +151,7 @@ class Pieces:
         best, least = np.zeros((len(begins), 2 + len(model.states))), np.full(len(begins), np.inf)
         for reach in REACHES:
             tried = np.zeros_like(best)
-            tried[:, :2] = [starting_state(self.record, self.response, sample, reach) for sample in begins]
+            tried[:, :2] = starting_states(self.record, self.response, begins, reach)
             try:
                 misfits = self.misfits(model, tried)
             except DivergenceError:

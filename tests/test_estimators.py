@@ -93,7 +93,7 @@ def test_dead_band_stiffness_is_positive():
 
 
 def test_true_parameters_have_the_same_names(systems):
-    assert set(true_parameters(systems["mathieu"].values)) == {"m", "c", "k", "f_n", "zeta", "k_m", "phase"}
+    assert set(true_parameters(systems["mathieu"].values)) == {"m", "c", "k", "f_n", "zeta", "k_m", "phase", "f_m"}
     assert true_parameters(systems["dead_band"].values)["k_dead_band"] == 355.3
     assert "f_n" not in true_parameters(systems["extreme"].values)
 

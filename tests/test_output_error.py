@@ -15,7 +15,7 @@ from study.inputs import histories, reverse_inputs
 from study.miso import analyse
 from study.model import Model, free
 from study.output_error import FreeRunFit, fit_free_run
-from study.pieces import REACHES, Pieces, starting_state
+from study.pieces import REACHES, Pieces, starting_states
 from study.record import MOTIONS, SI_UNITS, Record
 from study.simulate import Integrator, simulate
 from study.spectra import Segments, cross_spectra
@@ -259,7 +259,7 @@ def test_first_states_are_the_best_of_several_widths(systems: dict[str, Model], 
     pieces = Pieces(record, "displacement", (0, 400), cuts, 4)
     begun = pieces.misfits(model, pieces.first_states(model))
     for reach in REACHES:
-        one = np.array([starting_state(record, "displacement", sample, reach) for sample in (0, *cuts)])
+        one = starting_states(record, "displacement", (0, *cuts), reach)
         assert np.all(begun <= pieces.misfits(model, one))
 
 
@@ -267,7 +267,7 @@ def test_tied_pieces_are_one_motion(systems: dict[str, Model], records: dict[str
     """... with the estimates and the covariance of a free run; loose ones know less."""
     model, record = systems["duffing"], noisy(records["duffing"], 0.05, 2).part(0, 2048)
     whole, cuts = fit_free_run(model, record), tuple(range(128, 2048, 128))
-    states = np.array([starting_state(record, "displacement", sample) for sample in (0, *cuts)])
+    states = starting_states(record, "displacement", (0, *cuts))
     loose = fit_free_run(model, record, restarts=cuts, initial=states)
     tied = fit_free_run(model, record, restarts=cuts, initial=loose.initial, tie=1000.0)
     assert tied.converged

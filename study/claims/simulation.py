@@ -189,7 +189,7 @@ def table_1(evidence: Evidence, reported: Reported) -> Claim:
     conditions: list[Condition] = []
     for system in SYSTEMS:
         values = evidence.model(Drive(system)).values
-        found = true_parameters(values) | {k.split(".")[-1]: v for k, v in values.items() if "." in k and v is not None}
+        found = true_parameters(values)
         rows = [s for s in reported.statements.values() if s.id.startswith(f"table_1.{system}.")]
         wrong = [
             f"{name} {found.get(name, 0.0):.6g} for {s.value:.6g}"

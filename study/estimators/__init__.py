@@ -15,6 +15,8 @@ ESTIMATORS = {
     "miso": "study.estimators.miso",
     "miso_hand_read": "study.estimators.hand_read",
     "local_polynomial": "study.estimators.local_polynomial",
+    "output_error": "study.estimators.output_error",
+    "instrumental": "study.estimators.instrumental",
     "errors_in_variables": "study.estimators.errors_in_variables",
 }
 

@@ -62,19 +62,22 @@ class Identified:
         Named parameters.
     estimate : Estimate or None
         The coefficients themselves, as the model names them, for estimators that find them together.
+    note : str
+        What is to be known before the estimates are used, such as that a search did not converge; mostly empty.
     """
 
     inputs: tuple[Input, ...]
     responses: Responses | None
     parameters: tuple[Parameter, ...]
     estimate: Estimate | None = None
+    note: str = ""
 
 
 class Estimator(Protocol):
     """A function from model and record to parameters."""
 
     def __call__(self, model: Model, record: Record, settings: Settings) -> Identified:
-        """Identify; coefficients of the model are ignored, its shape parameters are used."""
+        """Identify; coefficients of the model are ignored, its shape parameters are used where it gives them."""
         ...
 
 
@@ -82,9 +85,10 @@ def named_parameters(estimate: Estimate) -> tuple[Parameter, ...]:
     """Coefficients and what follows from them, under the report's names.
 
     ``f_n`` and ``zeta`` by (4.4) and (4.5), ``k_m`` and ``phase`` by (4.9), ``k_dead_band`` by (4.10);
-    their standard errors to first order from the covariance of the coefficients.
+    their standard errors to first order from the covariance of the coefficients. Shape parameters go by their
+    own names: ``u_g``, ``f_m``.
     """
-    plain = {s: Parameter(s, estimate[s], estimate.error(s)) for s in estimate.symbols}
+    plain = {s: Parameter(s.rpartition(".")[2], estimate[s], estimate.error(s)) for s in estimate.symbols}
     found = {s: plain.pop(s) for s in ("m", "c", "k") if s in plain}
     if {"m", "c", "k"} <= set(found) and found["k"].value > 0.0 and found["m"].value > 0.0:
         found |= {p.name: p for p in _modal(estimate)}
@@ -99,7 +103,7 @@ def named_parameters(estimate: Estimate) -> tuple[Parameter, ...]:
 
 def true_parameters(values: Mapping[str, float | None]) -> dict[str, float]:
     """The same names for a model's own values."""
-    known = {key: value for key, value in values.items() if value is not None and "." not in key}
+    known = {key: value for key, value in values.items() if value is not None}
     estimate = Estimate(tuple(known), np.array(list(known.values())), np.zeros((len(known), len(known))))
     return {p.name: p.value for p in named_parameters(estimate)}
 

@@ -1,0 +1,33 @@
+"""Instruments from a free run: A_j(f) line by line, without the bias that noise on the response brings."""
+
+from study import instrumental, parametric
+from study.estimators import output_error
+from study.estimators.base import Identified, Settings, named_parameters
+from study.free_run import prepare
+from study.inputs import reverse_inputs
+from study.model import Model
+from study.output_error import FreeRunFit
+from study.record import MOTIONS, Record
+
+
+def identify(model: Model, record: Record, settings: Settings) -> Identified:
+    """A_j(f) with the fitted model's motion as instrument, then coefficients as from MI/SO."""
+    found = output_error.fit(model, record, settings)
+    inputs = reverse_inputs(found.model)
+    matrix = instrumental.cross_spectra(inputs, record, clean_motion(found, record), settings.segments)
+    estimate = instrumental.fit(
+        matrix, inputs, settings.band, parametric.response(inputs, found.estimate, matrix.frequency)
+    )
+    note = "" if found.converged else found.message
+    return Identified(inputs, instrumental.responses(matrix), named_parameters(estimate), estimate, note)
+
+
+def clean_motion(found: FreeRunFit, record: Record) -> Record:
+    """The record with displacement and velocity of the fitted model in free run."""
+    motions = {
+        name: prepare(
+            found.model, record, response=name, steps_per_sample=found.steps_per_sample, restarts=found.restarts
+        ).respond_by_piece({}, found.initial)[0]
+        for name in MOTIONS[:2]
+    }
+    return record.with_channels(motions)

@@ -1,0 +1,159 @@
+"""Frequency response functions that noise on the response does not bias: instruments and corrected inputs.
+
+Noise on u makes the reverse system's inputs wrong twice over: ``G_XX`` gains the noise's own power, and the mean
+of a distorted input is not the input's, as ``E[(u + n)^3 | u] = u^3 + 3 sigma^2 u`` shows. A motion free
+of noise, that of a model fitted in free run, mends both. Its inputs ``Z_j = g_j(u^)`` have nothing in
+common with the noise, so that ``A = G_ZX^-1 G_ZF`` holds as soon as the inputs X_j have the right mean; and
+they get it by ``X_j = g_j(u + n) - (E[g_j(u^ + n)] - g_j(u^))``, whatever the shape g_j.
+
+The measured response still decides: A_j(f) is free to differ from the form that the model gives it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study import expression, spectra
+from study.inputs import Input, history
+from study.miso import COLLINEAR
+from study.parameters import Estimate
+from study.parametric import left_over
+from study.record import Record
+from study.responses import Responses
+from study.spectra import Segments, SpectralMatrix
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+NODES = 15  # of the Gauss-Hermite rule: exact for shapes up to the power 29, close for kinked ones
+NOISY = {"u": "displacement", "v": "velocity"}  # what a formula calls the channels that carry noise
+TINY = float(np.finfo(np.float64).tiny)
+FAINT = 1e-8  # noise below this share of a channel's mean square is the rounding of the free run
+
+
+def cross_spectra(inputs: Sequence[Input], record: Record, clean: Record, segments: Segments) -> SpectralMatrix:
+    """Spectral matrix of q instruments, then q corrected inputs, then the force.
+
+    Parameters
+    ----------
+    inputs : sequence of Input
+        Inputs of the reverse system, q of them.
+    record : Record
+        As measured.
+    clean : Record
+        The same, its displacement and velocity those of the fitted model in free run.
+    segments : Segments
+        How both are cut.
+    """
+    instruments = [history(item, clean) for item in inputs]
+    return spectra.cross_spectra(
+        [*instruments, *corrected(inputs, record, clean), record["force"]], record.dt, segments
+    )
+
+
+def responses(matrix: SpectralMatrix) -> Responses:
+    """``A = G_ZX^-1 G_ZF`` with the covariance ``G_ZX^-1 G_ZZ G_ZX^-H G_ee / (n_d - q)``, e what is left of the force.
+
+    Parameters
+    ----------
+    matrix : SpectralMatrix
+        As :func:`cross_spectra` gives it.
+    """
+    density, count = matrix.density, matrix.density.shape[1] // 2
+    scale = np.sqrt(np.maximum(np.einsum("fii->fi", density).real, TINY))
+    scaled = density / (scale[:, :, None] * scale[:, None, :])
+    inverse = np.linalg.pinv(scaled[:, :count, count:-1], rcond=COLLINEAR)
+    gain = scale[:, -1:] / scale[:, count:-1]
+    response = (np.einsum("fij,fj->fi", inverse, scaled[:, :count, -1]) * gain).T
+    noise = left_over(_without_instruments(matrix), response)
+    share = noise / (np.maximum(density[:, -1, -1].real, TINY) * (matrix.averages - count))
+    spread = inverse @ scaled[:, :count, :count] @ inverse.conj().transpose(0, 2, 1)
+    covariance = spread * share[:, None, None] * (gain[:, :, None] * gain[:, None, :])
+    return Responses(matrix.frequency, response, covariance, noise)
+
+
+def fit(matrix: SpectralMatrix, inputs: Sequence[Input], band: tuple[float, float], known: Complexes) -> Estimate:
+    """Coefficients of all inputs from all lines of a band at once.
+
+    With ``Psi`` the instruments and ``Phi`` the inputs, each times its powers of ``j 2 pi f``, the
+    coefficients solve ``Re sum Psi^H Phi / G_ee theta = Re sum Psi^H F / G_ee``. Fitting A_j(f) line by line
+    would weigh lines by errors that are estimated with them, which biases under much noise.
+
+    Parameters
+    ----------
+    matrix : SpectralMatrix
+        As :func:`cross_spectra` gives it.
+    inputs : sequence of Input
+        What each A_j is made of.
+    band : pair of float
+        Lines from the first to the second frequency (Hz) are used.
+    known : complex array, shape (q, lines)
+        A_j(f) of the fitted model: what it leaves of the force, G_ee, weighs the lines.
+    """
+    keep = (matrix.frequency >= band[0]) & (matrix.frequency <= band[1])
+    density, count = matrix.density[keep], len(inputs)
+    noise = left_over(_without_instruments(matrix), known)[keep]
+    noise = np.maximum(noise, FAINT * np.max(noise))
+    powers = np.concatenate([item.powers(matrix.frequency[keep]) for item in inputs], axis=1)
+    owner = np.repeat(np.arange(count), [len(item.parts) for item in inputs])
+    weighted = powers.conj() / noise[:, None]
+    own, through = density[:, owner][:, :, owner], density[:, owner][:, :, count + owner]
+    size = np.sqrt(np.einsum("fp,fpp,fp->p", weighted, own, powers).real)
+    normal = np.einsum("fp,fpq,fq->pq", weighted, through, powers).real / np.outer(size, size)
+    right = np.einsum("fp,fp->p", weighted, density[:, owner, -1]).real / size
+    spread = np.einsum("fp,fpq,fq->pq", weighted, own, powers).real / np.outer(size, size)
+    inverse = np.linalg.pinv(normal) / size[:, None]
+    share = matrix.segments.line_inflation() / (2.0 * matrix.averages)
+    symbols = tuple(part.symbol for item in inputs for part in item.parts)
+    return Estimate(symbols, inverse @ right, share * inverse @ spread @ inverse.T)
+
+
+def _without_instruments(matrix: SpectralMatrix) -> SpectralMatrix:
+    count = matrix.density.shape[1] // 2
+    return replace(matrix, density=matrix.density[:, count:, count:])
+
+
+def corrected(inputs: Sequence[Input], record: Record, clean: Record) -> list[Floats]:
+    """Inputs from the measured motion whose mean is that of the true ones, each of shape (n,).
+
+    A term with a memory has no such mean at a point of time; its history along the clean motion stands for it,
+    so that its A_j(f) is the model's more than the record's.
+    """
+    spread = noise_spread(record, clean)
+    found: list[Floats] = []
+    for item in inputs:
+        if item.state is not None:
+            found.append(history(item, clean))
+        elif item.shape == "u":
+            found.append(history(item, record))
+        else:
+            found.append(history(item, record) - (expected(item, clean, spread) - history(item, clean)))
+    return found
+
+
+def noise_spread(record: Record, clean: Record) -> dict[str, Floats]:
+    """A root of the noise's covariance: for each noisy channel its part of every independent source."""
+    names = [name for name in NOISY.values() if name in record]
+    noise = np.stack([record[name] - clean[name] for name in names])
+    noise[np.mean(noise**2, axis=1) < FAINT * np.mean(np.stack([clean[name] for name in names]) ** 2, axis=1)] = 0.0
+    values, vectors = np.linalg.eigh(noise @ noise.T / noise.shape[1])
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    return dict(zip(names, root, strict=True))
+
+
+def expected(item: Input, clean: Record, spread: dict[str, Floats]) -> Floats:
+    """Mean of an input's history over Gaussian noise about a clean motion, shape (n,)."""
+    used = [NOISY[name] for name in expression.names(item.shape) if NOISY.get(name) in spread]
+    sources = [s for s in range(len(spread)) if any(spread[name][s] != 0.0 for name in used)]
+    nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
+    weights = weights / np.sum(weights)
+    total = np.zeros(len(clean))
+    for places in np.ndindex(*(NODES,) * len(sources)):
+        moved = {
+            name: clean[name] + sum(float(spread[name][s] * nodes[p]) for s, p in zip(sources, places, strict=True))
+            for name in used
+        }
+        weight = float(np.prod(weights[list(places)]))
+        total += weight * history(item, clean.with_channels(moved))
+    return total

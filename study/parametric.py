@@ -1,0 +1,51 @@
+"""Frequency response functions of known form: what estimated coefficients make of each A_j(f)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.inputs import Input
+from study.parameters import Estimate
+from study.responses import Responses
+from study.spectra import SpectralMatrix
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+
+def responses(inputs: Sequence[Input], estimate: Estimate, matrix: SpectralMatrix) -> Responses:
+    """``A_j(f) = sum of coefficient * factor * (j 2 pi f)^order`` with the covariance of the coefficients.
+
+    Parameters
+    ----------
+    inputs : sequence of Input
+        Inputs of the reverse system.
+    estimate : Estimate
+        Coefficients of all parts of the inputs; others may be there too.
+    matrix : SpectralMatrix
+        Of the inputs and the force: gives the lines, and what the functions leave of the force.
+    """
+    form = _form(inputs, estimate, matrix.frequency)
+    covariance = form @ estimate.covariance @ form.conj().transpose(0, 2, 1)
+    known = response(inputs, estimate, matrix.frequency)
+    return Responses(matrix.frequency, known, covariance, left_over(matrix, known))
+
+
+def response(inputs: Sequence[Input], estimate: Estimate, frequency: Floats) -> Complexes:
+    """The functions alone, shape (inputs, lines)."""
+    return (_form(inputs, estimate, frequency) @ estimate.values).T
+
+
+def _form(inputs: Sequence[Input], estimate: Estimate, frequency: Floats) -> Complexes:
+    """What a unit of each estimate adds to each A_j(f), shape (lines, inputs, estimates)."""
+    form = np.zeros((len(frequency), len(inputs), len(estimate.symbols)), dtype=np.complex128)
+    for j, item in enumerate(inputs):
+        form[:, j, [estimate.symbols.index(part.symbol) for part in item.parts]] = item.powers(frequency)
+    return form
+
+
+def left_over(matrix: SpectralMatrix, response: Complexes) -> Floats:
+    """Autospectral density of the output less what comes through the inputs by these A_j(f), shape (lines,)."""
+    through = np.concatenate([-response, np.ones((1, response.shape[1]))]).T
+    return np.clip(np.einsum("fi,fij,fj->f", through.conj(), matrix.density, through).real, 0.0, None)
