@@ -65,8 +65,8 @@ def fit_by(
     missing = [key for key in model.values if "." not in key and (estimate is None or key not in estimate)]
     if estimate is None or missing:
         raise StudyError(
-            f"the estimator {name} finds no {', '.join(missing)} in {part.name}, {band[0]:.3g} to {band[1]:.3g} Hz; take "
-            f"{FREE_RUN} or another"
+            f"the estimator {name} finds no {', '.join(missing)} in {part.name} from {band[0]:.3g} to "
+            f"{band[1]:.3g} Hz; take {FREE_RUN} or another"
         )
     known = model.with_values({key: estimate[key] for key in estimate.symbols})
     how = fitting.with_steps(how, STEPS)

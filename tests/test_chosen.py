@@ -1,0 +1,80 @@
+"""Comparisons whose coefficients come from an estimator of the user's choice."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study import cli
+from study.compare.comparison import Comparison, compare
+from study.compare.report import document, summary
+from study.errors import StudyError
+from study.excitation import Excitation, force
+from study.model import Model, free
+from study.record import Record, write_csv
+from study.simulate import Integrator, simulate
+from study.terms import get
+
+NAMES = ("inertia", "linear_damping", "linear_stiffness", "cubic_stiffness")
+VALUES = {"m": 1.0, "c": 3.77, "k": 355.3, "k3": 2e7}
+OPEN = Model("believed", tuple(free(get(n)) for n in NAMES))
+
+
+def record(periods: int = 1, noise: float = 0.005, on_force: float = 0.0) -> Record:
+    kind = "gaussian_lowpass" if periods == 1 else "random_phase_multisine"
+    drive = np.tile(force(Excitation(kind), 8192 if periods == 1 else 512, 0.02, 1), periods)
+    made = simulate(OPEN.with_values(VALUES), drive, 0.02, Integrator("rk4", 4))
+    rng = np.random.default_rng(2)
+    shares = {"force": on_force, "displacement": noise}
+    channels = {n: made[n] + s * np.std(made[n]) * rng.standard_normal(len(made)) for n, s in shares.items()}
+    return Record(0.02, channels, name="rig", period=512 if periods > 1 else None)
+
+
+def off(found: Comparison) -> dict[str, float]:
+    """Each coefficient's error in its own standard errors."""
+    return {c.key: (c.value - VALUES[c.key]) / (c.error or np.nan) for c in found.coefficients}
+
+
+@pytest.fixture(scope="module")
+def local() -> Comparison:
+    return compare(OPEN, record(), estimator="local_polynomial")
+
+
+def test_an_estimator_in_reverse_stands_in_for_the_free_run(local: Comparison) -> None:
+    assert all(abs(error) < 4.0 for error in off(local).values()), off(local)
+    assert all(c.error is not None and c.error < 0.01 * c.value for c in local.coefficients)
+    assert local.response_error < 3.0 * local.noise_floor, "judged in free run, like any other"
+    assert document([local])["fit"]["estimator"] == "local_polynomial"
+    assert "fitted to samples 0 to 4096 by local_polynomial, judged on 4096 to 8192" in summary([local])
+
+
+def test_noise_on_the_force_is_allowed_for_where_there_are_periods() -> None:
+    made = record(periods=18, noise=0.1, on_force=0.2)
+    found = compare(OPEN, made, estimator="errors_in_variables")
+    assert all(abs(error) < 4.0 for error in off(found).values()), off(found)
+    assert found.force.inputs, "the rest of the comparison is as ever"
+
+
+def test_what_is_held_and_what_is_not_found(local: Comparison) -> None:
+    held = OPEN.with_values({"k": 355.3})
+    with pytest.raises(StudyError, match="'believed' holds k; the estimator local_polynomial finds every coefficient"):
+        compare(held, local.record, estimator="local_polynomial")
+    offset = replace(OPEN, terms=(*OPEN.terms, free(get("constant_force"))))
+    with pytest.raises(
+        StudyError, match=r"local_polynomial finds no .* in rig from .* Hz; take output_error or another"
+    ):
+        compare(offset, local.record, estimator="local_polynomial")
+
+
+def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def asked(*_: object, estimator: str, **__: object) -> Comparison:
+        raise StudyError(f"asked for {estimator}")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("study.compare.comparison.compare", asked)
+    write_csv(record(), Path("rig.csv"))
+    Path("rig.yaml").write_text(f"name: rig\nterms: [{', '.join(NAMES)}]\n")
+    for words, name in (([], "output_error"), (["--estimator", "local_polynomial"], "local_polynomial")):
+        assert cli.main(["compare", "rig.csv", "--model", "rig.yaml", *words]) == 2
+        assert f"asked for {name}" in capsys.readouterr().err
