@@ -8,10 +8,13 @@ import pytest
 
 from study import cli
 from study.compare.comparison import Comparison, compare
+from study.compare.local_reverse import local_force_error
 from study.compare.report import document, summary
 from study.errors import StudyError
 from study.excitation import Excitation, force
+from study.fitting import Plan
 from study.model import Model, free
+from study.motion import CompletedRecord
 from study.record import Record, write_csv
 from study.simulate import Integrator, simulate
 from study.terms import get
@@ -47,6 +50,25 @@ def test_an_estimator_in_reverse_stands_in_for_the_free_run(local: Comparison) -
     assert local.response_error < 3.0 * local.noise_floor, "judged in free run, like any other"
     assert document([local])["fit"]["estimator"] == "local_polynomial"
     assert "fitted to samples 0 to 4096 by local_polynomial, judged on 4096 to 8192" in summary([local])
+
+
+def test_the_error_of_the_force_is_without_leakage() -> None:
+    made = record(noise=0.0)
+    own, report = (compare(OPEN, made, estimator=name).force for name in ("local_polynomial", "miso"))
+    assert own.total < 1e-6 < 1e-3 < report.total, "nothing is missing"
+    assert own.parametric_total < 1e-5
+    assert own.frequency[1] - own.frequency[0] == pytest.approx(own.frequency[2] - own.frequency[1])
+    linear = Model("believed", OPEN.terms[:3])
+    one, other = (compare(linear, made, estimator=name).force for name in ("local_polynomial", "miso"))
+    assert one.total == pytest.approx(other.total, rel=0.15), "what is missing is seen by both"
+    assert one.parametric_total == pytest.approx(other.parametric_total, rel=0.15)
+    assert np.all(np.diff(own.cumulative, axis=0) >= 0.0)
+
+
+def test_a_judging_part_too_short_for_two_bands(local: Comparison) -> None:
+    how, whole = Plan("displacement", (0, 4096), (4096, 4160)), CompletedRecord(local.record, (0.0, 25.0), 0, ())
+    with pytest.raises(StudyError, match="the part of rig to judge has 64 samples, too few for two bands of 17 lines"):
+        local_force_error(local.found.model, whole, how, local.noise)
 
 
 def test_noise_on_the_force_is_allowed_for_where_there_are_periods() -> None:

@@ -12,6 +12,7 @@ from study.compare.fitted import Coefficient, coefficients, fit_model
 from study.compare.frequency import Band, bands
 from study.compare.judged import Judged, judge
 from study.compare.levels import Level, levels
+from study.compare.local_reverse import local_force_error
 from study.compare.noise import Noise, noise_of
 from study.compare.restoring import Restoring, restoring
 from study.compare.reverse import ForceError, force_error
@@ -125,7 +126,8 @@ def compare(
     start : mapping of float, optional
         Values to begin the fit from, one for each that is fitted; searched for if left out.
     estimator : str
-        What finds the coefficients: the fit in free run, or one of ``study.estimators``.
+        What finds the coefficients: the fit in free run, or one of ``study.estimators``. With ``local_polynomial``
+        the error of the force is free of leakage too.
     progress : callable, optional
         Called with what is being done, ``STEPS`` times.
 
@@ -148,7 +150,8 @@ def compare(
     judged = judge(found, completed.record, how, completed.band[0])
     noise = noise_of(judged, completed.record, how.judge[1])
     told("force")
-    force = force_error(found.model, completed, how, noise)
+    in_reverse = local_force_error if estimator == "local_polynomial" else force_error
+    force = in_reverse(found.model, completed, how, noise)
     told("where it fails")
     lacking = restoring(found.model, (*found.keys, *errors), judged, noise, completed.record, how)
     return Comparison(

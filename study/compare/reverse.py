@@ -121,10 +121,10 @@ def force_error(model: Model, completed: CompletedRecord, how: Plan, noise: Nois
         force=result.output,
         unexplained=np.clip((1.0 - result.multiple) * freedom, 0.0, 1.0),
         parametric=_left(reverse, inputs, model) / force,
-        noise=_from_noise(matrix.frequency, inputs, model, how, density) / force,
+        noise=from_noise(matrix.frequency, inputs, model, how, density) / force,
         cumulative=result.cumulative,
         inputs=inputs,
-        band=_band(matrix.frequency, response, density, result.output, completed.band[0]),
+        band=lines_to_judge(matrix.frequency, response, density, result.output, completed.band[0]),
     )
 
 
@@ -149,7 +149,7 @@ def _left(matrix: SpectralMatrix, inputs: Sequence[Input], model: Model) -> Floa
     return np.einsum("fi,fij,fj->f", weights.conj(), matrix.density, weights).real.clip(0.0)
 
 
-def _from_noise(frequency: Floats, inputs: Sequence[Input], model: Model, how: Plan, density: Floats) -> Floats:
+def from_noise(frequency: Floats, inputs: Sequence[Input], model: Model, how: Plan, density: Floats) -> Floats:
     """Density of force that noise on the response makes through the linear terms."""
     linear = next(i for i in inputs if i.shape == "u")
     stiffness = np.abs(linear.response(frequency, model.numbers())) ** 2
@@ -157,7 +157,7 @@ def _from_noise(frequency: Floats, inputs: Sequence[Input], model: Model, how: P
     return stiffness * density / omega ** (2 * MOTIONS.index(how.response))
 
 
-def _band(frequency: Floats, response: Floats, noise: Floats, force: Floats, low: float) -> NDArray[np.bool_]:
+def lines_to_judge(frequency: Floats, response: Floats, noise: Floats, force: Floats, low: float) -> NDArray[np.bool_]:
     """Lines to judge by; if none passes, all of those on which the force has power."""
     heard = (force > AUDIBLE * float(np.max(force))) & (frequency >= max(low, frequency[1]))
     clear = heard & (response >= ABOVE * noise)
