@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from study import expression, fitting
 from study.compare.comparison import Comparison, compare, lacking_with
 from study.compare.report import rung as ladder_step
@@ -184,7 +186,7 @@ def with_held(session: Session, key: str, hold: bool) -> Session:
 
 
 def examined(session: Session, progress: Callable[[int], None] | None = None) -> tuple[Rung, Diagnosis]:
-    """The present rung with its diagnosis, and that: what is missing, the same in words, and what each candidate would leave."""
+    """The present rung with what is missing, in words too, and what each candidate would leave; and the diagnosis."""
     record, how = session.record, session.how
     found = diagnose(session.now.model, record, how, extra=session.own, progress=progress)
     return _foreseen(replace(session.now, diagnosis=found, said=in_words(found, record, how))), found
@@ -253,7 +255,8 @@ def tried(session: Session, text: str) -> Session:
     held, record, how = fitting.held_keys(now.model), session.record, session.how
     short = fitting.shortened(how, len(found.candidates[-1].found.residual)) if found.candidates else how
     fit = found.found if short == how else fitting.fit(found.found.model, record, short, held, now.values)
-    trial = candidates.attempt(term, search.baseline(fit, record, short), record, short, held)
+    with np.errstate(all="ignore"):  # a formula may overflow: that is found out below
+        trial = candidates.attempt(term, search.baseline(fit, record, short), record, short, held)
     if trial is None:
         raise StudyError(f"the expression {term.components[0].shape!r} has no finite response on this record")
     if short != how:

@@ -1,0 +1,252 @@
+"""``study explore`` in a real browser: one session from the first verdict to the saved page without a network."""
+
+import os
+import re
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, sync_playwright
+
+from study import ladder, modelfile, trials
+from study.record import write_csv
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome-stable", "google-chrome")
+BROWSER = os.environ.get("STUDY_BROWSER") or next((b for b in map(shutil.which, BROWSERS) if b), None)
+QUIET = [
+    "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--no-first-run",
+]  # fmt: skip
+HOSTILE = "__import__('os').system('touch hacked')"
+ERROR = "#figure-error b"
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A record with hidden drag and the model that its owner believes in."""
+    folder = tmp_path_factory.mktemp("rig")
+    trial = trials.make_trial(911, hidden=["quadratic_damping"], noise=0.0004, response="displacement")
+    write_csv(trial.record.part(0, 2048), folder / "rig.csv")
+    lines = "".join(f"  - {t.name}  # mine\n" for t in trial.believed.terms)
+    (folder / "rig.yaml").write_text(f"name: rig\nterms:\n{lines}")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def address(rig: Path) -> Iterator[str]:
+    words = ["explore", "rig.csv", "--model", "rig.yaml", "--port", "0", "--no-browser", "--out", "saved"]
+    server = subprocess.Popen(
+        [sys.executable, "-m", "study", *words], cwd=rig, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    assert server.stdout is not None
+    line = server.stdout.readline()
+    found = re.match(r"(http://127\.0\.0\.1:\d+/) shows", line)
+    assert found, line + server.stdout.read()
+    yield found[1]
+    server.terminate()
+    server.wait(10)
+    server.stdout.close()
+
+
+@pytest.fixture(scope="module")
+def page(address: str) -> Iterator[Page]:
+    """The page, with everything that its console says and every address that it asks for."""
+    if BROWSER is None:
+        missing = "no Chromium here: 'apt-get install chromium', or name a browser in STUDY_BROWSER"
+        pytest.fail(missing) if os.environ.get("CI") else pytest.skip(missing)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=BROWSER, args=QUIET)
+        opened = browser.new_page(viewport={"width": 1280, "height": 900})
+        opened.goto(address)
+        yield opened
+        browser.close()
+
+
+def watched(page: Page) -> tuple[list[str], list[str]]:
+    """Lists that fill with what goes wrong and what is asked for."""
+    wrong: list[str] = []
+    asked: list[str] = []
+
+    def console(message: Any) -> None:
+        if message.type in ("error", "warning"):
+            wrong.append(message.text)
+
+    page.on("console", console)
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("request", lambda request: asked.append(request.url))
+    page.on("websocket", lambda socket: asked.append(socket.url))
+    return wrong, asked
+
+
+def error(page: Page) -> float:
+    return float(page.inner_text(ERROR).removesuffix("%"))
+
+
+def until(page: Page, condition: str, *, seconds: float = 30.0) -> None:
+    page.wait_for_function(condition, timeout=1000.0 * seconds)
+
+
+def source(page: Page, name: str, column: str) -> list[float]:
+    return page.evaluate(f"Array.from(Bokeh.documents[0].get_model_by_name('{name}').get_column('{column}'))")
+
+
+def drag(page: Page, panel: str, first: float, last: float) -> None:
+    """Drag across a panel, from one share of its width to another."""
+    canvas = page.locator(f"[data-panel={panel}] canvas").first
+    canvas.scroll_into_view_if_needed()
+    box = canvas.bounding_box()
+    assert box is not None
+    y = box["y"] + 0.55 * box["height"]
+    page.mouse.move(box["x"] + first * box["width"], y)
+    page.mouse.down()
+    page.mouse.move(box["x"] + last * box["width"], y, steps=4)
+    page.mouse.up()
+
+
+def test_a_session_from_the_first_verdict_to_the_saved_page(page: Page, address: str, rig: Path) -> None:
+    wrong, asked = watched(page)
+    page.reload()
+    until(page, "document.querySelector('[data-candidate]')")
+    given = error(page)
+    _read_the_verdict(page)
+    _preview(page)
+    _select(page)
+    page.click("[data-candidate='0'] button")
+    until(page, f"parseFloat(document.querySelector('{ERROR}').textContent) < {0.5 * given}")
+    reached = error(page)
+    assert page.evaluate("Bokeh.documents[0].get_model_by_name('range_ladder').factors.length") == 2
+    page.click("[data-act=undo]")
+    until(page, f"parseFloat(document.querySelector('{ERROR}').textContent) === {given}")
+    assert page.is_disabled("[data-act=undo]")
+    _hostile(page, rig)
+    page.click("[data-act=add][data-name=quadratic_damping]")
+    until(page, f"parseFloat(document.querySelector('{ERROR}').textContent) === {reached}")
+    page.click("[data-act=save]")
+    until(page, "document.querySelector('#notice').textContent.startsWith('Saved')")
+    assert not wrong
+    hosts = {re.match(r"\w+://([^/]+)/", url)[1] for url in asked if not url.startswith("data:")}  # type: ignore[index]
+    assert hosts == {address.removeprefix("http://").rstrip("/")}
+    _saved(rig)
+    _opened_without_a_network(page, rig, given, reached)
+
+
+def _read_the_verdict(page: Page) -> None:
+    assert page.inner_text("#verdict h3") == "An effect is missing"
+    assert "Quadratic damping is missing" in page.inner_text("#verdict")
+    assert page.inner_text("[data-candidate='0'] .name") == "quadratic damping"
+    assert "v|v|" in page.inner_text("[data-candidate='0'] small")
+    labels = page.evaluate(
+        "[...Bokeh.documents[0].all_models].filter((m) => m.axis_label && m.visible).map((m) => m.axis_label)"
+    )
+    assert len(labels) >= 19
+    assert [text for text in labels if " / " not in text] == []
+
+
+def _preview(page: Page) -> None:
+    page.hover("[data-candidate='0']")
+    until(page, "Bokeh.documents[0].get_model_by_name('ghost_time').get_length() > 100")
+    assert max(map(abs, source(page, "ghost_time", "y"))) < 0.5 * max(map(abs, source(page, "time", "difference")))
+    page.mouse.move(5, 5)
+    until(page, "Bokeh.documents[0].get_model_by_name('ghost_time').get_length() === 0")
+
+
+def _select(page: Page) -> None:
+    """Each kind of selection shows in the panels of the other kinds."""
+    plane = {"picked_u": "y", "plane": "picked"}
+    for panel, said, shows in (
+        ("response", "time from", plane | {"picked_spectrum": "y", "picked_v": "y"}),
+        ("spectrum", "frequency from", plane | {"blocks": "weight", "picked_v": "y"}),
+        ("against_v", "velocity from", plane | {"blocks": "weight", "picked_spectrum": "y"}),
+    ):
+        drag(page, panel, 0.45, 0.7)
+        until(page, f"document.querySelector('#selection').textContent.includes('{said}')")
+        for name, column in shows.items():
+            values = source(page, name, column)
+            assert any(values), (panel, name)
+        assert 0 < sum(source(page, "plane", "picked")) < sum(source(page, "plane", "seen")), panel
+    page.keyboard.press("Escape")
+    assert not any(source(page, "blocks", "weight"))
+
+
+def _hostile(page: Page, rig: Path) -> None:
+    page.fill("#formula", HOSTILE)
+    page.press("#formula", "Enter")
+    until(page, "document.querySelector('#answer').textContent.includes('the functions are')")
+    assert page.get_attribute("#formula", "aria-invalid") == "true"
+    assert not (rig / "hacked").exists()
+    page.fill("#formula", "my_drag = v*abs(v)")
+    page.click("[data-act=try]")
+    until(page, "document.querySelector('[data-act=add][data-name=my_drag]')")
+    assert page.inner_text("#answer") == ""
+
+
+def _saved(rig: Path) -> None:
+    names = {path.name for path in (rig / "saved").iterdir()}
+    assert {"rig.yaml", "rig.history.json", "explore.html", "response.png", "ladder.svg"} <= names
+    text = (rig / "saved" / "rig.yaml").read_text()
+    assert text == (rig / "rig.yaml").read_text() + "  - quadratic_damping\n"
+    assert "quadratic_damping" in modelfile.read_model(rig / "saved" / "rig.yaml")
+    assert [s["added"] for s in ladder.read(rig / "saved" / "rig.yaml")] == [None, "quadratic_damping"]
+
+
+def _opened_without_a_network(page: Page, rig: Path, given: float, reached: float) -> None:
+    assert page.context.browser is not None
+    context = page.context.browser.new_context(offline=True)
+    saved = context.new_page()
+    wrong, asked = watched(saved)
+    saved.goto((rig / "saved" / "explore.html").as_uri())
+    until(saved, "window.study && window.study.ready")
+    assert error(saved) == reached
+    saved.click("[data-act=step][data-name='0']")
+    assert error(saved) == given
+    assert saved.inner_text("#verdict h3") == "An effect is missing"
+    assert saved.locator("button:has-text('Add')").count() == 0
+    _preview(saved)
+    _select(saved)
+    assert not wrong
+    assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
+    context.close()
+
+
+@pytest.mark.parametrize(("origin", "answer"), [("http://evil.example", 403), (None, 101)])
+def test_no_other_page_may_open_the_socket(address: str, origin: str | None, answer: int) -> None:
+    host = address.removeprefix("http://").rstrip("/")
+    page = _get(host, "/", "Connection: close\r\n")
+    token = re.search(r'"token":"([^"]+)"', page)
+    assert token, page[-2000:]
+    lines = [
+        "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
+        "Sec-WebSocket-Version: 13", f"Sec-WebSocket-Protocol: bokeh, {token[1]}",
+        f"Origin: {origin or address.rstrip('/')}",
+    ]  # fmt: skip
+    assert _get(host, "/ws", "".join(f"{line}\r\n" for line in lines), head=True).split()[1] == str(answer)
+
+
+def test_the_server_listens_to_this_machine_alone(address: str) -> None:
+    port = int(address.rstrip("/").rpartition(":")[2])
+    listening = Path("/proc/net/tcp")
+    if not listening.is_file():
+        pytest.skip("/proc/net/tcp lists listening sockets on Linux alone")
+    bound = [line.split()[1] for line in listening.read_text().splitlines() if f":{port:04X} 00000000:0000 0A" in line]
+    assert bound == [f"0100007F:{port:04X}"]
+
+
+def _get(host: str, path: str, lines: str, *, head: bool = False) -> str:
+    """A request by hand; only the head of the answer, or all of it."""
+    name, _, port = host.partition(":")
+    with socket.create_connection((name, int(port)), timeout=20.0) as stream:
+        stream.sendall(f"GET {path} HTTP/1.1\r\nHost: {host}\r\n{lines}\r\n".encode())
+        content = b""
+        began = time.monotonic()
+        while time.monotonic() - began < 20.0:
+            part = stream.recv(65536)
+            content += part
+            if not part or (head and b"\r\n\r\n" in content):
+                break
+    return content.decode("utf-8", "replace")
