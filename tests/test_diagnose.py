@@ -162,3 +162,20 @@ def test_a_model_that_runs_away_is_diagnosed_all_the_same() -> None:
     assert found.response_error == pytest.approx(1.0)
     assert set(found.pair) == {"displacement_damping", "quadratic_damping"}
     assert "does not stay finite" in sentences(found, "N", "m")[0]
+
+
+def test_an_imitator_that_leaves_only_noise_is_found_out_by_its_coefficient() -> None:
+    made = trials.make_trial(7_000_142, ("quintic_stiffness",), 0.01, "acceleration")
+    found, _ = found_in(made, without=("quintic_stiffness",))
+    assert found.verdict == UNKNOWN
+    assert found.candidates[0].response_error < 0.5 * found.response_error
+    assert "changes with the amplitude" in " ".join(sentences(found, "N", "m"))
+
+
+def test_a_constant_is_a_constant_and_a_moving_coefficient_is_not() -> None:
+    rng = np.random.default_rng(3)
+    error = np.full(8, 0.1)
+    flat = [steadiness.Curve(np.arange(8.0), 5.0 + 0.1 * rng.standard_normal(8) + 0j, error) for _ in range(400)]
+    p_values = np.array([curve.p_value() for curve in flat])
+    assert np.mean(p_values < 0.1) == pytest.approx(0.1, abs=0.05)
+    assert steadiness.Curve(np.arange(8.0), 5.0 + 0.2 * np.arange(8.0) + 0j, error).p_value() < 1e-6

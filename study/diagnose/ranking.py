@@ -24,6 +24,7 @@ UNSTEADY = 0.3  # relative change of its coefficient at which a candidate is no 
 NEARLY = 0.9  # ... if a steadier one explains at least so much of what it does
 PRACTICALLY = 0.99  # of what an effect of three unknowns explains: enough for one of a single unknown
 INDISTINCT = 1e-6
+CERTAIN, STILL = 1e-4, 0.01  # p value, and relative change with the amplitude, of a coefficient that moves
 EXAMINED = 6  # candidates whose coefficient is followed along frequency and amplitude
 
 
@@ -243,22 +244,32 @@ def _alike(one: Floats, other: Floats) -> bool:
 
 def _examined(row: Ranked, record: Record, how: Plan) -> Ranked:
     """Follow the candidate's coefficient along frequency and amplitude."""
-    jacobian = _jacobian(row.found, record, how)
-    columns = [row.found.keys.index(s) for s in row.term.symbols]
-    direction = row.found.values[columns]
+    flatness, steady = curves(row.found, row.term, record, how)
+    return replace(row, flatness=flatness, steadiness=steady)
+
+
+def curves(found: FreeRunFit, term: Term, record: Record, how: Plan) -> tuple[Curve | None, Curve | None]:
+    """The coefficient of a term in a fitted model along frequency and along amplitude.
+
+    None where it is zero, or the model's other coefficients could do all that it does.
+    """
+    jacobian = _jacobian(found, record, how)
+    columns = [found.keys.index(s) for s in term.symbols]
+    direction = found.values[columns]
     size = float(np.linalg.norm(direction))
     if size == 0.0:
-        return row
+        return None, None
     own = jacobian[:, columns] @ (direction / size)
     scale = np.linalg.norm(jacobian, axis=0)
     others = np.delete(jacobian / np.where(scale > 0.0, scale, 1.0), columns, axis=1)
     basis = np.linalg.qr(others)[0]
     alone = own - basis @ (basis.T @ own)
     if np.linalg.norm(alone) <= INDISTINCT * np.linalg.norm(own):
-        return row  # the model's own coefficients could do all that it does
-    residual = row.found.residual
-    return replace(
-        row,
-        flatness=steadiness.along_frequency(alone, residual, size, record.dt),
-        steadiness=steadiness.along_amplitude(alone, residual, size),
-    )
+        return None, None
+    along = steadiness.along_frequency(alone, found.residual, size, record.dt)
+    return along, steadiness.along_amplitude(alone, found.residual, size)
+
+
+def wavers(steady: Curve | None) -> bool:
+    """Whether a coefficient moves with the amplitude for certain, and by more than integration makes of it."""
+    return steady is not None and steady.p_value() < CERTAIN and steady.spread() > STILL

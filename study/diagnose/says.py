@@ -1,6 +1,6 @@
 """The diagnosis in plain sentences, composed from its numbers and from nothing else."""
 
-from study.diagnose.ranking import Ranked
+from study.diagnose.ranking import Ranked, wavers
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
 
 DEPENDENCE = 0.1  # held-out share from which the unexplained force is said to depend on something
@@ -59,7 +59,7 @@ def _unknown(found: Diagnosis) -> list[str]:
     if best is not None and best.gain.explained > 0.0 and best.p_value < 0.05:
         said.append(
             f"The nearest, {_words(best.name).lower()}, leaves {_percent(best.response_error)}; "
-            "what remains has structure, so its shape is not right."
+            f"{_doubt(best)}, so its shape is not right."
         )
     families = sorted(found.families.items(), key=lambda item: -item[1])
     if families and families[0][1] > DEPENDENCE:
@@ -71,6 +71,13 @@ def _unknown(found: Diagnosis) -> list[str]:
     else:
         said.append("Neither displacement, velocity, the past nor time as such explains a tenth of it.")
     return said
+
+
+def _doubt(row: Ranked) -> str:
+    if row.steadiness is None or not wavers(row.steadiness):
+        return "what remains has structure"
+    change, p = _percent(row.steadiness.spread()), row.steadiness.p_value()
+    return f"its coefficient changes with the amplitude by {change} (p = {p:.1g})"
 
 
 def _amount(row: Ranked, force: str, length: str) -> str:

@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import rfft, rfftfreq
+from scipy.stats import chi2
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -36,6 +37,12 @@ class Curve:
     at: Floats
     value: Complexes
     error: Floats
+
+    def p_value(self) -> float:
+        """Probability of values as different as these if the coefficient were a constant (chi square)."""
+        weight = 1.0 / np.maximum(self.error, 1e-300) ** 2
+        mean = np.sum(weight * self.value.real) / np.sum(weight)
+        return float(chi2.sf(np.sum(weight * (self.value.real - mean) ** 2), max(len(self.value) - 1, 1)))
 
     def spread(self) -> float:
         """Root mean square deviation from the mean that its errors do not account for, relative to it."""

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from study import fitting, noise_floor
 from study.compare.fitted import fit_model
-from study.diagnose import candidates, nature, pairs, search
-from study.diagnose.ranking import Ranked, rank
+from study.diagnose import candidates, nature, pairs, score, search
+from study.diagnose.pairs import Pair
+from study.diagnose.ranking import TIE, Ranked, curves, rank, wavers
 from study.diagnose.search import Baseline
 from study.errors import DivergenceError
 from study.fitting import Plan
@@ -70,6 +71,7 @@ class Diagnosis:
     pair: tuple[str, ...]
     families: dict[str, float]
     diverged: bool = False
+
 
 def diagnose(
     model: Model,
@@ -153,14 +155,15 @@ def _decide(
     if not credible:
         left = _left(residual, size, record.dt)
         return (UNKNOWN if left > NEGLIGIBLE else NOTHING), rows, left, ()
-    left = _left(credible[0].residual, size, record.dt)
-    if left <= LEFT:
+    first = credible[0]
+    left = _left(first.residual, size, record.dt)
+    if left <= LEFT and not wavers(first.steadiness):
         return MISSING, rows, left, ()
-    pair, remaining = _best_pair(rows, base, size, record, how, held)
-    if remaining <= LEFT:
-        first = next(r for r in rows if r.name == pair[0])
-        return MISSING, [first] + [r for r in rows if r is not first], remaining, pair
-    return UNKNOWN, rows, left, ()
+    pair = _explaining_pair(rows, base, size, record, how, held)
+    if pair is None:
+        return UNKNOWN, rows, left, ()
+    first = next(r for r in rows if r.name == pair.names[0])
+    return MISSING, [first] + [r for r in rows if r is not first], _left(pair.residual, size, record.dt), pair.names
 
 
 def _credible(row: Ranked, residual: Floats, size: float) -> bool:
@@ -174,29 +177,35 @@ def _left(residual: Floats, size: float, dt: float) -> float:
     return float(np.sqrt(found.excess)) / size if found.significance > SIGNIFICANT else 0.0
 
 
-def _best_pair(
+def _explaining_pair(
     rows: list[Ranked], base: Baseline, size: float, record: Record, how: Plan, held: tuple[str, ...]
-) -> tuple[tuple[str, ...], float]:
-    """Two effects that explain together, and the structure they leave.
+) -> Pair | None:
+    """Two effects that explain together what the first does not alone, or None.
 
-    First those that the reverse system puts first; if none explains, the first candidates with every other.
+    First the best of those that the reverse system puts first; then the first candidates with every other.
     """
     short = fitting.shortened(how, SEARCHED)
     found = pairs.best_pair(rows, base, record, short, held)
-    best: tuple[tuple[str, ...], float] = ((), np.inf)
-    if found is not None:
-        best = (found.names, _left(found.residual, size, record.dt))
+    if found is not None and _explains(found, rows, size, record, short):
+        return found
     for row in rows[:PAIRED]:
-        if best[1] <= LEFT:
-            break
         beside = search.baseline(_refitted(row.found, record, how, short, held), record, short)
         others = [r.term for r in rows if r.name != row.name]
         seconds = candidates.try_all(others, beside, record, short, held)
         second = min(seconds, key=lambda t: float(t.residual @ t.residual), default=None)
         if second is not None:
-            left = _left(second.residual, size, record.dt)
-            best = min(best, ((row.name, second.term.name), left), key=lambda pair: pair[1])
-    return best
+            found = Pair((row.name, second.term.name), second.found, second.residual)
+            if _explains(found, rows, size, record, short):
+                return found
+    return None
+
+
+def _explains(pair: Pair, rows: list[Ranked], size: float, record: Record, how: Plan) -> bool:
+    """Whether a pair leaves no structure, does more than the first alone, and neither coefficient moves."""
+    if _left(pair.residual, size, record.dt) > LEFT or score.difference(rows[0].residual, pair.residual) < TIE:
+        return False
+    terms = [r.term for r in rows if r.name in pair.names]
+    return not any(wavers(curves(pair.found, term, record, how)[1]) for term in terms)
 
 
 def _families(base: Baseline, record: Record, how: Plan) -> dict[str, float]:
