@@ -137,6 +137,13 @@ class Periods:
 
     @staticmethod
     def of(record: Record, inputs: Sequence[Input], band: tuple[float, float]) -> "Periods":
+        """Cut and transform the whole periods of a record.
+
+        Raises
+        ------
+        StudyError
+            If a period has too few lines in the band.
+        """
         channels = _grouped(record)
         samples = channels["force"].shape[1]
         frequency: Floats = np.arange(samples // 2 + 1, dtype=np.float64) / (samples * record.dt)
