@@ -13,7 +13,7 @@ report: study
 	$(BIN)/snakemake --report report.html
 
 test: lint
-	$(BIN)/pytest
+	$(BIN)/pytest -n logical --dist loadfile -p no:benchmark
 
 lint: $(READY)
 	$(BIN)/ruff check
