@@ -28,6 +28,7 @@ for _case in STUDY.cases:
             record=f"results/{_case}/record.csv",
             responses=f"results/{_case}/frequency_response.csv",
             coherences=f"results/{_case}/coherence.csv",
+            parameters=f"results/{_case}/parameters.csv",
             style=STYLE,
             code=CODE["draw"],
         output:

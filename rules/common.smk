@@ -31,6 +31,10 @@ def identification_settings(wildcards):
     return STUDY.identification_settings(wildcards.case)
 
 
+def monte_carlo_settings(wildcards):
+    return STUDY.identification_settings(wildcards.case) | {"estimators": STUDY.settings["monte_carlo"]["estimators"]}
+
+
 def model_of(wildcards):
     return STUDY.cases[wildcards.case].model
 

@@ -7,7 +7,7 @@ rule ensemble:
         table="results/monte_carlo/{case}.csv",
     params:
         record=record_settings,
-        identification=identification_settings,
+        identification=monte_carlo_settings,
         ensemble=STUDY.settings["monte_carlo"],
     benchmark:
         "results/benchmarks/ensemble.{case}.tsv"

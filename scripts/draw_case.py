@@ -18,11 +18,13 @@ HIGHEST = 10.0  # hertz: the report's systems have their dynamics below it (Sect
 PARTS = ("real part", "imaginary part")
 
 
-def linear(response_csv: Path, title: str, highest: float = HIGHEST, drawn: Sequence[str] | None = None) -> Figure:
+def linear(
+    response_csv: Path, title: str, highest: float = HIGHEST, drawn: Sequence[str] | None = None, found: str = ""
+) -> Figure:
     """Magnitude and phase of A_1."""
     first = curves.responses(pd.read_csv(response_csv), highest, drawn)[0]
     figure, axes = page.page(
-        title, "Linear frequency response function $A_1(f)$", rows=2,
+        title, f"Linear frequency response function $A_1(f)${found}", rows=2,
         legend_rows=page.rows_for(len(first.curves) + 2),
     )  # fmt: skip
     response.magnitude(axes[0], first, labels.response_unit(first.shape))
@@ -32,7 +34,9 @@ def linear(response_csv: Path, title: str, highest: float = HIGHEST, drawn: Sequ
     return figure
 
 
-def nonlinear(response_csv: Path, title: str, highest: float = HIGHEST, drawn: Sequence[str] | None = None) -> Figure:
+def nonlinear(
+    response_csv: Path, title: str, highest: float = HIGHEST, drawn: Sequence[str] | None = None, found: str = ""
+) -> Figure:
     """Real and imaginary part of A_2 and every further one, side by side."""
     shown = curves.responses(pd.read_csv(response_csv), highest, drawn)[1:]
     if not shown:
@@ -42,7 +46,7 @@ def nonlinear(response_csv: Path, title: str, highest: float = HIGHEST, drawn: S
     count = len(shown)
     names, s = ", ".join(f"$A_{r.number}(f)$" for r in shown), "s" if count > 1 else ""
     figure, axes = page.page(
-        title, f"Nonlinear frequency response function{s} {names}", rows=2, columns=count,
+        title, f"Nonlinear frequency response function{s} {names}{found}", rows=2, columns=count,
         width=page.width(count), legend_rows=page.rows_for(len(shown[0].curves) + 3),
     )  # fmt: skip
     for item, real, imaginary in zip(shown, axes[:count], axes[count:], strict=True):
@@ -54,11 +58,16 @@ def nonlinear(response_csv: Path, title: str, highest: float = HIGHEST, drawn: S
     return figure
 
 
-def cumulative(coherence_csv: Path, title: str, highest: float = HIGHEST) -> Figure:
-    """Cumulative coherences."""
-    shares = curves.coherences(pd.read_csv(coherence_csv), highest)
-    figure, axes = page.page(title, "Cumulative coherence", panel=2.7, legend_rows=len(shares), headed=False)
+def cumulative(coherence_csv: Path, title: str, highest: float = HIGHEST, found: str = "") -> Figure:
+    """Cumulative coherences; those with estimated shape parameters over them."""
+    table = pd.read_csv(coherence_csv)
+    shares = curves.coherences(table, highest)
+    again = labels.FREE_SHAPE in set(table["estimator"])
+    rows = len(shares) + (1 if again else 0)
+    figure, axes = page.page(title, f"Cumulative coherence{found}", panel=2.7, legend_rows=rows, headed=False)
     coherence.cumulative(axes[0], shares)
+    if again:
+        coherence.beside(axes[0], curves.coherences(table, highest, labels.FREE_SHAPE), labels.FREE_SHAPE)
     page.legend(figure, axes, columns=1)
     return figure
 
@@ -75,6 +84,7 @@ def histogram(record_csv: Path, title: str, channel: str = "displacement") -> Fi
 def draw(
     record_csv: Path, response_csv: Path, coherence_csv: Path, outputs: Mapping[str, Sequence[Path]],
     *, title: str, style: Path, highest: float = HIGHEST, drawn: Sequence[str] | None = None,
+    parameters_csv: Path | None = None,
 ) -> None:  # fmt: skip
     """Draw the wanted kinds of picture of a case.
 
@@ -92,16 +102,20 @@ def draw(
         Where the frequency axis ends, in hertz.
     drawn : sequence of str, optional
         Estimators whose frequency response functions are shown; all of them if left out.
+    parameters_csv : Path, optional
+        The case's parameters: shape parameters that were estimated stand in the headings.
 
     Raises
     ------
     StudyError
         If a kind of picture is asked for that there is not.
     """
+    shapes = "" if parameters_csv is None else labels.estimated(pd.read_csv(parameters_csv))
+    found = f"; estimated {shapes}" if shapes else ""
     kinds = {
-        "linear": lambda: linear(response_csv, title, highest, drawn),
-        "nonlinear": lambda: nonlinear(response_csv, title, highest, drawn),
-        "coherence": lambda: cumulative(coherence_csv, title, highest),
+        "linear": lambda: linear(response_csv, title, highest, drawn, found),
+        "nonlinear": lambda: nonlinear(response_csv, title, highest, drawn, found),
+        "coherence": lambda: cumulative(coherence_csv, title, highest, found),
         "histogram": lambda: histogram(record_csv, title),
     }
     with styles.context(style):
@@ -120,4 +134,5 @@ if "snakemake" in globals():
             Path(step.input.record), Path(step.input.responses), Path(step.input.coherences),
             {kind: [Path(p) for p in paths] for kind, paths in step.output.items()},
             title=step.params.title, style=Path(step.input.style), drawn=step.params.drawn,
+            parameters_csv=Path(step.input.parameters),
         )  # fmt: skip

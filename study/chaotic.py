@@ -1,6 +1,7 @@
 """Fitting a system in free run that is chaotic, or from starting values that are far off."""
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,14 +55,13 @@ def fit_in_pieces(
         )  # fmt: skip
     near = _tightened(begun, pieces, states, held, TIES)
     again = _tightened(near.model, pieces, pieces.first_states(near.model), tuple(near.model.values), TIES)
-    found = loose
-    states = again.initial
-    for tie in (TIES[-1], TIGHT):
-        trial = _fit(again.model, pieces, states, held, tie, FIRMER)
-        if not _as_good(trial, loose):
-            break
-        found, states = trial, trial.initial
-    return found
+    firm = _fit(again.model, pieces, again.initial, held, TIES[-1], FIRMER)
+    if not _as_good(firm, loose):
+        return loose
+    tight = _fit(firm.model, pieces, firm.initial, held, TIGHT, FIRMER)
+    # The tighter the ties, the narrower the side valleys in which a search may end; the curvature of one says
+    # nothing of the others. The firm fit's covariance covers what the tight one's values scatter by.
+    return replace(tight, covariance=firm.covariance) if _as_good(tight, loose) else firm
 
 
 def fit_record(

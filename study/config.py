@@ -244,7 +244,7 @@ def _check_settings(settings: Table, where: str) -> None:
             f"{where}: local_polynomial.half_width makes bands of {width} lines; fit_band [{low}, {high}] of "
             f"{sampling['samples']} samples holds fewer"
         )
-    for name in settings["estimators"]:
+    for name in (*settings["estimators"], *settings["monte_carlo"]["estimators"]):
         if name not in ESTIMATORS:
             raise StudyError(f"{where}: there is no estimator {name!r}; known are {', '.join(ESTIMATORS)}")
     if "miso" not in settings["estimators"]:

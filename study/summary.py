@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from study.claims.verdict import NOT_REPRODUCED, PARTLY, REPRODUCED
+from study.claims.verdict import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED
 from study.document import Block, Bullets, Heading, Text, table
 
 INTRODUCTION = (
@@ -72,7 +72,7 @@ def blocks(tables: Tables) -> list[Block]:
 
 def counts(tables: Tables) -> list[Block]:
     """How many claims and parameters hold, in sentences."""
-    verdicts = tables.claims["verdict"]
+    verdicts = tables.claims.loc[~tables.claims["where"].str.startswith(BESIDE), "verdict"]
     total, (whole, part, none) = len(verdicts), (
         int((verdicts == verdict).sum()) for verdict in (REPRODUCED, PARTLY, NOT_REPRODUCED)
     )  # fmt: skip
@@ -137,7 +137,9 @@ def _estimate(row: "pd.Series[Any]") -> str:
     error = "" if pd.isna(row["standard_error"]) else f" ± {row['standard_error']:.2g}"
     relative = "" if pd.isna(row["relative_error"]) else f" ({100.0 * row['relative_error']:+.2g} %)"
     text = f"{row['estimate']:.5g}{error}{relative}"
-    return text if row["within_tolerance"] else f"**{text}**"
+    text = text if row["within_tolerance"] else f"**{text}**"
+    note = row.get("note", "")
+    return f"{text}; {note}" if isinstance(note, str) and note else text
 
 
 def _tolerance(row: "pd.Series[Any]") -> str:

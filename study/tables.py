@@ -17,7 +17,7 @@ from study.model import Model
 Table = Mapping[str, Any]
 PARAMETER_COLUMNS = [
     "case", "estimator", "parameter", "true", "estimate", "standard_error",
-    "relative_error", "tolerance", "within_tolerance",
+    "relative_error", "tolerance", "within_tolerance", "note",
 ]  # fmt: skip
 RESPONSE_COLUMNS = [
     "frequency", "estimator", "input", "shape", "real", "imag", "standard_error", "exact_real", "exact_imag",
@@ -31,7 +31,8 @@ def parameters(case: str, model: Model, found: Mapping[str, Identified], setting
     """Every parameter of every estimator, one row each (``PARAMETER_COLUMNS``).
 
     ``tolerance`` is relative where the true value is not zero; where it is zero there is no relative
-    error, and ``tolerance`` is absolute, in the parameter's own unit.
+    error, and ``tolerance`` is absolute, in the parameter's own unit. ``note`` is the estimator's, such as
+    that its search did not converge.
     """
     truth = true_parameters(model.values)
     rows: list[dict[str, Any]] = []
@@ -43,7 +44,7 @@ def parameters(case: str, model: Model, found: Mapping[str, Identified], setting
             judged = judge(parameter.name, true, parameter.value, settings)
             rows.append(
                 {"case": case, "estimator": estimator, "parameter": parameter.name, "true": true,
-                 "estimate": parameter.value, "standard_error": parameter.error, **judged}
+                 "estimate": parameter.value, "standard_error": parameter.error, **judged, "note": identified.note}
             )  # fmt: skip
     return pd.DataFrame(rows, columns=PARAMETER_COLUMNS)
 

@@ -84,7 +84,11 @@ def test_figures_without_a_number_are_named_after_the_case(folder):
         ("[siso, miso,", "[siso, mios,", "there is no estimator 'mios'; known are siso, miso"),
         ("[siso, miso, miso_hand_read", "[siso, miso_hand_read", "estimators lacks 'miso', whose coherences are drawn"),
         ("half_width: 40", "half_width: 800", "half_width makes bands of 1601 lines; fit_band [0.3, 10.0] of 8192"),
-        ("with_noise: [siso, miso]", "with_noise: [siso, instrument]", "drawn.with_noise names 'instrument', which"),
+        (
+            "with_noise: [siso, miso, instrumental]",
+            "with_noise: [siso, instrument]",
+            "drawn.with_noise names 'instrument', which",
+        ),
         ("degree: 2", "degree: 2.5", "local_polynomial.degree is not right"),
         ("kind: gaussian_lowpass", "kind: gaussian", "excitations.report.kind is not right"),
         ("cutoff: 12.5", "cutoff: 125", "excitations.report: the excitation reaches 125 Hz"),

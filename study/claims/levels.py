@@ -72,7 +72,7 @@ def random_only(evidence: Evidence, reported: Reported) -> Claim:
     clean = _biases(evidence.unit(COMBINED), reported, PARTS)
     for noise in noises(reported):
         found = _biases(evidence.at(COMBINED, 1.0, noise), reported, PARTS)
-        shifts = [_shift(name, sample.minus(clean[name])) for name, sample in found.items()]
+        shifts = [shift(name, sample.minus(clean[name])) for name, sample in found.items()]
         conditions.append(together(f"{100 * noise:g} % noise", shifts))
     return conclude(
         reported, "noise_random_only", *conditions,
@@ -81,7 +81,8 @@ def random_only(evidence: Evidence, reported: Reported) -> Claim:
     )  # fmt: skip
 
 
-def _shift(name: str, off: Sample) -> Condition:
+def shift(name: str, off: Sample) -> Condition:
+    """A mean that scatter alone explains."""
     text = f"{name} {100 * off.mean:+.3g} +- {100 * off.error:.1g} %"
     criterion = f"mean shift of {name} within 3 standard errors of zero"
     return Condition(criterion, text, abs(off.mean) <= 3.0 * off.error, text)
@@ -148,7 +149,7 @@ def linear_bias(evidence: Evidence, reported: Reported) -> Claim:
         fitted = {n: ensemble.miso(n).mean for n in names}
         read = {n: ensemble.sample(lambda o, n=n: o.miso.read.get(n, math.nan)).median for n in names}
         for how, found in (("fitted (mean)", fitted), ("hand-read (median)", read)):
-            biases = {n: _bias(n, value / truth[n] - 1.0) for n, value in found.items()}
+            biases = {n: bias(n, value / truth[n] - 1.0) for n, value in found.items()}
             label = f"{100 * noise:g} % noise, {how}"
             conditions += [together(label, [biases[n] for n in ("k", "m", "f_n")]), together(label, [biases["c"]])]
     low, worst = evidence.settings["fit_band"][0], noises(reported)[-1]
@@ -161,7 +162,8 @@ def linear_bias(evidence: Evidence, reported: Reported) -> Claim:
     )  # fmt: skip
 
 
-def _bias(name: str, off: float) -> Condition:
+def bias(name: str, off: float) -> Condition:
+    """A bias that is not significant."""
     text = f"{name} {100 * off:+.3g} %"
     return Condition(f"bias of {name} within {100 * SIGNIFICANT_BIAS:g} %", text, abs(off) <= SIGNIFICANT_BIAS, text)
 

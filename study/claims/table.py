@@ -10,6 +10,7 @@ from study.claims import (
     damping,
     dead_band,
     duffing,
+    instruments,
     levels,
     linear,
     mathieu,
@@ -19,7 +20,7 @@ from study.claims import (
 )
 from study.claims.evidence import Evidence
 from study.claims.reported import Reported
-from study.claims.verdict import NOT_REPRODUCED, PARTLY, REPRODUCED, Claim
+from study.claims.verdict import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED, Claim
 
 CLAIMS: tuple[Callable[[Evidence, Reported], Claim], ...] = (
     *simulation.CLAIMS,
@@ -31,6 +32,7 @@ CLAIMS: tuple[Callable[[Evidence, Reported], Claim], ...] = (
     *mathieu.CLAIMS,
     *dead_band.CLAIMS,
     *levels.CLAIMS,
+    *instruments.CLAIMS,
     *conclusions.CLAIMS,
 )
 COLUMNS = ["id", "where", "claim", "reported", "measured", "criterion", "verdict", "why"]
@@ -50,9 +52,10 @@ def judge(evidence: Evidence, reported: Reported, progress: Callable[[int, Claim
 
 def page(table: pd.DataFrame) -> str:
     """The table as a page: counts, then every claim."""
-    counts = table["verdict"].value_counts()
+    own = table[~table["where"].str.startswith(BESIDE)]
+    counts = own["verdict"].value_counts()
     found = [f"{int(counts.get(v, 0))} {v}" for v in (REPRODUCED, PARTLY, NOT_REPRODUCED)]
-    lines = ["# Claims of the report", "", f"{len(table)} statements: {', '.join(found)}.", ""]
+    lines = ["# Claims of the report", "", f"{len(own)} statements: {', '.join(found)}.", ""]
     lines += [_cells(COLUMNS), _cells(["---"] * len(COLUMNS))]
     lines += [_cells(row) for row in table[COLUMNS].to_numpy()]
     return "\n".join(lines) + "\n"

@@ -11,6 +11,7 @@ from study.claims.reported import Reported
 from study.claims.sample import Sample
 
 REPRODUCED, PARTLY, NOT_REPRODUCED = "reproduced", "partly", "not reproduced"
+BESIDE = "beside"  # begins the place of what is no statement of the report: judged, but not counted among them
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ ESTIMATORS = {
     "local_polynomial": "study.estimators.local_polynomial",
     "output_error": "study.estimators.output_error",
     "instrumental": "study.estimators.instrumental",
+    "miso_free_shape": "study.estimators.free_shape",
     "errors_in_variables": "study.estimators.errors_in_variables",
 }
 

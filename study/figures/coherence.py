@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 
 from study.figures import labels
 from study.figures.curves import InputCoherence
+from study.figures.styles import look
 
 LOOKS = (("C1", (0, (5.0, 2.0))), ("C2", (0, (1.5, 1.2))), ("C3", (0, (7.0, 1.5, 1.5, 1.5))), ("C5", "-."))
 ALL = ("C0", "-")  # the last curve is the multiple coherence: what the whole model explains
@@ -34,6 +35,18 @@ def cumulative(axes: Axes, shares: Sequence[InputCoherence]) -> Axes:
     axes.set_xlim(0.0, float(np.ceil(shares[0].frequency[-1])))
     axes.set_xlabel("frequency (Hz)")
     axes.set_ylabel("cumulative coherence (dimensionless)")
+    return axes
+
+
+def beside(axes: Axes, shares: Sequence[InputCoherence], estimator: str) -> Axes:
+    """Cumulative coherences of a further estimator as thin lines over those that are drawn, under one label."""
+    style = look(estimator)
+    for share in shares:
+        label = style.label if share is shares[-1] else "_nolegend_"
+        axes.plot(
+            share.frequency, share.cumulative, color="black", linestyle=style.dash, linewidth=1.0, label=label,
+            zorder=4.0,
+        )  # fmt: skip
     return axes
 
 

@@ -4,6 +4,8 @@ import ast
 import math
 from fractions import Fraction
 
+import pandas as pd
+
 from study import expression, terms, units
 
 DIMENSIONS: dict[str, units.Dimensions] = {
@@ -13,6 +15,9 @@ DIMENSIONS: dict[str, units.Dimensions] = {
     "frequency": (Fraction(0), Fraction(-1)),
 }
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+SHAPE_UNITS = {"length": "m", "1/length": "1/m", "time": "s", "frequency": "Hz"}
+FREE_SHAPE = "miso_free_shape"  # the estimator that finds shape parameters too
+MOST_DIGITS = 6
 LOOSE = (ast.Add, ast.Sub)  # operators whose operands a product must put in brackets
 
 
@@ -101,6 +106,27 @@ def quantity(value: float, unit: str) -> str:
     """A value with its unit, three digits: ``6.64 mm``."""
     factor, shown = prefixed(unit, abs(value))
     return f"{value / factor:.3g} {units.pretty(shown)}"
+
+
+def estimated(parameters: pd.DataFrame) -> str:
+    """Shape parameters that were estimated, with a standard error: ``u_g = 2.5002 ± 0.0011 mm``; empty if none was.
+
+    Parameters
+    ----------
+    parameters : DataFrame
+        ``parameters.csv`` of a case.
+    """
+    units_of = {p.name: SHAPE_UNITS[p.quantity] for term in terms.LIBRARY.values() for p in term.parameters}
+    own = parameters[parameters["estimator"] == FREE_SHAPE]
+    found: list[str] = []
+    for _, row in own[own["parameter"].isin(list(units_of))].iterrows():
+        value, error = float(row["estimate"]), float(row["standard_error"])
+        factor, unit = prefixed(units_of[str(row["parameter"])], abs(value))
+        digits = MOST_DIGITS if error == 0.0 else min(max(0, -math.floor(math.log10(error / factor))), MOST_DIGITS)
+        symbol = _symbol(str(row["parameter"]))
+        spread = f"{error / factor:.{digits}f}" if digits < MOST_DIGITS else f"$<10^{{-{MOST_DIGITS}}}$"
+        found.append(f"${symbol}$ = {value / factor:.{digits}f} ± {spread} {units.pretty(unit)}")
+    return ", ".join(found)
 
 
 def term_names(text: str) -> str:

@@ -46,6 +46,7 @@ ESTIMATORS = {
     "siso": LineLook("SI/SO", "C1", (0, (5.0, 2.0)), 1.7, 2.5),
     "local_polynomial": LineLook("local polynomial", "C2", (0, (7.0, 1.5, 1.5, 1.5)), 1.6, 3.5),
     "instrumental": LineLook("instrumental", "C3", (0, (2.5, 1.2)), 2.0, 3.6),
+    "miso_free_shape": LineLook("MI/SO, shape estimated", "C4", (0, (1.6, 1.0)), 1.6, 3.2),
     "output_error": LineLook("output error", "C5", (0, (1.0, 1.0)), 2.2, 3.7),
 }
 

@@ -1,0 +1,30 @@
+"""The report's estimator where nobody says what u_g or f_m is: shape parameters from the record, then MI/SO."""
+
+from study.estimators import miso, output_error
+from study.estimators.base import Identified, Settings, named_parameters
+from study.model import Model
+from study.output_error import FreeRunFit
+from study.parameters import Estimate
+from study.record import Record
+
+
+def identify(model: Model, record: Record, settings: Settings) -> Identified:
+    """MI/SO with shape parameters that a fit in free run found; nothing for a model that has none.
+
+    Shape parameters of the model are ignored, as coefficients are.
+    """
+    shapes = tuple(key for key in model.values if "." in key)
+    if not shapes:
+        return Identified((), None, ())
+    found = output_error.fit(model.with_values(dict.fromkeys(shapes)), record, settings)
+    known = model.with_values({key: found.estimate[key] for key in shapes})
+    result = miso.identify(known, record, settings)
+    own = named_parameters(_of(found, shapes))
+    note = "" if found.converged else found.message
+    return Identified(result.inputs, result.responses, (*result.parameters, *own), result.estimate, note)
+
+
+def _of(found: FreeRunFit, keys: tuple[str, ...]) -> Estimate:
+    """Some of the estimates of a fit."""
+    places = [found.keys.index(key) for key in keys]
+    return Estimate(keys, found.values[places], found.covariance[places][:, places])
