@@ -20,6 +20,7 @@ from study.terms import Term
 Floats = NDArray[np.float64]
 TIE = 2.0  # candidates closer than this many standard errors of their difference are a tie
 ALIKE = 0.01  # ... and so are two whose predictions differ by less than this share of what either leaves
+RESOLUTION = 3e-4  # ... or of the rms response: what integration with few steps a sample leaves uncertain
 UNSTEADY = 0.3  # relative change of its coefficient at which a candidate is no longer believed ...
 NEARLY = 0.9  # ... if a steadier one explains at least so much of what it does
 PRACTICALLY = 0.99  # of what an effect of three unknowns explains: enough for one of a single unknown
@@ -178,9 +179,10 @@ def _ties_by_simplicity(rows: list[Ranked]) -> list[Ranked]:
     if not rows:
         return rows
     first = rows[0]
-    level = [r for r in rows if _distance(r, first) < TIE or _alike(r.residual, first.residual)]
+    level = [r for r in rows if _distance(r, first) < TIE or _alike(r, first)]
     level = [r for r in level if _unknowns(r) <= _unknowns(first)]
     first = min(level, key=_misfit)
+    first = min((r for r in level if _alike(r, first)), key=lambda r: (_unknowns(r), _misfit(r)), default=first)
     return [first] + [r for r in rows if r is not first]
 
 
@@ -232,14 +234,17 @@ def _level(one: Ranked, other: Ranked) -> bool:
     Two forms of the same equation (a steady force and u^2 beside u^3, where the rest position is not
     measured) leave residuals that differ by rounding alone, and that very evenly.
     """
-    if _alike(one.residual, other.residual):
+    if _alike(one, other):
         return True
     return abs(_distance(one, other)) < TIE and abs(_distance(other, one)) < TIE
 
 
-def _alike(one: Floats, other: Floats) -> bool:
-    smaller = min(float(one @ one), float(other @ other))
-    return float(np.sum((one - other) ** 2)) < ALIKE**2 * smaller
+def _alike(one: Ranked, other: Ranked) -> bool:
+    """Whether two predictions differ by no more than integration and rounding make of them."""
+    power, size = float(one.residual @ one.residual), one.response_error
+    apart = float(np.sum((one.residual - other.residual) ** 2))
+    nearer = min(power, float(other.residual @ other.residual))
+    return apart < ALIKE**2 * nearer or apart * size**2 < RESOLUTION**2 * power
 
 
 def _examined(row: Ranked, record: Record, how: Plan) -> Ranked:
