@@ -101,6 +101,11 @@ def test_steady_force_is_hidden_behind_acceleration_only_where_it_shows(seed: in
     assert np.std(measured - still) > 0.01 * np.std(measured)
 
 
+def test_steady_force_beside_effects_that_know_no_place_is_hidden_only_behind_another_that_does() -> None:
+    trial = make_trial(36, ("constant_force", "harmonic_force"), 0.0, "acceleration")
+    assert {t.name for t in trial.believed.terms} & {"cubic_stiffness", "van_der_pol_damping"}
+
+
 def test_command_writes_record_model_and_sealed_answer(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["trial", "--seed", "7", "--hidden", "quadratic_damping", "--noise", "0.05", "--response", "acceleration"]
     assert main([*words, "--out", str(tmp_path / "new")]) == 0

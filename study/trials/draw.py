@@ -22,6 +22,9 @@ EITHER_WAY = (  # effects that occur with either sign: an opening or a closing g
     "quadratic_stiffness", "signed_quadratic_stiffness", "cubic_stiffness", "dead_band", "bilinear_stiffness",
     "constant_force",
 )  # fmt: skip
+PLACELESS = (  # effects that are the same wherever the system rests
+    "quadratic_damping", "cubic_damping", "coulomb_friction", "relaxation", "hysteresis", "harmonic_force",
+)  # fmt: skip
 NOISES = (0.0, 0.01, 0.05, 0.10)
 KNOWN = ("none", "none", "cubic_stiffness", "van_der_pol_damping")  # of which one is drawn
 KNOWN_SHARE = 0.15
@@ -141,8 +144,14 @@ def _attempt(rng: np.random.Generator, seed: int, hidden: tuple[str, ...], noise
 
 
 def _unseen(base: Model, hidden: tuple[str, ...], response: str) -> bool:
-    """A steady force moves an otherwise linear system to another place, which only a displacement shows."""
-    return hidden == ("constant_force",) and response != "displacement" and len(base.terms) == len(LINEAR)
+    """A steady force moves a system to another place, which only a displacement shows if no force depends on the place.
+
+    Linear stiffness does not count: it is the same everywhere.
+    """
+    if "constant_force" not in hidden or response == "displacement":
+        return False
+    others = {t.name for t in base.terms} | set(hidden)
+    return others <= {*LINEAR, *PLACELESS, "constant_force"}
 
 
 def _measured(truth: Model, record: Record, response: str) -> Floats | None:
