@@ -41,17 +41,19 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def address(rig: Path) -> Iterator[str]:
     words = ["explore", "rig.csv", "--model", "rig.yaml", "--port", "0", "--no-browser", "--out", "saved"]
-    server = subprocess.Popen(
-        [sys.executable, "-m", "study", *words], cwd=rig, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    )
-    assert server.stdout is not None
-    line = server.stdout.readline()
-    found = re.match(r"(http://127\.0\.0\.1:\d+/) shows", line)
-    assert found, line + server.stdout.read()
-    yield found[1]
-    server.terminate()
-    server.wait(10)
-    server.stdout.close()
+    with (rig / "errors.txt").open("w") as errors:
+        server = subprocess.Popen(
+            [sys.executable, "-m", "study", *words], cwd=rig, stdout=subprocess.PIPE, stderr=errors, text=True
+        )
+        assert server.stdout is not None
+        line = server.stdout.readline()
+        found = re.match(r"(http://127\.0\.0\.1:\d+/) shows", line)
+        assert found, line + (rig / "errors.txt").read_text()
+        yield found[1]
+        server.terminate()
+        server.wait(10)
+        server.stdout.close()
+    assert "Traceback" not in (rig / "errors.txt").read_text()
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +90,7 @@ def error(page: Page) -> float:
     return float(page.inner_text(ERROR).removesuffix("%"))
 
 
-def until(page: Page, condition: str, *, seconds: float = 30.0) -> None:
+def until(page: Page, condition: str, *, seconds: float = 120.0) -> None:
     page.wait_for_function(condition, timeout=1000.0 * seconds)
 
 

@@ -39,7 +39,7 @@ window.study = (() => {
     if (has && kept === null) kept = column("plane", "mean")
     if (kept !== null) {
       const mean = has ? column("would_plane", String(i)) : kept
-      put("plane", {...model("plane").data, mean, hatch: Array.from(mean, (m) => (m < 0 ? "-" : " "))})
+      put("plane", {...model("plane").data, mean, hatch: Array.from(mean, (m) => (m < -1e-6 * model("mapper").high ? "-" : " "))})
       if (!has) kept = null
     }
     for (const name of ["difference", "spectrum", "against_u", "against_v"]) entry(name, "candidate", has)

@@ -73,7 +73,8 @@ def build(seen: View, ladder: Columns, stores: Sequence[ColumnDataSource] = ()) 
     panels: dict[str, Any] = {
         "response": plots.response(sources, time), "difference": plots.difference(sources, time),
         "close": plots.close(sources),
-        "force": plots.force(sources, frequency), "coherence": plots.coherence(sources, frequency),
+        "force": plots.force(sources, frequency, style.fixed("range_force", *seen.limits)),
+        "coherence": plots.coherence(sources, frequency),
         "spectrum": plots.spectrum(sources, frequency), "plane": plots.plane(sources),
         "against_u": plots.against(sources, "u"), "against_v": plots.against(sources, "v"),
         "ladder": plots.ladder(sources, ladder["name"], ladder_height(len(ladder["name"]))),
@@ -119,7 +120,7 @@ def ladder_of(steps: Sequence[Step], labels: Sequence[str]) -> Columns:
 def frame(seen: View) -> Columns:
     """Labels and limits that differ from rung to rung, as settings of named models."""
     scale = seen.scales
-    largest = np.nanmax(np.abs(seen.columns["plane"]["mean"]), initial=0.0)
+    largest = max(float(np.nanmax(np.abs(seen.columns["plane"]["mean"]), initial=0.0)), seen.least)
     u, v, f = (in_text(s.unit) for s in (scale.displacement, scale.velocity, scale.force))
     rows: list[tuple[str, str, Any]] = [
         ("response_y", "axis_label", f"{seen.quantity} / {in_text(scale.response.unit)}"),
@@ -129,8 +130,10 @@ def frame(seen: View) -> Columns:
         ("plane_x", "axis_label", f"displacement / {u}"), ("plane_y", "axis_label", f"velocity / {v}"),
         ("against_u_x", "axis_label", f"displacement / {u}"), ("against_u_y", "axis_label", f"missing force / {f}"),
         ("against_v_x", "axis_label", f"velocity / {v}"), ("against_v_y", "axis_label", f"missing force / {f}"),
-        ("mapper", "low", -float(largest) or -1.0), ("mapper", "high", float(largest) or 1.0),
-        ("range_frequency", "end", seen.highest),
+        ("mapper", "low", -largest), ("mapper", "high", largest),
+        *((f"range_against_{of}", "min_interval", 2.0 * seen.least) for of in ("u", "v")),
+        ("range_frequency", "end", seen.highest), ("range_force", "start", seen.limits[0]),
+        ("range_force", "end", seen.limits[1]),
     ]  # fmt: skip
     return {"model": [r[0] for r in rows], "property": [r[1] for r in rows], "value": [r[2] for r in rows]}
 

@@ -52,10 +52,10 @@ def _blocks(drawn: Any, s: Sources) -> None:
     drawn.add_glyph(s["blocks"], strips, level="underlay", nonselection_glyph=None)
 
 
-def force(s: Sources, frequency: Any) -> Any:
+def force(s: Sources, frequency: Any, share: Any) -> Any:
     """Unexplained share of the force with the noise floor."""
     drawn = style.panel(
-        "force", 222, "frequency / Hz", "unexplained share of the force / %", select="width", ranges=(frequency, None),
+        "force", 222, "frequency / Hz", "unexplained share of the force / %", select="width", ranges=(frequency, share),
         narrow=True, y_axis_type="log",
     )  # fmt: skip
     left = drawn.line("f", "parametric", source=s["force"], line_color="#0b5394", line_width=1.6)
@@ -134,6 +134,7 @@ def against(s: Sources, of: str) -> Any:
     would = drawn.line("at", "y", source=s[f"ghost_{of}"], **style.WOULD)
     picked = drawn.line("at", "y", source=s[f"picked_{of}"], **style.PICKED)
     style.chosen(drawn, f"box_{name}")
+    drawn.y_range.name = f"range_{name}"
     style.follows(drawn, [mean, bars])
     style.legend(drawn, [("mean, 95 %", [mean, dots, bars]), ("candidate", [would]), ("selected", [picked])])
     return drawn

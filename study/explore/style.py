@@ -66,7 +66,8 @@ def panel(
         name=f"panel_{name}", height=height, sizing_mode="stretch_width", min_width=140, tools=tools,
         x_axis_label=x, y_axis_label=y, x_range=ranges[0] or DataRange1d(range_padding=0.0),
         y_range=ranges[1] or DataRange1d(range_padding=0.06),
-        active_drag=tools[0] if select else None, active_scroll=None, toolbar_location="right", min_border_right=6,
+        active_drag=tools[0] if select else None, active_scroll=None, toolbar_location="right", toolbar_inner=True,
+        min_border_right=8,
         **more,
     )  # fmt: skip
     drawn.toolbar.autohide = True
@@ -79,6 +80,9 @@ def panel(
     if narrow and "x_axis_type" not in more:
         ticker: Any = drawn.xaxis[0].ticker
         ticker.desired_num_ticks = 4
+    if more.get("y_axis_type") == "log":
+        rough: Any = drawn.yaxis[0].ticker
+        rough.mantissas = [1, 3]
     for grid in drawn.grid:
         grid.grid_line_color = RULE
     return drawn

@@ -20,6 +20,7 @@ from study.figures.labels import power_of_ten
 Floats = NDArray[np.float64]
 Columns = dict[str, Any]
 NINETY_FIVE = 1.96  # standard errors to each side
+LEAST = 0.005  # of the rms force
 SURE = 2.0  # standard errors: cells whose mean is below may be noise
 
 
@@ -48,12 +49,18 @@ class View:
         Frequency in hertz at which the axes of frequency end.
     quantity : str
         The measured motion.
+    limits : (float, float)
+        Ends of the axis of the force.
+    least : float
+        Missing force, in the unit of its axis, down to which axes are drawn: below lies nothing to be seen.
     """
 
     columns: dict[str, Columns]
     scales: Scales
     highest: float
     quantity: str
+    limits: tuple[float, float]
+    least: float
 
 
 def view(rung: Rung, step: int, live: bool = True) -> View:
@@ -85,7 +92,9 @@ def view(rung: Rung, step: int, live: bool = True) -> View:
         **_links(found, scales),
         "words": words.words(rung, rows, step, live),
     }
-    return View({name: _small(c) for name, c in columns.items()}, scales, found.force.highest, found.how.response)
+    least = LEAST * float(np.std(found.record["force"])) / scales.force.factor
+    small = {name: _small(c) for name, c in columns.items()}
+    return View(small, scales, found.force.highest, found.how.response, force_limits(found), least)
 
 
 def _small(columns: Columns) -> Columns:
@@ -158,8 +167,16 @@ def _force(found: Comparison) -> Columns:
     return {
         "f": force.frequency[keep],
         **{name: 100.0 * np.maximum(values[keep], 1e-9) for name, values in share.items()},
-        "clear": np.where(force.band[keep], 1.0, np.nan),
     }
+
+
+def force_limits(found: Comparison) -> tuple[float, float]:
+    """Ends of the axis of the force in per cent: where the motion is lost in noise, shares leave the panel."""
+    force = found.force
+    keep = _heard(force.frequency, force.highest)
+    inside = np.concatenate([force.parametric[force.band], force.unexplained[force.band]])
+    least = np.concatenate([force.parametric[keep], force.unexplained[keep], force.noise[keep]])
+    return 50.0 * max(float(np.min(least)), 1e-9), max(200.0, 150.0 * float(np.max(inside)))
 
 
 def _coherence(found: Comparison) -> Columns:
@@ -192,11 +209,12 @@ def _plane(found: Comparison, scales: Scales) -> Columns:
     plane = surface(*(x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force)))
     left, right = (np.repeat(e, CELLS) for e in (plane.displacement[:-1], plane.displacement[1:]))
     low, high = (np.tile(e, CELLS) for e in (plane.velocity[:-1], plane.velocity[1:]))
+    tiny = 1e-9 * float(np.std(found.record["force"]))  # rounding
     mean, size, speed = plane.mean.ravel(), scales.displacement.factor, scales.velocity.factor
     return {
         "left": left / size, "right": right / size, "middle_u": 0.5 * (left + right) / size,
         "bottom": low / speed, "top": high / speed, "middle_v": 0.5 * (low + high) / speed, "mean": mean,
-        "hatch": [" " if not value < 0.0 else "-" for value in mean],
+        "hatch": ["-" if value < -tiny else " " for value in mean],
         "seen": np.where(np.isfinite(mean), 1.0, 0.0),
         "unsure": np.where(np.abs(mean) < SURE * plane.error.ravel(), 3.0, 0.0),
         "picked": np.zeros(len(mean)),

@@ -97,7 +97,7 @@ def _row(place: int, row: Ranked, rung: Rung, live: bool) -> str:
     units = rung.comparison.record.units
     unit = row.term.unit(row.term.symbols[0], units.get("force", "N"), units.get("displacement", "m"))
     add = f"<button data-act='add' data-name='{escape(row.name)}'>Add</button>" if live else ""
-    explained = f"{100.0 * row.gain.explained:.1f} ± {100.0 * row.gain.error:.1f} %"
+    explained = f"{round(100.0 * row.gain.explained, 1) + 0.0:.1f} ± {100.0 * row.gain.error:.1f} %"
     formula = escape(in_text(row.term.formula))
     what = f"<b>{escape(in_words(row.name))}</b>"
     meaning = row.term.meaning[0].upper() + row.term.meaning[1:]
