@@ -1,6 +1,11 @@
-"""Write the table of the report's numbers into README.md from results/claims.csv: ``make readme``."""
+"""Write measured numbers into README.md and docs/tool.md from the tables of results/: ``make readme``.
 
+The trials and the Silverbox are targets of their own; a table that is not there leaves its place as it is.
+"""
+
+import json
 import re
+import shutil
 from pathlib import Path
 
 import pandas as pd
@@ -15,20 +20,47 @@ SHOWN = (
     "mathieu_side_resonances", "mathieu_stiffness", "dead_band_stiffness", "dead_band_error", "dead_band_share",
     "levels_invariant", "levels_siso", "error_free", "noise_random_only",
 )  # fmt: skip
-PLACE = re.compile(r"(<!-- numbers -->\n).*?(<!-- /numbers -->)", re.DOTALL)
 
 
-def main(readme: Path, claims: Path) -> None:
+def main(results: Path, figures: Path, readme: Path, tool: Path) -> None:
+    claims = results / "claims.csv"
     if not claims.is_file():
         raise StudyError(f"{claims}: there is no such file; run 'make study' first")
     table = pd.read_csv(claims, keep_default_na=False).set_index("id").loc[list(SHOWN)].reset_index()
-    block = document.markdown([summary.statements(table)])
-    text, count = PLACE.subn(lambda found: found[1] + block + found[2], readme.read_text(encoding="utf-8"))
+    put(readme, "numbers", document.markdown([summary.statements(table)]))
+    if (reached := results / "trials" / "summary.csv").is_file():
+        put(tool, "reach", reach(pd.read_csv(reached)))
+        shutil.copyfile(figures / "trials_confusion.png", tool.parent / "trials_confusion.png")
+    if (history := results / "silverbox" / "history.json").is_file():
+        put(tool, "ladder", ladder(json.loads(history.read_text(encoding="utf-8"))["steps"]))
+
+
+def put(page: Path, name: str, block: str) -> None:
+    """Replace what stands between the two marks of this name."""
+    place = re.compile(rf"(<!-- {name} -->\n).*?(<!-- /{name} -->)", re.DOTALL)
+    text, count = place.subn(lambda found: found[1] + block + found[2], page.read_text(encoding="utf-8"))
     if count != 1:
-        raise StudyError(f"{readme} has no place for the table: a line '<!-- numbers -->' and one '<!-- /numbers -->'")
-    replace_file(readme, text.encode())
+        raise StudyError(f"{page} has no place for the table: a line '<!-- {name} -->' and one '<!-- /{name} -->'")
+    replace_file(page, text.encode())
+
+
+def reach(table: pd.DataFrame) -> str:
+    percent = 100.0 * table[["rate", "standard_error"]]
+    rates = [f"{rate:.1f} +- {error:.1f} %" for rate, error in percent.itertuples(index=False)]
+    wanted = ["" if pd.isna(w) else f"{100.0 * w:.0f} %" for w in table["wanted"]]
+    shown = pd.DataFrame({"reach": table["reach"], "trials": table["trials"], "measured": rates, "wanted": wanted})
+    return shown.to_markdown(index=False) + "\n"
+
+
+def ladder(steps: list[dict]) -> str:
+    rows = [
+        {"model": "linear oscillator" if step["added"] is None else f"+ {step['added'].replace('_', ' ')}",
+         "error of the response": f"{100.0 * step['error']['response']:.3g} %", "rms": f"{1000.0 * step['rms']:.3f} mV"}
+        for step in steps
+    ]  # fmt: skip
+    return pd.DataFrame(rows).to_markdown(index=False) + "\n"
 
 
 if __name__ == "__main__":
     with one_sentence():
-        main(Path("README.md"), Path("results/claims.csv"))
+        main(Path("results"), Path("figures"), Path("README.md"), Path("docs/tool.md"))
