@@ -17,6 +17,8 @@ Floats = NDArray[np.float64]
 TIES = (0.3, 1.0, 3.0, 10.0)  # ever tighter, see ``fit_free_run``: each step is small enough to find its way
 TIGHT = 30.0  # tied so, pieces know of each other all that the noise lets them
 TRIALS, FIRMER = 8, 30  # free runs at each step of the way, and in the last two
+POOR = 0.05  # of the response's standard deviation: a residual that may hide a motion
+SMOOTH = 0.5  # correlation of neighbouring samples of a residual; white noise has none
 DEVIATIONS = 3.0  # by how many standard deviations the misfit may exceed what fewer unknowns explain
 
 
@@ -76,10 +78,11 @@ def fit_record(
 ) -> FreeRunFit:
     """Fit a model to a whole record: in one free run where that holds, in pieces where it does not.
 
-    One free run is believed if the fit converges and the fitted system does not magnify a disturbance
-    tenfold anywhere on its way (``study.pieces.needed_restarts``, from the exact sensitivities). A system that
-    does loses the record however true the model, and its sum of squares is full of side valleys; in pieces
-    it takes half the steps, which are many enough for their length. Parameters and result are those of
+    One free run is believed if the fit converges, leaves no part of the motion (a residual that is large and
+    smooth), and the fitted system does not magnify a disturbance tenfold anywhere on its way
+    (``study.pieces.needed_restarts``, from the exact sensitivities). A system that does loses the record
+    however true the model, and its sum of squares is full of side valleys; in pieces it takes half the steps,
+    which are many enough for their length. Parameters and result are those of
     :func:`study.output_error.fit_free_run`.
 
     Raises
@@ -94,7 +97,9 @@ def fit_record(
             model, record, start=start, held=held, response=response, steps_per_sample=steps_per_sample,
             max_iterations=max_iterations,
         )  # fmt: skip
-        if found.converged and not _magnifies(found, record, response, steps_per_sample):
+        if found.converged and not (
+            _astray(found, record[response]) or _magnifies(found, record, response, steps_per_sample)
+        ):
             return found
     except DivergenceError:
         pass
@@ -102,6 +107,14 @@ def fit_record(
         model, record, start=start, held=held, response=response, steps_per_sample=max(steps_per_sample // 2, 1),
         max_iterations=max_iterations,
     )  # fmt: skip
+
+
+def _astray(found: FreeRunFit, measured: Floats) -> bool:
+    """Whether a fit ended in a side valley: what it leaves is a good part of the response, and looks like motion."""
+    if found.rms < POOR * float(np.std(measured)):
+        return False
+    neighbours = 1.0 - float(np.mean(np.diff(found.residual) ** 2)) / (2.0 * found.rms**2)
+    return neighbours > SMOOTH
 
 
 def _magnifies(found: FreeRunFit, record: Record, response: str, steps: int) -> bool:

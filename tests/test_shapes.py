@@ -1,0 +1,138 @@
+"""Shape parameters that a model leaves open are found in the record; the estimators that rest on it."""
+
+import math
+
+import numpy as np
+import pytest
+
+from study import estimators, tables
+from study.chaotic import fit_record
+from study.errors import StudyError
+from study.estimators.base import Settings
+from study.excitation import displacement_noise
+from study.free_run import predict
+from study.output_error import fit_free_run
+from study.record import Record
+from study.shapes import shape_keys, with_starting_shapes
+from study.spectra import Segments
+
+TOLD = Settings(Segments(512), (0.3, 10.0))
+LINEAR = {"inertia": {"m": 1.0}, "linear_damping": {"c": 3.77}, "linear_stiffness": {"k": 355.3}}
+HIDDEN = {
+    "one_sided_contact": {"kc": 300.0, "one_sided_contact.gap": 0.002},
+    "relaxation": {"kr": 200.0, "relaxation.tau": 0.05},
+    "hysteresis": {"kz": 200.0, "hysteresis.beta": 300.0, "hysteresis.gamma": 100.0},
+}
+
+
+def noisy(record, fraction, seed):
+    clean = record["displacement"]
+    return (
+        record.with_channels({"displacement": clean + displacement_noise(clean, fraction, seed)})
+        if fraction
+        else record
+    )
+
+
+def opened(model):
+    """The model without its shape parameters."""
+    return model.with_values({key: None for key in model.values if "." in key})
+
+
+def by_name(found):
+    return {p.name: p for p in found.parameters}
+
+
+@pytest.mark.parametrize("fraction", [0.0, 0.05])
+def test_frequency_and_phase_of_a_stiffness(fraction, systems, records):
+    record = noisy(records["mathieu"], fraction, 4)
+    found = estimators.identify("output_error", opened(systems["mathieu"]), record, TOLD)
+    own = by_name(found)
+    assert not found.note
+    assert own["f_m"].value == pytest.approx(1.0, abs=1e-3)
+    assert own["phase"].value == pytest.approx(0.0, abs=0.02)
+    if fraction:
+        for name, true in (("f_m", 1.0), ("phase", 0.0), ("k_m", 177.7)):
+            assert abs(own[name].value - true) < 4.0 * own[name].error
+
+
+@pytest.mark.parametrize("fraction", [0.0, 0.05])
+def test_width_of_a_dead_band(fraction, systems, records):
+    """A chaotic system: in one free run the record is lost, however true the model."""
+    record = noisy(records["dead_band"], fraction, 3).part(0, 4096)
+    found = estimators.identify("miso_free_shape", systems["dead_band"], record, TOLD)
+    width = by_name(found)["u_g"]
+    assert width.value == pytest.approx(0.0025, rel=0.02 if fraction else 1e-3)  # half a record
+    if fraction:
+        assert abs(width.value - 0.0025) < 4.0 * width.error
+    assert dict(found.inputs[1].parameters)["u_g"] == width.value
+
+
+@pytest.mark.parametrize("name", HIDDEN)
+def test_the_rest_of_the_library(name, make_model, report_force):
+    model = make_model(name, {**LINEAR, name: HIDDEN[name]})
+    clean = predict(model, Record(0.02, {"force": report_force}), steps_per_sample=8)
+    for seed in (1, 2):
+        record = noisy(Record(0.02, {"force": report_force, "displacement": clean}), 0.02, seed).part(0, 4096)
+        begun = with_starting_shapes(opened(model), record)
+        fit = fit_record(begun, record, start={k: 0.9 * v for k, v in model.values.items() if "." not in k})
+        assert fit.converged
+        true = np.array([model.values[key] for key in fit.keys])
+        assert np.max(np.abs(fit.values - true) / np.sqrt(np.diag(fit.covariance))) < 4.0
+        assert set(shape_keys(begun)) <= set(fit.keys)
+
+
+def test_given_shapes_are_kept(systems, records):
+    model = systems["mathieu"]
+    assert with_starting_shapes(model, records["mathieu"]) is model
+    found = estimators.identify("output_error", model, records["mathieu"], TOLD)
+    assert "f_m" not in by_name(found)
+    assert shape_keys(model) == ("periodic_stiffness.f_m",)
+    assert shape_keys(opened(model)) == ()
+
+
+def test_nothing_is_found_for_a_model_without_shapes(systems, records):
+    found = estimators.identify("miso_free_shape", systems["duffing"], records["duffing"], TOLD)
+    assert found.inputs == ()
+    assert found.parameters == ()
+    assert found.responses is None
+
+
+def test_curves_are_of_the_form_of_the_model(systems, records):
+    """A_j(f) exact but for the coefficients, whose errors it carries."""
+    model, record = systems["duffing_van_der_pol"], noisy(records["duffing_van_der_pol"], 0.1, 1)
+    found = estimators.identify("output_error", model, record, TOLD)
+    result, estimate = found.responses, found.estimate
+    np.testing.assert_allclose(result.response[1].real, estimate["k3"], rtol=1e-12)
+    np.testing.assert_allclose(
+        result.response[1].imag, estimate["c3"] * 2.0 * math.pi * result.frequency / 3.0, rtol=1e-12
+    )
+    np.testing.assert_allclose(np.sqrt(result.covariance[0, 1, 1].real), estimate.error("k3"), rtol=1e-12)
+    assert np.sqrt(result.covariance[-1, 0, 0].real) > estimate.error("k")
+
+
+def test_a_search_that_does_not_arrive_says_so(systems, records, monkeypatch):
+    def hasty(model, record, **told):
+        return fit_free_run(model, record, **told, max_iterations=1)
+
+    monkeypatch.setattr("study.estimators.output_error.fit_record", hasty)
+    record = noisy(records["duffing"], 0.05, 1)
+    found = estimators.identify("output_error", systems["duffing"], record, TOLD)
+    assert found.note == "still falling after 1 free runs, the most allowed"
+    table = tables.parameters("x", systems["duffing"], {"output_error": found}, {"relative": {}, "absolute": {}})
+    assert set(table["note"]) == {found.note}
+
+
+def test_one_free_run_is_enough_for_all_but_the_dead_band(systems, records):
+    for name, model in systems.items():
+        if name == "dead_band":
+            continue
+        fit = fit_record(model, records[name].part(0, 2048), held=shape_keys(model))
+        assert fit.converged
+        assert fit.restarts == (), name
+
+
+def test_a_record_that_does_not_show_it_is_refused(systems, records):
+    record = records["linear"].with_channels({"displacement": np.zeros(8192)})
+    with pytest.raises(StudyError):
+        with_starting_shapes(opened(systems["mathieu"]), record)
