@@ -232,7 +232,7 @@ def test_the_desk_does_one_thing_at_a_time_and_says_what_went_wrong(asked, tmp_p
     done = threading.Event()
     busy: list[str] = []
 
-    def told(_: bool) -> None:
+    def told() -> None:
         busy.append(desk.state.busy)
         if not desk.state.busy:
             done.set()

@@ -56,7 +56,7 @@ class Desk:
         self.session = session
         self.state = State()
         self.model, self.text, self.folder = model, text, folder
-        self.watchers: dict[object, Callable[[bool], None]] = {}
+        self.watchers: dict[object, Callable[[], None]] = {}
         self._lock = threading.RLock()
         self._rest = threading.Event()  # never set but to end
         self._hand = ThreadPoolExecutor(1, "change")
@@ -67,8 +67,8 @@ class Desk:
             "free": ("freeing {}", lambda key: self._hold(key, False)), "try": ("trying {}", self._try),
         }  # fmt: skip
 
-    def watch(self, who: object, told: Callable[[bool], None]) -> None:
-        """Tell someone of every change, from whatever thread makes it; True if the session itself changed."""
+    def watch(self, who: object, told: Callable[[], None]) -> None:
+        """Tell someone of every change, from whatever thread makes it."""
         with self._lock:
             self.watchers[who] = told
 
@@ -103,7 +103,7 @@ class Desk:
                 self.session = session
             told = list(self.watchers.values())
         for one in told:
-            one(session is not None)
+            one()
 
     def _do(self, work: Callable[[str], None], name: str, action: str) -> None:
         try:

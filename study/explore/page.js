@@ -224,6 +224,10 @@ window.study = (() => {
     if (event.key === "Enter" && event.target.id === "formula") act("try", event.target.value)
   })
 
-  const begin = () => { words(); if (model("state")) state(); window.study.ready = true }
+  const begin = () => {
+    words()
+    if (model("state")) { state(); put("asked", {act: ["hello"], name: [""], count: [++count]}) }
+    window.study.ready = true
+  }
   return {words, state, selected, clear, step, begin, ready: false}
 })()

@@ -72,5 +72,11 @@ def _server(application: Application, port: int) -> Server:
         socket.close()
     origins = [f"{host}:{bound}" for host in (HOST, "localhost")]
     return Server(
-        {"/": application}, address=HOST, port=bound, allow_websocket_origin=origins, session_token_expiration=DAY
+        {"/": application},
+        address=HOST,
+        port=bound,
+        allow_websocket_origin=origins,
+        session_token_expiration=DAY,
+        check_unused_sessions_milliseconds=1000,
+        unused_session_lifetime_milliseconds=2000,
     )
