@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: study report test lint readme clean
+.PHONY: study report test lint picture readme clean
 
 study: $(READY)
 	$(BIN)/snakemake -j2
@@ -19,6 +19,10 @@ lint: $(READY)
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/pyright
+
+picture: $(READY)
+	$(BIN)/snakemake -j2 silverbox_climb
+	$(BIN)/python scripts/page_picture.py results/silverbox/climb.html docs/explore.png 1
 
 readme: study
 	$(BIN)/python scripts/readme.py
