@@ -22,7 +22,8 @@ DT = 0.02
 DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parent.parent.parent / "shared" / "data"))
 LINEAR = "name: rig\nterms: [inertia, linear_damping, linear_stiffness]\n"
 WRITTEN = {
-    "comparison.json", "comparison.csv", "coefficients.csv", "force_error.csv", "response_spectrum.csv", "growth.csv",
+    "explore.html", "comparison.json", "comparison.csv", "coefficients.csv", "force_error.csv",
+    "response_spectrum.csv", "growth.csv",
     "missing_force_curves.csv", "missing_force_map.csv", "error_in_time.csv",
     *(f"{name}.{kind}" for name in ("response", "force_error", "missing_force", "error_in_time")
       for kind in ("png", "svg")),

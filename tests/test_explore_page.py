@@ -3,7 +3,6 @@
 import contextlib
 import os
 import re
-import shutil
 import socket
 import subprocess
 import sys
@@ -15,15 +14,10 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, TimeoutError, sync_playwright
 
+from scripts.page_picture import MISSING, QUIET, browser
 from study import ladder, modelfile, trials
 from study.record import write_csv
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome-stable", "google-chrome")
-BROWSER = os.environ.get("STUDY_BROWSER") or next((b for b in map(shutil.which, BROWSERS) if b), None)
-QUIET = [
-    "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--no-first-run",
-]  # fmt: skip
 HOSTILE = "__import__('os').system('touch hacked')"
 ERROR = "#figure-error b"
 
@@ -60,14 +54,14 @@ def address(rig: Path) -> Iterator[str]:
 @pytest.fixture(scope="module")
 def page() -> Iterator[Page]:
     """An empty page of a browser."""
-    if BROWSER is None:
-        missing = "no Chromium here: 'apt-get install chromium', or name a browser in STUDY_BROWSER"
-        pytest.fail(missing) if os.environ.get("CI") else pytest.skip(missing)
+    where = browser()
+    if where is None:
+        pytest.fail(MISSING) if os.environ.get("CI") else pytest.skip(MISSING)
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=BROWSER, args=QUIET)
-        opened = browser.new_page(viewport={"width": 1280, "height": 900})
+        started = playwright.chromium.launch(executable_path=where, args=list(QUIET))
+        opened = started.new_page(viewport={"width": 1280, "height": 900})
         yield opened
-        browser.close()
+        started.close()
 
 
 def watched(page: Page) -> tuple[list[str], list[str]]:
