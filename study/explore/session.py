@@ -238,6 +238,21 @@ def own_term(session: Session, text: str) -> Term:
     return term
 
 
+def _no_response(term: Term) -> StudyError:
+    return StudyError(f"the expression {term.components[0].shape!r} has no finite response on this record")
+
+
+def _attempted(term: Term, found: Diagnosis, session: Session) -> Trial:
+    """The present model with a term, fitted as the candidates of its diagnosis were."""
+    record, how, held = session.record, session.how, fitting.held_keys(session.now.model)
+    short = fitting.shortened(how, len(found.candidates[-1].found.residual)) if found.candidates else how
+    fit = found.found if short == how else fitting.fit(found.found.model, record, short, held, session.now.values)
+    trial = candidates.attempt(term, search.baseline(fit, record, short), record, short, held)
+    if trial is None:
+        raise _no_response(term)
+    return trial if short == how else candidates.refitted(trial, record, how, held)
+
+
 def tried(session: Session, text: str) -> Session:
     """The session with a formula of the user's among the candidates, fitted and ranked with them.
 
@@ -252,15 +267,11 @@ def tried(session: Session, text: str) -> Session:
     found = now.diagnosis
     if found is None:
         raise StudyError("the present model is still being diagnosed; a formula can be tried when that is done")
-    held, record, how = fitting.held_keys(now.model), session.record, session.how
-    short = fitting.shortened(how, len(found.candidates[-1].found.residual)) if found.candidates else how
-    fit = found.found if short == how else fitting.fit(found.found.model, record, short, held, now.values)
-    with np.errstate(all="ignore"):  # a formula may overflow: that is found out below
-        trial = candidates.attempt(term, search.baseline(fit, record, short), record, short, held)
-    if trial is None:
-        raise StudyError(f"the expression {term.components[0].shape!r} has no finite response on this record")
-    if short != how:
-        trial = candidates.refitted(trial, record, how, held)
-    rows = rank([*(Trial(r.term, r.found, r.residual) for r in found.candidates), trial], found.residual, record, how)
+    known = [Trial(r.term, r.found, r.residual) for r in found.candidates]
+    try:
+        with np.errstate(all="ignore"):  # a formula may overflow: then it has no finite response
+            rows = rank([*known, _attempted(term, found, session)], found.residual, session.record, session.how)
+    except np.linalg.LinAlgError:
+        raise _no_response(term) from None
     ranked = replace(found, candidates=tuple(rows))
     return replace(with_rung(session, _foreseen(replace(now, diagnosis=ranked))), own=(*session.own, term))
