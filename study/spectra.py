@@ -5,7 +5,7 @@ Bendat and Piersol and in ``scipy.signal.csd``), densities in units^2/Hz, the wi
 for, zero and Nyquist frequency not doubled.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -147,23 +147,73 @@ def cross_spectra(channels: Sequence[Floats], dt: float, segments: Segments | No
     StudyError
         If channels differ in length or are shorter than a segment.
     """
+    return cross_spectra_in_pieces([channels], dt, segments)
+
+
+def cross_spectra_in_pieces(
+    pieces: Iterable[Sequence[Floats]], dt: float, segments: Segments | None = None
+) -> SpectralMatrix:
+    """Cross-spectral density matrix of a record that comes piece by piece and is never whole in memory.
+
+    Segments reach across the joints: the result is that of :func:`cross_spectra` for the pieces end to end, to
+    rounding. Memory is that of one piece.
+
+    Parameters
+    ----------
+    pieces : iterable of sequences of arrays
+        Consecutive pieces, each a sequence of all channels, shape (samples of the piece,), of any length.
+    dt : float
+        Sampling interval in seconds.
+    segments : Segments, optional
+        Default: the report's 512-point Hann segments with half overlap.
+
+    Returns
+    -------
+    SpectralMatrix
+
+    Raises
+    ------
+    StudyError
+        If channels differ in length, pieces in the number of channels, or all together are shorter than a segment.
+    """
     cut = segments or Segments()
-    samples = len(channels[0])
-    if any(len(c) != samples for c in channels):
-        raise StudyError(f"channels have {[len(c) for c in channels]} samples; all must have the same number")
-    count, taper = cut.count(samples), cut.taper()
-    total = np.zeros((cut.length // 2 + 1, len(channels), len(channels)), dtype=np.complex128)
-    views = [np.lib.stride_tricks.sliding_window_view(c, cut.length)[:: cut.hop] for c in channels]
-    for first in range(0, count, CHUNK):
-        last = min(first + CHUNK, count)
-        lines = np.stack([np.asarray(rfft(v[first:last] * taper)).T for v in views], axis=1)
-        total += lines.conj() @ lines.transpose(0, 2, 1)
-    scale = np.full(total.shape[0], 2.0 * dt / (count * np.sum(taper**2)))
+    total, left, samples = np.zeros((cut.length // 2 + 1, 0, 0), dtype=np.complex128), list[Floats](), 0
+    for piece in pieces:
+        samples += _common_length(piece)
+        if not left:
+            total = np.zeros((len(total), len(piece), len(piece)), dtype=np.complex128)
+        elif len(piece) != len(left):
+            raise StudyError(f"a piece has {len(piece)} channels; the pieces before it have {len(left)}")
+        joined = [np.concatenate(pair) for pair in zip(left, piece, strict=True)] if left else piece
+        count = max(0, 1 + (len(joined[0]) - cut.length) // cut.hop)
+        _add_products(total, joined, count, cut)
+        left = [channel[count * cut.hop :].copy() for channel in joined]
+    scale = np.full(len(total), 2.0 * dt / (cut.count(samples) * np.sum(cut.taper() ** 2)))
     scale[0] /= 2.0
     if cut.length % 2 == 0:
         scale[-1] /= 2.0
     frequency = np.asarray(rfftfreq(cut.length, dt), dtype=np.float64)
     return SpectralMatrix(frequency, total * scale[:, None, None], cut.effective_averages(samples), cut)
+
+
+def _common_length(channels: Sequence[Floats]) -> int:
+    """Number of samples that all channels have."""
+    samples = len(channels[0])
+    if any(len(c) != samples for c in channels):
+        raise StudyError(f"channels have {[len(c) for c in channels]} samples; all must have the same number")
+    return samples
+
+
+def _add_products(total: Complexes, channels: Sequence[Floats], count: int, cut: Segments) -> None:
+    """Add ``X_i* X_j`` of the first ``count`` segments to ``total``, shape (lines, channels, channels)."""
+    if count == 0:
+        return
+    taper = cut.taper()
+    views = [np.lib.stride_tricks.sliding_window_view(c, cut.length)[:: cut.hop] for c in channels]
+    for first in range(0, count, CHUNK):
+        last = min(first + CHUNK, count)
+        lines = np.stack([np.asarray(rfft(v[first:last] * taper)).T for v in views], axis=1)
+        total += lines.conj() @ lines.transpose(0, 2, 1)
 
 
 def autospectrum(values: Floats, dt: float, segments: Segments | None = None) -> tuple[Floats, Floats]:

@@ -8,7 +8,7 @@ from scipy import signal
 
 from study import spectra
 from study.errors import StudyError
-from study.spectra import Segments, autospectrum, cross_spectra
+from study.spectra import Segments, autospectrum, cross_spectra, cross_spectra_in_pieces
 
 DT = 0.02
 
@@ -88,6 +88,33 @@ def test_chunks_do_not_matter(channels: list[np.ndarray], chunk: int, monkeypatc
     whole = cross_spectra(channels, DT, cut).density
     monkeypatch.setattr(spectra, "CHUNK", chunk)
     np.testing.assert_allclose(cross_spectra(channels, DT, cut).density, whole, rtol=1e-9, atol=1e-30)
+
+
+@pytest.mark.parametrize("cuts", [(1500,), (40, 41, 1000), (2990,), tuple(range(100, 3000, 100))])
+@pytest.mark.parametrize("settings", [(128, 0.5), (255, 0.7), (100, 0.0)])
+def test_a_record_in_pieces_is_the_whole_record(
+    channels: list[np.ndarray], cuts: tuple[int, ...], settings: tuple[int, float]
+) -> None:
+    cut = Segments(*settings)
+    pieces = zip(*(np.split(channel, cuts) for channel in channels), strict=True)
+    matrix, whole = cross_spectra_in_pieces(pieces, DT, cut), cross_spectra(channels, DT, cut)
+    size = np.sqrt(np.einsum("fii,fjj->fij", whole.density, whole.density).real)
+    np.testing.assert_allclose(matrix.density / size, whole.density / size, rtol=0.0, atol=1e-13)
+    assert matrix.averages == whole.averages
+
+
+@pytest.mark.parametrize(
+    ("pieces", "named"),
+    [
+        ([], "0 samples, fewer than the segment length 512"),
+        ([[np.zeros(200)], [np.zeros(300)]], "500 samples, fewer than the segment length 512"),
+        ([[np.zeros(600)] * 2, [np.zeros(600)] * 3], "3 channels; the pieces before it have 2"),
+        ([[np.zeros(600)] * 2, [np.zeros(600), np.zeros(599)]], r"\[600, 599\]"),
+    ],
+)
+def test_bad_pieces_are_named(pieces: Sequence[Sequence[np.ndarray]], named: str) -> None:
+    with pytest.raises(StudyError, match=named):
+        cross_spectra_in_pieces(pieces, DT)
 
 
 def test_same_bytes_twice(channels: list[np.ndarray]) -> None:

@@ -1,0 +1,122 @@
+"""Errors and times of other packages beside ours, on the same records, into docs/peers.md.
+
+Run with ``sh benchmarks/peers.sh``, which makes the environment that this needs (the extra ``peers``).
+"""
+
+import argparse
+import re
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from threadpoolctl import threadpool_limits
+
+from benchmarks.peer_methods import OURS, PEERS, WANTED
+from study.excitation import Excitation, displacement_noise, force
+from study.files import replace_file
+from study.model import Model
+from study.modelfile import read_model
+from study.record import Record
+from study.simulate import Integrator, simulate
+
+ROOT = Path(__file__).parent.parent
+DT = 0.02
+EXACT = Integrator("rk4", 16)  # finer than the study's, so that the record's own error is not what is compared
+NOISES = {"clean": 0.0, "5 % noise": 0.05}  # rms of the noise over that of the displacement
+WARM_UP = 2048  # samples of a first run that is not timed
+PLACE = r"(<!-- {0} -->\n).*?(<!-- /{0} -->)"
+
+
+def record(model: Model, samples: int, seed: int, noise: float) -> Record:
+    """Force and displacement of the Duffing system, nothing else."""
+    full = simulate(model, force(Excitation(), samples, DT, seed), DT, EXACT)
+    u = full["displacement"]
+    return replace(full, channels={"force": full["force"], "displacement": u + displacement_noise(u, noise**2, seed)})
+
+
+def measure(model: Model, samples: int, seeds: int) -> pd.DataFrame:
+    """One row a method, kind of record and seed: relative errors in percent, processor seconds."""
+    rows: list[dict[str, object]] = []
+    for run in (*PEERS.values(), *OURS.values()):
+        run(model, record(model, WARM_UP, 0, 0.0))
+    for seed in range(1, seeds + 1):
+        for kind, noise in NOISES.items():
+            data = record(model, samples, seed, noise)
+            for method, run in {**PEERS, **OURS}.items():
+                begun = time.process_time()
+                found = run(model, data)
+                seconds = time.process_time() - begun
+                errors = {key: 100.0 * abs(found[key] / model.values[key] - 1.0) for key in WANTED}
+                rows.append(
+                    {"samples": samples, "seed": seed, "record": kind, "method": method, **errors, "s": seconds}
+                )
+                print(f"{samples:>9,} {kind:9} {method:30} {seconds:8.3f} s", errors, flush=True)
+    return pd.DataFrame(rows)
+
+
+def table(measured: pd.DataFrame) -> pd.DataFrame:
+    """Medians over the seeds, a row a method, columns by kind of record and number; nan is nothing found."""
+    numbers = [*WANTED, "s"]
+    middle = measured.groupby(["method", "record"])[numbers].median(numeric_only=True).unstack("record")
+    order = [(number, kind) for kind in NOISES for number in numbers]
+    return middle.loc[[*PEERS, *OURS], order]
+
+
+def shown(middle: pd.DataFrame) -> str:
+    """Markdown; the best of each column in bold."""
+    best = middle.min()
+    cells = middle.astype(object)
+    for column in middle:
+        for method, value in middle[column].items():
+            text = "-" if np.isnan(value) else f"{value:.2g}" if value < 10.0 else f"{value:.0f}"
+            cells.loc[method, column] = f"**{text}**" if value == best[column] else text
+    cells.columns = [f"{kind}: {'time (s)' if number == 's' else f'{number} (%)'}" for number, kind in middle.columns]
+    return cells.rename_axis(None).to_markdown(disable_numparse=True)
+
+
+def leads(middle: pd.DataFrame) -> str:
+    """Where a peer is ahead of all of ours, and by how much; computed, whichever way it comes out."""
+    behind = []
+    for number, kind in middle.columns:
+        column = middle[number, kind]
+        theirs, mine = column[list(PEERS)].min(), column[list(OURS)].min()
+        if theirs < mine:
+            name = column[list(PEERS)].idxmin()
+            behind.append(f"{'time' if number == 's' else number} ({kind}): {name}, {mine / theirs:.2g} times")
+    return (
+        f"A peer is ahead in: {'; '.join(behind)}." if behind else "One of ours has the smallest number of each column."
+    )
+
+
+def write(page: Path, name: str, block: str) -> None:
+    """Fill a place of the page."""
+    place = re.compile(PLACE.format(name), re.DOTALL)
+    text, count = place.subn(lambda found: found[1] + block + "\n" + found[2], page.read_text(encoding="utf-8"))
+    if count != 1:
+        raise SystemExit(f"{page} has no place for the table: lines '<!-- {name} -->' and '<!-- /{name} -->'")
+    replace_file(page, text.encode())
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=5, help="records of 8,192 samples (default 5)")
+    parser.add_argument("--long-seeds", type=int, default=1, help="records of 1,000,000 samples (default 1)")
+    told = parser.parse_args()
+    model = read_model(ROOT / "models" / "duffing.yaml")
+    results = ROOT / "results" / "benchmarks"
+    results.mkdir(parents=True, exist_ok=True)
+    for name, samples, seeds in (("short", 8192, told.seeds), ("long", 1_000_000, told.long_seeds)):
+        if seeds < 1:
+            continue
+        with threadpool_limits(1):
+            measured = measure(model, samples, seeds)
+        measured.to_csv(results / f"peers_{name}.csv", index=False)
+        middle = table(measured)
+        heading = f"{samples:,} samples, median over {seeds} record{'s' if seeds > 1 else ''}:"
+        write(ROOT / "docs" / "peers.md", name, f"{heading}\n\n{shown(middle)}\n\n{leads(middle)}")
+
+
+if __name__ == "__main__":
+    main()
