@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: study report test lint picture readme clean
+.PHONY: study report test lint picture readme estimators clean
 
 study: $(READY)
 	$(BIN)/snakemake -j2
@@ -26,6 +26,10 @@ picture: $(READY)
 
 readme: study
 	$(BIN)/python scripts/readme.py
+
+estimators: $(READY)
+	$(BIN)/snakemake -j2 estimators
+	$(BIN)/python scripts/estimator_docs.py
 
 $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \

@@ -19,6 +19,7 @@ include: "rules/common.smk"
 include: "rules/reproduce.smk"
 include: "rules/claims.smk"
 include: "rules/monte_carlo.smk"
+include: "rules/estimators.smk"
 include: "rules/summary.smk"
 include: "rules/trials.smk"
 include: "rules/cases.smk"
@@ -30,4 +31,5 @@ rule all:
     input:
         [products(case) for case in STUDY.cases],
         CLAIM_RESULTS,
+        ERROR_RESULTS,
         SUMMARY_RESULTS,

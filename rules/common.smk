@@ -10,6 +10,7 @@ CODE = {
     "record": rests_on(Path("scripts/make_record.py"), without=IDENTIFICATION_ONLY),
     "identify": rests_on(Path("scripts/identify.py"), also=ESTIMATORS.values()),
     "draw": rests_on(Path("scripts/draw_case.py")),
+    "draw_estimators": rests_on(Path("scripts/draw_estimators.py")),
     "preliminary": rests_on(Path("scripts/draw_preliminary.py")),
     "monte_carlo": rests_on(Path("scripts/monte_carlo.py"), also=ESTIMATORS.values()),
     "rates": rests_on(Path("scripts/rates.py")),
@@ -32,7 +33,13 @@ def identification_settings(wildcards):
 
 
 def monte_carlo_settings(wildcards):
-    return STUDY.identification_settings(wildcards.case) | {"estimators": STUDY.settings["monte_carlo"]["estimators"]}
+    names = STUDY.settings["monte_carlo"]["estimators"]
+    return [STUDY.identification_settings(wildcards.case) | {"estimators": names}]
+
+
+def compared_settings(case):
+    names = STUDY.settings["estimator_errors"]["estimators"]
+    return STUDY.identification_settings(case) | {"estimators": names}
 
 
 def model_of(wildcards):

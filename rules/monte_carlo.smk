@@ -1,14 +1,16 @@
 # How often each tolerance is met: `snakemake -j2 monte_carlo`, a few minutes, not part of `all`.
 rule ensemble:
     input:
-        model=model_of,
+        models=lambda wildcards: [model_of(wildcards)],
         code=CODE["monte_carlo"],
     output:
         table="results/monte_carlo/{case}.csv",
     params:
-        record=record_settings,
-        identification=monte_carlo_settings,
-        ensemble=STUDY.settings["monte_carlo"],
+        records=lambda wildcards: [record_settings(wildcards)],
+        identifications=monte_carlo_settings,
+        judged="rates",
+        seeds=STUDY.settings["monte_carlo"]["seeds"],
+        first_seed=STUDY.settings["monte_carlo"]["first_seed"],
     benchmark:
         "results/benchmarks/ensemble.{case}.tsv"
     script:

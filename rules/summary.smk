@@ -3,10 +3,11 @@ BENCHMARKS = [f"results/benchmarks/{stage}.{case}.tsv" for stage in ("record", "
 BENCHMARKS += [
     f"results/benchmarks/draw_preliminary.{name}.tsv" for name, case in STUDY.cases.items() if draws_preliminary(case)
 ]
-BENCHMARKS += [f"results/benchmarks/{rule}.tsv" for rule in ("excitation_reading", "integrator_steps", "claims")]
+BENCHMARKS += [f"results/benchmarks/{rule}.tsv" for rule in ("excitation_reading", "integrator_steps", "claims", "estimator_errors")]
 PAGES = {
     "claims": "Claims of the report",
     "parameters": "Parameters of all cases",
+    "estimators": "Errors of the estimators",
     "excitation_reading": "Reading of unit variance",
     "integrator_steps": "Steps of the integrator",
 }
@@ -33,6 +34,7 @@ rule summary:
         parameters="results/parameters.csv",
         claims="results/claims.csv",
         reading="results/excitation_reading.csv",
+        errors="results/estimators.csv",
         benchmarks=BENCHMARKS,
         code=CODE["summary"],
     output:

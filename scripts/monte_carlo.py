@@ -1,30 +1,42 @@
-"""Snakemake step: how often a case meets each tolerance over many seeds."""
+"""Snakemake step: cases over many seeds -> how often each meets a tolerance, or how far each estimator is off."""
 
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from study import ensemble, tables
+import pandas as pd
+
+from study import ensemble, estimator_errors, tables
 from study.modelfile import read_model
 from study.step import one_sentence
 
 EVERY = 100  # seeds between two signs of life
+JUDGED = {"rates": ensemble.rates, "errors": estimator_errors.errors}
 
 
-def main(model: str, record: dict[str, Any], identification: dict[str, Any], seeds: range, output: str) -> None:
-    def progress(done: int) -> None:
-        if done % EVERY == 0 or done == len(seeds):
-            print(f"{record['case']}: {done} of {len(seeds)} seeds", file=sys.stderr, flush=True)
+def main(
+    models: Sequence[str], records: Sequence[Mapping[str, Any]], identifications: Sequence[Mapping[str, Any]],
+    seeds: range, judged: str, output: str,
+) -> None:  # fmt: skip
+    def found(model: str, record: Mapping[str, Any], identification: Mapping[str, Any]) -> pd.DataFrame:
+        def progress(done: int) -> None:
+            if done % EVERY == 0 or done == len(seeds):
+                print(f"{record['case']}: {done} of {len(seeds)} seeds", file=sys.stderr, flush=True)
 
-    found = ensemble.estimates(read_model(Path(model)), record, identification, seeds, workers=1, progress=progress)
-    tables.write_csv(ensemble.rates(found), Path(output))
+        known = read_model(Path(model))
+        return ensemble.estimates(known, record, identification, seeds, workers=1, progress=progress)
+
+    judge = JUDGED[judged]
+    parts = [judge(found(*told)) for told in zip(models, records, identifications, strict=True)]
+    tables.write_csv(pd.concat(parts, ignore_index=True), Path(output))
 
 
 if "snakemake" in globals():
     step = globals()["snakemake"]
-    first, count = step.params.ensemble["first_seed"], step.params.ensemble["seeds"]
     with one_sentence():
         main(
-            step.input.model, step.params.record, step.params.identification, range(first, first + count),
+            step.input.models, step.params.records, step.params.identifications,
+            range(step.params.first_seed, step.params.first_seed + step.params.seeds), step.params.judged,
             step.output.table,
         )  # fmt: skip

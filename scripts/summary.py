@@ -25,6 +25,7 @@ def main(inputs: Mapping[str, str], benchmarks: Sequence[str], told: Mapping[str
         parameters=pd.read_csv(inputs["parameters"]),
         claims=pd.read_csv(inputs["claims"], keep_default_na=False),
         reading=pd.read_csv(inputs["reading"]),
+        errors=pd.read_csv(inputs["errors"]),
         times=run_times(benchmarks),
         noise=told["noise"],
         setting=told["setting"],
@@ -36,6 +37,6 @@ def main(inputs: Mapping[str, str], benchmarks: Sequence[str], told: Mapping[str
 
 if "snakemake" in globals():
     step = globals()["snakemake"]
-    tables = {name: getattr(step.input, name) for name in ("parameters", "claims", "reading")}
+    tables = {name: getattr(step.input, name) for name in ("parameters", "claims", "reading", "errors")}
     with one_sentence():
         main(tables, step.input.benchmarks, step.params.told, step.output.page, step.output.html)

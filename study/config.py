@@ -244,18 +244,25 @@ def _check_settings(settings: Table, where: str) -> None:
             f"{where}: local_polynomial.half_width makes bands of {width} lines; fit_band [{low}, {high}] of "
             f"{sampling['samples']} samples holds fewer"
         )
-    for name in (*settings["estimators"], *settings["monte_carlo"]["estimators"]):
-        if name not in ESTIMATORS:
-            raise StudyError(f"{where}: there is no estimator {name!r}; known are {', '.join(ESTIMATORS)}")
-    if "miso" not in settings["estimators"]:
-        raise StudyError(f"{where}: estimators lacks 'miso', whose coherences are drawn of every case")
-    for kind, names in settings["drawn"].items():
-        for name in names:
-            if name not in settings["estimators"]:
-                raise StudyError(f"{where}: drawn.{kind} names {name!r}, which is not among the estimators")
+    _check_estimators(settings, where)
     for name, described in settings["excitations"].items():
         try:
             excitation = Excitation(**{key: value for key, value in described.items() if key != "seed"})
             theoretical_autospectrum(excitation, np.zeros(1), sampling["samples"], sampling["dt"])
         except StudyError as error:
             raise StudyError(f"{where}: excitations.{name}: {error}") from None
+
+
+def _check_estimators(settings: Table, where: str) -> None:
+    compared = settings["estimator_errors"]["estimators"]
+    for name in (*settings["estimators"], *settings["monte_carlo"]["estimators"], *compared):
+        if name not in ESTIMATORS:
+            raise StudyError(f"{where}: there is no estimator {name!r}; known are {', '.join(ESTIMATORS)}")
+    if "miso" not in settings["estimators"]:
+        raise StudyError(f"{where}: estimators lacks 'miso', whose coherences are drawn of every case")
+    if "miso" not in compared:
+        raise StudyError(f"{where}: estimator_errors.estimators lacks 'miso', which the others are compared with")
+    for kind, names in settings["drawn"].items():
+        for name in names:
+            if name not in settings["estimators"]:
+                raise StudyError(f"{where}: drawn.{kind} names {name!r}, which is not among the estimators")

@@ -4,8 +4,12 @@ import html
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
 
 from tabulate import tabulate
+
+from study.errors import StudyError
+from study.files import replace_file
 
 STYLE = """\
 body { font: 15px/1.45 system-ui, sans-serif; color: #1a1a1a; max-width: 1200px; margin: 1.5em auto; padding: 0 1em }
@@ -47,7 +51,15 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
 
 
-Block = Heading | Text | Bullets | Table
+@dataclass(frozen=True)
+class Image:
+    """A picture in a file of its own; a self-contained page gives its words alone."""
+
+    words: str
+    path: str
+
+
+Block = Heading | Text | Bullets | Table | Image
 
 
 def table(heading: Sequence[str], rows: Sequence[Sequence[object]]) -> Block:
@@ -70,9 +82,27 @@ def _markdown(block: Block) -> str:
             return text
         case Bullets(items):
             return "\n".join(f"- {item}" for item in items)
+        case Image(words, path):
+            return f"![{words}]({path})"
         case Table(heading, rows):
             cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
             return tabulate(cells, headers=list(heading), tablefmt="pipe", disable_numparse=True)
+
+
+def put(path: Path, mark: str, blocks: Sequence[Block]) -> None:
+    """Write blocks into a Markdown file, in place of what stands between ``<!-- mark -->`` and ``<!-- /mark -->``.
+
+    Raises
+    ------
+    StudyError
+        If the file does not have exactly one such place.
+    """
+    place = re.compile(rf"(<!-- {mark} -->\n).*?(<!-- /{mark} -->)", re.DOTALL)
+    block = markdown(blocks)
+    text, count = place.subn(lambda found: found[1] + block + found[2], path.read_text(encoding="utf-8"))
+    if count != 1:
+        raise StudyError(f"{path} has no place for {mark}: a line '<!-- {mark} -->' and one '<!-- /{mark} -->'")
+    replace_file(path, text.encode())
 
 
 def page(title: str, blocks: Sequence[Block]) -> str:
@@ -92,6 +122,8 @@ def _html(block: Block) -> str:
             return f"<p>{_inline(text)}</p>"
         case Bullets(items):
             return "<ul>" + "".join(f"<li>{_inline(item)}</li>" for item in items) + "</ul>"
+        case Image(words, path):
+            return f"<p>{_inline(words)}: <code>{html.escape(PurePosixPath(path).name)}</code></p>"
         case Table(heading, rows):
             head = "".join(f"<th>{_inline(cell)}</th>" for cell in heading)
             lines = ["<tr>" + "".join(f"<td>{_inline(cell)}</td>" for cell in row) + "</tr>" for row in rows]

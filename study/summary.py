@@ -6,8 +6,9 @@ from typing import Any
 
 import pandas as pd
 
+from study import error_pages
 from study.claims.verdict import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED
-from study.document import Block, Bullets, Heading, Text, table
+from study.document import Block, Bullets, Heading, Image, Text, table
 
 INTRODUCTION = (
     "Bendat, Palo and Coppolino identify nonlinear systems with one degree of freedom from force and response: "
@@ -20,6 +21,7 @@ FILES = (
     ("`results/<case>/coherence.csv`", "ordinary, partial and cumulative coherences"),
     ("`results/<case>/parameters.csv`", "parameters of the case; `results/parameters.csv` holds those of all cases"),
     ("`figures/figure_<number>.png`, `.svg`", "the report's Figures 2 to 8 and 16 to 61, by its numbers"),
+    ("`results/estimators.csv`, `figures/estimators.png`", "error of each estimator, and its gain over MI/SO"),
     ("`results/claims.md`, `claims.csv`", "every checkable statement: reported, measured, criterion, verdict"),
     ("`results/excitation_reading.csv`", 'both readings of "unit variance" against the numbers that the report quotes'),
     ("`results/integrator_steps.md`, `.csv`", "what the report's one step a sample does to each recovered parameter"),
@@ -34,8 +36,8 @@ class Tables:
 
     Attributes
     ----------
-    parameters, claims, reading : DataFrame
-        ``results/parameters.csv``, ``claims.csv``, ``excitation_reading.csv``.
+    parameters, claims, reading, errors : DataFrame
+        ``results/parameters.csv``, ``claims.csv``, ``excitation_reading.csv``, ``estimators.csv``.
     times : DataFrame
         Columns ``stage, case, seconds``: one row a job.
     noise : dict of float
@@ -47,6 +49,7 @@ class Tables:
     parameters: pd.DataFrame
     claims: pd.DataFrame
     reading: pd.DataFrame
+    errors: pd.DataFrame
     times: pd.DataFrame
     noise: dict[str, float]
     setting: str
@@ -55,6 +58,7 @@ class Tables:
 def blocks(tables: Tables) -> list[Block]:
     """The whole page."""
     sections: list[tuple[str, Callable[[Tables], list[Block]]]] = [
+        ("How far each estimator is off", estimators),
         ("What was reproduced", counts),
         ("The report's numbers beside ours", numbers),
         ("Parameters by case", parameters),
@@ -68,6 +72,12 @@ def blocks(tables: Tables) -> list[Block]:
     for title, section in sections:
         found += [Heading(title), *section(tables)]
     return found
+
+
+def estimators(tables: Tables) -> list[Block]:
+    """The errors of the estimators on the same records, and the picture of them."""
+    picture = Image("Errors of the estimators by parameter and case", "../figures/estimators.png")
+    return [*error_pages.opening(tables.errors, tables.noise), picture]
 
 
 def counts(tables: Tables) -> list[Block]:

@@ -89,6 +89,11 @@ def test_figures_without_a_number_are_named_after_the_case(folder):
             "with_noise: [siso, instrument]",
             "drawn.with_noise names 'instrument', which",
         ),
+        (
+            "estimators: [siso, miso, local_polynomial, instrumental, output_error]",
+            "estimators: [siso, local_polynomial]",
+            "estimator_errors.estimators lacks 'miso', which the others are compared with",
+        ),
         ("degree: 2", "degree: 2.5", "local_polynomial.degree is not right"),
         ("kind: gaussian_lowpass", "kind: gaussian", "excitations.report.kind is not right"),
         ("cutoff: 12.5", "cutoff: 125", "excitations.report: the excitation reaches 125 Hz"),

@@ -30,6 +30,13 @@ READING = pd.DataFrame(
     columns=["quantity", "reported", "raw_mean", "raw_standard_error", "filtered_mean", "filtered_standard_error",
              "nearer"],
 )  # fmt: skip
+ERRORS = pd.DataFrame(
+    [
+        ("quiet", "miso", "k", "relative", 0.02, 1.0, 0.01, 0.02, 4),
+        ("quiet", "output_error", "k", "relative", 0.0004, 50.0, 0.0, 0.001, 4),
+    ],
+    columns=["case", "estimator", "parameter", "kind", "median_error", "gain", "bias", "scatter", "seeds"],
+)
 TIMES = pd.DataFrame(
     [("record", "quiet", 1.0), ("record", "noisy", 2.0), ("claims", "", 4.0)], columns=["stage", "case", "seconds"]
 )
@@ -37,11 +44,18 @@ TIMES = pd.DataFrame(
 
 @pytest.fixture
 def tables():
-    return summary.Tables(PARAMETERS, CLAIMS, READING, TIMES, {"quiet": 0.0, "noisy": 0.05}, "raw")
+    return summary.Tables(PARAMETERS, CLAIMS, READING, ERRORS, TIMES, {"quiet": 0.0, "noisy": 0.05}, "raw")
 
 
 def flat(text):
     return " ".join(text.split())
+
+
+def test_the_errors_of_the_estimators_open_the_page(tables):
+    page = flat(document.markdown(summary.blocks(tables)))
+    assert "| quiet | k | 2 % | 0.04 % (x 50) |" in page
+    assert "![Errors of the estimators by parameter and case](../figures/estimators.png)" in page
+    assert page.index("How far each estimator is off") < page.index("What was reproduced")
 
 
 def test_counts_are_counted(tables):
@@ -52,7 +66,7 @@ def test_counts_are_counted(tables):
 
 
 def test_a_study_without_noise_does_not_speak_of_it():
-    quiet = summary.Tables(PARAMETERS[:3], CLAIMS, READING, TIMES, {"quiet": 0.0}, "raw")
+    quiet = summary.Tables(PARAMETERS[:3], CLAIMS, READING, ERRORS, TIMES, {"quiet": 0.0}, "raw")
     assert "With noise" not in document.markdown(summary.counts(quiet))
 
 

@@ -20,6 +20,7 @@ SMALL = [
     (r"samples: 8192", "samples: 2048"),
     (r"length: 512", "length: 256"),
     (r"(?s)(monte_carlo:\n  seeds:) \d+", r"\1 3"),
+    (r"(?s)(estimator_errors:\n  seeds:) \d+", r"\1 2"),
     (r"(?s)(ensembles:\n  seeds:) \d+", r"\1 2"),
     (r"\nexcitations:\n", "\nexcitations:\n  other: {kind: gaussian_lowpass, seed: 7}\n"),
 ]
@@ -157,6 +158,7 @@ def test_targets_by_name_and_by_number(built):
     (built / "kept.png").rename(built / "figures" / "figure_21.png")
     assert planned(built, "noisy") == {}
     assert planned(built, "monte_carlo") == {"ensemble": 2, "rates": 1, "monte_carlo": 1}
+    assert planned(built, "estimators") == {"many_errors": 2, "join_errors": 1, "draw_many_errors": 1, "estimators": 1}
 
 
 def test_killed_at_work_and_finished_on_one_core_gives_the_same_bytes(built, tmp_path):

@@ -1,0 +1,37 @@
+"""Write numbers, picture and table of docs/estimators.md from the run with many seeds: ``make estimators``."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from study import document, error_pages
+from study.config import load
+from study.errors import StudyError
+from study.files import replace_file
+from study.step import one_sentence
+
+
+def main(page: Path, table: Path, picture: Path, noise: dict[str, float]) -> None:
+    for path in (table, picture):
+        if not path.is_file():
+            raise StudyError(f"{path}: there is no such file; run 'snakemake -j2 estimators' first")
+    errors = pd.read_csv(table)
+    for mark, block in {
+        "sentences": document.Bullets(error_pages.sentences(errors, noise)),
+        "about": document.Text(error_pages.about(errors)),
+        "errors": error_pages.overview(errors),
+        "bias": error_pages.bias_overview(errors, noise),
+    }.items():
+        document.put(page, mark, [block])
+    replace_file(page.with_suffix(".png"), picture.read_bytes())
+    replace_file(page.with_suffix(".csv"), table.read_bytes())
+
+
+if __name__ == "__main__":
+    with one_sentence():
+        study = load(Path("config"))
+        stem = f"estimators_{study.settings['estimator_errors']['many']}"
+        main(
+            Path("docs/estimators.md"), Path(f"results/{stem}.csv"), Path(f"figures/{stem}.png"),
+            {name: case.noise for name, case in study.cases.items()},
+        )  # fmt: skip
