@@ -210,6 +210,8 @@ def _opened_without_a_network(page: Page, rig: Path, given: float, reached: floa
     assert error(saved) == reached
     saved.click("[data-act=step][data-name='0']")
     assert error(saved) == given
+    largest = max(map(abs, source(saved, "against_v", "mean")))
+    until(saved, f"Bokeh.documents[0].get_model_by_name('panel_against_v').y_range.end > {0.5 * largest}", seconds=5.0)
     assert saved.inner_text("#verdict h3") == "An effect is missing"
     assert saved.locator("button:has-text('Add')").count() == 0
     _preview(saved)

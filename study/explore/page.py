@@ -131,7 +131,6 @@ def frame(seen: View) -> Columns:
         ("against_u_x", "axis_label", f"displacement / {u}"), ("against_u_y", "axis_label", f"missing force / {f}"),
         ("against_v_x", "axis_label", f"velocity / {v}"), ("against_v_y", "axis_label", f"missing force / {f}"),
         ("mapper", "low", -largest), ("mapper", "high", largest),
-        *((f"range_against_{of}", "min_interval", 2.0 * seen.least) for of in ("u", "v")),
         ("range_frequency", "end", seen.highest), ("range_force", "start", seen.limits[0]),
         ("range_force", "end", seen.limits[1]),
     ]  # fmt: skip

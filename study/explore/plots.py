@@ -134,8 +134,8 @@ def against(s: Sources, of: str) -> Any:
     would = drawn.line("at", "y", source=s[f"ghost_{of}"], **style.WOULD)
     picked = drawn.line("at", "y", source=s[f"picked_{of}"], **style.PICKED)
     style.chosen(drawn, f"box_{name}")
-    drawn.y_range.name = f"range_{name}"
-    style.follows(drawn, [mean, bars])
+    reach = drawn.line("at", "reach", source=s[name], line_alpha=0.0)  # how near the axis may come
+    style.follows(drawn, [mean, bars, reach])
     style.legend(drawn, [("mean, 95 %", [mean, dots, bars]), ("candidate", [would]), ("selected", [picked])])
     return drawn
 

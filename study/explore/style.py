@@ -13,6 +13,7 @@ from bokeh.models import (
     Range1d,
     ResetTool,
     SaveTool,
+    Title,
     WheelZoomTool,
 )
 from bokeh.plotting import figure
@@ -111,7 +112,8 @@ def legend(drawn: Any, items: Sequence[tuple[Any, list[Any]]], place: Any = "abo
     )  # fmt: skip
     words.padding = 0
     if place == "above":
-        words.location = (-34, 5)
+        words.location = (-34, 0)
+        drawn.add_layout(Title(text=" ", text_font_size="6px", standoff=0), "above")  # room for the topmost tick label
         drawn.add_layout(words, "above")
     else:
         words.location = place

@@ -92,7 +92,7 @@ def view(rung: Rung, step: int, live: bool = True) -> View:
         **_links(found, scales),
         "words": words.words(rung, rows, step, live),
     }
-    least = LEAST * float(np.std(found.record["force"])) / scales.force.factor
+    least = least_force(found) / scales.force.factor
     small = {name: _small(c) for name, c in columns.items()}
     return View(small, scales, found.force.highest, found.how.response, force_limits(found), least)
 
@@ -103,6 +103,11 @@ def _small(columns: Columns) -> Columns:
         name: np.asarray(c, dtype=np.float32) if getattr(c, "dtype", None) == np.float64 else c
         for name, c in columns.items()
     }
+
+
+def least_force(found: Comparison) -> float:
+    """Missing force down to which axes are drawn: below lies nothing to be seen."""
+    return LEAST * float(np.std(found.record["force"]))
 
 
 def scales_of(found: Comparison) -> Scales:
@@ -230,6 +235,7 @@ def _against(found: Comparison, of: str, scale: Scale, force: Scale) -> Columns:
     return {
         "at": at, "mean": line.mean / force.factor, "low": (line.mean - half) / force.factor,
         "high": (line.mean + half) / force.factor,
+        "reach": np.resize([-1.0, 1.0], len(at)) * least_force(found) / force.factor,
     }  # fmt: skip
 
 
