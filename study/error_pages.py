@@ -7,10 +7,10 @@ from typing import Any
 import pandas as pd
 
 from study import estimator_errors
-from study.document import Block, Bullets, Text, table
+from study.document import Block, Bullets, Image, Text, table
 from study.figures.styles import look
 
-SHOWN = 1e4  # a gain above is shown as a power of ten
+LARGE = 9950.0  # from here on a number is shown with a power of ten
 
 
 def opening(errors: pd.DataFrame, noise: Mapping[str, float]) -> list[Block]:
@@ -22,7 +22,8 @@ def opening(errors: pd.DataFrame, noise: Mapping[str, float]) -> list[Block]:
         "unit. `snakemake -j2 estimators` does it with more seeds: `docs/estimators.md`."
     )
     noisy = errors[errors["case"].map(noise) > 0.0]
-    found: list[Block] = [Bullets(sentences(errors, noise)), Text(note), by_parameter(errors)]
+    picture = Image("Errors of the estimators by parameter and case", "../figures/estimators.png")
+    found: list[Block] = [Bullets(sentences(errors, noise)), picture, Text(note), by_parameter(errors)]
     if len(noisy):
         found += [Text("Under noise on the displacement, bias ± scatter of one estimate, both in %:"), biases(noisy)]
     return found
@@ -71,7 +72,7 @@ def by_parameter(errors: pd.DataFrame) -> Block:
 
 def _cell(row: "pd.Series[Any]") -> str:
     scale, unit = (100.0, " %") if row["kind"] == "relative" else (1.0, "")
-    size = f"{scale * row['median_error']:.2g}{unit}" if math.isfinite(row["median_error"]) else "none"
+    size = f"{short(scale * row['median_error'])}{unit}" if math.isfinite(row["median_error"]) else "none"
     return size if row["estimator"] == estimator_errors.BASIS else f"{size} ({factor(row['gain'])})"
 
 
@@ -82,11 +83,13 @@ def biases(errors: pd.DataFrame) -> Block:
     rows: list[list[str]] = []
     for (case, parameter), group in kept.groupby(["case", "parameter"], sort=False):
         found = {str(row["estimator"]): row for _, row in group.iterrows()}
-        cells = [
-            f"{100 * found[n]['bias']:+.2g} ± {100 * found[n]['scatter']:.2g}" if n in found else "" for n in names
-        ]
+        cells = [_bias(found[n]) if n in found else "" for n in names]
         rows.append([str(case), str(parameter), *cells])
     return table(["case", "parameter", *(look(name).label for name in names)], rows)
+
+
+def _bias(row: "pd.Series[Any]") -> str:
+    return f"{short(100.0 * row['bias'])} ± {short(100.0 * row['scatter'])}"
 
 
 def overview(errors: pd.DataFrame) -> Block:
@@ -107,15 +110,18 @@ def bias_overview(errors: pd.DataFrame, noise: Mapping[str, float]) -> Block:
     names, found = estimator_errors.estimators(errors), estimator_errors.worst_bias(loud)
     rows: list[list[str]] = []
     for case, group in found.groupby("case", sort=False):
-        own = {str(row["estimator"]): f"{row['ratio']:.2g} ({row['parameter']})" for _, row in group.iterrows()}
+        own = {str(row["estimator"]): f"{short(row['ratio'])} ({row['parameter']})" for _, row in group.iterrows()}
         rows.append([str(case), *(own.get(name, "") for name in names)])
     return table(["case", *(look(name).label for name in names)], rows)
 
 
 def factor(gain: float) -> str:
-    """A gain as ``x 3.2``; nothing where there is none to compare with."""
-    if math.isnan(gain):
-        return "-"
-    if math.isinf(gain) or gain == 0.0:
-        return "x inf" if gain else "x 0"
-    return f"x {gain:.0e}".replace("e+0", "e").replace("e+", "e") if gain >= SHOWN else f"x {gain:.2g}"
+    """A gain as ``x 3.2``; a dash where there is none to compare with."""
+    return "-" if math.isnan(gain) else f"x {short(gain)}"
+
+
+def short(number: float) -> str:
+    """Two digits, without an exponent from 0.01 to 9999: ``0.034``, ``1600``, ``2e4``."""
+    if not 100.0 <= abs(number) < LARGE:
+        return f"{number:.2g}".replace("e+0", "e").replace("e-0", "e-").replace("e+", "e")
+    return f"{float(f'{number:.2g}'):.0f}"

@@ -8,7 +8,7 @@ import pandas as pd
 
 from study import error_pages
 from study.claims.verdict import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED
-from study.document import Block, Bullets, Heading, Image, Text, table
+from study.document import Block, Bullets, Heading, Text, table
 
 INTRODUCTION = (
     "Bendat, Palo and Coppolino identify nonlinear systems with one degree of freedom from force and response: "
@@ -76,8 +76,7 @@ def blocks(tables: Tables) -> list[Block]:
 
 def estimators(tables: Tables) -> list[Block]:
     """The errors of the estimators on the same records, and the picture of them."""
-    picture = Image("Errors of the estimators by parameter and case", "../figures/estimators.png")
-    return [*error_pages.opening(tables.errors, tables.noise), picture]
+    return error_pages.opening(tables.errors, tables.noise)
 
 
 def counts(tables: Tables) -> list[Block]:

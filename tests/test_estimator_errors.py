@@ -121,9 +121,9 @@ def test_the_opening_holds_every_case_and_parameter(table):
 
 
 def test_factors_are_short():
-    assert [error_pages.factor(g) for g in (0.5, 12.34, 3e7, math.inf, math.nan)] == [
-        "x 0.5", "x 12", "x 3e7", "x inf", "-"
-    ]  # fmt: skip
+    gains = (0.5, 12.34, 161.0, 9949.0, 9951.0, 3e7, 4e-7, math.inf, math.nan)
+    words = ["x 0.5", "x 12", "x 160", "x 9900", "x 1e4", "x 3e7", "x 4e-7", "x inf", "-"]
+    assert [error_pages.factor(gain) for gain in gains] == words
 
 
 def test_the_picture_shows_each_estimator_at_its_error(table):
