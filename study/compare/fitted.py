@@ -10,7 +10,7 @@ from study import fitting, units
 from study.chaotic import fit_in_pieces
 from study.diagnose import search
 from study.diagnose.score import clustered_covariance
-from study.errors import StudyError
+from study.errors import DivergenceError, StudyError
 from study.fitting import Plan
 from study.free_run import prepare
 from study.model import Model, ModelTerm
@@ -100,19 +100,28 @@ def _from_afar(model: Model, record: Record, how: Plan, held: tuple[str, ...]) -
     A free run of a strongly nonlinear system with somewhat wrong coefficients drifts out of step with the
     measured motion, and the sum of squares has side valleys there. Within pieces nothing drifts far.
     """
-    found = fitting.fit(model, record, how, held)
     measured = record[how.response][slice(*how.fit)]
+    try:
+        found = fitting.fit(model, record, how, held)
+    except DivergenceError:  # the linear start, with the values that are held, is no system that stays finite
+        return _in_pieces(model, record, how, held)
     if not found.keys or (found.converged and found.rms < POOR * float(np.std(measured))):
         return found
-    length = round(PERIODS * 2.0 * np.pi / (angular_rate(measured, record.dt) * record.dt))
-    span = (how.fit[0], min(how.fit[0] + int(np.clip(length, SHORT, LONG)), how.fit[1]))
-    start = {key: v for key, v in fitting.linear_start(model, record, how).items() if key not in held}
     try:
-        near = fit_in_pieces(model, record, start=start, held=held, response=how.response, span=span)
-        again = fitting.fit(model, record, how, held, dict(zip(near.keys, near.values.tolist(), strict=True)))
+        again = _in_pieces(model, record, how, held)
     except StudyError:
         return found
     return again if again.rms < found.rms else found
+
+
+def _in_pieces(model: Model, record: Record, how: Plan, held: tuple[str, ...]) -> FreeRunFit:
+    """A fit that begins where one in pieces of a few periods ends."""
+    measured = record[how.response][slice(*how.fit)]
+    length = round(PERIODS * 2.0 * np.pi / (angular_rate(measured, record.dt) * record.dt))
+    span = (how.fit[0], min(how.fit[0] + int(np.clip(length, SHORT, LONG)), how.fit[1]))
+    start = {key: v for key, v in fitting.linear_start(model, record, how).items() if key not in held}
+    near = fit_in_pieces(model, record, start=start, held=held, response=how.response, span=span)
+    return fitting.fit(model, record, how, held, dict(zip(near.keys, near.values.tolist(), strict=True)))
 
 
 def _refined(found: FreeRunFit, record: Record, how: Plan, held: tuple[str, ...]) -> tuple[FreeRunFit, Plan]:

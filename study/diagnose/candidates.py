@@ -119,10 +119,10 @@ def _starts(term: Term, base: Baseline, record: Record, how: Plan) -> list[dict[
     """
     fitted = {key: v for key, v in base.found.model.values.items() if v is not None}
     points = search.starts(term, base, record, how)
-    keys = free(term).keys
-    begins = [fitted | dict(zip(keys, p.coefficients + p.parameters, strict=True)) for p in points]
+    keys, zero = free(term).keys, (0.0,) * len(term.components)
+    begins = [fitted | dict(zip(keys, zero + p.parameters, strict=True)) for p in points]
     if points:
-        still = dict(zip(keys, (0.0,) * len(term.components) + points[0].parameters, strict=True))
+        still = dict(zip(keys, zero + points[0].parameters, strict=True))
         grown = base.found.model.with_term(free(term)).with_values(fitted | still)
         anew = _reversed(grown, record, how) or base.linear
         begins.append(fitted | still | {k: v for k, v in anew.items() if k in (*base.found.keys, *term.symbols)})

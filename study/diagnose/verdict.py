@@ -28,6 +28,7 @@ SIGNIFICANT = 5.0  # standard errors by which structure must stand above the noi
 SMALLEST_GAIN = 1e-3  # of the rms response: what a candidate must explain; less is the resolution of integration
 NEGLIGIBLE = 2e-3  # of the rms response: structure below this is no evidence that something is missing
 LEFT = 0.0075  # of the rms response: structure that may be left beside a candidate which counts as the explanation
+LACK = 0.03  # held-out share of a residual that general shapes of the motion must explain to be more than chance
 SEARCHED = 16384  # samples of the fitting part that the search uses
 REFITTED = 6  # ... after which the best so many are fitted on the whole of it
 PAIRED = 2  # the best so many candidates are tried together with every other
@@ -107,7 +108,10 @@ def diagnose(
     held = fitting.held_keys(model)
     found, finer = fit_model(model, record, how)
     if finer != how:  # the candidates are told apart at the plan's own steps, and so is the model without them
-        found = fitting.fit(found.model, record, how, held, found.model.numbers())
+        try:
+            found = fitting.fit(found.model, record, how, held, found.model.numbers())
+        except DivergenceError:  # stiff: nothing runs with fewer steps
+            how = finer
     residual, diverged = _held_out(found, record, how)
     short = fitting.shortened(how, SEARCHED)
     base = search.baseline(_refitted(found, record, how, short, held), record, short)
@@ -156,7 +160,7 @@ def _decide(
         left = _left(residual, size, record.dt)
         return (UNKNOWN if left > NEGLIGIBLE else NOTHING), rows, left, ()
     first = credible[0]
-    left = _left(first.residual, size, record.dt)
+    left = max(_left(first.residual, size, record.dt), _lack(first.found, first.response_error, record, how))
     if left <= LEFT and not wavers(first.steadiness):
         return MISSING, rows, left, ()
     pair = _explaining_pair(rows, base, size, record, how, held)
@@ -204,8 +208,22 @@ def _explains(pair: Pair, rows: list[Ranked], size: float, record: Record, how: 
     """Whether a pair leaves no structure, does more than the first alone, and neither coefficient moves."""
     if _left(pair.residual, size, record.dt) > LEFT or score.difference(rows[0].residual, pair.residual) < TIE:
         return False
+    error = float(np.sqrt(np.mean(pair.residual**2))) / size
+    if _lack(pair.found, error, record, how) > LEFT:
+        return False
     terms = [r.term for r in rows if r.name in pair.names]
     return not any(wavers(curves(pair.found, term, record, how)[1]) for term in terms)
+
+
+def _lack(found: FreeRunFit, error: float, record: Record, how: Plan) -> float:
+    """Rms over that of the response which general shapes of the motion and of its past explain of a residual.
+
+    Structure that is as broad as noise is not seen in a spectrum; it still depends on the motion.
+    """
+    short = fitting.shortened(how, len(found.residual))
+    shares = _families(search.baseline(found, record, short), record, short)
+    share = max(share for name, share in shares.items() if name != "time")
+    return error * float(np.sqrt(share)) if share > LACK else 0.0
 
 
 def _families(base: Baseline, record: Record, how: Plan) -> dict[str, float]:
