@@ -17,7 +17,7 @@ QUIET = (
     "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update", "--disable-sync",
     "--no-first-run",
 )  # fmt: skip
-WIDTH, HEIGHT = 1400, 1060
+WIDTH, HEIGHT = 1400, 1340
 COLOURS = 128  # of the picture: a page has few
 
 

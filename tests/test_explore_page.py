@@ -27,7 +27,7 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A record with hidden drag and the model that its owner believes in."""
     folder = tmp_path_factory.mktemp("rig")
     trial = trials.make_trial(911, hidden=["quadratic_damping"], noise=0.0004, response="displacement")
-    write_csv(trial.record.part(0, 2048), folder / "rig.csv")
+    write_csv(trial.record.part(0, 4096), folder / "rig.csv")
     lines = "".join(f"  - {t.name}  # mine\n" for t in trial.believed.terms)
     (folder / "rig.yaml").write_text(f"name: rig\nterms:\n{lines}")
     return folder
