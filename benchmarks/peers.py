@@ -7,6 +7,7 @@ import argparse
 import re
 import time
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,8 @@ ROOT = Path(__file__).parent.parent
 DT = 0.02
 EXACT = Integrator("rk4", 16)  # finer than the study's, so that the record's own error is not what is compared
 NOISES = {"clean": 0.0, "5 % noise": 0.05}  # rms of the noise over that of the displacement
+METHODS = {**PEERS, **OURS}
+KEYS, NUMBERS = ["seed", "record", "method"], [*WANTED, "s"]
 WARM_UP = 2048  # samples of a first run that is not timed
 PLACE = r"(<!-- {0} -->\n).*?(<!-- /{0} -->)"
 
@@ -36,32 +39,34 @@ def record(model: Model, samples: int, seed: int, noise: float) -> Record:
     return replace(full, channels={"force": full["force"], "displacement": u + displacement_noise(u, noise**2, seed)})
 
 
-def measure(model: Model, samples: int, seeds: int) -> pd.DataFrame:
-    """One row a method, kind of record and seed: relative errors in percent, processor seconds."""
-    rows: list[dict[str, object]] = []
-    for run in (*PEERS.values(), *OURS.values()):
+def measure(model: Model, samples: int, seeds: int, path: Path) -> pd.DataFrame:
+    """One row a seed, kind of record and method: relative errors in percent, processor seconds.
+
+    Rows are added to the file as they come, and those that it holds are not measured again.
+    """
+    for run in METHODS.values():
         run(model, record(model, WARM_UP, 0, 0.0))
-    for seed in range(1, seeds + 1):
-        for kind, noise in NOISES.items():
-            data = record(model, samples, seed, noise)
-            for method, run in {**PEERS, **OURS}.items():
-                begun = time.process_time()
-                found = run(model, data)
-                seconds = time.process_time() - begun
-                errors = {key: 100.0 * abs(found[key] / model.values[key] - 1.0) for key in WANTED}
-                rows.append(
-                    {"samples": samples, "seed": seed, "record": kind, "method": method, **errors, "s": seconds}
-                )
-                print(f"{samples:>9,} {kind:9} {method:30} {seconds:8.3f} s", errors, flush=True)
-    return pd.DataFrame(rows)
+    known = pd.read_csv(path) if path.exists() else pd.DataFrame(columns=[*KEYS, *NUMBERS])
+    done = set(known[KEYS].itertuples(index=False, name=None))
+    for seed, (kind, noise) in product(range(1, seeds + 1), NOISES.items()):
+        data = record(model, samples, seed, noise)
+        for method, run in METHODS.items():
+            if (seed, kind, method) in done:
+                continue
+            begun = time.process_time()
+            found = run(model, data)
+            seconds = time.process_time() - begun
+            errors = [100.0 * abs(found[key] / model.values[key] - 1.0) for key in WANTED]
+            row = pd.DataFrame([[seed, kind, method, *errors, seconds]], columns=[*KEYS, *NUMBERS])
+            row.to_csv(path, mode="a", header=not path.exists(), index=False)
+            print(f"{samples:>9,}", *row.to_string(header=False, index=False).split("\n"), flush=True)
+    return pd.read_csv(path)
 
 
 def table(measured: pd.DataFrame) -> pd.DataFrame:
-    """Medians over the seeds, a row a method, columns by kind of record and number; nan is nothing found."""
-    numbers = [*WANTED, "s"]
-    middle = measured.groupby(["method", "record"])[numbers].median(numeric_only=True).unstack("record")
-    order = [(number, kind) for kind in NOISES for number in numbers]
-    return middle.loc[[*PEERS, *OURS], order]
+    """Medians over the seeds, a row a method, columns by kind of record and number; nan is nothing found or not run."""
+    middle = measured.groupby(["method", "record"])[NUMBERS].median().unstack("record")
+    return middle.reindex(index=[*METHODS], columns=[(number, kind) for kind in NOISES for number in NUMBERS])
 
 
 def shown(middle: pd.DataFrame) -> str:
@@ -103,6 +108,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=5, help="records of 8,192 samples (default 5)")
     parser.add_argument("--long-seeds", type=int, default=1, help="records of 1,000,000 samples (default 1)")
+    parser.add_argument("--resume", action="store_true", help="keep what an interrupted run has measured")
     told = parser.parse_args()
     model = read_model(ROOT / "models" / "duffing.yaml")
     results = ROOT / "results" / "benchmarks"
@@ -110,9 +116,11 @@ def main() -> None:
     for name, samples, seeds in (("short", 8192, told.seeds), ("long", 1_000_000, told.long_seeds)):
         if seeds < 1:
             continue
+        path = results / f"peers_{name}.csv"
+        if not told.resume:
+            path.unlink(missing_ok=True)
         with threadpool_limits(1):
-            measured = measure(model, samples, seeds)
-        measured.to_csv(results / f"peers_{name}.csv", index=False)
+            measured = measure(model, samples, seeds, path)
         middle = table(measured)
         heading = f"{samples:,} samples, median over {seeds} record{'s' if seeds > 1 else ''}:"
         write(ROOT / "docs" / "peers.md", name, f"{heading}\n\n{shown(middle)}\n\n{leads(middle)}")

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.signal import csd
 
-from study import miso
+from study import miso, parameters
 from study.excitation import Excitation, force
 from study.inputs import histories, reverse_inputs
 from study.interpolation import between_samples
@@ -50,28 +49,6 @@ def integration(model: Model, method: str):
 @pytest.mark.benchmark(group="integration: 65,536 steps (13.1 ms is 5 million a second)")
 def test_integration(benchmark, path, method):
     benchmark(integration(read_model(path), method))
-
-
-@pytest.mark.benchmark(group="a Duffing record at equal error (1e-6 of the rms)")
-def test_simulate(benchmark):
-    model = read_model(MODELS[0].parent / "duffing.yaml")
-    values = the_force()[:1024]
-    benchmark(lambda: simulate(model, values, DT, Integrator("rk4", 8)))
-
-
-@pytest.mark.benchmark(group="a Duffing record at equal error (1e-6 of the rms)")
-def test_scipy_dop853(benchmark):
-    fine = between_samples(the_force()[:1024], 16)
-    grid = np.arange(len(fine)) * DT / 16
-
-    def slope(t, x):
-        return [x[1], np.interp(t, grid, fine) - 3.77 * x[1] - 355.3 * x[0] - 2e7 * x[0] ** 3]
-
-    at = np.arange(1024) * DT
-    benchmark.pedantic(
-        lambda: solve_ivp(slope, (0.0, at[-1]), [0.0, 0.0], "DOP853", at, rtol=1e-6, atol=1e-12, max_step=DT / 2),
-        rounds=2,
-    )
 
 
 def channels(count: int = 4, samples: int = 1_000_000):
@@ -129,5 +106,17 @@ def test_local_polynomial(benchmark):
 @pytest.mark.benchmark(group="a Duffing record of 100,000 samples in reverse")
 def test_miso(benchmark):
     """The report's estimator on the same record."""
-    _, data = reverse_channels(100_000)
-    benchmark.pedantic(lambda: miso.analyse(cross_spectra(data, DT)), rounds=3, warmup_rounds=1)
+    benchmark.pedantic(in_reverse(100_000), rounds=3, warmup_rounds=1)
+
+
+@pytest.mark.benchmark(group="a Duffing record of 1,000,000 samples in reverse")
+def test_miso_of_a_million(benchmark):
+    """Spectra, conditioned spectra and coherences, coefficients with their errors."""
+    benchmark.pedantic(in_reverse(1_000_000), rounds=3, warmup_rounds=1)
+
+
+def in_reverse(samples: int):
+    """MI/SO with everything that follows from the inputs' time histories."""
+    inputs, data = reverse_channels(samples)
+    inflation = Segments().line_inflation()
+    return lambda: parameters.fit(miso.analyse(cross_spectra(data, DT)), inputs, (0.3, 10.0), inflation)
