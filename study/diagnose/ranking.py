@@ -18,7 +18,7 @@ from study.record import Record
 from study.terms import Term
 
 Floats = NDArray[np.float64]
-TIE = 2.0  # candidates closer than this many standard errors of their difference are a tie
+TIE = 3.0  # standard errors of their difference within which two candidates are a tie: 5 %, shared by a library of 18
 ALIKE = 0.01  # ... and so are two whose predictions differ by less than this share of what either leaves
 RESOLUTION = 3e-4  # ... or of the rms response: what integration with few steps a sample leaves uncertain
 UNSTEADY = 0.3  # relative change of its coefficient at which a candidate is no longer believed ...

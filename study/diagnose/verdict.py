@@ -28,6 +28,7 @@ SIGNIFICANT = 5.0  # standard errors by which structure must stand above the noi
 SMALLEST_GAIN = 1e-3  # of the rms response: what a candidate must explain; less is the resolution of integration
 NEGLIGIBLE = 2e-3  # of the rms response: structure below this is no evidence that something is missing
 LEFT = 0.0075  # of the rms response: structure that may be left beside a candidate which counts as the explanation
+ENOUGH = 0.99  # of the unexplained power: what explains so much is missing, whatever is missing besides
 LACK = 0.03  # held-out share of a residual that general shapes of the motion must explain to be more than chance
 SEARCHED = 16384  # samples of the fitting part that the search uses
 REFITTED = 6  # ... after which the best so many are fitted on the whole of it
@@ -161,7 +162,8 @@ def _decide(
         return (UNKNOWN if left > NEGLIGIBLE else NOTHING), rows, left, ()
     first = credible[0]
     left = max(_left(first.residual, size, record.dt), _lack(first.found, first.response_error, record, how))
-    if left <= LEFT and not wavers(first.steadiness):
+    slight = first.response_error <= LEFT  # the model is then as good as models are; its faults move a coefficient
+    if first.gain.explained >= ENOUGH or (left <= LEFT and (slight or not wavers(first.steadiness))):
         return MISSING, rows, left, ()
     pair = _explaining_pair(rows, base, size, record, how, held)
     if pair is None:
