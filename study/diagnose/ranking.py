@@ -19,6 +19,7 @@ from study.terms import Term
 
 Floats = NDArray[np.float64]
 TIE = 3.0  # standard errors of their difference within which two candidates are a tie: 5 %, shared by a library of 18
+COMPARABLE = 0.75  # of what the better explains: one that explains less is not its equal, however uncertain both are
 ALIKE = 0.01  # ... and so are two whose predictions differ by less than this share of what either leaves
 RESOLUTION = 3e-4  # ... or of the rms response: what integration with few steps a sample leaves uncertain
 UNSTEADY = 0.3  # relative change of its coefficient at which a candidate is no longer believed ...
@@ -179,7 +180,7 @@ def _ties_by_simplicity(rows: list[Ranked]) -> list[Ranked]:
     if not rows:
         return rows
     first = rows[0]
-    level = [r for r in rows if _distance(r, first) < TIE or _alike(r, first)]
+    level = [r for r in rows if _alike(r, first) or (_comparable(r, first) and _distance(r, first) < TIE)]
     level = [r for r in level if _unknowns(r) <= _unknowns(first)]
     first = min(level, key=_misfit)
     first = min((r for r in level if _alike(r, first)), key=lambda r: (_unknowns(r), _misfit(r)), default=first)
@@ -236,7 +237,13 @@ def _level(one: Ranked, other: Ranked) -> bool:
     """
     if _alike(one, other):
         return True
+    if not _comparable(one, other) or not _comparable(other, one):
+        return False
     return abs(_distance(one, other)) < TIE and abs(_distance(other, one)) < TIE
+
+
+def _comparable(one: Ranked, other: Ranked) -> bool:
+    return one.gain.explained >= COMPARABLE * other.gain.explained
 
 
 def _alike(one: Ranked, other: Ranked) -> bool:
