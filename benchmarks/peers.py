@@ -90,9 +90,13 @@ def leads(middle: pd.DataFrame) -> str:
         if theirs < mine:
             name = column[list(PEERS)].idxmin()
             behind.append(f"{'time' if number == 's' else number} ({kind}): {name}, {mine / theirs:.2g} times")
-    return (
+    ahead = (
         f"A peer is ahead in: {'; '.join(behind)}." if behind else "One of ours has the smallest number of each column."
     )
+    missing = [
+        f"{method} ({kind})" for kind in NOISES for method in METHODS if np.isnan(middle.loc[method, ("s", kind)])
+    ]
+    return f"{ahead} Not run: {'; '.join(missing)}." if missing else ahead
 
 
 def write(page: Path, name: str, block: str) -> None:
