@@ -122,6 +122,6 @@ def factor(gain: float) -> str:
 
 def short(number: float) -> str:
     """Two digits, without an exponent from 0.01 to 9999: ``0.034``, ``1600``, ``2e4``."""
-    if not 100.0 <= abs(number) < LARGE:
+    if not 99.5 <= abs(number) < LARGE:
         return f"{number:.2g}".replace("e+0", "e").replace("e-0", "e-").replace("e+", "e")
     return f"{float(f'{number:.2g}'):.0f}"

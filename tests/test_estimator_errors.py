@@ -121,8 +121,8 @@ def test_the_opening_holds_every_case_and_parameter(table):
 
 
 def test_factors_are_short():
-    gains = (0.5, 12.34, 161.0, 9949.0, 9951.0, 3e7, 4e-7, math.inf, math.nan)
-    words = ["x 0.5", "x 12", "x 160", "x 9900", "x 1e4", "x 3e7", "x 4e-7", "x inf", "-"]
+    gains = (0.5, 12.34, 99.7, 161.0, 9949.0, 9951.0, 3e7, 4e-7, math.inf, math.nan)
+    words = ["x 0.5", "x 12", "x 100", "x 160", "x 9900", "x 1e4", "x 3e7", "x 4e-7", "x inf", "-"]
     assert [error_pages.factor(gain) for gain in gains] == words
 
 
