@@ -23,7 +23,8 @@ EITHER_WAY = (  # effects that occur with either sign: an opening or a closing g
     "constant_force",
 )  # fmt: skip
 PLACELESS = (  # effects that are the same wherever the system rests, u^2 but for another linear stiffness
-    "quadratic_stiffness", "quadratic_damping", "cubic_damping", "coulomb_friction", "relaxation", "hysteresis", "harmonic_force",
+    "quadratic_stiffness", "quadratic_damping", "cubic_damping", "coulomb_friction", "relaxation", "hysteresis",
+    "harmonic_force",
 )  # fmt: skip
 NOISES = (0.0, 0.01, 0.05, 0.10)
 KNOWN = ("none", "none", "cubic_stiffness", "van_der_pol_damping")  # of which one is drawn
