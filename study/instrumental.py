@@ -11,6 +11,7 @@ The measured response still decides: A_j(f) is free to differ from the form that
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,7 @@ Complexes = NDArray[np.complex128]
 NODES = 15  # of the Gauss-Hermite rule: exact for shapes up to the power 29, close for kinked ones
 NOISY = {"u": "displacement", "v": "velocity"}  # what a formula calls the channels that carry noise
 TINY = float(np.finfo(np.float64).tiny)
+_pinv = cast(Any, np.linalg.pinv)  # its annotation leaves the element type open
 FAINT = 1e-8  # noise below this share of a channel's mean square is the rounding of the free run
 
 
@@ -63,7 +65,7 @@ def responses(matrix: SpectralMatrix) -> Responses:
     density, count = matrix.density, matrix.density.shape[1] // 2
     scale = np.sqrt(np.maximum(np.einsum("fii->fi", density).real, TINY))
     scaled = density / (scale[:, :, None] * scale[:, None, :])
-    inverse = np.linalg.pinv(scaled[:, :count, count:-1], rcond=COLLINEAR)
+    inverse: Complexes = np.asarray(_pinv(scaled[:, :count, count:-1], rcond=COLLINEAR), dtype=np.complex128)
     gain = scale[:, -1:] / scale[:, count:-1]
     response = (np.einsum("fij,fj->fi", inverse, scaled[:, :count, -1]) * gain).T
     noise = left_over(_without_instruments(matrix), response)
@@ -103,7 +105,7 @@ def fit(matrix: SpectralMatrix, inputs: Sequence[Input], band: tuple[float, floa
     normal = np.einsum("fp,fpq,fq->pq", weighted, through, powers).real / np.outer(size, size)
     right = np.einsum("fp,fp->p", weighted, density[:, owner, -1]).real / size
     spread = np.einsum("fp,fpq,fq->pq", weighted, own, powers).real / np.outer(size, size)
-    inverse = np.linalg.pinv(normal) / size[:, None]
+    inverse: Floats = np.asarray(_pinv(normal), dtype=np.float64) / size[:, None]
     share = matrix.segments.line_inflation() / (2.0 * matrix.averages)
     symbols = tuple(part.symbol for item in inputs for part in item.parts)
     return Estimate(symbols, inverse @ right, share * inverse @ spread @ inverse.T)
