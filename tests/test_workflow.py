@@ -97,7 +97,9 @@ def test_a_row_of_the_table_gives_every_product(built):
             assert (built / "results" / case / name).stat().st_size > 100
     drawn = {path.name for path in (built / "figures").iterdir()}
     stems = ["figure_21", "figure_22", "figure_23", "figure_24", "figure_3", "figure_53", "figure_54", "figure_55"]
-    assert drawn == {f"{stem}.{ending}" for stem in (*stems, "noisy_histogram", "estimators") for ending in ("png", "svg")}
+    assert drawn == {
+        f"{stem}.{ending}" for stem in (*stems, "noisy_histogram", "estimators") for ending in ("png", "svg")
+    }
     page = (built / "results" / "summary.md").read_text()
     assert "| duffing " in page
     assert "| noisy " in page
