@@ -20,6 +20,7 @@ SHOWN = (
     "mathieu_side_resonances", "mathieu_stiffness", "dead_band_stiffness", "dead_band_error", "dead_band_share",
     "levels_invariant", "levels_siso", "error_free", "noise_random_only",
 )  # fmt: skip
+CONFUSION = "trials_confusion.png"
 
 
 def main(results: Path, figures: Path, readme: Path, tool: Path) -> None:
@@ -29,8 +30,8 @@ def main(results: Path, figures: Path, readme: Path, tool: Path) -> None:
     table = pd.read_csv(claims, keep_default_na=False).set_index("id").loc[list(SHOWN)].reset_index()
     put(readme, "numbers", document.markdown([summary.statements(table)]))
     if (reached := results / "trials" / "summary.csv").is_file():
-        put(tool, "reach", reach(pd.read_csv(reached)))
-        shutil.copyfile(figures / "trials_confusion.png", tool.parent / "trials_confusion.png")
+        put(tool, "reach", f"{reach(pd.read_csv(reached))}\n![What was hidden, and what was said]({CONFUSION})\n")
+        shutil.copyfile(figures / CONFUSION, tool.parent / CONFUSION)
     if (history := results / "silverbox" / "history.json").is_file():
         put(tool, "ladder", ladder(json.loads(history.read_text(encoding="utf-8"))["steps"]))
 
