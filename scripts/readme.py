@@ -4,7 +4,6 @@ The trials and the Silverbox are targets of their own; a table that is not there
 """
 
 import json
-import re
 import shutil
 from pathlib import Path
 
@@ -12,7 +11,6 @@ import pandas as pd
 
 from study import document, summary
 from study.errors import StudyError
-from study.files import replace_file
 from study.step import one_sentence
 
 SHOWN = (
@@ -28,38 +26,31 @@ def main(results: Path, figures: Path, readme: Path, tool: Path) -> None:
     if not claims.is_file():
         raise StudyError(f"{claims}: there is no such file; run 'make study' first")
     table = pd.read_csv(claims, keep_default_na=False).set_index("id").loc[list(SHOWN)].reset_index()
-    put(readme, "numbers", document.markdown([summary.statements(table)]))
+    document.put(readme, "numbers", [summary.statements(table)])
     if (reached := results / "trials" / "summary.csv").is_file():
-        put(tool, "reach", f"{reach(pd.read_csv(reached))}\n![What was hidden, and what was said]({CONFUSION})\n")
+        said = document.Image("What was hidden, and what was said", CONFUSION)
+        document.put(tool, "reach", [reach(pd.read_csv(reached)), said])
         shutil.copyfile(figures / CONFUSION, tool.parent / CONFUSION)
     if (history := results / "silverbox" / "history.json").is_file():
-        put(tool, "ladder", ladder(json.loads(history.read_text(encoding="utf-8"))["steps"]))
+        document.put(tool, "ladder", [ladder(json.loads(history.read_text(encoding="utf-8"))["steps"])])
 
 
-def put(page: Path, name: str, block: str) -> None:
-    """Replace what stands between the two marks of this name."""
-    place = re.compile(rf"(<!-- {name} -->\n).*?(<!-- /{name} -->)", re.DOTALL)
-    text, count = place.subn(lambda found: found[1] + block + found[2], page.read_text(encoding="utf-8"))
-    if count != 1:
-        raise StudyError(f"{page} has no place for the table: a line '<!-- {name} -->' and one '<!-- /{name} -->'")
-    replace_file(page, text.encode())
-
-
-def reach(table: pd.DataFrame) -> str:
-    percent = 100.0 * table[["rate", "standard_error"]]
-    rates = [f"{rate:.1f} +- {error:.1f} %" for rate, error in percent.itertuples(index=False)]
-    wanted = ["" if pd.isna(w) else f"{100.0 * w:.0f} %" for w in table["wanted"]]
-    shown = pd.DataFrame({"reach": table["reach"], "trials": table["trials"], "measured": rates, "wanted": wanted})
-    return shown.to_markdown(index=False) + "\n"
-
-
-def ladder(steps: list[dict]) -> str:
+def reach(table: pd.DataFrame) -> document.Block:
     rows = [
-        {"model": "linear oscillator" if step["added"] is None else f"+ {step['added'].replace('_', ' ')}",
-         "error of the response": f"{100.0 * step['error']['response']:.3g} %", "rms": f"{1000.0 * step['rms']:.3f} mV"}
+        (row["reach"], row["trials"], f"{100.0 * row['rate']:.1f} +- {100.0 * row['standard_error']:.1f} %",
+         "" if pd.isna(row["wanted"]) else f"{100.0 * row['wanted']:.0f} %")
+        for row in table.to_dict("records")
+    ]  # fmt: skip
+    return document.table(("reach", "trials", "measured", "wanted"), rows)
+
+
+def ladder(steps: list[dict]) -> document.Block:
+    rows = [
+        ("linear oscillator" if step["added"] is None else f"+ {step['added'].replace('_', ' ')}",
+         f"{100.0 * step['error']['response']:.3g} %", f"{1000.0 * step['rms']:.3f} mV")
         for step in steps
     ]  # fmt: skip
-    return pd.DataFrame(rows).to_markdown(index=False) + "\n"
+    return document.table(("model", "error of the response", "rms"), rows)
 
 
 if __name__ == "__main__":

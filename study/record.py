@@ -12,7 +12,7 @@ MOTIONS = ("displacement", "velocity", "acceleration")
 SI_UNITS = {"time": "s", "force": "N", "displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # arrays have no one truth value: a record equals itself alone
 class Record:
     """Evenly sampled channels.
 

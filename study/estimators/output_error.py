@@ -1,5 +1,7 @@
 """Output error: the model runs free under the measured force and is fitted to the measured displacement."""
 
+from functools import lru_cache
+
 from study import parametric, spectra
 from study.chaotic import fit_record
 from study.estimators import miso
@@ -9,6 +11,8 @@ from study.model import Model
 from study.output_error import FreeRunFit
 from study.record import Record
 from study.shapes import shape_keys, with_starting_shapes
+
+KEPT = 4  # fits: those of the records that the threads are at
 
 
 def identify(model: Model, record: Record, settings: Settings) -> Identified:
@@ -24,8 +28,9 @@ def identify(model: Model, record: Record, settings: Settings) -> Identified:
     return Identified(inputs, result, named_parameters(estimate), estimate, note)
 
 
+@lru_cache(maxsize=KEPT)
 def fit(model: Model, record: Record, settings: Settings) -> FreeRunFit:
-    """The fit in free run that the estimate is made of."""
+    """The fit in free run that the estimate is made of; kept a while, for instruments rest on the same one."""
     begun = with_starting_shapes(model, record)
     first = miso.identify(begun, record, settings).estimate
     assert first is not None  # MI/SO finds all coefficients together
