@@ -4,6 +4,7 @@ wildcard_constraints:
 
 
 rule record:
+    priority: 2  # all else waits for records
     input:
         model=model_of,
         code=CODE["record"],

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import rfft, rfftfreq
-from scipy.signal import get_window
 
 from study.errors import StudyError
 
@@ -56,6 +55,8 @@ class Segments:
 
     def taper(self) -> Floats:
         """The window's samples, shape (length,)."""
+        from scipy.signal import get_window  # a third of a second, which not every step that knows segments needs
+
         return np.asarray(get_window(self.window, self.length), dtype=np.float64)
 
     def count(self, samples: int) -> int:
