@@ -13,7 +13,7 @@ report: study
 	$(BIN)/snakemake --report report.html
 
 test: lint
-	$(BIN)/pytest -n logical --dist loadfile -p no:benchmark
+	$(BIN)/pytest -n logical --dist loadfile --no-loadscope-reorder -p no:benchmark
 
 lint: $(READY)
 	$(BIN)/ruff check
