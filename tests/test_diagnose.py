@@ -105,14 +105,22 @@ def test_gain_counts_the_blocks():
     before = rng.standard_normal(4096)
     assert score.gain(before, 0.5 * before).explained == pytest.approx(0.75)
     assert score.gain(before, 0.5 * before).p_value < 1e-6
-    assert score.gain(before, rng.standard_normal(4096)).p_value > 1e-3
+    assert score.gain(before, before + 0.1 * rng.standard_normal(4096)).p_value > 1e-3
     assert score.gain(before, before).p_value == 1.0
 
 
 def test_false_alarms_of_a_gain_are_as_rare_as_its_p_value():
     rng = np.random.default_rng(3)
-    p = [score.gain(*rng.standard_normal((2, 1536))).p_value for _ in range(400)]
-    assert np.mean(np.array(p) < 0.05) == pytest.approx(0.05, abs=0.04)
+    p = [score.gain(noise, noise - 0.2 * useless).p_value for noise, useless in rng.standard_normal((400, 2, 1536))]
+    assert np.mean(np.array(p) < 0.05) == pytest.approx(0.05, abs=0.025)
+
+
+def test_a_small_change_of_the_prediction_that_is_right_is_seen():
+    """A hundredth of the residual's power: five standard errors of the agreement, two of the fall of the power."""
+    rng = np.random.default_rng(30)
+    noise, change = rng.standard_normal((2, 200, 2500))
+    p = [score.gain(n + 0.1 * c, n).p_value for n, c in zip(noise, change, strict=True)]
+    assert np.mean(np.array(p) < 0.001) > 0.9
 
 
 def test_clustered_errors_match_the_scatter_for_correlated_noise():

@@ -108,10 +108,13 @@ def starts(term: Term, base: Baseline, record: Record, how: Plan) -> list[Start]
     return best[:1] + [point for point in tried[::step] if point is not best[0]]
 
 
-def _try(
+def sensitivity(
     term: Term, parameters: tuple[float, ...], base: Baseline, record: Record, how: Plan
-) -> Start | None:  # fmt: skip
-    """One point: least squares of the residual on the candidate's sensitivities."""
+) -> Floats | None:  # fmt: skip
+    """What small amounts of a candidate add to the response that the model's own coefficients cannot, (n, components).
+
+    None where the model with it does not run, or nothing is left.
+    """
     entry = ModelTerm(term, (0.0,) * len(term.components), parameters)
     model = base.found.model.with_term(entry)
     try:
@@ -120,7 +123,15 @@ def _try(
     except StudyError:
         return None
     added = added - base.basis @ (base.basis.T @ added)
-    if not np.all(np.isfinite(added)) or not np.any(added):
+    return added if np.all(np.isfinite(added)) and np.any(added) else None
+
+
+def _try(
+    term: Term, parameters: tuple[float, ...], base: Baseline, record: Record, how: Plan
+) -> Start | None:  # fmt: skip
+    """One point: least squares of the residual on the candidate's sensitivities."""
+    added = sensitivity(term, parameters, base, record, how)
+    if added is None:
         return None
     residual = base.found.residual
     amounts = least_squares(added, residual, 1e-8)

@@ -23,7 +23,6 @@ from study.terms import Term
 Floats = NDArray[np.float64]
 MISSING, NOTHING, UNKNOWN = "missing_effect", "nothing_missing", "unknown_effect"
 LEVEL = 0.01  # of the p value, all candidates accounted for
-SMALLEST_SHARE = 0.01  # of the held-out residual: what a candidate must explain to be worth a term
 SIGNIFICANT = 5.0  # standard errors by which structure must stand above the noise floor
 SMALLEST_GAIN = 1e-3  # of the rms response: what a candidate must explain; less is the resolution of integration
 NEGLIGIBLE = 2e-3  # of the rms response: structure below this is no evidence that something is missing
@@ -174,7 +173,7 @@ def _decide(
 
 def _credible(row: Ranked, residual: Floats, size: float) -> bool:
     gained = max(float(np.mean(residual**2) - np.mean(row.residual**2)), 0.0)
-    return row.p_value < LEVEL and row.gain.explained > SMALLEST_SHARE and gained > (SMALLEST_GAIN * size) ** 2
+    return row.p_value < LEVEL and gained > (SMALLEST_GAIN * size) ** 2
 
 
 def _left(residual: Floats, size: float, dt: float) -> float:

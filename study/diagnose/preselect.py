@@ -1,0 +1,138 @@
+"""Which pairs of candidates are worth a free run? Two answers, as each is blind where the other sees.
+
+The reverse system, where all terms are linear inputs, knows no side valleys, but noise on the response biases
+it. The sensitivities of the fitted model's free run know no noise, but that model lacks both effects. In both
+a pair is one small system of equations.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import rfft, rfftfreq
+from scipy.signal import get_window
+
+from study.diagnose.ranking import Ranked
+from study.diagnose.search import Baseline, sensitivity
+from study.errors import StudyError
+from study.fitting import FAINT, Plan
+from study.inputs import history, reverse_inputs
+from study.linear import least_squares
+from study.model import Model, ModelTerm
+from study.motion import complete
+from study.record import Record
+
+Floats = NDArray[np.float64]
+TRIED = 12  # pairs that each of the two answers puts first
+
+
+@dataclass(frozen=True)
+class Start:
+    """Two candidates and where their fit begins.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The two.
+    model : Model
+        The model with both, every value given.
+    """
+
+    names: tuple[str, str]
+    model: Model
+
+
+def promising(
+    rows: Sequence[Ranked], base: Baseline, record: Record, how: Plan, held: tuple[str, ...]
+) -> list[Start]:  # fmt: skip
+    """The best pairs of the reverse system, then those of the sensitivities that are not among them.
+
+    Parameters
+    ----------
+    rows : sequence of Ranked
+        The candidates with their shape parameters.
+    base, record, how, held
+        As for :func:`study.diagnose.pairs.best_pair`.
+    """
+    entries = {r.name: next(t for t in r.found.model.terms if t.name == r.name) for r in rows}
+    reverse = _of_the_reverse_system(entries, base, record, how, held)
+    known = {start.names for start in reverse}
+    return reverse + [s for s in _of_the_sensitivities(entries, base, record, how) if s.names not in known]
+
+
+def _of_the_reverse_system(
+    entries: Mapping[str, ModelTerm], base: Baseline, record: Record, how: Plan, held: tuple[str, ...]
+) -> list[Start]:
+    """Pairs with coefficients, all of them anew, from the reverse system; best first."""
+    known = base.found.model
+    everything = known
+    for entry in entries.values():
+        everything = everything.with_term(entry)
+    try:
+        columns, target = _spectra(everything, base, record, how)
+    except StudyError:
+        return []
+    own = [key for key in known.values if key in columns]
+    fixed = [key for key in own if key in held]
+    target = target - sum((float(known.values[k] or 0.0) * columns[k] for k in fixed), np.zeros(len(target)))
+    free = [key for key in own if key not in held]
+    found: list[tuple[float, Start]] = []
+    for one, other in combinations([n for n, e in entries.items() if set(e.term.symbols) <= set(columns)], 2):
+        keys = [*free, *entries[one].term.symbols, *entries[other].term.symbols]
+        design = np.stack([columns[k] for k in keys], axis=1)
+        amounts = least_squares(design, target)
+        left = float(np.sum((target - design @ amounts) ** 2))
+        model = known.with_term(entries[one]).with_term(entries[other])
+        found.append((left, Start((one, other), model.with_values(dict(zip(keys, amounts.tolist(), strict=True))))))
+    return _best(found)
+
+
+def _of_the_sensitivities(
+    entries: Mapping[str, ModelTerm], base: Baseline, record: Record, how: Plan
+) -> list[Start]:  # fmt: skip
+    """Pairs with coefficients of zero beside the fitted model; best first."""
+    known, residual = base.found.model, base.found.residual
+    tried = {n: sensitivity(e.term, tuple(float(p or 0.0) for p in e.parameters), base, record, how)
+             for n, e in entries.items()}  # fmt: skip
+    columns = {name: added for name, added in tried.items() if added is not None}
+    found: list[tuple[float, Start]] = []
+    for one, other in combinations(columns, 2):
+        design = np.hstack([columns[one], columns[other]])
+        left = float(np.sum((residual - design @ least_squares(design, residual, 1e-8)) ** 2))
+        model = known.with_term(entries[one]).with_term(entries[other])
+        zero = dict.fromkeys((*entries[one].term.symbols, *entries[other].term.symbols), 0.0)
+        found.append((left, Start((one, other), model.with_values(zero))))
+    return _best(found)
+
+
+def _best(found: list[tuple[float, Start]]) -> list[Start]:
+    return [start for _, start in sorted(found, key=lambda f: f[0])[:TRIED]]
+
+
+def _spectra(model: Model, base: Baseline, record: Record, how: Plan) -> tuple[dict[str, Floats], Floats]:
+    """Spectra of each coefficient's unit force, and of the measured force, as the response would show them.
+
+    Real and imaginary parts of the lines that the force drives, one array a key. Weighted with the linear
+    receptance, so that noise on the response weighs as it does in a free run.
+    """
+    completed = complete(record.part(*how.fit))
+    part = completed.record.part(completed.edge, len(completed.record) - completed.edge)
+    taper = get_window("hann", len(part))
+    frequency = np.asarray(rfftfreq(len(part), part.dt))
+    force = np.asarray(rfft(taper * part["force"]))
+    loud = np.abs(force) ** 2 > FAINT * np.max(np.abs(force) ** 2)
+    keep = (frequency >= completed.band[0]) & (frequency <= frequency[loud][-1])
+    omega = 2j * np.pi * frequency[keep]
+    weight = base.transfer(np.where(omega == 0.0, omega[-1] / len(omega), omega))
+    columns: dict[str, Floats] = {}
+    for item in reverse_inputs(model):
+        spectrum = np.asarray(rfft(taper * history(item, part)))[keep] * weight
+        for k, power in zip(item.parts, item.powers(frequency[keep]).T, strict=True):
+            columns[k.symbol] = _parts(spectrum * power)
+    return columns, _parts(force[keep] * weight)
+
+
+def _parts(values: NDArray[np.complex128]) -> Floats:
+    return np.concatenate([values.real, values.imag])
