@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.errors import StudyError
-from study.free_run import prepare
+from study.free_run import FreeRun, prepare
 from study.linear import least_squares
 from study.model import Model
 from study.output_error import FreeRunFit, fit_free_run
@@ -147,19 +147,43 @@ def held_out_residual(found: FreeRunFit, record: Record, how: Plan) -> Floats:
     DivergenceError
         If the free run leaves the range of finite numbers.
     """
-    first, last = how.judge
-    measured = record[how.response][first:last]
-    if first == how.fit[1]:
-        run = prepare(
-            found.model, record, response=how.response, steps_per_sample=how.steps_per_sample, span=(how.fit[0], last)
-        )
-        response, _ = run.respond({}, found.initial)
-        return measured - response[first - how.fit[0] :]
-    keys = tuple(found.model.values)
-    again = fit_free_run(
-        found.model, record, held=keys, response=how.response, steps_per_sample=how.steps_per_sample, span=how.judge
-    )
-    return again.residual
+    return record[how.response][slice(*how.judge)] - held_out_motion(found, record, how, how.response)
+
+
+def held_out_motion(found: FreeRunFit, record: Record, how: Plan, motion: str) -> Floats:
+    """A motion of the free run on the judging part, as :func:`held_out_residual` has it.
+
+    Raises
+    ------
+    DivergenceError
+        If the free run leaves the range of finite numbers.
+    """
+    run, initial, first = _judging_run(found, record, how, motion)
+    return run.respond({}, initial)[0][first:]
+
+
+def held_out_derivatives(found: FreeRunFit, record: Record, how: Plan) -> Floats:
+    """As :func:`linearise`, on the judging part."""
+    run, initial, first = _judging_run(found, record, how, how.response, found.keys)
+    values = dict(zip(found.keys, (float(v) for v in found.values), strict=True))
+    return run.respond(values, initial, 2)[1][first:]
+
+
+def _judging_run(
+    found: FreeRunFit, record: Record, how: Plan, motion: str, keys: tuple[str, ...] = ()
+) -> tuple[FreeRun, Floats, int]:
+    """A free run that covers the judging part, its initial state, and the judging part's first sample in it."""
+    initial, first = found.initial, how.fit[0]
+    if how.judge[0] != how.fit[1]:
+        again = fit_free_run(
+            found.model, record, held=tuple(found.model.values), response=how.response,
+            steps_per_sample=how.steps_per_sample, span=how.judge,
+        )  # fmt: skip
+        initial, first = again.initial, how.judge[0]
+    run = prepare(
+        found.model, record, keys, response=motion, steps_per_sample=how.steps_per_sample, span=(first, how.judge[1])
+    )  # fmt: skip
+    return run, initial, how.judge[0] - first
 
 
 def shortened(how: Plan, samples: int) -> Plan:

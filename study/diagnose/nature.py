@@ -1,101 +1,200 @@
 """What does an unexplained force depend on: displacement, velocity, both, the past, or time?
 
-Each family is a handful of general shapes of the free run's motion, passed through the linear system.
-The first part of the record says how much of each, the second how much of the residual that explains.
+Each family is a handful of general shapes of the free run's motion. What a small force of such a shape adds to the
+response is exact for functions of displacement and velocity (the free run's sensitivity); for those of the past and of
+time the force is passed through the linear system. The first part of the record says how much of each, the second
+how much of the residual that explains.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+from scipy.signal import lfilter
 
+from study import fitting
+from study.diagnose import score
 from study.diagnose.search import Baseline, modulation_lines, residual_lines
+from study.errors import DivergenceError
+from study.fitting import Plan
+from study.free_run import prepare
 from study.linear import least_squares
+from study.model import ModelTerm
+from study.output_error import FreeRunFit
+from study.record import MOTIONS, Record
+from study.terms import custom
 
 Floats = NDArray[np.float64]
 DEGREE = 7
 TAUS = (0.1, 0.3, 1.0, 3.0, 10.0)
-FAMILIES = ("displacement", "velocity", "displacement and velocity", "past", "time")
+LONGEST = 16384  # samples of either part that are looked at
 
 
-def explained_by(base: Baseline, velocity: Floats, dt: float) -> dict[str, float]:
-    """Held-out share of the residual that each family of shapes explains; at most one, negative for nothing.
+@dataclass(frozen=True)
+class Leftover:
+    """A free run and what it leaves unexplained, on the fitting part and then on the judging part.
+
+    Attributes
+    ----------
+    displacement, velocity : array, shape (n,)
+        Of the free run, over their standard deviations.
+    residual : array, shape (n,)
+        Measured minus predicted response.
+    own : array, shape (n, p)
+        Derivatives of the response to the model's own coefficients and initial state.
+    shapes : dict of array, shape (n, shapes)
+        What forces that are functions of displacement, velocity and both add to the response.
+    split : int
+        Samples of the fitting part.
+    base : Baseline
+        Of the fitted model: its transfer passes other forces, its residual holds the lines.
+    """
+
+    displacement: Floats
+    velocity: Floats
+    residual: Floats
+    own: Floats
+    shapes: Mapping[str, Floats]
+    split: int
+    base: Baseline
+
+
+def leftover(found: FreeRunFit, base: Baseline, record: Record, how: Plan) -> Leftover:
+    """What a fitted model leaves; where its free run does not stay finite to the end, on the fitting part alone.
 
     Parameters
     ----------
+    found : FreeRunFit
+        The fit.
     base : Baseline
-        The fitted model and its residual on the fitting part.
-    velocity : array, shape (n,)
-        Velocity of the free run.
-    dt : float
-        Sampling interval in seconds.
+        Of the same model.
+    record, how
+        The record, and the parts that the fit was made on and is judged on.
     """
-    u = base.displacement / np.std(base.displacement)
-    v = velocity / np.std(velocity)
-    families = {
-        "displacement": _polynomials(u),
-        "velocity": _polynomials(v),
-        "displacement and velocity": [u**a * v**b for a, b in product(range(4), range(4)) if 1 < a + b < 6 and a and b]
-        + [np.abs(u) * v, np.abs(v) * u],
-        "past": _states(u, v),
-        "time": _times(base, u),
+    how = replace(how, judge=(how.judge[0], min(how.judge[1], how.judge[0] + LONGEST)))
+    motions = [_motion(found, record, how, name) for name in MOTIONS[:2]]
+    families = _formulas(*(float(np.std(x)) for x in motions))
+    shaped = _with_shapes(found, [text for texts in families.values() for text in texts])
+    residual, slopes, split = found.residual, fitting.linearise(shaped, record, how), len(found.residual) // 2
+    try:
+        later = [fitting.held_out_motion(found, record, how, name) for name in MOTIONS[:2]]
+        beyond = fitting.held_out_residual(found, record, how), fitting.held_out_derivatives(shaped, record, how)
+    except DivergenceError:
+        pass
+    else:
+        motions = [np.concatenate(both) for both in zip(motions, later, strict=True)]
+        residual, slopes = np.concatenate([residual, beyond[0]]), np.concatenate([slopes, beyond[1]])
+        split = len(found.residual)
+    u, v = motions
+    first, last = len(found.keys), len(shaped.keys)
+    own = np.hstack([slopes[:, :first], slopes[:, last:]])
+    edges = first + np.cumsum([len(texts) for texts in families.values()])[:-1]
+    columns = np.split(slopes[:, :last], [first, *edges], axis=1)[1:]
+    shapes = dict(zip(families, columns, strict=True))
+    return Leftover(u / np.std(u), v / np.std(v), residual, own, shapes, split, base)
+
+
+def _with_shapes(found: FreeRunFit, texts: Sequence[str]) -> FreeRunFit:
+    """The same fit of a model that has forces of these shapes as well, all of them zero."""
+    model, keys = found.model, found.keys
+    for i, text in enumerate(texts):
+        term = custom(f"shape_{i}", text)
+        model, keys = model.with_term(ModelTerm(term, (0.0,), ())), (*keys, *term.symbols)
+    return replace(found, model=model, keys=keys, values=np.append(found.values, np.zeros(len(texts))))
+
+
+def _motion(found: FreeRunFit, record: Record, how: Plan, name: str) -> Floats:
+    run = prepare(found.model, record, response=name, steps_per_sample=how.steps_per_sample, span=how.fit)
+    return run.respond({}, found.initial)[0]
+
+
+def explained_by(left: Leftover) -> dict[str, float]:
+    """Held-out share of the residual that each family of shapes explains; at most one, negative for nothing."""
+    families = {**left.shapes, "past": _passed(left, _states(left)), "time": _passed(left, _times(left))}
+    return {name: score.gain(*_held_out(left, columns)).explained for name, columns in families.items()}
+
+
+def significant(left: Leftover, level: float) -> float:
+    """Largest held-out share that a single shape of the motion or its past explains, and not by chance.
+
+    One coefficient at a time sees less than a whole family may, but what little noise leaves to be seen it sees
+    sooner.
+
+    Parameters
+    ----------
+    left : Leftover
+        The residual and the motion.
+    level : float
+        Of the p value, all shapes accounted for.
+
+    Returns
+    -------
+    float
+        Zero where none is significant.
+    """
+    columns = np.hstack([*left.shapes.values(), _passed(left, _states(left))])
+    gains = [score.gain(*_held_out(left, column[:, None])) for column in columns.T]
+    return max((g.explained for g in gains if g.p_value * len(gains) < level), default=0.0)
+
+
+def _formulas(u: float, v: float) -> dict[str, list[str]]:
+    """Shapes of a force by family; ``u`` and ``v`` are the standard deviations of the motion."""
+    both = [f"u**{a}*v**{b}" for a, b in product(range(1, 4), range(1, 4)) if a + b < 6]
+    return {
+        "displacement": _functions("u", u),
+        "velocity": _functions("v", v),
+        "displacement and velocity": [*both, "abs(u)*v", "abs(v)*u"],
     }
-    linear = [u, v, np.gradient(v)]
-    return {name: _share(base, [*linear, *shapes], dt) for name, shapes in families.items()}
 
 
-def _polynomials(x: Floats) -> list[Floats]:
-    top = float(np.max(np.abs(x)))
-    even = [x**2, np.abs(x), np.maximum(x, 0.0), np.ones_like(x)]
-    return [np.polynomial.chebyshev.Chebyshev.basis(n)(x / top) for n in range(3, DEGREE + 1)] + [
-        *even, x * np.abs(x), np.sign(x), np.clip(x, -0.5, 0.5), np.clip(x, -1.0, 1.0)
-    ]  # fmt: skip
+def _functions(x: str, size: float) -> list[str]:
+    powers = [f"{x}**{n}" for n in range(2, DEGREE + 1)]
+    limits = [f"max(min({x}, {share * size!r}), {-share * size!r})" for share in (0.5, 1.0)]
+    return [*powers, f"abs({x})", f"{x}*abs({x})", f"sgn({x})", *limits]
 
 
-def _states(u: Floats, v: Floats) -> list[Floats]:
+def _states(left: Leftover) -> list[Floats]:
     """Relaxations of several speeds, of the motion and of where it turned."""
-    rate = float(np.std(np.diff(u)) / np.std(v))  # time step in units of displacement over velocity
-    found: list[Floats] = []
-    for tau in TAUS:
-        state, total = np.zeros_like(u), 0.0
-        fade = float(np.exp(-rate / tau))
-        for i in range(1, len(u)):
-            total = fade * total + u[i] - u[i - 1]
-            state[i] = total
-        found.append(state)
-    for beta in (0.5, 1.5, 4.0):
-        state, z = np.zeros_like(u), 0.0
-        for i in range(1, len(u)):
-            step = u[i] - u[i - 1]
-            z = float(np.clip(z + step - beta * abs(step) * z, -1.0 / beta, 1.0 / beta))
-            state[i] = z
-        found.append(state)
-    return found
+    steps: Floats = np.diff(left.displacement, prepend=left.displacement[0])
+    rate = float(np.std(steps) / np.std(left.velocity))  # time step in units of displacement over velocity
+    relaxed = [np.asarray(lfilter([1.0], [1.0, -np.exp(-rate / tau)], steps), dtype=np.float64) for tau in TAUS]
+    return relaxed + [_hysteresis(steps, beta) for beta in (0.5, 1.5, 4.0)]
 
 
-def _times(base: Baseline, u: Floats) -> list[Floats]:
-    n = len(u)
-    turn = 2.0 * np.pi * np.arange(n) / n
+def _hysteresis(steps: Floats, beta: float) -> Floats:
+    state, z = np.zeros_like(steps), 0.0
+    for i, step in enumerate(steps.tolist()):
+        z = min(max(z + step - beta * abs(step) * z, -1.0 / beta), 1.0 / beta)
+        state[i] = z
+    return state
+
+
+def _times(left: Leftover) -> list[Floats]:
+    turn = 2.0 * np.pi * np.arange(len(left.residual)) / len(left.base.found.residual)
     found: list[Floats] = []
-    for line in modulation_lines(base)[:3]:
-        found += [u * np.cos(line * turn), u * np.sin(line * turn)]
-    for line in residual_lines(base)[:3]:
+    for line in modulation_lines(left.base)[:3]:
+        found += [left.displacement * np.cos(line * turn), left.displacement * np.sin(line * turn)]
+    for line in residual_lines(left.base)[:3]:
         found += [np.cos(line * turn), np.sin(line * turn)]
     return found
 
 
-def _share(base: Baseline, shapes: Sequence[Floats], dt: float) -> float:
-    residual = base.found.residual
-    n = len(residual)
+def _passed(left: Leftover, shapes: Sequence[Floats]) -> Floats:
+    """Forces of these shapes passed through the linear system, shape (n, shapes)."""
+    n = len(left.residual)
     size = next_fast_len(2 * n)
-    omega = np.asarray(2j * np.pi * rfftfreq(size, dt), dtype=np.complex128)
+    omega = np.asarray(2j * np.pi * rfftfreq(size, left.base.dt), dtype=np.complex128)
     omega[0] = omega[1]  # a constant goes through as the lowest line does
-    transfer = base.transfer(omega)
-    columns = np.column_stack([irfft(transfer * rfft(s, size), size)[:n] for s in shapes])
-    half = n // 2
-    amounts = least_squares(columns[:half], residual[:half], 1e-6)
-    rest = residual[half:] - columns[half:] @ amounts
-    power = float(residual[half:] @ residual[half:])
-    return 1.0 - float(rest @ rest) / power if power > 0.0 else 0.0
+    transfer = left.base.transfer(omega)
+    return np.column_stack([irfft(transfer * rfft(s, size), size)[:n] for s in shapes])
+
+
+def _held_out(left: Leftover, columns: Floats) -> tuple[Floats, Floats]:
+    """The residual of the judging part before and after the amounts, beside the model's own, of the fitting part."""
+    design = np.hstack([left.own, columns])
+    amounts = least_squares(design[: left.split], left.residual[: left.split], 1e-6)
+    before = left.residual[left.split :]
+    return before, before - design[left.split :] @ amounts

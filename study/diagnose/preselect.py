@@ -25,7 +25,7 @@ from study.motion import complete
 from study.record import Record
 
 Floats = NDArray[np.float64]
-TRIED = 12  # pairs that each of the two answers puts first
+TRIED = 10  # pairs that each of the two answers puts first
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Start:
 def promising(
     rows: Sequence[Ranked], base: Baseline, record: Record, how: Plan, held: tuple[str, ...]
 ) -> list[Start]:  # fmt: skip
-    """The best pairs of the reverse system, then those of the sensitivities that are not among them.
+    """The best pairs of the reverse system and those of the sensitivities; the same pair may begin at both places.
 
     Parameters
     ----------
@@ -58,8 +58,7 @@ def promising(
     """
     entries = {r.name: next(t for t in r.found.model.terms if t.name == r.name) for r in rows}
     reverse = _of_the_reverse_system(entries, base, record, how, held)
-    known = {start.names for start in reverse}
-    return reverse + [s for s in _of_the_sensitivities(entries, base, record, how) if s.names not in known]
+    return reverse + _of_the_sensitivities(entries, base, record, how)
 
 
 def _of_the_reverse_system(

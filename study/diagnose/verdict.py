@@ -10,11 +10,10 @@ from study import fitting, noise_floor
 from study.compare.fitted import fit_model
 from study.diagnose import candidates, nature, pairs, score, search
 from study.diagnose.pairs import Pair
-from study.diagnose.ranking import TIE, Ranked, curves, rank, wavers
+from study.diagnose.ranking import Ranked, curves, rank, wavers
 from study.diagnose.search import Baseline
 from study.errors import DivergenceError
 from study.fitting import Plan
-from study.free_run import prepare
 from study.model import Model
 from study.output_error import FreeRunFit
 from study.record import Record
@@ -29,6 +28,7 @@ NEGLIGIBLE = 2e-3  # of the rms response: structure below this is no evidence th
 LEFT = 0.0075  # of the rms response: structure that may be left beside a candidate which counts as the explanation
 ENOUGH = 0.99  # of the unexplained power: what explains so much is missing, whatever is missing besides
 LACK = 0.03  # held-out share of a residual that general shapes of the motion must explain to be more than chance
+CHANCE = 1e-3  # ... and of the p value of a single one of these shapes, all of them accounted for
 SEARCHED = 16384  # samples of the fitting part that the search uses
 REFITTED = 6  # ... after which the best so many are fitted on the whole of it
 PAIRED = 2  # the best so many candidates are tried together with every other
@@ -125,7 +125,7 @@ def diagnose(
     size = float(np.std(record[how.response][how.judge[0] : how.judge[1]]))
     noise = _floor([residual, *(r.residual for r in rows[:3])], record.dt)
     verdict, rows, left, pair = _decide(rows, base, residual, size, record, how, held)
-    families = _families(base, record, short) if verdict == UNKNOWN else {}
+    families = nature.explained_by(nature.leftover(base.found, base, record, short)) if verdict == UNKNOWN else {}
     return Diagnosis(
         verdict, found, residual, float(np.sqrt(np.mean(residual**2))) / size,
         noise / size, tuple(rows), left, pair, families, diverged,
@@ -157,7 +157,8 @@ def _decide(
     """Verdict, candidates in their final order, what is left, and the pair that explains it if none does alone."""
     credible = [r for r in rows if _credible(r, residual, size)]
     if not credible:
-        left = _left(residual, size, record.dt)
+        error = float(np.sqrt(np.mean(residual**2))) / size
+        left = max(_left(residual, size, record.dt), _lack(base.found, error, record, how))
         return (UNKNOWN if left > NEGLIGIBLE else NOTHING), rows, left, ()
     first = credible[0]
     left = max(_left(first.residual, size, record.dt), _lack(first.found, first.response_error, record, how))
@@ -207,7 +208,8 @@ def _explaining_pair(
 
 def _explains(pair: Pair, rows: list[Ranked], size: float, record: Record, how: Plan) -> bool:
     """Whether a pair leaves no structure, does more than the first alone, and neither coefficient moves."""
-    if _left(pair.residual, size, record.dt) > LEFT or score.difference(rows[0].residual, pair.residual) < TIE:
+    more = score.gain(rows[0].residual, pair.residual).p_value * len(rows) < LEVEL
+    if not more or _left(pair.residual, size, record.dt) > LEFT:
         return False
     error = float(np.sqrt(np.mean(pair.residual**2))) / size
     if _lack(pair.found, error, record, how) > LEFT:
@@ -222,14 +224,7 @@ def _lack(found: FreeRunFit, error: float, record: Record, how: Plan) -> float:
     Structure that is as broad as noise is not seen in a spectrum; it still depends on the motion.
     """
     short = fitting.shortened(how, len(found.residual))
-    shares = _families(search.baseline(found, record, short), record, short)
+    left = nature.leftover(found, search.baseline(found, record, short), record, short)
+    shares = nature.explained_by(left)
     share = max(share for name, share in shares.items() if name != "time")
-    return error * float(np.sqrt(share)) if share > LACK else 0.0
-
-
-def _families(base: Baseline, record: Record, how: Plan) -> dict[str, float]:
-    run = prepare(
-        base.found.model, record, response="velocity", steps_per_sample=how.steps_per_sample, span=how.fit
-    )  # fmt: skip
-    velocity, _ = run.respond({}, base.found.initial)
-    return nature.explained_by(base, velocity, record.dt)
+    return error * float(np.sqrt(max(share if share > LACK else 0.0, nature.significant(left, CHANCE))))
