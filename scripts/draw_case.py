@@ -18,13 +18,11 @@ HIGHEST = 10.0  # hertz: the report's systems have their dynamics below it (Sect
 PARTS = ("real part", "imaginary part")
 
 
-def linear(
-    response_csv: Path, title: str, highest: float = HIGHEST, drawn: Sequence[str] | None = None, found: str = ""
-) -> Figure:
+def linear(response_csv: Path, title: str, highest: float = HIGHEST, drawn: Sequence[str] | None = None) -> Figure:
     """Magnitude and phase of A_1."""
     first = curves.responses(pd.read_csv(response_csv), highest, drawn)[0]
     figure, axes = page.page(
-        title, f"Linear frequency response function $A_1(f)${found}", rows=2,
+        title, "Linear frequency response function $A_1(f)$", rows=2,
         legend_rows=page.rows_for(len(first.curves) + 2),
     )  # fmt: skip
     response.magnitude(axes[0], first, labels.response_unit(first.shape))
@@ -34,9 +32,7 @@ def linear(
     return figure
 
 
-def nonlinear(
-    response_csv: Path, title: str, highest: float = HIGHEST, drawn: Sequence[str] | None = None, found: str = ""
-) -> Figure:
+def nonlinear(response_csv: Path, title: str, highest: float = HIGHEST, drawn: Sequence[str] | None = None) -> Figure:
     """Real and imaginary part of A_2 and every further one, side by side."""
     shown = curves.responses(pd.read_csv(response_csv), highest, drawn)[1:]
     if not shown:
@@ -46,7 +42,7 @@ def nonlinear(
     count = len(shown)
     names, s = ", ".join(f"$A_{r.number}(f)$" for r in shown), "s" if count > 1 else ""
     figure, axes = page.page(
-        title, f"Nonlinear frequency response function{s} {names}{found}", rows=2, columns=count,
+        title, f"Nonlinear frequency response function{s} {names}", rows=2, columns=count,
         width=page.width(count), legend_rows=page.rows_for(len(shown[0].curves) + 3),
     )  # fmt: skip
     for item, real, imaginary in zip(shown, axes[:count], axes[count:], strict=True):
@@ -58,13 +54,13 @@ def nonlinear(
     return figure
 
 
-def cumulative(coherence_csv: Path, title: str, highest: float = HIGHEST, found: str = "") -> Figure:
+def cumulative(coherence_csv: Path, title: str, highest: float = HIGHEST) -> Figure:
     """Cumulative coherences; those with estimated shape parameters over them."""
     table = pd.read_csv(coherence_csv)
     shares = curves.coherences(table, highest)
     again = labels.FREE_SHAPE in set(table["estimator"])
     rows = len(shares) + (1 if again else 0)
-    figure, axes = page.page(title, f"Cumulative coherence{found}", panel=2.7, legend_rows=rows, headed=False)
+    figure, axes = page.page(title, "Cumulative coherence", panel=2.7, legend_rows=rows, headed=False)
     coherence.cumulative(axes[0], shares)
     if again:
         coherence.beside(axes[0], curves.coherences(table, highest, labels.FREE_SHAPE), labels.FREE_SHAPE)
@@ -111,11 +107,11 @@ def draw(
         If a kind of picture is asked for that there is not.
     """
     shapes = "" if parameters_csv is None else labels.estimated(pd.read_csv(parameters_csv))
-    found = f"; estimated {shapes}" if shapes else ""
+    system = f"{title}, estimated {shapes}" if shapes else title
     kinds = {
-        "linear": lambda: linear(response_csv, title, highest, drawn, found),
-        "nonlinear": lambda: nonlinear(response_csv, title, highest, drawn, found),
-        "coherence": lambda: cumulative(coherence_csv, title, highest, found),
+        "linear": lambda: linear(response_csv, system, highest, drawn),
+        "nonlinear": lambda: nonlinear(response_csv, system, highest, drawn),
+        "coherence": lambda: cumulative(coherence_csv, system, highest),
         "histogram": lambda: histogram(record_csv, title),
     }
     with styles.context(style):
