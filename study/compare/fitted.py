@@ -104,18 +104,24 @@ def _from_afar(model: Model, record: Record, how: Plan, held: tuple[str, ...]) -
     try:
         found = fitting.fit(model, record, how, held)
     except DivergenceError:  # the linear start, with the values that are held, is no system that stays finite
-        return _in_pieces(model, record, how, held)
+        return from_pieces(model, record, how, held)
     if not found.keys or (found.converged and found.rms < POOR * float(np.std(measured))):
         return found
     try:
-        again = _in_pieces(model, record, how, held)
+        again = from_pieces(model, record, how, held)
     except StudyError:
         return found
     return again if again.rms < found.rms else found
 
 
-def _in_pieces(model: Model, record: Record, how: Plan, held: tuple[str, ...]) -> FreeRunFit:
-    """A fit that begins where one in pieces of a few periods ends."""
+def from_pieces(model: Model, record: Record, how: Plan, held: tuple[str, ...]) -> FreeRunFit:
+    """A fit that begins where one in pieces of about a period ends, which knows no side valleys.
+
+    Raises
+    ------
+    StudyError
+        If the model cannot run even in pieces.
+    """
     measured = record[how.response][slice(*how.fit)]
     length = round(PERIODS * 2.0 * np.pi / (angular_rate(measured, record.dt) * record.dt))
     span = (how.fit[0], min(how.fit[0] + int(np.clip(length, SHORT, LONG)), how.fit[1]))

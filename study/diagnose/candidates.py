@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study import fitting
+from study.compare.fitted import from_pieces
 from study.diagnose import search
 from study.diagnose.search import Baseline
 from study.errors import StudyError
@@ -21,6 +22,7 @@ from study.terms import LIBRARY, Term
 Floats = NDArray[np.float64]
 THREADS = 2
 SHORT, LONG = 15, 40  # free runs of a fit that tries a start, and of one that is kept
+ASTRAY = 0.3  # of the rms response: what a fit leaves that lost the motion
 NEVER_CANDIDATES = ("inertia",)
 
 
@@ -84,7 +86,10 @@ def attempt(term: Term, base: Baseline, record: Record, how: Plan, held: tuple[s
     for values in _starts(term, base, record, how):
         limit = SHORT if keys else LONG
         best = _better(best, _fit(model.with_values(values), record, how, (*held, *keys), values, limit))
-    if best is not None and keys:
+    size = float(np.std(record[how.response][slice(*how.fit)]))
+    if best is None or (not best.converged and best.rms > ASTRAY * size):
+        best = _better(best, _from_pieces(best.model if best else model, record, how, (*held, *keys)))
+    if best is not None and (keys or not best.converged):
         values = {key: v for key, v in best.model.values.items() if v is not None}
         best = _better(best, _fit(best.model, record, how, held, values, LONG))
     if best is None:
@@ -107,6 +112,14 @@ def _fit(
 ) -> FreeRunFit | None:
     try:
         return fitting.fit(model, record, how, held, values, limit)
+    except StudyError:
+        return None
+
+
+def _from_pieces(model: Model, record: Record, how: Plan, held: tuple[str, ...]) -> FreeRunFit | None:
+    """A start that knows no side valleys, for what all others got stuck in."""
+    try:
+        return from_pieces(model, record, how, held)
     except StudyError:
         return None
 

@@ -89,6 +89,7 @@ def along_amplitude(sensitivity: Floats, residual: Floats, coefficient: float) -
     cross: Floats = np.sum(s * e, axis=1)
     order: NDArray[np.intp] = np.argsort(own)
     edges = _equal_shares(own[order], CLASSES)
+    noise = _noise(own, cross)
     at, value, error = list[float](), list[float](), list[float]()
     for a, b in pairwise(edges):
         rows = order[a:b]
@@ -99,5 +100,11 @@ def along_amplitude(sensitivity: Floats, residual: Floats, coefficient: float) -
         scatter: Floats = cross[rows] - change * own[rows]
         at.append((float(np.mean(own[rows])) / float(np.mean(own))) ** 0.5)
         value.append(coefficient + change)
-        error.append(float(np.sqrt(np.sum(scatter**2)) / power))
+        error.append(max(float(np.sqrt(np.sum(scatter**2)) / power), float(np.sqrt(noise / power))))
     return Curve(np.array(at), np.array(value, dtype=np.complex128), np.array(error))
+
+
+def _noise(own: Floats, cross: Floats) -> float:
+    """Mean square of the residual as all blocks show it: the scatter of a few strong ones may be small by chance."""
+    change = float(np.sum(cross)) / float(np.sum(own))
+    return float(np.mean((cross - change * own) ** 2 / np.maximum(own, np.finfo(float).tiny)))
