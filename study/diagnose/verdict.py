@@ -31,7 +31,7 @@ LACK = 0.03  # held-out share of a residual that general shapes of the motion mu
 CHANCE = 1e-3  # ... and of the p value of a single one of these shapes, all of them accounted for
 SEARCHED = 16384  # samples of the fitting part that the search uses
 REFITTED = 6  # ... after which the best so many are fitted on the whole of it
-PAIRED = 2  # the best so many candidates are tried together with every other
+PAIRED = 1  # the best so many candidates are tried together with every other
 
 
 @dataclass(frozen=True)
