@@ -1,0 +1,89 @@
+"""What a fitted model leaves is held against general shapes of the motion; two effects against one and other two."""
+
+import numpy as np
+import pytest
+
+from study import fitting, trials
+from study.compare.fitted import fit_model
+from study.diagnose import candidates, nature, pairs, preselect, search, steadiness
+from study.diagnose.ranking import rank
+from study.excitation import Excitation, force
+from study.model import free
+from study.record import Record
+from study.simulate import Integrator, simulate
+from study.terms import get
+
+
+def left_by(model, record):
+    how = fitting.plan(record)
+    found, _ = fit_model(model, record, how)
+    return nature.leftover(found, search.baseline(found, record, how), record, how)
+
+
+def test_an_imitator_under_noise_leaves_a_shape_and_the_truth_leaves_none():
+    """u|v| and u^2 v differ by a hundredth of the noise's power; the truth is fitted as the imitator is."""
+    made = trials.make_trial(94181, ("van_der_pol_damping",), 0.05, "displacement")
+    imitator = left_by(made.believed.with_term(free(get("displacement_damping"))), made.record)
+    truth = left_by(made.believed.with_term(free(get("van_der_pol_damping"))), made.record)
+    assert 0.003 < nature.significant(imitator, 1e-3) < 0.03
+    assert nature.significant(truth, 1e-2) == 0.0
+    assert max(nature.explained_by(truth).values()) < 0.01
+
+
+def test_a_shape_is_seen_in_noise_as_rarely_as_its_level_says(systems):
+    clean = simulate(systems["linear"], force(Excitation(), 2048, 0.02, seed=5), 0.02, Integrator("rk4", 8))
+    rng = np.random.default_rng(6)
+    noise = 0.2 * np.std(clean["displacement"]) * rng.standard_normal((12, 2048))
+    model = systems["linear"].with_values(dict.fromkeys(systems["linear"].values))
+    records = [Record(clean.dt, {"force": clean["force"], "displacement": clean["displacement"] + n}) for n in noise]
+    alarms = [nature.significant(left_by(model, record), 0.1) > 0.0 for record in records]
+    assert np.mean(alarms) <= 0.25  # a tenth is meant: more than three of twelve has a chance of 3 %
+
+
+def test_few_strong_blocks_do_not_make_a_coefficient_move():
+    """Three blocks hold half of the sensitivity's power: their own scatter says little of their errors."""
+    rng = np.random.default_rng(7)
+    swell = np.ones(64 * steadiness.BLOCK)
+    swell[: 3 * steadiness.BLOCK] = 5.0
+    curves = [
+        steadiness.along_amplitude(swell * rng.standard_normal(len(swell)), rng.standard_normal(len(swell)), 1.0)
+        for _ in range(300)
+    ]
+    assert np.mean([curve.p_value() < 0.01 for curve in curves]) < 0.03
+
+
+@pytest.fixture(scope="module")
+def two_effects():
+    made = trials.make_trial(93001, ("quadratic_stiffness", "quadratic_damping"), 0.01, "displacement")
+    how = fitting.plan(made.record)
+    found, _ = fit_model(made.believed, made.record, how)
+    base = search.baseline(found, made.record, how)
+    terms = [get(n) for n in ("quadratic_stiffness", "quadratic_damping", "cubic_stiffness", "bilinear_stiffness")]
+    tried = candidates.try_all(terms, base, made.record, how, ())
+    return made, how, base, rank(tried, fitting.held_out_residual(found, made.record, how), made.record, how)
+
+
+def test_both_of_two_effects_are_the_best_pair(two_effects):
+    made, how, base, rows = two_effects
+    best = pairs.best_pair(rows, base, made.record, how, ())
+    assert best is not None
+    assert set(best.names) == set(made.hidden)
+
+
+def test_each_way_of_preselecting_names_the_pair(two_effects):
+    made, how, base, rows = two_effects
+    starts = preselect.promising(rows, base, made.record, how, ())
+    assert sum(set(start.names) == set(made.hidden) for start in starts) == 2
+    assert all(value is not None for start in starts for value in start.model.values.values())
+
+
+def test_a_candidate_whose_fits_all_lost_the_motion_begins_in_pieces():
+    made = trials.make_trial(97072, ("quintic_stiffness",), 0.05, "displacement")
+    how = fitting.plan(made.record)
+    found, _ = fit_model(made.believed, made.record, how)
+    base = search.baseline(found, made.record, how)
+    tried = candidates.attempt(get("quintic_stiffness"), base, made.record, how, ())
+    assert tried is not None
+    size = np.std(made.record["displacement"])
+    assert np.std(found.residual) > 0.8 * size
+    assert np.std(tried.residual) < 0.3 * size
