@@ -106,13 +106,19 @@ def histories(inputs: Sequence[Input], record: Record) -> list[Floats]:
     Raises
     ------
     StudyError
-        If a formula needs a channel that the record lacks.
+        If a formula needs a channel that the record lacks, or has no finite value somewhere along it.
     """
     return [record["displacement"] if i.shape == "u" else history(i, record) for i in inputs]
 
 
 def history(item: Input, record: Record) -> Floats:
-    """g(u, v, t) of one input along a record, shape (n,); a state begins at zero."""
+    """g(u, v, t) of one input along a record, shape (n,); a state begins at zero.
+
+    Raises
+    ------
+    StudyError
+        As :func:`histories`.
+    """
     formula = item.shape if item.state is None else item.state
     wanted = [n for n in expression.names(formula) if n not in dict(item.parameters) and n != "z"]
     data = _columns(wanted, formula, record)
@@ -128,11 +134,19 @@ def history(item: Input, record: Record) -> Floats:
             program.code, program.first, registers, positions, program.inputs["z"], int(output[0]),
             record.dt / STATE_STEPS, STATE_STEPS, fine, states,
         )  # fmt: skip
-        return states
+        return _finite(states, item, record)
     table = np.column_stack(data) if data else np.zeros((len(record), 0))
     out = np.empty((len(record), 1))
     kernels.evaluate(program.code, program.first, registers, positions, table, output, out)
-    return out[:, 0]
+    return _finite(out[:, 0], item, record)
+
+
+def _finite(values: Floats, item: Input, record: Record) -> Floats:
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        formula, time = item.shape if item.state is None else item.state, record.time[bad[0]]
+        raise StudyError(f"the formula {formula!r} has no finite value at t = {time:.6g} s of {record.name}")
+    return values
 
 
 def _columns(wanted: Sequence[str], formula: str, record: Record) -> list[Floats]:

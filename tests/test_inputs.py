@@ -98,3 +98,17 @@ def test_a_missing_channel_is_named(formula: str, channel: str, systems: dict[st
     bare = Record(0.02, {"force": np.zeros(9), "displacement": np.zeros(9)}, name="rig")
     with pytest.raises(StudyError, match=f"'{channel}', which rig lacks"):
         histories(reverse_inputs(model), bare)
+
+
+@pytest.mark.parametrize("formula", ["log(u)", "1/(u - u)", "exp(exp(20*abs(u)))"])
+def test_a_formula_without_a_finite_value_is_refused(formula: str, systems: dict[str, Model], record: Record) -> None:
+    model = systems["linear"].with_term(custom("mine", formula))
+    with pytest.raises(StudyError, match=r"no finite value at t = \d"):
+        histories(reverse_inputs(model), record)
+
+
+def test_a_state_that_overflows_is_refused(systems: dict[str, Model], record: Record) -> None:
+    wild = {"hysteresis.beta": -5000.0, "hysteresis.gamma": 0.0}
+    model = systems["linear"].with_term(get("hysteresis")).with_values(wild)
+    with pytest.raises(StudyError, match="no finite value"):
+        histories(reverse_inputs(model), record)
