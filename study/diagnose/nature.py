@@ -8,7 +8,7 @@ how much of the residual that explains.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,30 +78,30 @@ def leftover(found: FreeRunFit, base: Baseline, record: Record, how: Plan) -> Le
     motions = [_motion(found, record, how, name) for name in MOTIONS[:2]]
     families = _formulas(*(float(np.std(x)) for x in motions))
     shaped = _with_shapes(found, [text for texts in families.values() for text in texts])
-    residual, slopes, split = found.residual, fitting.linearise(shaped, record, how), len(found.residual) // 2
+    rows = [*motions, found.residual, fitting.linearise(shaped, record, how)]
     try:
         later = [fitting.held_out_motion(found, record, how, name) for name in MOTIONS[:2]]
-        beyond = fitting.held_out_residual(found, record, how), fitting.held_out_derivatives(shaped, record, how)
+        later += [fitting.held_out_residual(found, record, how), fitting.held_out_derivatives(shaped, record, how)]
     except DivergenceError:
-        pass
+        split = len(found.residual) // 2
     else:
-        motions = [np.concatenate(both) for both in zip(motions, later, strict=True)]
-        residual, slopes = np.concatenate([residual, beyond[0]]), np.concatenate([slopes, beyond[1]])
-        split = len(found.residual)
-    u, v = motions
+        rows, split = [np.concatenate(both) for both in zip(rows, later, strict=True)], len(found.residual)
+    u, v, residual, slopes = rows
     first, last = len(found.keys), len(shaped.keys)
-    own = np.hstack([slopes[:, :first], slopes[:, last:]])
-    edges = first + np.cumsum([len(texts) for texts in families.values()])[:-1]
-    columns = np.split(slopes[:, :last], [first, *edges], axis=1)[1:]
-    shapes = dict(zip(families, columns, strict=True))
-    return Leftover(u / np.std(u), v / np.std(v), residual, own, shapes, split, base)
+    edges = first + np.cumsum([0, *(len(texts) for texts in families.values())])
+    return Leftover(
+        displacement=u / np.std(u), velocity=v / np.std(v), residual=residual,
+        own=np.hstack([slopes[:, :first], slopes[:, last:]]),
+        shapes={name: slopes[:, a:b] for name, (a, b) in zip(families, pairwise(edges), strict=True)},
+        split=split, base=base,
+    )  # fmt: skip
 
 
 def _with_shapes(found: FreeRunFit, texts: Sequence[str]) -> FreeRunFit:
     """The same fit of a model that has forces of these shapes as well, all of them zero."""
     model, keys = found.model, found.keys
     for i, text in enumerate(texts):
-        term = custom(f"shape_{i}", text)
+        term = custom(f"general_shape_{i}", text)
         model, keys = model.with_term(ModelTerm(term, (0.0,), ())), (*keys, *term.symbols)
     return replace(found, model=model, keys=keys, values=np.append(found.values, np.zeros(len(texts))))
 
