@@ -15,7 +15,7 @@ import numpy as np
 from study import fitting
 from study.compare.fitted import fit_model
 from study.diagnose.verdict import MISSING, Diagnosis, diagnose
-from study.errors import StudyError
+from study.errors import DivergenceError, StudyError
 from study.fitting import Plan
 from study.model import Model, free
 from study.output_error import FreeRunFit
@@ -167,7 +167,11 @@ def error_of_truth(trial: Trial, how: Plan) -> float:
 
 
 def _held_out(found: FreeRunFit, trial: Trial, how: Plan) -> float:
-    residual = fitting.held_out_residual(found, trial.record, how)
+    """Rms of what is left of the judging part over that of the response; all of it where the free run runs away."""
+    try:
+        residual = fitting.held_out_residual(found, trial.record, how)
+    except DivergenceError:
+        return 1.0
     return float(np.sqrt(np.mean(residual**2)) / np.std(trial.record[how.response][slice(*how.judge)]))
 
 
