@@ -7,6 +7,12 @@ from study.diagnose.says import sentences
 from study.diagnose.separate import separating_level
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN, diagnose
 from study.record import Record
+from study.terms import LIBRARY
+
+
+def all_but(*names: str) -> tuple[str, ...]:
+    """What to leave out of the library, so that few candidates are tried and a test is soon done."""
+    return tuple(name for name in LIBRARY if name not in names)
 
 
 def found_in(trial: trials.Trial, **options: object):
@@ -165,7 +171,8 @@ def test_the_judging_part_is_never_fitted(drag):
 
 def test_a_model_that_runs_away_is_diagnosed_all_the_same() -> None:
     made = trials.make_trial(7_000_122, ("displacement_damping", "quadratic_damping"), 0.0, "acceleration")
-    found = diagnose(made.believed, made.record, fitting.plan(made.record))
+    few = all_but("displacement_damping", "quadratic_damping", "van_der_pol_damping", "cubic_stiffness")
+    found = diagnose(made.believed, made.record, fitting.plan(made.record), without=few)
     assert found.diverged
     assert found.response_error == pytest.approx(1.0)
     assert set(found.pair) == {"displacement_damping", "quadratic_damping"}
@@ -174,7 +181,7 @@ def test_a_model_that_runs_away_is_diagnosed_all_the_same() -> None:
 
 def test_an_imitator_that_leaves_only_noise_is_found_out_by_its_coefficient() -> None:
     made = trials.make_trial(7_000_142, ("quintic_stiffness",), 0.01, "acceleration")
-    found, _ = found_in(made, without=("quintic_stiffness",))
+    found, _ = found_in(made, without=all_but("cubic_stiffness", "signed_quadratic_stiffness", "quadratic_damping"))
     assert found.verdict == UNKNOWN
     assert found.candidates[0].response_error < 0.5 * found.response_error
     assert "changes with the amplitude" in " ".join(sentences(found, "N", "m"))
