@@ -30,11 +30,11 @@ NOISY = "noisy\tduffing_van_der_pol\tother\t1.0\t0.05\t\t53\t54\t55\t\t\t\t\t\tC
 
 
 def project(folder, *rows):
-    """A copy of the project with a small configuration; modules keep their times."""
+    """A copy of the project with a small configuration; modules keep their times, and so their compiled kernels."""
     for part in PARTS:
         source = ROOT / part
         if source.is_dir():
-            shutil.copytree(source, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
+            shutil.copytree(source, folder / part)
         else:
             shutil.copy2(source, folder / part)
     settings = folder / "config" / "config.yaml"
