@@ -17,3 +17,9 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """
     decorate = cast(Any, njit(cache=True, nogil=True, error_model="numpy"))
     return cast(Callable[P, R], decorate(function))
+
+
+def inlined(function: Callable[P, R]) -> Callable[P, R]:
+    """The same, as part of every kernel that calls it: for what is called in each step, with many arrays."""
+    decorate = cast(Any, njit(cache=True, nogil=True, error_model="numpy", forceinline=True))
+    return cast(Callable[P, R], decorate(function))

@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from study.jit import compiled
+from study.jit import compiled, inlined
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -21,11 +21,14 @@ Ints = NDArray[np.int64]
 
 @compiled
 def run(code: Ints, first: int, r: Floats) -> None:
-    """Run a program: one instruction after the other, each into the next register."""
+    """Run a program: one instruction after the other, each into the next register.
+
+    Registers are looked up by unsigned numbers: signed ones would be tested for counting from the end.
+    """
     for i in range(code.shape[0]):
         op = code[i, 0]
-        a = r[code[i, 1]]
-        b = r[code[i, 2]]
+        a = r[np.uint64(code[i, 1])]
+        b = r[np.uint64(code[i, 2])]
         if op == 2:
             y = a * b
         elif op == 0:
@@ -60,7 +63,7 @@ def run(code: Ints, first: int, r: Floats) -> None:
             y = math.tanh(a)
         else:
             y = np.power(a, b)
-        r[first + i] = y
+        r[np.uint64(first + i)] = y
 
 
 @compiled
@@ -74,7 +77,7 @@ def evaluate(code: Ints, first: int, r: Floats, columns: Ints, data: Floats, out
             out[i, k] = r[outputs[k]]
 
 
-@compiled
+@inlined
 def _slope(
     code: Ints, first: int, r: Floats, outputs: Ints, time: float, drive: Floats, j: int, w: Floats, at: int, to: int
 ) -> None:  # fmt: skip
@@ -97,7 +100,7 @@ def _slope(
         w[to, i] = r[outputs[i - 1]]
 
 
-@compiled
+@inlined
 def _rk4_step(
     code: Ints, first: int, r: Floats, outputs: Ints, time: float, h: float, drive: Floats, j: int, w: Floats
 ) -> None:  # fmt: skip
