@@ -29,7 +29,10 @@ window.study = (() => {
   let kept = null
   function preview(i) {
     const has = i !== null && model("would_time").get_column(String(i)) !== null
-    const ghost = (name, x, y) => put(name, has ? {[x[0]]: column(x[1], x[2]), y: column(y, String(i))} : {[x[0]]: [], y: []})
+    const ghost = (name, x, y) => {
+      if (has) put(name, {[x[0]]: column(x[1], x[2]), y: column(y, String(i))})
+      else empty(name, {[x[0]]: [], y: []})
+    }
     ghost("ghost_time", ["t", "time", "t"], "would_time")
     ghost("ghost_spectrum", ["f", "spectrum", "f"], "would_spectrum")
     for (const of of ["u", "v"]) {
@@ -39,7 +42,7 @@ window.study = (() => {
     if (has && kept === null) kept = column("plane", "mean")
     if (kept !== null) {
       const mean = has ? column("would_plane", String(i)) : kept
-      put("plane", {...model("plane").data, mean, hatch: Array.from(mean, (m) => (m < -1e-6 * model("mapper").high ? "-" : " "))})
+      put("plane", {...model("plane").data, mean, below: Float32Array.from(mean, (m) => (m < -1e-6 * model("mapper").high ? 5 : 0))})
       if (!has) kept = null
     }
     for (const name of ["difference", "spectrum", "against_u", "against_v"]) entry(name, "candidate", has)
@@ -154,13 +157,17 @@ window.study = (() => {
     element.classList.add("on")
   }
 
+  // what is drawn anew takes time: only what changes is
+  const any = (source, key) => source.get_column(key).some((x) => x !== 0)
+  const empty = (name, columns) => { if (model(name).get_length() > 0) put(name, columns) }
+
   function clear() {
     for (const names of Object.values(KINDS)) for (const name of names) model(name).visible = false
     const blocks = model("blocks"), plane = model("plane")
-    put("blocks", {...blocks.data, weight: new Float32Array(blocks.get_length() ?? 0)})
-    put("plane", {...plane.data, picked: new Float32Array(plane.get_length() ?? 0)})
-    put("picked_spectrum", {f: [], y: []})
-    for (const kind of ["u", "v"]) put(`picked_${kind}`, {at: [], y: []})
+    if (any(blocks, "weight")) put("blocks", {...blocks.data, weight: new Float32Array(blocks.get_length() ?? 0)})
+    if (any(plane, "picked")) put("plane", {...plane.data, picked: new Float32Array(plane.get_length() ?? 0)})
+    empty("picked_spectrum", {f: [], y: []})
+    for (const kind of ["u", "v"]) empty(`picked_${kind}`, {at: [], y: []})
     for (const name of ["spectrum", "against_u", "against_v"]) entry(name, "selected", false)
     if (far !== null) put("close", far)
     far = null

@@ -21,6 +21,7 @@ Floats = NDArray[np.float64]
 Columns = dict[str, Any]
 NINETY_FIVE = 1.96  # standard errors to each side
 LEAST = 0.005  # of the rms force
+DASH = 5.0  # pixels
 SURE = 2.0  # standard errors: cells whose mean is below may be noise
 
 
@@ -219,7 +220,7 @@ def _plane(found: Comparison, scales: Scales) -> Columns:
     return {
         "left": left / size, "right": right / size, "middle_u": 0.5 * (left + right) / size,
         "bottom": low / speed, "top": high / speed, "middle_v": 0.5 * (low + high) / speed, "mean": mean,
-        "hatch": ["-" if value < -tiny else " " for value in mean],
+        "below": np.where(mean < -tiny, DASH, 0.0),
         "seen": np.where(np.isfinite(mean), 1.0, 0.0),
         "unsure": np.where(np.abs(mean) < SURE * plane.error.ravel(), 3.0, 0.0),
         "picked": np.zeros(len(mean)),
