@@ -136,21 +136,57 @@ def fit(
     )  # fmt: skip
 
 
-def held_out_residual(found: FreeRunFit, record: Record, how: Plan) -> Floats:
-    """Measured minus predicted response on the judging part, shape (samples to judge,).
+@dataclass(frozen=True)
+class JudgingStart:
+    """Where the free run begins that covers the judging part.
 
-    Where the judging part follows the fitting part the free run goes on through both; elsewhere its
-    initial state, and nothing else, is estimated from the judging part.
+    Attributes
+    ----------
+    initial : array, shape (2 + states,)
+        Initial state.
+    first : int
+        The record's sample at which it holds.
+    """
+
+    initial: Floats
+    first: int
+
+
+def judging_start(found: FreeRunFit, record: Record, how: Plan) -> JudgingStart:
+    """Where the judging part follows the fitting part the free run goes on through both.
+
+    Elsewhere its initial state, and nothing else, is estimated from the judging part.
 
     Raises
     ------
     DivergenceError
         If the free run leaves the range of finite numbers.
     """
-    return record[how.response][slice(*how.judge)] - held_out_motion(found, record, how, how.response)
+    if how.judge[0] == how.fit[1]:
+        return JudgingStart(found.initial, how.fit[0])
+    again = fit_free_run(
+        found.model, record, held=tuple(found.model.values), response=how.response,
+        steps_per_sample=how.steps_per_sample, span=how.judge,
+    )  # fmt: skip
+    return JudgingStart(again.initial, how.judge[0])
 
 
-def held_out_motion(found: FreeRunFit, record: Record, how: Plan, motion: str) -> Floats:
+def held_out_residual(found: FreeRunFit, record: Record, how: Plan, start: JudgingStart | None = None) -> Floats:
+    """Measured minus predicted response on the judging part, shape (samples to judge,).
+
+    ``start`` is what :func:`judging_start` gives, for those who ask for more than one thing.
+
+    Raises
+    ------
+    DivergenceError
+        If the free run leaves the range of finite numbers.
+    """
+    return record[how.response][slice(*how.judge)] - held_out_motion(found, record, how, how.response, start)
+
+
+def held_out_motion(
+    found: FreeRunFit, record: Record, how: Plan, motion: str, start: JudgingStart | None = None
+) -> Floats:
     """A motion of the free run on the judging part, as :func:`held_out_residual` has it.
 
     Raises
@@ -158,32 +194,24 @@ def held_out_motion(found: FreeRunFit, record: Record, how: Plan, motion: str) -
     DivergenceError
         If the free run leaves the range of finite numbers.
     """
-    run, initial, first = _judging_run(found, record, how, motion)
-    return run.respond({}, initial)[0][first:]
+    begin = start or judging_start(found, record, how)
+    return _judging_run(found, record, how, motion, begin).respond({}, begin.initial)[0][how.judge[0] - begin.first :]
 
 
-def held_out_derivatives(found: FreeRunFit, record: Record, how: Plan) -> Floats:
+def held_out_derivatives(found: FreeRunFit, record: Record, how: Plan, start: JudgingStart | None = None) -> Floats:
     """As :func:`linearise`, on the judging part."""
-    run, initial, first = _judging_run(found, record, how, how.response, found.keys)
+    begin = start or judging_start(found, record, how)
+    run = _judging_run(found, record, how, how.response, begin, found.keys)
     values = dict(zip(found.keys, (float(v) for v in found.values), strict=True))
-    return run.respond(values, initial, 2)[1][first:]
+    return run.respond(values, begin.initial, 2)[1][how.judge[0] - begin.first :]
 
 
 def _judging_run(
-    found: FreeRunFit, record: Record, how: Plan, motion: str, keys: tuple[str, ...] = ()
-) -> tuple[FreeRun, Floats, int]:
-    """A free run that covers the judging part, its initial state, and the judging part's first sample in it."""
-    initial, first = found.initial, how.fit[0]
-    if how.judge[0] != how.fit[1]:
-        again = fit_free_run(
-            found.model, record, held=tuple(found.model.values), response=how.response,
-            steps_per_sample=how.steps_per_sample, span=how.judge,
-        )  # fmt: skip
-        initial, first = again.initial, how.judge[0]
-    run = prepare(
-        found.model, record, keys, response=motion, steps_per_sample=how.steps_per_sample, span=(first, how.judge[1])
-    )  # fmt: skip
-    return run, initial, how.judge[0] - first
+    found: FreeRunFit, record: Record, how: Plan, motion: str, start: JudgingStart, keys: tuple[str, ...] = ()
+) -> FreeRun:
+    """A free run that covers the judging part."""
+    span = (start.first, how.judge[1])
+    return prepare(found.model, record, keys, response=motion, steps_per_sample=how.steps_per_sample, span=span)
 
 
 def shortened(how: Plan, samples: int) -> Plan:

@@ -272,9 +272,11 @@ def test_a_full_disk_behind_stdout_is_one_sentence(words: list[str]) -> None:
 
 
 ENDLESS = """
-import sys, time
+import signal, sys, time
 from study import cli
 from study.commands.command import Command
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # shells start what runs behind them without it
 
 def run(_):
     print("working", flush=True)

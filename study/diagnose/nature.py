@@ -80,8 +80,10 @@ def leftover(found: FreeRunFit, base: Baseline, record: Record, how: Plan) -> Le
     shaped = _with_shapes(found, [text for texts in families.values() for text in texts])
     rows = [*motions, found.residual, fitting.linearise(shaped, record, how)]
     try:
-        later = [fitting.held_out_motion(found, record, how, name) for name in MOTIONS[:2]]
-        later += [fitting.held_out_residual(found, record, how), fitting.held_out_derivatives(shaped, record, how)]
+        start = fitting.judging_start(found, record, how)
+        later = [fitting.held_out_motion(found, record, how, name, start) for name in MOTIONS[:2]]
+        later.append(fitting.held_out_residual(found, record, how, start))
+        later.append(fitting.held_out_derivatives(shaped, record, how, start))
     except DivergenceError:
         split = len(found.residual) // 2
     else:

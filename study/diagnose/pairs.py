@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from study import fitting
 from study.diagnose import preselect
 from study.diagnose.candidates import SHORT, THREADS
-from study.diagnose.preselect import Start
+from study.diagnose.preselect import PairStart
 from study.diagnose.ranking import Ranked
 from study.diagnose.search import Baseline
 from study.errors import StudyError
@@ -60,7 +60,7 @@ def best_pair(
     """
     order = {row.name: i for i, row in enumerate(rows)}
 
-    def one(start: Start) -> Pair | None:
+    def one(start: PairStart) -> Pair | None:
         first, second = sorted(start.names, key=lambda name: order[name])
         values = {key: v for key, v in start.model.values.items() if v is not None}
         try:

@@ -29,7 +29,7 @@ TRIED = 10  # pairs that each of the two answers puts first
 
 
 @dataclass(frozen=True)
-class Start:
+class PairStart:
     """Two candidates and where their fit begins.
 
     Attributes
@@ -46,7 +46,7 @@ class Start:
 
 def promising(
     rows: Sequence[Ranked], base: Baseline, record: Record, how: Plan, held: tuple[str, ...]
-) -> list[Start]:  # fmt: skip
+) -> list[PairStart]:  # fmt: skip
     """The best pairs of the reverse system and those of the sensitivities; the same pair may begin at both places.
 
     Parameters
@@ -63,7 +63,7 @@ def promising(
 
 def _of_the_reverse_system(
     entries: Mapping[str, ModelTerm], base: Baseline, record: Record, how: Plan, held: tuple[str, ...]
-) -> list[Start]:
+) -> list[PairStart]:
     """Pairs with coefficients, all of them anew, from the reverse system; best first."""
     known = base.found.model
     everything = known
@@ -77,36 +77,36 @@ def _of_the_reverse_system(
     fixed = [key for key in own if key in held]
     target = target - sum((float(known.values[k] or 0.0) * columns[k] for k in fixed), np.zeros(len(target)))
     free = [key for key in own if key not in held]
-    found: list[tuple[float, Start]] = []
+    found: list[tuple[float, PairStart]] = []
     for one, other in combinations([n for n, e in entries.items() if set(e.term.symbols) <= set(columns)], 2):
         keys = [*free, *entries[one].term.symbols, *entries[other].term.symbols]
         design = np.stack([columns[k] for k in keys], axis=1)
         amounts = least_squares(design, target)
         left = float(np.sum((target - design @ amounts) ** 2))
         model = known.with_term(entries[one]).with_term(entries[other])
-        found.append((left, Start((one, other), model.with_values(dict(zip(keys, amounts.tolist(), strict=True))))))
+        found.append((left, PairStart((one, other), model.with_values(dict(zip(keys, amounts.tolist(), strict=True))))))
     return _best(found)
 
 
 def _of_the_sensitivities(
     entries: Mapping[str, ModelTerm], base: Baseline, record: Record, how: Plan
-) -> list[Start]:  # fmt: skip
+) -> list[PairStart]:  # fmt: skip
     """Pairs with coefficients of zero beside the fitted model; best first."""
     known, residual = base.found.model, base.found.residual
     tried = {n: sensitivity(e.term, tuple(float(p or 0.0) for p in e.parameters), base, record, how)
              for n, e in entries.items()}  # fmt: skip
     columns = {name: added for name, added in tried.items() if added is not None}
-    found: list[tuple[float, Start]] = []
+    found: list[tuple[float, PairStart]] = []
     for one, other in combinations(columns, 2):
         design = np.hstack([columns[one], columns[other]])
         left = float(np.sum((residual - design @ least_squares(design, residual, 1e-8)) ** 2))
         model = known.with_term(entries[one]).with_term(entries[other])
         zero = dict.fromkeys((*entries[one].term.symbols, *entries[other].term.symbols), 0.0)
-        found.append((left, Start((one, other), model.with_values(zero))))
+        found.append((left, PairStart((one, other), model.with_values(zero))))
     return _best(found)
 
 
-def _best(found: list[tuple[float, Start]]) -> list[Start]:
+def _best(found: list[tuple[float, PairStart]]) -> list[PairStart]:
     return [start for _, start in sorted(found, key=lambda f: f[0])[:TRIED]]
 
 
