@@ -197,13 +197,31 @@ def test_units_are_written_as_people_write_them():
     assert units.number(-0.012) == "-0.012"
     assert units.rate("m/s^2", 0.02) == units.Scale(1e-3, "mm/s^2")
     assert units.length("V", 0.02) == units.Scale(1.0, "V")
+    assert units.power("V", 0.012) == units.Scale(1e-3, "10^-3 V")
+    assert units.power("N", 30.0) == units.power("N", 0.0) == units.Scale(1.0, "N")
+
+
+def test_the_missing_force_has_one_unit_everywhere(asked):
+    rung, factor = asked.now, 1e-5
+    record = replace(rung.comparison.record, channels=rung.comparison.record.channels | {})
+    lacking = replace(rung.comparison.restoring, force=rung.comparison.restoring.force * factor)
+    record.channels["force"] = record.channels["force"] * factor
+    small = view.view(replace(rung, comparison=replace(rung.comparison, record=record, restoring=lacking)), 0)
+    usual = view.view(rung, 0)
+    assert usual.scales.force.factor == 1.0
+    assert small.scales.force.factor < 0.01
+    for source, column in (("plane", "mean"), ("against_u", "mean"), ("against_v", "high")):
+        expected = usual.columns[source][column] * factor / small.scales.force.factor
+        assert small.columns[source][column] == pytest.approx(expected, rel=1e-4, nan_ok=True), source
+    heading = dict(zip(*small.columns["words"].values(), strict=True))["force-unit"]
+    assert "10⁻" in heading
 
 
 def test_ties_are_shown_as_ties(asked):
     rows = asked.now.diagnosis.candidates[:2]
     tied = (replace(rows[0], tied_with=(rows[1].name,)), replace(rows[1], tied_with=(rows[0].name,)))
     rung = replace(asked.now, diagnosis=replace(asked.now.diagnosis, candidates=tied))
-    html = dict(zip(*words.words(rung, tied, 0, True).values(), strict=True))["candidates"]
+    html = dict(zip(*words.words(rung, tied, 0, True, "N").values(), strict=True))["candidates"]
     assert re.findall(r"class='rank'>(.)<", html) == ["1", "="]
     assert html.count("class='tie'") == 2
 

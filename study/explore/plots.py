@@ -120,6 +120,7 @@ def plane(s: Sources) -> Any:
         label_standoff=4, bar_line_color=None,
     )  # fmt: skip
     drawn.add_layout(bar, "right")
+    drawn.min_border_right = 60  # its numbers grow when its scale changes, the room for them does not
     drawn.grid.visible = False
     drawn.add_tools(HoverTool(renderers=[cells], tooltips=[("missing force", "@mean{0.000}")], mode="mouse"))
     return drawn

@@ -31,7 +31,7 @@ def columns(rung: Rung, scales: "Scales") -> dict[str, Columns]:
         "would_spectrum": {str(i): _spectrum(found, row, scales) for i, row in enumerate(rows)},
         "would_u": _curves([(r.displacement, r) for r in lacking], scales.displacement.factor, scales.force.factor),
         "would_v": _curves([(r.velocity, r) for r in lacking], scales.velocity.factor, scales.force.factor),
-        "would_plane": {str(i): _map(r) for i, r in enumerate(lacking)},
+        "would_plane": {str(i): _map(r) / scales.force.factor for i, r in enumerate(lacking)},
     }
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from study.figures import labels
 
+EASY = (0.1, 1e4)  # largest numbers of an axis that are read without a power of ten
 RAISED = str.maketrans("0123456789-/.", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻ᐟ·")
 
 
@@ -26,6 +27,14 @@ def rate(unit: str, largest: float) -> Scale:
     stem, sign, rest = unit.partition("/")
     factor, shown = labels.prefixed(stem, largest) if stem == "m" and sign else (1.0, stem)
     return Scale(factor, shown + sign + rest)
+
+
+def power(unit: str, largest: float) -> Scale:
+    """A power of 1000 before any unit, where numbers would begin with zeros or fill the axis with digits."""
+    if EASY[0] <= largest < EASY[1]:
+        return Scale(1.0, unit)
+    factor, before = labels.power_of_ten(largest)
+    return Scale(factor, before + unit)
 
 
 def number(value: float, digits: int = 4) -> str:

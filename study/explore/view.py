@@ -14,7 +14,7 @@ from study.diagnose.ranking import Ranked
 from study.diagnose.steadiness import Curve as Steadiness
 from study.explore import decimate, preview, words
 from study.explore.session import Rung
-from study.explore.units import Scale, in_text, length, rate
+from study.explore.units import Scale, in_text, length, power, rate
 from study.figures.labels import power_of_ten
 
 Floats = NDArray[np.float64]
@@ -91,7 +91,7 @@ def view(rung: Rung, step: int, live: bool = True) -> View:
         "constancy": _constancy(rows),
         **preview.columns(rung, scales),
         **_links(found, scales),
-        "words": words.words(rung, rows, step, live),
+        "words": words.words(rung, rows, step, live, scales.force.unit),
     }
     least = least_force(found) / scales.force.factor
     small = {name: _small(c) for name, c in columns.items()}
@@ -115,6 +115,7 @@ def scales_of(found: Comparison) -> Scales:
     """Units in which the numbers of a comparison are easy to read."""
     units, lacking = found.record.units, found.restoring
     u, v = (float(np.max(np.abs(x))) for x in (lacking.displacement, lacking.velocity))
+    least = least_force(found)
     motion = rate if found.how.response != "displacement" else length
     unit = units.get(found.how.response, "")
     return Scales(
@@ -122,7 +123,7 @@ def scales_of(found: Comparison) -> Scales:
         difference=motion(unit, float(np.max(np.abs(found.judged.residual)))),
         displacement=length(units.get("displacement", ""), u),
         velocity=rate(units.get("velocity", ""), v),
-        force=Scale(1.0, units.get("force", "")),
+        force=power(units.get("force", ""), float(np.max(np.abs(lacking.force[lacking.inner]), initial=least))),
     )
 
 
@@ -216,13 +217,14 @@ def _plane(found: Comparison, scales: Scales) -> Columns:
     left, right = (np.repeat(e, CELLS) for e in (plane.displacement[:-1], plane.displacement[1:]))
     low, high = (np.tile(e, CELLS) for e in (plane.velocity[:-1], plane.velocity[1:]))
     tiny = 1e-9 * float(np.std(found.record["force"]))  # rounding
-    mean, size, speed = plane.mean.ravel(), scales.displacement.factor, scales.velocity.factor
+    missing = plane.mean.ravel()
+    mean, size, speed = missing / scales.force.factor, scales.displacement.factor, scales.velocity.factor
     return {
         "left": left / size, "right": right / size, "middle_u": 0.5 * (left + right) / size,
         "bottom": low / speed, "top": high / speed, "middle_v": 0.5 * (low + high) / speed, "mean": mean,
-        "below": np.where(mean < -tiny, DASH, 0.0),
+        "below": np.where(missing < -tiny, DASH, 0.0),
         "seen": np.where(np.isfinite(mean), 1.0, 0.0),
-        "unsure": np.where(np.abs(mean) < SURE * plane.error.ravel(), 3.0, 0.0),
+        "unsure": np.where(np.abs(missing) < SURE * plane.error.ravel(), 3.0, 0.0),
         "picked": np.zeros(len(mean)),
     }  # fmt: skip
 

@@ -22,7 +22,7 @@ NOT_ASKED = (
 TIES = 2  # that a row names
 
 
-def words(rung: Rung, rows: Sequence[Ranked], step: int, live: bool) -> dict[str, Any]:
+def words(rung: Rung, rows: Sequence[Ranked], step: int, live: bool, force_unit: str) -> dict[str, Any]:
     """Every fragment of a rung, as columns ``place`` and ``html``."""
     found = rung.comparison
     fragments = {
@@ -34,7 +34,7 @@ def words(rung: Rung, rows: Sequence[Ranked], step: int, live: bool) -> dict[str
         "equation": equation(rung),
         "notes": escape("; ".join(found.notes)),
         "step": escape(name(rung, step)),
-        "force-unit": escape(in_text(found.record.units.get("force", ""))),
+        "force-unit": escape(in_text(force_unit)),
     }
     return {"place": list(fragments), "html": list(fragments.values())}
 
