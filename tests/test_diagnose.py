@@ -6,8 +6,12 @@ from study.diagnose import report, score, steadiness
 from study.diagnose.says import sentences
 from study.diagnose.separate import separating_level
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN, diagnose
+from study.model import ModelTerm
 from study.record import Record
-from study.terms import LIBRARY
+from study.simulate import Integrator, simulate
+from study.terms import LIBRARY, custom
+
+DT = 0.02
 
 
 def all_but(*names: str) -> tuple[str, ...]:
@@ -77,6 +81,23 @@ def test_an_effect_that_is_not_in_the_library_is_unknown_and_its_kind_is_said():
     found, _ = found_in(trial, without=["periodic_stiffness"])
     assert found.verdict == UNKNOWN
     assert max(found.families, key=lambda name: found.families[name]) == "time"
+
+
+@pytest.mark.parametrize("ripples", [5.0, 6.0])
+def test_a_small_effect_is_not_given_the_name_of_what_takes_a_little_of_it(systems, report_force, ripples):
+    """A hundredth of the stiffness in ripples; a dead band, alone or beside a cube, takes part of what is left."""
+    size = float(np.std(simulate(systems["linear"], report_force, DT)["displacement"]))
+    ripple = custom("ripple", f"sin({ripples / size!r}*u)")
+    truth = systems["linear"].with_term(ModelTerm(ripple, (0.01 * 355.3 * size,), ()))
+    history = simulate(truth, report_force, DT, Integrator("rk4", 8))["displacement"]
+    record = Record(DT, {"force": report_force, "displacement": history})
+    believed = systems["linear"].with_values(dict.fromkeys(systems["linear"].values))
+    few = all_but("dead_band", "cubic_stiffness", "quintic_stiffness", "one_sided_contact")
+    found = diagnose(believed, record, fitting.plan(record), without=few)
+    assert found.response_error < 0.01
+    assert found.candidates[0].p_value < 0.01
+    assert found.verdict == UNKNOWN
+    assert "changes with the frequency" in " ".join(sentences(found, "N", "m"))
 
 
 def test_the_fields_are_those_of_the_file(drag_found):

@@ -32,7 +32,7 @@ def test_every_effect_can_be_hidden_at_its_share(name: str) -> None:
     assert SHARE[0] <= trial.shares[0] <= SHARE[1]
 
 
-@pytest.mark.parametrize("seed", range(820, 828))
+@pytest.mark.parametrize("seed", range(820, 824))
 def test_shares_of_two_effects_are_those_of_the_final_motion(seed: int) -> None:
     trial = make_trial(seed, ("cubic_stiffness", "quadratic_damping"), noise=0.0, response="displacement")
     assert all(SHARE[0] <= share <= SHARE[1] for share in trial.shares)
@@ -54,11 +54,12 @@ def test_library_beside_the_linear_terms_is_covered() -> None:
 
 
 def test_same_seed_same_bytes_and_other_seed_other_record() -> None:
-    one, other = make_trial(12), make_trial(12)
+    hidden = ("quadratic_damping",)
+    one, other = make_trial(12, hidden), make_trial(12, hidden)
     for channel in one.record.channels:
         assert one.record[channel].tobytes() == other.record[channel].tobytes()
     assert one.truth == other.truth
-    assert make_trial(13).record["force"].tobytes() != one.record["force"].tobytes()
+    assert make_trial(13, hidden).record["force"].tobytes() != one.record["force"].tobytes()
 
 
 @pytest.mark.parametrize("noise", [0.01, 0.10])

@@ -170,7 +170,7 @@ def test_targets_by_name_and_by_number(built):
 
 def test_killed_at_work_and_finished_on_one_core_gives_the_same_bytes(built, tmp_path):
     folder = project(tmp_path, DUFFING, NOISY)
-    targets = ["results/parameters.csv", "results/excitation_reading.csv"]
+    targets = ["results/duffing/parameters.csv", "results/excitation_reading.csv"]
     process = subprocess.Popen(
         [SNAKEMAKE, "-j2", *targets], cwd=folder, start_new_session=True,
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
@@ -184,7 +184,7 @@ def test_killed_at_work_and_finished_on_one_core_gives_the_same_bytes(built, tmp
     run(folder, "-j1", *targets)
     expected = digests(built)
     found = digests(folder)
-    assert len(found) > 8
+    assert len(found) > 4
     assert found == {name: expected[name] for name in found}
 
 

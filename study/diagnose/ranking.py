@@ -89,8 +89,7 @@ class Ranked:
     @property
     def unsteadiness(self) -> float:
         """By how much, relative to itself, the coefficient changes with frequency or amplitude."""
-        curves = [c for c in (self.flatness, self.steadiness) if c is not None]
-        return max((c.spread() for c in curves), default=math.nan)
+        return changes(self.flatness, self.steadiness)
 
 
 def rank(trials: Sequence[Trial], before: Floats, record: Record, how: Plan) -> list[Ranked]:
@@ -280,6 +279,11 @@ def curves(found: FreeRunFit, term: Term, record: Record, how: Plan) -> tuple[Cu
         return None, None
     along = steadiness.along_frequency(alone, found.residual, size, record.dt)
     return along, steadiness.along_amplitude(alone, found.residual, size)
+
+
+def changes(*along: Curve | None) -> float:
+    """The largest relative change of a coefficient along any of these; nan where it was followed along none."""
+    return max((c.spread() for c in along if c is not None), default=math.nan)
 
 
 def wavers(steady: Curve | None) -> bool:

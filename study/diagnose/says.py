@@ -1,6 +1,8 @@
 """The diagnosis in plain sentences, composed from its numbers and from nothing else."""
 
-from study.diagnose.ranking import Ranked, wavers
+import math
+
+from study.diagnose.ranking import UNSTEADY, Ranked, wavers
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
 
 DEPENDENCE = 0.1  # held-out share from which the unexplained force is said to depend on something
@@ -74,16 +76,24 @@ def _unknown(found: Diagnosis) -> list[str]:
 
 
 def _doubt(row: Ranked) -> str:
-    if row.steadiness is None or not wavers(row.steadiness):
-        return "what remains has structure"
-    change, p = _percent(row.steadiness.spread()), row.steadiness.p_value()
-    return f"its coefficient changes with the amplitude by {change} (p = {p:.1g})"
+    if row.steadiness is not None and wavers(row.steadiness):
+        change, p = _percent(row.steadiness.spread()), row.steadiness.p_value()
+        return f"its coefficient changes with the amplitude by {change} (p = {p:.1g})"
+    if row.flatness is not None and row.flatness.spread() > UNSTEADY:
+        return f"its coefficient changes with the frequency by {_percent(row.flatness.spread())}"
+    return "what remains has structure"
 
 
 def _amount(row: Ranked, force: str, length: str) -> str:
     low, high = row.interval
+    digits = _digits(row.coefficient, high - low)
     unit = row.term.unit(row.term.symbols[0], force, length)
-    return f"{row.coefficient:.4g} {unit} (95 % interval {low:.4g} to {high:.4g})"
+    return f"{row.coefficient:.{digits}g} {unit} (95 % interval {low:.{digits}g} to {high:.{digits}g})"
+
+
+def _digits(value: float, width: float) -> int:
+    """Significant digits that tell the ends of an interval apart, four at least."""
+    return 4 if width <= 0.0 or value == 0.0 else min(max(4, math.ceil(math.log10(abs(value) / width)) + 2), 12)
 
 
 def _shape(row: Ranked, length: str) -> str:
@@ -101,4 +111,4 @@ def _words(name: str) -> str:
 
 
 def _percent(share: float) -> str:
-    return f"{100.0 * share:.3g} %"
+    return f"{100.0 * share:.3g} %" if share < 10.0 else f"{100.0 * share:.0f} %"

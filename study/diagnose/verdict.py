@@ -10,7 +10,7 @@ from study import fitting, noise_floor
 from study.compare.fitted import fit_model
 from study.diagnose import candidates, nature, pairs, score, search
 from study.diagnose.pairs import Pair
-from study.diagnose.ranking import Ranked, curves, rank, wavers
+from study.diagnose.ranking import UNSTEADY, Ranked, changes, curves, rank, wavers
 from study.diagnose.search import Baseline
 from study.errors import DivergenceError
 from study.fitting import Plan
@@ -26,6 +26,7 @@ SIGNIFICANT = 5.0  # standard errors by which structure must stand above the noi
 SMALLEST_GAIN = 1e-3  # of the rms response: what a candidate must explain; less is the resolution of integration
 NEGLIGIBLE = 2e-3  # of the rms response: structure below this is no evidence that something is missing
 LEFT = 0.0075  # of the rms response: structure that may be left beside a candidate which counts as the explanation
+FORGIVEN = 0.1  # of the unexplained power: what explains less of a good model's must have a coefficient that stays
 ENOUGH = 0.99  # of the unexplained power: what explains so much is missing, whatever is missing besides
 LACK = 0.03  # held-out share of a residual that general shapes of the motion must explain to be more than chance
 CHANCE = 1e-3  # ... and of the p value of a single one of these shapes, all of them accounted for
@@ -162,14 +163,25 @@ def _decide(
         return (UNKNOWN if left > NEGLIGIBLE else NOTHING), rows, left, ()
     first = credible[0]
     left = max(_left(first.residual, size, record.dt), _lack(first.found, first.response_error, record, how))
-    slight = first.response_error <= LEFT  # the model is then as good as models are; its faults move a coefficient
-    if first.gain.explained >= ENOUGH or (left <= LEFT and (slight or not wavers(first.steadiness))):
+    if first.gain.explained >= ENOUGH or (left <= LEFT and _steady(first)):
         return MISSING, rows, left, ()
-    pair = _explaining_pair(rows, base, size, record, how, held)
+    slight = first.response_error <= LEFT  # two effects that explain little alone explain little together
+    pair = None if slight else _explaining_pair(rows, base, size, record, how, held)
     if pair is None:
         return UNKNOWN, rows, left, ()
     first = next(r for r in rows if r.name == pair.names[0])
     return MISSING, [first] + [r for r in rows if r is not first], _left(pair.residual, size, record.dt), pair.names
+
+
+def _steady(row: Ranked) -> bool:
+    """Whether the coefficient stays where a true term's would.
+
+    Where the model is as good as models are, its own faults move the coefficient of what is added to it: that is
+    forgiven to what explains a good share, and to nothing else.
+    """
+    if row.response_error > LEFT:
+        return not wavers(row.steadiness)
+    return row.gain.explained >= FORGIVEN or row.unsteadiness <= UNSTEADY
 
 
 def _credible(row: Ranked, residual: Floats, size: float) -> bool:
@@ -215,7 +227,10 @@ def _explains(pair: Pair, rows: list[Ranked], size: float, record: Record, how: 
     if _lack(pair.found, error, record, how) > LEFT:
         return False
     terms = [r.term for r in rows if r.name in pair.names]
-    return not any(wavers(curves(pair.found, term, record, how)[1]) for term in terms)
+    followed = [curves(pair.found, term, record, how) for term in terms]
+    if error <= LEFT:
+        return all(changes(*both) <= UNSTEADY for both in followed)
+    return not any(wavers(steadiness) for _, steadiness in followed)
 
 
 def _lack(found: FreeRunFit, error: float, record: Record, how: Plan) -> float:
