@@ -1,14 +1,14 @@
 # The report's claims, and the two studies that they rest on: the reading of "unit variance" and the
 # integrator's steps. All work on ensembles of their own seeds, not on results/<case>.
+from study.claims.reported import check_table_1
 from study.claims.reported import load as load_reported
-from study.modelfile import read_model
+from study.config import parameter_names
 
 STATEMENTS = {"statements": "config/reported.tsv", "schema": "config/schemas/reported.schema.yaml"}
 
 with one_sentence():
     _reported = load_reported(*(Path(path) for path in STATEMENTS.values()))
-    for _path in sorted(Path("models").glob("*.yaml")):
-        read_model(_path)
+    check_table_1(_reported, Path("models"), parameter_names(Path("models")))
 
 # The systems of Table 1: another model in the folder is none of the claims' business.
 MODELS = sorted({f"models/{name.split('.')[1]}.yaml" for name in _reported.statements if name.count(".") == 2})
@@ -22,6 +22,7 @@ CLAIM_SETTINGS = {
     for key in "sampling noise_seed integrator segments fit_band tolerances ensembles".split()
 }
 CLAIM_SETTINGS["excitations"] = {key: value for key, value in STUDY.settings["excitations"].items() if key == "report"}
+WITHOUT_NOISE = {key: value for key, value in CLAIM_SETTINGS.items() if key != "noise_seed"}
 CLAIM_RESULTS = [
     f"results/{name}"
     for name in "excitation_reading.csv integrator_steps.csv integrator_steps.md claims.csv claims.md".split()
@@ -42,7 +43,7 @@ rule excitation_reading:
         ),
     params:
         models="models",
-        settings=CLAIM_SETTINGS,
+        settings=WITHOUT_NOISE,
     threads: 2
     benchmark:
         "results/benchmarks/excitation_reading.tsv"
@@ -64,7 +65,7 @@ rule integrator_steps:
         page="results/integrator_steps.md",
     params:
         models="models",
-        settings=CLAIM_SETTINGS,
+        settings=WITHOUT_NOISE,
     threads: 2
     benchmark:
         "results/benchmarks/integrator_steps.tsv"

@@ -25,13 +25,15 @@ rule parameters:
             category="Tables",
             labels={"table": "Parameters of all cases", "as": "raw CSV"},
         ),
+    params:
+        without=["note"],
     script:
         "../scripts/join.py"
 
 
 rule summary:
     input:
-        parameters="results/parameters.csv",
+        parameters=[f"results/{case}/parameters.csv" for case in STUDY.cases],
         claims="results/claims.csv",
         reading="results/excitation_reading.csv",
         errors="results/estimators.csv",

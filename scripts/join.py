@@ -3,22 +3,24 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+import pandas as pd
+
 from study.errors import StudyError
 from study.files import replace_file
 from study.step import one_sentence
 
 
-def main(tables: Sequence[str], output: str) -> None:
-    heading, rows = "", []
-    for path in tables:
-        first, *others = Path(path).read_text(encoding="utf-8").splitlines(keepends=True)
-        if heading and first != heading:
+def main(tables: Sequence[str], without: Sequence[str], output: str) -> None:
+    """Join tables, their cells as they stand; columns ``without`` are left out."""
+    read = [pd.read_csv(path, dtype=str, keep_default_na=False) for path in tables]
+    for path, table in zip(tables, read, strict=True):
+        if list(table.columns) != list(read[0].columns):
             raise StudyError(f"{path}: its heading differs from that of {tables[0]}")
-        heading, rows = first, rows + others
-    replace_file(Path(output), "".join([heading, *rows]).encode())
+    joined = pd.concat(read).drop(columns=list(without))
+    replace_file(Path(output), joined.to_csv(index=False, lineterminator="\n").encode())
 
 
 if "snakemake" in globals():
     step = globals()["snakemake"]
     with one_sentence():
-        main(step.input.tables, step.output.table)
+        main(step.input.tables, step.params.get("without", ()), step.output.table)

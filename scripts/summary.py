@@ -20,9 +20,12 @@ def run_times(paths: Sequence[str]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["stage", "case", "seconds"])
 
 
-def main(inputs: Mapping[str, str], benchmarks: Sequence[str], told: Mapping[str, Any], page: str, html: str) -> None:
+def main(
+    parameters: Sequence[str], inputs: Mapping[str, str], benchmarks: Sequence[str], told: Mapping[str, Any],
+    page: str, html: str,
+) -> None:  # fmt: skip
     tables = summary.Tables(
-        parameters=pd.read_csv(inputs["parameters"]),
+        parameters=pd.concat([pd.read_csv(path) for path in parameters], ignore_index=True),
         claims=pd.read_csv(inputs["claims"], keep_default_na=False),
         reading=pd.read_csv(inputs["reading"]),
         errors=pd.read_csv(inputs["errors"]),
@@ -37,6 +40,6 @@ def main(inputs: Mapping[str, str], benchmarks: Sequence[str], told: Mapping[str
 
 if "snakemake" in globals():
     step = globals()["snakemake"]
-    tables = {name: getattr(step.input, name) for name in ("parameters", "claims", "reading", "errors")}
+    tables = {name: getattr(step.input, name) for name in ("claims", "reading", "errors")}
     with one_sentence():
-        main(tables, step.input.benchmarks, step.params.told, step.output.page, step.output.html)
+        main(step.input.parameters, tables, step.input.benchmarks, step.params.told, step.output.page, step.output.html)

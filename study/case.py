@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from study import estimators
+from study.errors import DivergenceError
 from study.estimators.base import Identified, Settings
 from study.excitation import Excitation, displacement_noise, force
 from study.local_polynomial import LocalPolynomial
@@ -43,7 +44,11 @@ def make_record(model: Model, settings: Table, *, seed: int | None = None, noise
     own = described.pop("seed")
     excitation = Excitation(level=settings["level"], **described)
     values = force(excitation, sampling["samples"], sampling["dt"], own if seed is None else seed)
-    record = simulate(model, values, sampling["dt"], Integrator(**settings["integrator"]))
+    try:
+        record = simulate(model, values, sampling["dt"], Integrator(**settings["integrator"]))
+    except DivergenceError as error:
+        name, level = settings["case"], settings["level"]
+        raise DivergenceError(f"case {name!r} at level {level:g}: {error}", error.time) from None
     if settings["noise"] > 0.0:
         stream = settings["noise_seed"] if noise_seed is None else noise_seed
         noise = displacement_noise(record["displacement"], settings["noise"], stream)

@@ -1,6 +1,6 @@
 """The study's configuration: read, checked whole before any job starts, and handed out case by case."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,8 +10,9 @@ import numpy as np
 from study import terms
 from study.errors import StudyError
 from study.estimators import ESTIMATORS
-from study.excitation import Excitation, theoretical_autospectrum
-from study.model import Model, forward_graph
+from study.estimators.base import true_parameters
+from study.excitation import SETTINGS, Excitation, theoretical_autospectrum
+from study.model import Model, forward_graph, free
 from study.modelfile import read_model
 from study.schema import check, numbered_rows, read_yaml
 
@@ -79,7 +80,7 @@ class StudyConfig:
             "excitation": row.excitation,
             "level": row.level,
             "noise": row.noise,
-            "noise_seed": self.settings["noise_seed"],
+            **({"noise_seed": self.settings["noise_seed"]} if row.noise > 0.0 else {}),
             "sampling": self.settings["sampling"],
             "integrator": self.settings["integrator"],
         }
@@ -134,6 +135,7 @@ def load(folder: Path) -> StudyConfig:
     for name in settings["tolerances"].get("of_case", {}):
         if name not in cases and not (folder.parent / "models" / f"{name}.yaml").is_file():
             raise StudyError(f"{source}: tolerances.of_case names {name!r}, which is neither a case nor a system")
+    _check_tolerances(settings["tolerances"], parameter_names(folder.parent / "models"), str(source))
     return StudyConfig(settings, cases)
 
 
@@ -246,11 +248,36 @@ def _check_settings(settings: Table, where: str) -> None:
         )
     _check_estimators(settings, where)
     for name, described in settings["excitations"].items():
+        own = ("kind", "seed", "periods", *SETTINGS[described["kind"]])
+        for key in described:
+            if key not in own:
+                raise StudyError(
+                    f"{where}: excitations.{name} has {key}, which means nothing to a {described['kind']}; "
+                    f"it may have {', '.join(own)}"
+                )
         try:
             excitation = Excitation(**{key: value for key, value in described.items() if key != "seed"})
             theoretical_autospectrum(excitation, np.zeros(1), sampling["samples"], sampling["dt"])
         except StudyError as error:
             raise StudyError(f"{where}: excitations.{name}: {error}") from None
+
+
+def parameter_names(models: Path) -> list[str]:
+    """Names that tables give to the parameters of the library's terms and of those of the models in a folder."""
+    keys = [key for term in terms.LIBRARY.values() for key in free(term).keys]
+    keys += [key for path in sorted(models.glob("*.yaml")) for key in read_model(path).values]
+    return sorted(true_parameters(dict.fromkeys(keys, 1.0)))
+
+
+def _check_tolerances(tolerances: Table, known: Sequence[str], where: str) -> None:
+    groups = {"relative": tolerances["relative"], "absolute": tolerances["absolute"]}
+    groups |= {f"of_case.{name}": own for name, own in tolerances.get("of_case", {}).items()}
+    for group, names in groups.items():
+        for name in names:
+            if name not in known:
+                raise StudyError(
+                    f"{where}: tolerances.{group} names {name!r}, which is no parameter; known are {', '.join(known)}"
+                )
 
 
 def _check_estimators(settings: Table, where: str) -> None:

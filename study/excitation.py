@@ -18,6 +18,12 @@ Floats = NDArray[np.float64]
 FORCE_STREAM, NOISE_STREAM = 0, 1
 READINGS = ("raw", "filtered")
 SWEEPS = ("linear", "logarithmic")
+SETTINGS = {  # of each kind, beside kind, level and periods
+    "gaussian_lowpass": ("reading", "cutoff"),
+    "pierson_moskowitz": ("peak_frequency", "cutoff"),
+    "random_phase_multisine": ("start_frequency", "stop_frequency", "odd_only"),
+    "swept_sine": ("start_frequency", "stop_frequency", "sweep"),
+}
 ROUNDING = 1e-9  # relative: a cut-off that stands on a line of the record keeps that line
 
 

@@ -12,6 +12,9 @@ from study.claims.reported import Reported
 from study.claims.sample import Sample
 from study.excitation import READINGS
 
+SURE = 2.0  # standard errors by which one reading must come nearer than the other ...
+TIE = "tie"  # ... or this is said
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -103,6 +106,10 @@ def _row(quantity: Quantity, evidence: Evidence, reported: Reported) -> Row:
             f"{reading}_in_scatter": (sample.mean - target) / sample.scatter,
         }
     nearer = min(READINGS, key=lambda r: abs(found[r].mean - target))
+    distances = [abs(found[r].mean - target) for r in READINGS]
+    between = found[READINGS[0]].minus(found[READINGS[1]])  # seed by seed: both readings have the same seeds
+    if abs(distances[0] - distances[1]) < SURE * between.error:
+        nearer = TIE
     return Row(quantity.name, statement.where, statement.unit, target, **numbers, nearer=nearer)
 
 

@@ -44,7 +44,9 @@ def test_noise_is_on_the_displacement_alone_and_has_the_asked_mean_square(system
 
 
 def test_a_run_that_diverges_yields_no_record(systems):
-    with pytest.raises(DivergenceError, match=r"'duffing' diverged at t = .* mean square"):
+    with pytest.raises(
+        DivergenceError, match=r"case 'duffing' at level 1e\+08: the simulation .* diverged at t = .* mean square"
+    ):
         make_record(systems["duffing"], settings("duffing", level=1e8))
 
 

@@ -14,7 +14,7 @@ from study import config, excitation_reading, integrator_study
 from study.claims import damping, duffing, evidence, levels, preliminary, sample, simulation, table, verdict
 from study.claims import reported as stated
 from study.claims.reported import Reported, Statement
-from study.claims.sample import Sample
+from study.claims.sample import Sample, departure
 from study.claims.verdict import Condition
 
 ROOT = Path(__file__).parents[1]
@@ -238,3 +238,15 @@ def test_diverged_runs_are_counted_by_name(steps: pd.DataFrame) -> None:
     assert all(" at " in n and n.endswith(" s") for n in named)
     page = integrator_study.page(steps)
     assert f"{rows['diverged'].iloc[0]} of {rows['seeds'].iloc[0]} |" in page
+
+
+def test_a_white_spectrum_is_uniform_and_a_bump_is_seen() -> None:
+    """Four lines in a thousand of white spectra may be refused, not one in two."""
+    rng = np.random.default_rng(4)
+    white = rng.chisquare(2 * 29, (300, 24, 120))
+    assert np.mean([not departure(spectra).uniform for spectra in white]) < 0.03
+    bump = white[:20].copy()
+    bump[:, :, 60] *= 1.25
+    found = [departure(spectra) for spectra in bump]
+    assert np.mean([f.uniform for f in found]) < 0.2
+    assert np.median([f.share for f in found]) == pytest.approx(0.25, abs=0.05)

@@ -53,6 +53,8 @@ def test_settings_of_a_case():
     study = load(ROOT / "config")
     record = study.record_settings("noise_10")
     assert record["noise"] == 0.1
+    assert record["noise_seed"] == study.settings["noise_seed"]
+    assert "noise_seed" not in study.record_settings("linear"), "the noise's seed is no business of a case without"
     assert study.drawn("noise_10") == study.settings["drawn"]["with_noise"]
     assert study.drawn("linear") == study.settings["drawn"]["without_noise"]
     assert record["excitation"]["seed"] == study.settings["excitations"]["report"]["seed"]
@@ -98,6 +100,9 @@ def test_figures_without_a_number_are_named_after_the_case(folder):
         ("kind: gaussian_lowpass", "kind: gaussian", "excitations.report.kind is not right"),
         ("cutoff: 12.5", "cutoff: 125", "excitations.report: the excitation reaches 125 Hz"),
         ("cutoff: 12.5", "periods: 7", "excitations.report: 8192 samples do not hold 7 whole periods"),
+        ("cutoff: 12.5", "peak_frequency: 2.0", "excitations.report has peak_frequency, which means nothing to a"),
+        ("    k3: 0.005", "    k_3: 0.005", "tolerances.relative names 'k_3', which is no parameter; known are"),
+        ("{k: 0.01,", "{kk: 0.01,", "tolerances.of_case.dead_band names 'kk', which is no parameter"),
         ("seed: 1990", "seed: -1", "excitations.report.seed is not right: -1 is less than the minimum of 0"),
         ("method: abm4", "method: abm5", "integrator.method is not right: 'abm5' is not one of"),
         ("dead_band: {k", "deadband: {k", "of_case names 'deadband', which is neither a case nor a system"),

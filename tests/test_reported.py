@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from study.claims import reported
+from study.config import parameter_names
 from study.errors import StudyError
 from study.excitation_reading import quantities
 from tests.conftest import LINEAR, TABLE_1
@@ -40,6 +41,20 @@ def test_the_numbers_the_report_quotes(stated: reported.Reported) -> None:
     quoted = {"siso_stiffness": 500.0, "siso_frequency": 3.6, "duffing_share": 0.9, "dead_band_share": 0.65}
     assert {name: stated.value(name) for name in quoted} == quoted
     assert {q.reported for q in quantities(stated)} >= set(quoted)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("table_1.dufing.k3", "names a system that is not in models/"), ("table_1.duffing.k_3", "'k_3', which is no")],
+)
+def test_a_number_of_no_system_or_no_parameter_is_refused(tmp_path: Path, name: str, said: str) -> None:
+    rows = load(tmp_path, f"{name}\tTable 1\twhat\t1\tN\n")
+    with pytest.raises(StudyError, match=said):
+        reported.check_table_1(rows, ROOT / "models", parameter_names(ROOT / "models"))
+
+
+def test_table_1_names_systems_and_parameters(stated: reported.Reported) -> None:
+    reported.check_table_1(stated, ROOT / "models", parameter_names(ROOT / "models"))
 
 
 def test_numbers_of_a_claim_come_with_units(stated: reported.Reported) -> None:

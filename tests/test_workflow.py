@@ -209,6 +209,6 @@ def test_bad_configuration_is_refused_in_one_sentence(built, file, old, new, say
 def test_a_fault_in_a_job_is_said_in_one_sentence(tmp_path):
     folder = project(tmp_path, DUFFING.replace("report\t1.0", "report\t1e14"))
     said = run(folder, "-j1", "results/duffing/record.csv", code=1)
-    assert "study: the simulation of 'duffing' diverged at t = " in said
+    assert "study: case 'duffing' at level 1e+14: the simulation of 'duffing' diverged at t = " in said
     assert "Traceback" not in said
     assert not (folder / "results" / "duffing" / "record.csv").exists(), "a run that diverges leaves no record"

@@ -255,7 +255,7 @@ def record_settings(settings: Table, drive: Drive) -> dict[str, Any]:
         "excitation": {**settings["excitations"]["report"], **dict(drive.excitation)},
         "level": drive.level,
         "noise": drive.noise,
-        "noise_seed": settings["noise_seed"],
+        **({"noise_seed": settings["noise_seed"]} if drive.noise > 0.0 else {}),
         "sampling": settings["sampling"],
         "integrator": settings["integrator"],
     }

@@ -1,6 +1,6 @@
 """What the report states: ``config/reported.tsv``."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -83,6 +83,26 @@ class Reported:
         rows = [s for s in self.statements.values() if s.id == name or s.id.startswith(f"{name}.")]
         found = [str(s) for s in rows if s.value is not None]
         return "as tabulated" if len(found) > MANY else ", ".join(found) or "as stated"
+
+
+def check_table_1(reported: Reported, models: Path, names: Collection[str]) -> None:
+    """Whether each number of Table 1 is that of a system that there is, and of a parameter.
+
+    Raises
+    ------
+    StudyError
+        At the first that is not, naming it.
+    """
+    for name in reported.statements:
+        where, _, rest = name.partition(".")
+        system, _, parameter = rest.partition(".")
+        if where != "table_1" or not parameter:
+            continue
+        if not (models / f"{system}.yaml").is_file():
+            raise StudyError(f"config/reported.tsv: {name!r} names a system that is not in {models.name}/")
+        if parameter not in names:
+            known = ", ".join(sorted(names))
+            raise StudyError(f"config/reported.tsv: {name!r} ends in {parameter!r}, which is no parameter: {known}")
 
 
 def load(path: Path, schema: Path) -> Reported:

@@ -3,13 +3,16 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
+from scipy.stats import t as student
 
 Floats = NDArray[np.float64]
 SIGNIFICANT = 1.96  # two-sided 5 % of the standard normal
+BY_CHANCE = 0.01  # of all lines together: how often even a uniform spectrum is refused
 
 
 @dataclass(frozen=True)
@@ -111,6 +114,46 @@ def effective_size(values: Floats) -> float:
 def is_gaussian(values: Floats) -> bool:
     """Whether the kurtosis is one that a Gaussian process may well show (5 % level)."""
     return abs(gaussian_score(values)) <= SIGNIFICANT
+
+
+@dataclass(frozen=True)
+class Departure:
+    """How far the line of an averaged spectrum that departs most stands from the mean of all lines.
+
+    Attributes
+    ----------
+    share : float
+        Of the mean.
+    errors : float
+        In standard errors, from the scatter between the seeds.
+    allowed : float
+        Standard errors that one of so many lines reaches by chance in a hundredth of all cases (Student, Bonferroni).
+    """
+
+    share: float
+    errors: float
+    allowed: float
+
+    @property
+    def uniform(self) -> bool:
+        """Whether chance alone may depart so far."""
+        return self.errors <= self.allowed
+
+    def __str__(self) -> str:
+        """In words."""
+        return f"the line furthest off departs by {100.0 * self.share:.2g} %, {self.errors:.2g} standard errors"
+
+
+def departure(spectra: Floats) -> Departure:
+    """Of the mean of autospectra, shape (seeds, lines)."""
+    seeds, lines = spectra.shape
+    mean: Floats = np.mean(spectra, axis=0)
+    away: Floats = np.abs(mean - average(mean))
+    error: Floats = np.std(spectra, axis=0, ddof=1) / math.sqrt(seeds)
+    score: Floats = away / error
+    worst = int(np.argmax(score))
+    allowed = float(cast(float, student.isf(BY_CHANCE / (2.0 * lines), seeds - 1)))
+    return Departure(float(away[worst]) / average(mean), float(score[worst]), allowed)
 
 
 def central_share(values: Floats) -> float:

@@ -12,29 +12,36 @@ from study.model import Model
 from study.record import Record
 from study.responses import Responses
 
-LOWEST_LINES = 3  # "the asymptotic behavior of A_1 for f -> 0": the first lines of the band
+LOWEST_LINES = 3  # "the asymptotic behavior of A_1 for f -> 0": the first lines above zero, where no mean is lost
 
 
 def identify(model: Model, record: Record, settings: Settings) -> Identified:
     """Read k, f_n, m, c, zeta off A_1 and the plateaus off the other A_j, as a hand would."""
     found = miso.identify(model, record, settings)
     assert found.responses is not None
-    responses, band = found.responses, settings.band
-    keep = (responses.frequency >= band[0]) & (responses.frequency <= band[1])
-    frequency = responses.frequency[keep]
+    band, frequency = settings.band, found.responses.frequency
+    keep = (frequency >= band[0]) & (frequency <= band[1])
     values: list[tuple[str, float]] = []
-    for item, response in zip(found.inputs, responses.response[:, keep], strict=True):
-        values += read_linear(frequency, response) if item.shape == "u" else _plateaus(item, frequency, response)
+    for item, response in zip(found.inputs, found.responses.response, strict=True):
+        if item.shape == "u":
+            values += read_linear(frequency, response, band)
+        else:
+            values += _plateaus(item, frequency[keep], response[keep])
     return Identified(found.inputs, None, tuple(Parameter(n, v, math.nan) for n, v in _renamed(values)))
 
 
-def read_linear(frequency: NDArray[np.float64], response: NDArray[np.complex128]) -> list[tuple[str, float]]:
+def read_linear(
+    frequency: NDArray[np.float64], response: NDArray[np.complex128], band: tuple[float, float]
+) -> list[tuple[str, float]]:
     """k as f -> 0, f_n at the minimum of abs(A_1), m = k / (2 pi f_n)^2, c = abs(A_1(f_n)) / (2 pi f_n).
 
-    Only k is read where abs(A_1) has no minimum inside the band (a system without a resonance).
+    The minimum is looked for in ``band``, in hertz. Only k is read where abs(A_1) has none inside it (a system
+    without a resonance).
     """
-    k = float(np.mean(response[:LOWEST_LINES].real))
-    size = np.abs(response)
+    above = frequency > 0.0
+    k = float(np.mean(response[above][:LOWEST_LINES].real))
+    keep = (frequency >= band[0]) & (frequency <= band[1])
+    frequency, size = frequency[keep], np.abs(response[keep])
     i = int(np.argmin(size))
     if i in (0, len(size) - 1):
         return [("k", k)]
@@ -46,8 +53,7 @@ def read_linear(frequency: NDArray[np.float64], response: NDArray[np.complex128]
 
 def read_curve(result: Responses, band: tuple[float, float]) -> dict[str, float]:
     """The same for the first response function of any analysis, the SI/SO curve included."""
-    keep = (result.frequency >= band[0]) & (result.frequency <= band[1])
-    return dict(read_linear(result.frequency[keep], result.response[0][keep]))
+    return dict(read_linear(result.frequency, result.response[0], band))
 
 
 def _vertex(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
