@@ -49,7 +49,8 @@ def nonlinear(response_csv: Path, title: str, highest: float = HIGHEST, drawn: S
         unit = labels.response_unit(item.shape)
         alike = [other for other in shown if labels.response_unit(other.shape) == unit]
         response.real_and_imaginary(real, imaginary, item, unit, response.common_span(alike))
-    page.letter(axes, [f"{part} of $A_{r.number}$, input {labels.formula(r.shape)}" for part in PARTS for r in shown])
+    by_input = [panel for pair in zip(axes[:count], axes[count:], strict=True) for panel in pair]
+    page.letter(by_input, [f"{p} of $A_{r.number}$, input {labels.formula(r.shape)}" for r in shown for p in PARTS])
     page.legend(figure, axes, bands=True)
     return figure
 

@@ -13,6 +13,7 @@ from study.figures.curves import InputCoherence
 from study.figures.styles import look
 
 LOOKS = (("C1", (0, (5.0, 2.0))), ("C2", (0, (1.5, 1.2))), ("C3", (0, (7.0, 1.5, 1.5, 1.5))), ("C5", "-."))
+APART = 9  # lines between two circles: the curve under them stays to be seen
 ALL = ("C0", "-")  # the last curve is the multiple coherence: what the whole model explains
 
 
@@ -39,13 +40,12 @@ def cumulative(axes: Axes, shares: Sequence[InputCoherence]) -> Axes:
 
 
 def beside(axes: Axes, shares: Sequence[InputCoherence], estimator: str) -> Axes:
-    """Cumulative coherences of a further estimator as thin lines over those that are drawn, under one label."""
-    style = look(estimator)
-    for share in shares:
-        label = style.label if share is shares[-1] else "_nolegend_"
+    """Cumulative coherences of a further estimator as circles on those that are drawn, under one label."""
+    for index, share in enumerate(shares):
+        label = look(estimator).label if share is shares[-1] else "_nolegend_"
         axes.plot(
-            share.frequency, share.cumulative, color="black", linestyle=style.dash, linewidth=1.0, label=label,
-            zorder=4.0,
+            share.frequency, share.cumulative, "o", color="black", markerfacecolor="none", markersize=5.0,
+            markeredgewidth=0.9, markevery=(APART * index // len(shares), APART), label=label, zorder=4.0,
         )  # fmt: skip
     return axes
 

@@ -44,7 +44,7 @@ def errors(table: pd.DataFrame, cases: Sequence[str]) -> Figure:
         _panel(panel, drawn[drawn["parameter"].isin(parameters)], cases)
         panel.set_title(", ".join(WORDS[name] for name in parameters))
     for panel in axes[-COLUMNS:]:
-        panel.set_xlabel("error / %")
+        panel.set_xlabel("error (%)")
     _heading(figure, axes, int(table["seeds"].max()))
     return figure
 

@@ -111,6 +111,8 @@ def quantity(value: float, unit: str) -> str:
 def estimated(parameters: pd.DataFrame) -> str:
     """Shape parameters that were estimated, with a standard error: ``u_g = 2.5002 ± 0.0011 mm``; empty if none was.
 
+    An error that the six decimals shown do not reach is left out.
+
     Parameters
     ----------
     parameters : DataFrame
@@ -124,8 +126,11 @@ def estimated(parameters: pd.DataFrame) -> str:
         factor, unit = prefixed(units_of[str(row["parameter"])], abs(value))
         digits = MOST_DIGITS if error == 0.0 else min(max(0, -math.floor(math.log10(error / factor))), MOST_DIGITS)
         symbol = _symbol(str(row["parameter"]))
-        spread = f"{error / factor:.{digits}f}" if digits < MOST_DIGITS else f"$<10^{{-{MOST_DIGITS}}}$"
-        found.append(f"${symbol}$ = {value / factor:.{digits}f} ± {spread} {units.pretty(unit)}")
+        stated = f"${symbol}$ = {value / factor:.{digits}f}"
+        if digits < MOST_DIGITS:
+            found.append(f"{stated} ± {error / factor:.{digits}f} {units.pretty(unit)}")
+        else:
+            found.append(f"{stated} {units.pretty(unit)}")
     return ", ".join(found)
 
 

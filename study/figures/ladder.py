@@ -25,7 +25,7 @@ def ladder(axes: Axes, steps: Sequence[dict[str, Any]]) -> Axes:
     axes.set_yscale("log")
     names = [f"+ {s['added']}".replace("_", " ") if s.get("added") else "as given" for s in steps]
     axes.set_xticks(place, names, rotation=20, ha="right")
-    axes.set_ylabel("held-out error / %")
+    axes.set_ylabel("held-out error (%)")
     axes.margins(x=0.08)
     return axes
 

@@ -4,6 +4,8 @@
 # pyright: reportUnknownMemberType=false
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -78,7 +80,7 @@ def real_and_imaginary(real: Axes, imaginary: Axes, response: InputResponse, uni
     _linear(real, response, np.real, factor, span)
     real.set_ylabel(rf"Re ${name}$ ({label})")
     if _grows(response):
-        _logarithmic(imaginary, response)
+        _logarithmic(imaginary, response, span)
         imaginary.set_ylabel(rf"|Im ${name}$| ({units.pretty(unit)})")
     else:
         _linear(imaginary, response, np.imag, factor, span)
@@ -103,7 +105,7 @@ def _grows(response: InputResponse) -> bool:
 
 
 def _linear(axes: Axes, response: InputResponse, part: Part, factor: float, span: float) -> None:
-    for curve in response.curves:
+    for curve in map(partial(_told, span=span), response.curves):
         values, width = part(curve.values) / factor, curve.half_width / factor
         _band(axes, curve, values - width, values + width)
         axes.plot(curve.frequency, values, **look(curve.estimator).line)
@@ -124,14 +126,15 @@ def _limits(response: InputResponse, part: Part) -> tuple[float, float]:
     return float(values.min()), float(values.max())
 
 
-def _logarithmic(axes: Axes, response: InputResponse) -> None:
+def _logarithmic(axes: Axes, response: InputResponse, span: float) -> None:
     """|Im A_j|; where its sign is not that of the exact function, crosses say so."""
     assert response.exact is not None, "the scale is logarithmic only where the exact function says so"
-    for curve in response.curves:
+    for curve in map(partial(_told, span=span), response.curves):
         style, size = look(curve.estimator), np.abs(curve.values.imag)
         _band(axes, curve, np.maximum(size - curve.half_width, 1e-2 * size), size + curve.half_width)
         axes.plot(curve.frequency, size, **style.line)
-        wrong = np.sign(curve.values.imag) != np.sign(_at(curve.frequency, response).imag)
+        signs = np.sign(curve.values.imag) * np.sign(_at(curve.frequency, response).imag)
+        wrong = signs < 0.0
         if np.any(wrong):
             axes.plot(curve.frequency[wrong], size[wrong], "x", color=style.colour, ms=5, zorder=6.0, label=OPPOSITE)
     exact = np.abs(response.exact.imag)
@@ -139,6 +142,12 @@ def _logarithmic(axes: Axes, response: InputResponse) -> None:
     axes.set_yscale("log")
     middle = [np.quantile(np.abs(c.values.imag), [0.05, 0.95]) for c in response.curves]
     _decades(axes, [*middle, exact])
+
+
+def _told(curve: Curve, span: float) -> Curve:
+    """The curve with gaps where its 95 % band is higher than the panel: the record tells nothing of A_j there."""
+    untold = 2.0 * curve.half_width > span
+    return replace(curve, values=np.where(untold, complex("nan+nanj"), curve.values))
 
 
 def _at(frequency: Floats, response: InputResponse) -> Complexes:

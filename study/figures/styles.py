@@ -43,9 +43,9 @@ class LineLook:
 EXACT = LineLook("exact", "black", "-", 0.8, 5.0)
 ESTIMATORS = {
     "miso": LineLook("MI/SO", "C0", "-", 2.0, 3.0),
-    "siso": LineLook("SI/SO", "C1", (0, (5.0, 2.0)), 1.7, 2.5),
+    "siso": LineLook("SI/SO", "C1", (0, (5.0, 2.0)), 1.7, 3.8),
     "local_polynomial": LineLook("local polynomial", "C2", (0, (7.0, 1.5, 1.5, 1.5)), 1.6, 3.5),
-    "instrumental": LineLook("instrumental", "C3", (0, (2.5, 1.2)), 2.0, 3.6),
+    "instrumental": LineLook("instrumental", "C3", (0, (1.0, 1.1)), 2.4, 3.6),
     "miso_free_shape": LineLook("MI/SO, shape estimated", "C4", (0, (1.6, 1.0)), 1.6, 3.2),
     "output_error": LineLook("output error", "C5", (0, (1.0, 1.0)), 2.2, 3.7),
 }
