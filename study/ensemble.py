@@ -115,4 +115,8 @@ def page(table: pd.DataFrame, noise: Mapping[str, float]) -> str:
     for _, row in low.iterrows():
         rate, error = 100.0 * row["within_tolerance"], 100.0 * row["rate_error"]
         lines.append(f"- {row['case']}: {row['parameter']} in {rate:.1f} ± {error:.1f} %")
+    for name, group in table[table["case"].map(noise) == 0.0].groupby("estimator", sort=False):
+        if name != "miso":
+            met = int((group["within_tolerance"] >= WANTED).sum())
+            lines.append(f"- beside it, {str(name).replace('_', ' ')}: {met} of {len(group)} do")
     return "\n".join(lines) + "\n"

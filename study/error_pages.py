@@ -10,6 +10,7 @@ from study import estimator_errors
 from study.document import Block, Bullets, Image, Text, table
 from study.figures.styles import look
 
+ENOUGH = 5  # seeds from which a scatter means something
 LARGE = 9950.0  # from here on a number is shown with a power of ten
 
 
@@ -24,7 +25,7 @@ def opening(errors: pd.DataFrame, noise: Mapping[str, float]) -> list[Block]:
     noisy = errors[errors["case"].map(noise) > 0.0]
     picture = Image("Errors of the estimators by parameter and case", "../figures/estimators.png")
     found: list[Block] = [Bullets(sentences(errors, noise)), picture, Text(note), by_parameter(errors)]
-    if len(noisy):
+    if len(noisy) and seeds >= ENOUGH:
         found += [Text("Under noise on the displacement, bias ± scatter of one estimate, both in %:"), biases(noisy)]
     return found
 

@@ -111,13 +111,14 @@ def numbers(tables: Tables) -> list[Block]:
     stated = tables.claims[~tables.claims["reported"].isin(["as stated", "as tabulated"])]
     note = (
         "Ours: mean over the seeds of an ensemble with its standard error, and the study's own record in brackets. "
-        "Of statements with several conditions the first is shown; [claims.md](claims.md) has them all."
+        "Of statements with several conditions one is shown, one that fails where any does; [claims.md](claims.md) has "
+        "them all."
     )
     return [Text(note), statements(stated)]
 
 
 def statements(claims: pd.DataFrame) -> Block:
-    """One row a claim; of those with several conditions the first."""
+    """One row a claim; of those with several conditions the first, which fails where any does."""
     rows = [
         [row["where"], row["claim"], row["reported"], str(row["measured"]).split("; ")[0], row["verdict"]]
         for _, row in claims.iterrows()
@@ -136,7 +137,9 @@ def parameters(tables: Tables) -> list[Block]:
         rows.append([str(case), str(parameter), f"{limit['true']:.6g}", _tolerance(limit), *cells])
     note = (
         "In SI units (kg, N s/m, N/m, Hz, N/m^3, N s/m^3, rad); with its standard error, and the error against the "
-        "true value. In bold what lies outside the tolerance."
+        "true value. In bold what lies outside the tolerance. The standard errors are Bendat and Piersol's for random "
+        "noise, with the effective number of averages under overlap (claims.md, `averages`). Without noise MI/SO "
+        "leaves leakage, which they overrate: `snakemake -j2 monte_carlo` sets them against the scatter over many seeds."
     )
     heading = ["case", "parameter", "true", "tolerance", *(name.replace("_", " ") for name in names)]
     return [Text(note), table(heading, rows)]
@@ -177,10 +180,11 @@ def reading(tables: Tables) -> list[Block]:
         [row["quantity"], f"{row['reported']:g}", _mean(row, "raw"), _mean(row, "filtered"), row["nearer"]]
         for _, row in tables.reading.iterrows()
     ]
-    raw = int((tables.reading["nearer"] == "raw").sum())
+    raw, filtered = (int((tables.reading["nearer"] == name).sum()) for name in ("raw", "filtered"))
     note = (
         f"The variance of the white sequence before its low-pass (raw) comes nearer in {raw} of {len(rows)} numbers, "
-        f"that of the applied force (filtered) in {len(rows) - raw}. The study runs with `{tables.setting}`."
+        f"that of the applied force (filtered) in {filtered}; the rest are ties. The study runs with "
+        f"`{tables.setting}`."
     )
     return [Text(note), table(["number", "report", "raw", "filtered", "nearer"], rows)]
 

@@ -35,6 +35,12 @@ LINEAR = {"inertia": {"m": 1.0}, "linear_damping": {"c": 3.77}, "linear_stiffnes
 
 FIRST = (
     "test_hidden_effects.py",
+    "test_spectra.py",
+    "test_broken_records.py",
+    "test_readers.py",
+    "test_modelfile.py",
+    "test_config.py",
+    "test_cli.py",
     "test_output_error.py",
     "test_workflow.py",
     "test_diagnose.py",
@@ -45,7 +51,8 @@ FIRST = (
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The longest files begin first, else one core waits for another at the end.
 
-    Those that compile the kernels come before the workflow's, whose many processes would each compile them anew.
+    One core compiles the kernels while the other does what needs none: both would compile them anew, and so would
+    the workflow's many processes.
     """
     items.sort(key=lambda item: FIRST.index(item.path.name) if item.path.name in FIRST else len(FIRST))
 

@@ -117,6 +117,8 @@ def test_the_opening_holds_every_case_and_parameter(table):
     assert "Median over 9 seeds" in text
     assert text.count("| quiet | k |") == 1
     assert text.count("| noisy | k |") == 2, "errors, and bias beside scatter"
+    few = " ".join(document.markdown(error_pages.opening(table.assign(seeds=2), NOISE)).split())
+    assert few.count("| noisy | k |") == 1, "two seeds show no scatter"
     assert "Under noise" not in document.markdown(error_pages.opening(table, {"quiet": 0.0, "noisy": 0.0}))
 
 

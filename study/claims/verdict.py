@@ -61,6 +61,7 @@ def conclude(reported: Reported, name: str, *conditions: Condition, because: str
     ``because`` is what is behind every condition that fails.
     """
     statement = reported[name]
+    conditions = tuple(sorted(conditions, key=lambda c: c.met))  # what fails decides, and stands first
     failed = [reason(c) for c in conditions if not c.met]
     reasons = [_joined(failed) + (f": {because}" if because else "")] if failed else []
     return Claim(
