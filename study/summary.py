@@ -139,7 +139,7 @@ def parameters(tables: Tables) -> list[Block]:
         "In SI units (kg, N s/m, N/m, Hz, N/m^3, N s/m^3, rad); with its standard error, and the error against the "
         "true value. In bold what lies outside the tolerance. The standard errors are Bendat and Piersol's for random "
         "noise, with the effective number of averages under overlap (claims.md, `averages`). Without noise MI/SO "
-        "leaves leakage, which they overrate: `snakemake -j2 monte_carlo` sets them against the scatter over many seeds."
+        "leaves leakage, which they overrate: `snakemake -j2 monte_carlo` sets them against the scatter over seeds."
     )
     heading = ["case", "parameter", "true", "tolerance", *(name.replace("_", " ") for name in names)]
     return [Text(note), table(heading, rows)]
