@@ -132,19 +132,19 @@ def error_free(evidence: Evidence, reported: Reported) -> Claim:
     table = evidence.integrator_steps
     setting = ("abm4", 1, table[0]["reading"])
     own = [r for r in table if (r["method"], r["steps_per_sample"], r["reading"]) == setting]
-    conditions: list[Condition] = []
+    judged: list[tuple[float, Condition]] = []
     for name in ("k", "f_n", "m", "c", "zeta"):
         rows = [r for r in own if r["parameter"] == name and math.isfinite(r["relative_error"])]
         worst = max(rows, key=lambda r: abs(r["relative_error"]))
         error, spread = worst["relative_error"], worst["standard_error"] / abs(worst["true"])
         found = f"{name} {100 * error:+.3g} +- {100 * spread:.1g} % ({worst['system']})"
-        conditions.append(
-            Condition(
-                f"largest error of {name} over the systems at most {100 * ERROR_FREE:g} %",
-                found, abs(error) <= ERROR_FREE,
-                f"one step a sample moves {found}",
-            )
+        condition = Condition(
+            f"largest error of {name} over the systems at most {100 * ERROR_FREE:g} %",
+            found, abs(error) <= ERROR_FREE,
+            f"one step a sample moves {found}",
         )  # fmt: skip
+        judged.append((abs(error), condition))
+    conditions = [condition for _, condition in sorted(judged, key=lambda j: -j[0])]
     lost = sum({r["system"]: int(r["diverged"]) for r in own}.values())
     conditions.append(Condition("no run diverges", f"{lost} runs diverged", lost == 0))
     return conclude(
