@@ -16,7 +16,7 @@ from study.errors import StudyError
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
-CHUNK = 256  # segments transformed at a time: memory does not grow with the record
+CHUNK = 64  # segments transformed at a time: they stay in the cache, and memory does not grow with the record
 
 
 @dataclass(frozen=True)
@@ -211,10 +211,17 @@ def _add_products(total: Complexes, channels: Sequence[Floats], count: int, cut:
         return
     taper = cut.taper()
     views = [np.lib.stride_tricks.sliding_window_view(c, cut.length)[:: cut.hop] for c in channels]
+    room = np.empty((len(views), CHUNK, cut.length))  # used again and again: fresh memory costs as much as a transform
+    turned = np.empty((len(total), len(views), CHUNK), dtype=np.complex128)
+    mirrored = np.empty_like(turned)
     for first in range(0, count, CHUNK):
-        last = min(first + CHUNK, count)
-        lines = np.stack([np.asarray(rfft(v[first:last] * taper)).T for v in views], axis=1)
-        total += lines.conj() @ lines.transpose(0, 2, 1)
+        size = min(CHUNK, count - first)
+        tapered, lines, conjugate = room[:, :size], turned[..., :size], mirrored[..., :size]
+        for view, out in zip(views, tapered, strict=True):
+            np.multiply(view[first : first + size], taper, out=out)
+        lines[:] = np.asarray(rfft(tapered)).transpose(2, 0, 1)
+        np.conjugate(lines, out=conjugate)
+        total += conjugate @ lines.transpose(0, 2, 1)
 
 
 def autospectrum(values: Floats, dt: float, segments: Segments | None = None) -> tuple[Floats, Floats]:
