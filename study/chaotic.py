@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 TIES = (0.3, 1.0, 3.0, 10.0)  # ever tighter, see ``fit_free_run``: each step is small enough to find its way
 TIGHT = 30.0  # tied so, pieces know of each other all that the noise lets them
 TRIALS, FIRMER = 8, 30  # free runs at each step of the way, and in the last two
+GLANCE = 10  # free runs after which a fit of a whole record that has lost the motion is given up
 POOR = 0.05  # of the response's standard deviation: a residual that may hide a motion
 SMOOTH = 0.5  # correlation of neighbouring samples of a residual; white noise has none
 DEVIATIONS = 3.0  # by how many standard deviations the misfit may exceed what fewer unknowns explain
@@ -95,8 +96,13 @@ def fit_record(
     try:
         found = fit_free_run(
             model, record, start=start, held=held, response=response, steps_per_sample=steps_per_sample,
-            max_iterations=max_iterations,
+            max_iterations=min(GLANCE, max_iterations),
         )  # fmt: skip
+        if not found.converged and max_iterations > GLANCE and not _astray(found, record[response]):
+            found = fit_free_run(
+                found.model, record, held=held, response=response, steps_per_sample=steps_per_sample,
+                max_iterations=max_iterations - GLANCE, initial=found.initial,
+            )  # fmt: skip
         if found.converged and not (
             _astray(found, record[response]) or _magnifies(found, record, response, steps_per_sample)
         ):
