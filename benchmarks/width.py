@@ -49,8 +49,8 @@ def main() -> None:
     size, covered = np.abs(error), np.abs(error) < 1.96 * np.array(standard)
     print(
         f"median error {np.median(size):.2g} %, rms {np.sqrt(np.mean(size**2)):.2g} %, largest {size.max():.2g} %; "
-        f"within 1 % in {np.sum(size < 1.0)} of {len(size)}; interval holds the truth in {np.sum(covered)}; not converged "
-        f"{sum(map(bool, notes))}; median {np.median(seconds):.1f} s"
+        f"within 1 % in {np.sum(size < 1.0)} of {len(size)}; interval holds the truth in "
+        f"{np.sum(covered)}; not converged {sum(map(bool, notes))}; median {np.median(seconds):.1f} s"
     )
 
 
