@@ -1,3 +1,6 @@
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -107,6 +110,15 @@ def test_the_fields_are_those_of_the_file(drag_found):
     wanted = {"term", "parameters", "coefficient", "interval", "response_error", "explained", "p_value", "tied_with"}
     assert all(set(row) >= wanted for row in fields["candidates"])
     assert "quadratic_damping" in report.table(found, "N", "m")
+
+
+def test_the_ends_of_a_narrow_interval_are_told_apart(drag_found):
+    found, _ = drag_found
+    first = replace(found.candidates[0], error=1e-7 * abs(found.candidates[0].coefficient))
+    said = " ".join(sentences(replace(found, candidates=(first, *found.candidates[1:])), "N", "m"))
+    low, high = re.search(r"95 % interval (\S+) to (\S+?)\)", said).groups()
+    assert float(low) < first.coefficient < float(high)
+    assert float(high) - float(low) == pytest.approx(3.92e-7 * abs(first.coefficient), rel=0.2)
 
 
 def test_twins_are_told_apart_by_exciting_harder(drag, drag_found):

@@ -269,6 +269,18 @@ def test_imaginary_part_of_a_damping_term_is_logarithmic_and_marks_wrong_signs()
     np.testing.assert_allclose(drawn(imaginary)["exact"].get_ydata(), np.abs(item.exact.imag))
 
 
+def test_a_curve_has_a_gap_where_its_band_is_taller_than_the_panel():
+    frequency, error = np.arange(1.0, 11.0), np.full(10, 0.1)
+    error[6] = 100.0
+    curve = curves.Curve("miso", frequency, np.full(10, 2.0 + 1.0j), error)
+    item = curves.InputResponse(2, "u**3", (curve,), frequency, np.full(10, 2.0 + 1.0j))
+    real, imaginary = Figure().subplots(2)
+    response.real_and_imaginary(real, imaginary, item, "N/m^3", response.common_span([item]))
+    for axes in (real, imaginary):
+        drawn = axes.get_lines()[0].get_ydata()
+        assert list(np.flatnonzero(np.isnan(drawn))) == [6]
+
+
 def test_real_part_that_is_zero_is_seen_to_be_small_beside_the_function():
     table = response_table("duffing_van_der_pol")
     table[["real", "exact_real"]] -= 2e7 * (table["input"] == 2).to_numpy()[:, None]

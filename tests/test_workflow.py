@@ -158,6 +158,13 @@ def test_a_changed_seed_or_row_runs_its_case_alone(built, file, old, new):
     assert not {"draw.duffing", "draw_preliminary.duffing", "claims", "excitation_reading"} & set(jobs)
 
 
+def test_the_seed_of_the_noise_is_no_business_of_what_has_none(built):
+    with edited(built / "config" / "config.yaml", "noise_seed: 54", "noise_seed: 55"):
+        jobs = planned(built)
+    assert (jobs["record"], jobs["identify"], jobs["claims"]) == (1, 1, 1), "claims judge the study's own noisy records"
+    assert not {"draw.duffing", "excitation_reading", "integrator_steps"} & set(jobs)
+
+
 def test_targets_by_name_and_by_number(built):
     (built / "figures" / "figure_21.png").rename(built / "kept.png")
     assert planned(built, "figures/figure_21.png") == {"draw.duffing": 1}
