@@ -15,6 +15,7 @@ from study.record import read_csv
 from study.step import one_sentence
 
 HIGHEST = 10.0  # hertz: the report's systems have their dynamics below it (Section 2.2)
+BESIDE = (labels.FREE_SHAPE, "instrumental")  # whose coherences stand over those of MI/SO
 PARTS = ("real part", "imaginary part")
 
 
@@ -55,16 +56,18 @@ def nonlinear(response_csv: Path, title: str, highest: float = HIGHEST, drawn: S
     return figure
 
 
-def cumulative(coherence_csv: Path, title: str, highest: float = HIGHEST) -> Figure:
-    """Cumulative coherences; those with estimated shape parameters over them."""
+def cumulative(coherence_csv: Path, title: str, highest: float = HIGHEST, drawn: Sequence[str] | None = None) -> Figure:
+    """Cumulative coherences of MI/SO; over them those with estimated shape parameters, and of motion free of noise."""
     table = pd.read_csv(coherence_csv)
     shares = curves.coherences(table, highest)
-    again = labels.FREE_SHAPE in set(table["estimator"])
-    rows = len(shares) + (1 if again else 0)
-    figure, axes = page.page(title, "Cumulative coherence", panel=2.7, legend_rows=rows, headed=False)
+    known = set(table["estimator"])
+    others = [e for e in BESIDE if e in known and (drawn is None or e in drawn)]
+    figure, axes = page.page(
+        title, "Cumulative coherence", panel=2.7, legend_rows=len(shares) * (1 + len(others)), headed=False
+    )  # fmt: skip
     coherence.cumulative(axes[0], shares)
-    if again:
-        coherence.beside(axes[0], curves.coherences(table, highest, labels.FREE_SHAPE), labels.FREE_SHAPE)
+    for estimator in others:
+        coherence.beside(axes[0], curves.coherences(table, highest, estimator), estimator)
     page.legend(figure, axes, columns=1)
     return figure
 
@@ -112,7 +115,7 @@ def draw(
     kinds = {
         "linear": lambda: linear(response_csv, system, highest, drawn),
         "nonlinear": lambda: nonlinear(response_csv, system, highest, drawn),
-        "coherence": lambda: cumulative(coherence_csv, system, highest),
+        "coherence": lambda: cumulative(coherence_csv, system, highest, drawn),
         "histogram": lambda: histogram(record_csv, title),
     }
     with styles.context(style):

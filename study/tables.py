@@ -90,7 +90,7 @@ def coherences(found: Mapping[str, Identified]) -> pd.DataFrame:
     """Ordinary, partial, nonlinear and cumulative coherence of each input, in long form; some estimators have none."""
     frames: list[pd.DataFrame] = []
     for estimator, identified in found.items():
-        result = identified.responses
+        result = identified.analysis or identified.responses
         if not isinstance(result, MisoResult):
             continue
         for j, item in enumerate(identified.inputs):

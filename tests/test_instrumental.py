@@ -119,3 +119,13 @@ def test_a_formula_of_a_missing_channel_is_refused(records):
     lacking = replace(record, channels={name: record[name] for name in ("force", "displacement")})
     with pytest.raises(StudyError, match="velocity"):
         instrumental.corrected([one_input("v**3")], lacking, lacking)
+
+
+def test_coherence_along_the_free_run_is_that_without_noise(systems, records):
+    model, clean = systems["duffing_van_der_pol"], records["duffing_van_der_pol"]
+    measured = noisy(clean, 0.1, 1)
+    found = estimators.identify("instrumental", model, measured, TOLD).analysis
+    blurred, true = (estimators.identify("miso", model, r, TOLD).responses for r in (measured, clean))
+    keep = (true.frequency > 0.3) & (true.frequency < 10.0)
+    assert np.max(np.abs(found.cumulative - true.cumulative)[:, keep]) < 0.02
+    assert np.mean(blurred.multiple[keep]) < 0.8 < 0.99 < np.mean(found.multiple[keep])

@@ -9,6 +9,7 @@ import numpy as np
 
 from study.inputs import Input
 from study.local_polynomial import LocalPolynomial
+from study.miso import MisoResult
 from study.model import Model
 from study.parameters import Estimate
 from study.record import Record
@@ -64,6 +65,8 @@ class Identified:
         The coefficients themselves, as the model names them, for estimators that find them together.
     note : str
         What is to be known before the estimates are used, such as that a search did not converge; mostly empty.
+    analysis : MisoResult or None
+        Coherences, for estimators whose ``responses`` have none of their own.
     """
 
     inputs: tuple[Input, ...]
@@ -71,6 +74,7 @@ class Identified:
     parameters: tuple[Parameter, ...]
     estimate: Estimate | None = None
     note: str = ""
+    analysis: MisoResult | None = None
 
 
 class Estimator(Protocol):

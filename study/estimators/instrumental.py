@@ -1,25 +1,32 @@
 """Instruments from a free run: A_j(f) line by line, without the bias that noise on the response brings."""
 
-from study import instrumental, parametric
+from study import instrumental, miso, parametric, spectra
 from study.estimators import output_error
 from study.estimators.base import Identified, Settings, named_parameters
 from study.free_run import prepare
-from study.inputs import reverse_inputs
+from study.inputs import histories, reverse_inputs
 from study.model import Model
 from study.output_error import FreeRunFit
 from study.record import MOTIONS, Record
 
 
 def identify(model: Model, record: Record, settings: Settings) -> Identified:
-    """A_j(f) with the fitted model's motion as instrument, then coefficients as from MI/SO."""
+    """A_j(f) with the fitted model's motion as instrument, then coefficients as from MI/SO.
+
+    Coherences are those of the force with the inputs along that motion, which has no noise.
+    """
     found = output_error.fit(model, record, settings)
     inputs = reverse_inputs(found.model)
-    matrix = instrumental.cross_spectra(inputs, record, clean_motion(found, record), settings.segments)
+    clean = clean_motion(found, record)
+    matrix = instrumental.cross_spectra(inputs, record, clean, settings.segments)
     estimate = instrumental.fit(
         matrix, inputs, settings.band, parametric.response(inputs, found.estimate, matrix.frequency)
     )
     note = "" if found.converged else found.message
-    return Identified(inputs, instrumental.responses(matrix), named_parameters(estimate), estimate, note)
+    own = spectra.cross_spectra([*histories(inputs, clean), record["force"]], record.dt, settings.segments)
+    return Identified(
+        inputs, instrumental.responses(matrix), named_parameters(estimate), estimate, note, miso.analyse(own)
+    )  # fmt: skip
 
 
 def clean_motion(found: FreeRunFit, record: Record) -> Record:

@@ -13,6 +13,7 @@ from study.figures.curves import InputCoherence
 from study.figures.styles import look
 
 LOOKS = (("C1", (0, (5.0, 2.0))), ("C2", (0, (1.5, 1.2))), ("C3", (0, (7.0, 1.5, 1.5, 1.5))), ("C5", "-."))
+MARKS = ("o", "s", "^", "v")
 APART = 9  # lines between two circles: the curve under them stays to be seen
 ALL = ("C0", "-")  # the last curve is the multiple coherence: what the whole model explains
 
@@ -40,16 +41,21 @@ def cumulative(axes: Axes, shares: Sequence[InputCoherence]) -> Axes:
 
 
 def beside(axes: Axes, shares: Sequence[InputCoherence], estimator: str) -> Axes:
-    """Cumulative coherences of a further estimator as circles on those that are drawn, under one label."""
+    """Cumulative coherences of a further estimator as marks on a hair line, one label for each curve."""
     for index, share in enumerate(shares):
-        label = look(estimator).label if share is shares[-1] else "_nolegend_"
+        plus = "+ " if index else ""
         axes.plot(
-            share.frequency, share.cumulative, "o", color="black", markerfacecolor="none", markersize=5.0,
-            markeredgewidth=0.9, markevery=(APART * index // len(shares), APART), label=label, zorder=4.0,
+            share.frequency, share.cumulative, MARKS[index % len(MARKS)], linestyle="-", color="black", linewidth=0.4,
+            markerfacecolor="none", markersize=5.0, markeredgewidth=0.9, zorder=2.95,
+            markevery=(APART * index // len(shares), APART), label=f"{look(estimator).label}: {plus}{_shape(share)}",
         )  # fmt: skip
     return axes
 
 
 def _label(share: InputCoherence, index: int) -> str:
     plus = "+ " if index else ""
-    return f"{plus}{labels.formula(share.shape)}: {labels.term_names(share.terms)}"
+    return f"{plus}{_shape(share)}: {labels.term_names(share.terms)}"
+
+
+def _shape(share: InputCoherence) -> str:
+    return labels.formula(share.shape)
