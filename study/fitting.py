@@ -21,6 +21,7 @@ from study.spectra import Segments, cross_spectra
 Floats = NDArray[np.float64]
 LINEAR_ORDERS = {"k": 0, "c": 1, "m": 2}
 FAINT = 1e-3  # ... and whose force is above this share of the strongest line: leakage tells nothing
+SHORT = 512  # samples below which missing coherence may be the record's own shortness
 CHANCE = 0.01  # the linear start uses lines whose coherence noise alone would reach this rarely
 
 
@@ -89,6 +90,11 @@ def linear_start(model: Model, record: Record, how: Plan) -> dict[str, float]:
     coherence = np.clip(coherence, 0.0, 1.0 - 1e-6)
     by_chance = 1.0 - CHANCE ** (1.0 / max(matrix.averages - 1.0, 1.0))
     keep = (coherence > by_chance) & (g[:, 0, 0].real > FAINT * np.max(g[:, 0, 0].real))
+    if np.count_nonzero(keep) < 4 and len(part) < SHORT:
+        raise StudyError(
+            f"the part to fit of {record.name!r} has {len(part)} samples, too few to see what force and {how.response} "
+            f"have in common; fit a longer part, {SHORT} samples or more"
+        )
     if np.count_nonzero(keep) < 4:
         raise StudyError(f"force and {how.response} of {record.name!r} have nothing in common at any frequency")
     omega = 2j * np.pi * f[keep]

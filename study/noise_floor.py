@@ -9,10 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from study.errors import StudyError
 from study.spectra import Segments, autospectrum
 
 Floats = NDArray[np.float64]
-BANDS = 20
+BANDS = 20  # or as many as there are lines
+FEWEST = 8  # lines
 QUIET = 5  # so many of the bands, the quietest, give the floor
 
 
@@ -41,22 +43,36 @@ class Floor:
 
 
 def floor(residual: Floats, dt: float, low: float = 0.0) -> Floor:
-    """Split a residual into noise floor and structure, both above the frequency ``low`` (hertz)."""
+    """Split a residual into noise floor and structure, both above the frequency ``low`` (hertz).
+
+    Raises
+    ------
+    StudyError
+        If too few lines of the spectrum lie above it.
+    """
     length = max(32, min(1024, 2 ** int(np.log2(len(residual) / 8))))
     segments = Segments(length=length)
     frequency, density = autospectrum(residual, dt, segments)
     averages = segments.effective_averages(len(residual))
-    bands = np.array_split(density[1:-1][frequency[1:-1] >= low], BANDS)
+    kept = density[1:-1][frequency[1:-1] >= low]
+    if len(kept) < FEWEST:
+        raise StudyError(
+            f"{len(residual)} samples are judged, of whose spectrum {len(kept)} lines lie above {low:.3g} Hz; "
+            f"{FEWEST} or more show a noise floor: judge a longer part"
+        )
+    count = min(BANDS, len(kept))
+    some = max(1, count * QUIET // BANDS)
+    bands = np.array_split(kept, count)
     means = np.array([np.mean(band) for band in bands])
     lines = np.array([len(band) for band in bands])
     spread = 1.0 / np.sqrt(averages * lines / segments.line_inflation())
-    quiet = np.argsort(means)[:QUIET]
+    quiet = np.argsort(means)[:some]
     # The quietest of many equal bands lie below their common level by about one standard deviation.
-    level = float(np.mean(means[quiet])) * (1.0 + _selection(BANDS, QUIET) * float(np.mean(spread)))
+    level = float(np.mean(means[quiet])) * (1.0 + _selection(count, some) * float(np.mean(spread)))
     width = float(frequency[1])
     above = np.clip(means - level, 0.0, None) * lines * width
     error = float(np.sqrt(np.sum((level * spread * lines * width) ** 2)))
-    bias = 0.4 * error * np.sqrt(BANDS)  # what clipping at zero adds for noise alone: 0.4 sigma a band
+    bias = 0.4 * error * np.sqrt(count)  # what clipping at zero adds for noise alone: 0.4 sigma a band
     return Floor(float(np.sqrt(level * (0.5 / dt - low))), max(float(np.sum(above)) - bias, 0.0), error)
 
 

@@ -226,3 +226,35 @@ def test_the_bouc_wen_record_is_no_function_of_the_motion_and_hysteresis_reaches
     Path("rig.yaml").write_text(LINEAR.replace("linear_stiffness]", f"linear_stiffness, {held}]"))
     assert cli.main(words) == 0
     assert "that is noise (from the scatter between periods)" in capsys.readouterr().out
+
+
+def test_a_record_too_short_to_be_fitted_is_refused_for_that(capsys: pytest.CaptureFixture[str]) -> None:
+    write_csv(record().part(0, 130), Path("short.csv"))
+    assert "has 65 samples, too few" in refused(capsys, "short.csv", "--model", "rig.yaml")
+
+
+@pytest.mark.parametrize("samples", [500, 1000])
+def test_a_short_record_has_a_noise_floor_all_the_same(capsys: pytest.CaptureFixture[str], samples: int) -> None:
+    write_csv(record().part(0, samples), Path("short.csv"))
+    assert cli.main(["compare", "short.csv", "--model", "rig.yaml", "--out", "short"]) == 0
+    found = json.loads(Path("short/comparison.json").read_text())
+    assert 0.005 < found["noise_floor"]["response"] < found["error"]["response"]
+    assert "inf" not in capsys.readouterr().out
+    assert cli.main(["diagnose", "short.csv", "--model", "rig.yaml", "--out", "short"]) == 0
+    assert json.loads(Path("short/diagnosis.json").read_text())["noise_floor"]["response"] > 0.005
+
+
+def test_a_model_that_cannot_follow_is_said_to_mean_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("bare.yaml").write_text("name: bare\nterms: [inertia, {term: linear_damping, value: 0.0}]\n")
+    assert cli.main(["compare", "rig.csv", "--model", "bare.yaml", "--out", "bare"]) == 0
+    assert "its fitted coefficients mean nothing" in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_formula_that_is_no_number_somewhere_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("own.yaml").write_text(LINEAR.replace("linear_stiffness]", 'linear_stiffness, {term: own, force: "log(u)"}]'))
+    assert "the formula 'log(u)' has no finite value at t = " in refused(capsys, "rig.csv", "--model", "own.yaml")
+
+
+def test_a_rate_that_the_times_deny_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    said = refused(capsys, "rig.csv", "--model", "rig.yaml", "--fs", "100")
+    assert "an interval of 0.01 s is given (--fs or --dt), its times step by 0.02 s" in said

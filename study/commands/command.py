@@ -29,16 +29,17 @@ class Command:
     run: Callable[[argparse.Namespace], None]
 
 
-def number(above: float = -math.inf, least: float = -math.inf) -> Callable[[str], float]:
-    """A reader of finite numbers above one limit and not below the other."""
+def number(above: float = -math.inf, least: float = -math.inf, most: float = math.inf) -> Callable[[str], float]:
+    """A reader of finite numbers above one limit, not below the other and not beyond the last."""
 
     def read(text: str) -> float:
         try:
             value = float(text)
         except ValueError:
             value = math.nan
-        if not (math.isfinite(value) and value > above and value >= least):
+        if not (math.isfinite(value) and value > above and least <= value <= most):
             limit = f" above {above:g}" if above > -math.inf else f" of at least {least:g}" if least > -math.inf else ""
+            limit += f" and at most {most:g}" if most < math.inf else ""
             raise argparse.ArgumentTypeError(f"{text!r} is not a finite number{limit}")
         return value
 

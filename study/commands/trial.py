@@ -18,7 +18,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--hidden", metavar="NAMES", help="'none', or one or more effects (a,b) to hide; drawn if left out"
     )
     parser.add_argument(
-        "--noise", type=number(least=0.0), help="mean square of the noise over that of the response; drawn if left out"
+        "--noise",
+        type=number(least=0.0, most=1.0),
+        help="mean square of the noise over that of the response (0.05 is 5 %%); drawn if left out",
     )
     parser.add_argument(
         "--response", choices=("displacement", "velocity", "acceleration"), help="what is measured; drawn if left out"

@@ -13,11 +13,13 @@ from study.diagnose.score import clustered_covariance
 from study.errors import DivergenceError, StudyError
 from study.fitting import Plan
 from study.free_run import prepare
+from study.inputs import history, reverse_inputs
 from study.model import Model, ModelTerm
+from study.motion import complete
 from study.output_error import FreeRunFit
 from study.pieces import angular_rate
 from study.record import Record
-from study.terms import QUANTITIES
+from study.terms import LIBRARY, QUANTITIES
 
 Floats = NDArray[np.float64]
 TWO_SIDED_95 = 1.959964  # standard errors
@@ -82,6 +84,7 @@ def fit_model(
     """
     if "inertia" not in model:
         raise StudyError(f"model {model.name!r} has no inertia; a free run needs it")
+    _check_own_formulas(model, record)
     held = fitting.held_keys(model)
     if start is not None:
         return _refined(fitting.fit(model, record, how, held, start), record, how, held)
@@ -92,6 +95,18 @@ def fit_model(
         found = _with_shape(found, entry, record, how, held)
     ordered = replace(model, terms=tuple(_named(found.model, t.name) for t in model.terms))
     return _refined(replace(found, model=ordered), record, how, held)
+
+
+def _check_own_formulas(model: Model, record: Record) -> None:
+    """A user's formula must be a number all along the measured motion: a fit that it stops would be blamed else."""
+    if all(term.name in LIBRARY for term in model.terms):
+        return
+    completed = complete(record)
+    motion = completed.record.part(completed.edge, len(record) - completed.edge)
+    known = replace(model, terms=tuple(t for t in model.terms if None not in t.parameters))
+    for item in reverse_inputs(known):
+        if any(name not in LIBRARY for name in item.terms):
+            history(item, motion)
 
 
 def _from_afar(model: Model, record: Record, how: Plan, held: tuple[str, ...]) -> FreeRunFit:

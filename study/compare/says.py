@@ -18,6 +18,7 @@ NEAR = 0.25  # how near to a whole number a power must lie to be called by it
 SURE = 0.4  # standard error of a power, at most, for it to be called by a whole number
 HARDLY = 0.6  # a power below this is a step that noise has rounded, or close to one
 HIGHEST = 5.9  # the powers that are tried end at six
+HOPELESS = 0.98  # of the rms response: an error with which a model predicts nothing
 NAMES = {0: "constant size", 2: "square", 3: "cube", 4: "fourth power", 5: "fifth power"}
 PARITY = {"odd": "odd in it", "even": "even in it"}
 
@@ -25,7 +26,9 @@ PARITY = {"odd": "odd in it", "even": "even in it"}
 def says(found: Comparison) -> str:
     """What a user should know of one record, in two or three sentences."""
     sentences = [_how_good(found)]
-    if found.structure > NEGLIGIBLE:
+    if found.response_error >= HOPELESS:
+        sentences.append("Mass, damping and stiffness are the least that a model needs")
+    elif found.structure > NEGLIGIBLE:
         sentences.append(_where(found))
     if not found.found.converged:
         sentences.append(f"The fit did not arrive at a minimum ({found.found.message}), so this may be the fit's fault")
@@ -46,9 +49,15 @@ def _plain(number: float) -> str:
 def _how_good(found: Comparison) -> str:
     error, floor = percent(found.response_error), percent(found.noise_floor)
     start = f"the model misses the response by {error} of its rms"
+    if found.response_error >= HOPELESS:
+        return (
+            f"{start}, as one without any motion would: it cannot follow this record, and its fitted coefficients "
+            "mean nothing"
+        )
     if found.noise.alone:
         how = " (from the scatter between periods)" if found.noise.source == SCATTER else ""
-        return f"{start}, and that is noise{how}: nothing stands above the noise floor of {floor}"
+        doubt = "" if how else "; 'study diagnose' looks closer"
+        return f"{start}, and that is noise{how}: nothing stands above the noise floor of {floor}{doubt}"
     if found.structure <= NEGLIGIBLE:
         return (
             f"{start}; what stands above the noise floor of {floor} is {percent(found.structure)} of the response, "

@@ -278,7 +278,13 @@ def curves(found: FreeRunFit, term: Term, record: Record, how: Plan) -> tuple[Cu
     if np.linalg.norm(alone) <= INDISTINCT * np.linalg.norm(own):
         return None, None
     along = steadiness.along_frequency(alone, found.residual, size, record.dt)
-    return along, steadiness.along_amplitude(alone, found.residual, size)
+    classes = steadiness.along_amplitude(alone, found.residual, size)
+    return _unless_empty(along), _unless_empty(classes)
+
+
+def _unless_empty(curve: Curve) -> Curve | None:
+    """A short record has not blocks enough for a class, or not lines enough for a band."""
+    return curve if len(curve.at) else None
 
 
 def changes(*along: Curve | None) -> float:

@@ -27,7 +27,7 @@ def _shown(place: int, row: Ranked, force: str, length: str) -> list[str]:
     return [
         str(place),
         row.name,
-        f"{100 * row.gain.explained:.1f} +- {100 * row.gain.error:.1f} %",
+        f"{100 * row.gain.explained:z.1f} +- {100 * row.gain.error:.1f} %",
         f"{100 * row.response_error:.3g} %",
         f"{row.coefficient:.4g} +- {half:.2g} {unit}",
         f"{row.p_value:.1g}",

@@ -4,6 +4,7 @@ import math
 
 from study.diagnose.ranking import UNSTEADY, Ranked, wavers
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
+from study.figures.labels import term_names
 
 DEPENDENCE = 0.1  # held-out share from which the unexplained force is said to depend on something
 CLOSE = 0.05  # families this close to the best one are named with it
@@ -44,11 +45,11 @@ def _missing(found: Diagnosis, force: str, length: str) -> list[str]:
     ]
     if found.pair:
         second = next(name for name in found.pair if name != first.name)
-        said.append(f"It does not explain all: beside it {_words(second).lower()} is needed.")
+        said.append(f"It does not explain all: beside it {term_names(second)} is needed.")
     elif found.left > 0.0:
         said.append(f"Structure of {_percent(found.left)} of the response is left beside it.")
     if first.tied_with:
-        said.append(f"This record cannot tell it from {', '.join(_words(n).lower() for n in first.tied_with)}.")
+        said.append(f"This record cannot tell it from {', '.join(term_names(n) for n in first.tied_with)}.")
     return said
 
 
@@ -60,7 +61,7 @@ def _unknown(found: Diagnosis) -> list[str]:
     best = found.candidates[0] if found.candidates else None
     if best is not None and best.gain.explained > 0.0 and best.p_value < 0.05:
         said.append(
-            f"The nearest, {_words(best.name).lower()}, leaves {_percent(best.response_error)}; "
+            f"The nearest, {term_names(best.name)}, leaves {_percent(best.response_error)}; "
             f"{_doubt(best)}, so its shape is not right."
         )
     families = sorted(found.families.items(), key=lambda item: -item[1])
@@ -107,7 +108,8 @@ def _shape(row: Ranked, length: str) -> str:
 
 
 def _words(name: str) -> str:
-    return name.replace("_", " ").capitalize()
+    words = term_names(name)
+    return words[0].upper() + words[1:]
 
 
 def _percent(share: float) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 
 from study.diagnose.ranking import Ranked
 from study.errors import StudyError
+from study.figures.labels import term_names
 from study.fitting import Plan
 from study.free_run import prepare
 from study.linear import least_squares
@@ -49,7 +50,7 @@ def advice(rows: Sequence[Ranked], record: Record, how: Plan) -> str:
     if rival is None:
         return ""
     level = separating_level(rows[0], rival, record, how)
-    names = f"{rows[0].name} and {rival.name}"
+    names = f"{term_names(rows[0].name)} and {term_names(rival.name)}"
     if level is None:
         other = "another kind of test" if how.response == "displacement" else "the displacement, its mean included,"
         return f"No level from a quarter to five times this one would tell {names} apart; {other} is needed."

@@ -99,11 +99,12 @@ def view(rung: Rung, step: int, live: bool = True) -> View:
 
 
 def _small(columns: Columns) -> Columns:
-    """Single precision: a screen shows no more, and a saved page is half as large."""
-    return {
-        name: np.asarray(c, dtype=np.float32) if getattr(c, "dtype", None) == np.float64 else c
-        for name, c in columns.items()
-    }
+    """Single precision: a screen shows no more, and a saved page is half as large. What is beyond it is not drawn."""
+    with np.errstate(over="ignore"):
+        return {
+            name: np.asarray(c, dtype=np.float32) if getattr(c, "dtype", None) == np.float64 else c
+            for name, c in columns.items()
+        }
 
 
 def least_force(found: Comparison) -> float:

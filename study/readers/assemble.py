@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from study.errors import StudyError
 from study.readers import checks
 from study.readers.options import ReadOptions
@@ -12,6 +14,8 @@ from study.readers.sampling import even_interval
 from study.readers.table import Column, Table
 from study.readers.unit_names import ROLES, is_unit, parse_unit, role_unit
 from study.record import MOTIONS, SI_UNITS, Record
+
+AGREE = 0.01  # share by which a given interval may differ from that of the times
 
 
 def record_from(path: Path, table: Table, options: ReadOptions) -> Record:
@@ -108,7 +112,15 @@ def _sampling(
     stated = options.interval
     if "time" in roles:
         time = roles["time"].values * parse_unit(units.get("time", "s")).factor
-        return (stated, float(time[0])) if stated is not None else even_interval(path, time, table.place)
+        if stated is None:
+            return even_interval(path, time, table.place)
+        step = float(np.median(np.diff(time)))
+        if not abs(step / stated - 1.0) < AGREE:
+            raise StudyError(
+                f"{path}: an interval of {stated:g} s is given (--fs or --dt), its times step by {step:g} s; leave the "
+                "option out, or say with --unit time=UNIT what the times are in"
+            )
+        return stated, float(time[0])
     dt = stated if stated is not None else table.dt
     if dt is None:
         raise StudyError(
