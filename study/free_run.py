@@ -6,9 +6,8 @@ of the numbers which the simulation yields, not of an idealisation of them.
 """
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -23,7 +22,6 @@ from study.record import MOTIONS, Record
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-MANY, THREADS = 64, 2  # pieces from which two threads run a half each
 REMEMBERED = 4  # channels of which the values between the samples are kept
 SIDE = "side of v"  # the input that stands for sgn v while a step lasts
 
@@ -122,33 +120,14 @@ class FreeRun:
         if len(states) != len(bounds) - 1:
             raise StudyError(f"{len(states)} initial states were given; {len(bounds) - 1} pieces need one each")
         program = with_registers(self.program, {key: values[key] for key in self.keys})
-        out = np.empty((self.samples, 1 + len(self.keys) + free_states))
+        out = np.empty((self.samples + 1, 1 + len(self.keys) + free_states))
         arrivals = np.empty((len(self.cuts), len(self.slots) + 1, out.shape[1]))
-
-        run = partial(self._run_part, program, bounds, states, free_states, out, arrivals)
-        count = len(bounds) - 1
-        if count < MANY:
-            run(range(count))
-        else:
-            with ThreadPoolExecutor(THREADS) as pool:
-                list(pool.map(run, [range(count * k // THREADS, count * (k + 1) // THREADS) for k in range(THREADS)]))
-        return out[:, 0], out[:, 1:], arrivals
-
-    def _run_part(
-        self, program: Program, bounds: Sequence[int], states: Floats, free_states: int, out: Floats,
-        arrivals: Floats, part: range,
-    ) -> None:  # fmt: skip
-        """Pieces that follow one another, in registers of their own."""
-        own = replace(program, registers=program.registers.copy())
-        for i in part:
-            begin, end = bounds[i], bounds[i + 1]
-            if i == len(bounds) - 2:
-                self._piece(own, begin, states[i], free_states, out[begin:end])
-                continue
-            # A piece arrives at the next one's first sample. That may be another thread's, so it has room of its own.
-            piece = np.empty((end + 1 - begin, out.shape[1]))
-            arrivals[i] = self._piece(own, begin, states[i], free_states, piece)
-            out[begin:end] = piece[:-1]
+        for i, (begin, end) in enumerate(pairwise(bounds)):
+            last = min(end + 1, self.samples)  # the next piece writes over the sample at which this one arrives
+            arrived = self._piece(program, begin, states[i], free_states, out[begin:last])
+            if i < len(arrivals):
+                arrivals[i] = arrived
+        return out[:-1, 0], out[:-1, 1:], arrivals
 
     def _piece(self, program: Program, first: int, initial: Floats, free_states: int, out: Floats) -> Floats:
         """Response beside its derivatives from one sample on, into ``out``; returns the state at the end like it."""
