@@ -120,21 +120,18 @@ class FreeRun:
         if len(states) != len(bounds) - 1:
             raise StudyError(f"{len(states)} initial states were given; {len(bounds) - 1} pieces need one each")
         program = with_registers(self.program, {key: values[key] for key in self.keys})
-        out = np.empty((self.samples + 1, 1 + len(self.keys) + free_states))
-        arrivals = np.empty((len(self.cuts), len(self.slots) + 1, out.shape[1]))
+        first_free = 1 + len(self.keys)
+        out = np.empty((self.samples, first_free + free_states))
+        state = np.zeros((len(states), len(self.slots) + 1, out.shape[1]))  # of all pieces: one each would take longer
+        state[:, : states.shape[1], 0] = states
+        state[:, range(free_states), range(first_free, out.shape[1])] = 1.0
         for i, (begin, end) in enumerate(pairwise(bounds)):
             last = min(end + 1, self.samples)  # the next piece writes over the sample at which this one arrives
-            arrived = self._piece(program, begin, states[i], free_states, out[begin:last])
-            if i < len(arrivals):
-                arrivals[i] = arrived
-        return out[:-1, 0], out[:-1, 1:], arrivals
+            self._piece(program, begin, state[i], out[begin:last])
+        return out[:, 0], out[:, 1:], state[:-1]
 
-    def _piece(self, program: Program, first: int, initial: Floats, free_states: int, out: Floats) -> Floats:
-        """Response beside its derivatives from one sample on, into ``out``; returns the state at the end like it."""
-        first_free = 1 + len(self.keys)
-        state = np.zeros((len(self.slots) + 1, first_free + free_states))
-        state[: len(initial), 0] = initial
-        state[range(free_states), range(first_free, first_free + free_states)] = 1.0
+    def _piece(self, program: Program, first: int, state: Floats, out: Floats) -> None:
+        """Response beside its derivatives from one sample on, into ``out``; leaves the state as it is at the end."""
         begin = self.start + first * self.dt
         failed = kernels.integrate_variation(
             program.code, program.first, program.registers, self.slots, self.side,
@@ -143,7 +140,6 @@ class FreeRun:
         if failed >= 0:
             time = begin + failed * self.dt
             raise DivergenceError(f"the free run diverged at t = {time:.4g} s", time)
-        return state
 
 
 def prepare(

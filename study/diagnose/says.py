@@ -45,7 +45,7 @@ def _missing(found: Diagnosis, force: str, length: str) -> list[str]:
     ]
     if found.pair:
         second = next(name for name in found.pair if name != first.name)
-        said.append(f"It does not explain all: beside it {term_names(second)} is needed.")
+        said.append(f"It does not explain all: of all candidates, {term_names(second)} beside it explains most.")
     elif found.left > 0.0:
         said.append(f"Structure of {_percent(found.left)} of the response is left beside it.")
     if first.tied_with:
