@@ -233,9 +233,8 @@ def test_a_record_too_short_to_be_fitted_is_refused_for_that(capsys: pytest.Capt
     assert "has 65 samples, too few" in refused(capsys, "short.csv", "--model", "rig.yaml")
 
 
-@pytest.mark.parametrize("samples", [500, 1000])
-def test_a_short_record_has_a_noise_floor_all_the_same(capsys: pytest.CaptureFixture[str], samples: int) -> None:
-    write_csv(record().part(0, samples), Path("short.csv"))
+def test_a_short_record_has_a_noise_floor_all_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+    write_csv(record().part(0, 500), Path("short.csv"))
     assert cli.main(["compare", "short.csv", "--model", "rig.yaml", "--out", "short"]) == 0
     found = json.loads(Path("short/comparison.json").read_text())
     assert 0.005 < found["noise_floor"]["response"] < found["error"]["response"]

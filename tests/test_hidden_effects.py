@@ -38,7 +38,7 @@ def test_hidden_effect_comes_first_or_is_named_in_the_tie(place: int, name: str)
     assert first.response_error < 1.05 * truth + 1e-6  # where nothing is noise, the rounding of the fit
 
 
-@pytest.mark.parametrize("noise", NOISES)
+@pytest.mark.parametrize("noise", [0.0, 0.05])
 def test_nothing_is_invented_where_nothing_is_hidden(noise: float) -> None:
     trial = make_trial(FIRST_SEED + 100 + int(100 * noise), (), noise, "displacement")
     assert diagnosed(trial).verdict == NOTHING
