@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: study report test lint picture readme estimators clean
+.PHONY: study report test checks lint picture readme estimators clean
 
 study: $(READY)
 	$(BIN)/snakemake -j2
@@ -12,7 +12,10 @@ study: $(READY)
 report: study
 	$(BIN)/snakemake --report report.html
 
-test: lint
+test: $(READY)
+	$(MAKE) --no-print-directory -j2 lint checks
+
+checks: $(READY)
 	$(BIN)/pytest -n logical --dist loadfile --no-loadscope-reorder -p no:benchmark
 
 lint: $(READY)
