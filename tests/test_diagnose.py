@@ -121,6 +121,14 @@ def test_the_ends_of_a_narrow_interval_are_told_apart(drag_found):
     assert float(high) - float(low) == pytest.approx(3.92e-7 * abs(first.coefficient), rel=0.2)
 
 
+@pytest.mark.parametrize("error", [np.inf, np.nan, 0.0])
+def test_an_interval_without_ends_is_said_all_the_same(drag_found, error):
+    found, _ = drag_found
+    first = replace(found.candidates[0], error=error)
+    said = sentences(replace(found, candidates=(first, *found.candidates[1:])), "N", "m")
+    assert any("95 % interval" in sentence for sentence in said)
+
+
 def test_twins_are_told_apart_by_exciting_harder(drag, drag_found):
     found, how = drag_found
     rival = next(c for c in found.candidates if c.name == "cubic_damping")

@@ -94,7 +94,9 @@ def _amount(row: Ranked, force: str, length: str) -> str:
 
 def _digits(value: float, width: float) -> int:
     """Significant digits that tell the ends of an interval apart, four at least."""
-    return 4 if width <= 0.0 or value == 0.0 else min(max(4, math.ceil(math.log10(abs(value) / width)) + 2), 12)
+    if value == 0.0 or not 0.0 < width < math.inf:
+        return 4
+    return min(max(4, math.ceil(math.log10(abs(value) / width)) + 2), 12)
 
 
 def _shape(row: Ranked, length: str) -> str:
