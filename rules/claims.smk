@@ -1,14 +1,15 @@
 # The report's claims, and the two studies that they rest on: the reading of "unit variance" and the
-# integrator's steps. All work on ensembles of their own seeds, not on results/<case>.
-from study.claims.reported import check_table_1
+# integrator's steps. All work on ensembles of their own seeds, not on results/<case>: they wait for no case, and what
+# takes longest begins first. What they do beside the simulations keeps one core busy, not two.
+from study.claims.reported import check_complete, check_systems
 from study.claims.reported import load as load_reported
-from study.config import parameter_names
 
 STATEMENTS = {"statements": "config/reported.tsv", "schema": "config/schemas/reported.schema.yaml"}
 
 with one_sentence():
     _reported = load_reported(*(Path(path) for path in STATEMENTS.values()))
-    check_table_1(_reported, Path("models"), parameter_names(Path("models")))
+    check_complete(_reported, *(Path(path) for path in STATEMENTS.values()))
+    check_systems(_reported, Path("models"))
 
 # The systems of Table 1: another model in the folder is none of the claims' business.
 MODELS = sorted({f"models/{name.split('.')[1]}.yaml" for name in _reported.statements if name.count(".") == 2})
@@ -44,7 +45,7 @@ rule excitation_reading:
     params:
         models="models",
         settings=WITHOUT_NOISE,
-    threads: 2
+    priority: 1
     benchmark:
         "results/benchmarks/excitation_reading.tsv"
     script:
@@ -66,7 +67,7 @@ rule integrator_steps:
     params:
         models="models",
         settings=WITHOUT_NOISE,
-    threads: 2
+    priority: 1
     benchmark:
         "results/benchmarks/integrator_steps.tsv"
     script:
@@ -90,7 +91,7 @@ rule claims:
     params:
         models="models",
         settings=CLAIM_SETTINGS,
-    threads: 2
+    priority: 1
     benchmark:
         "results/benchmarks/claims.tsv"
     script:

@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from study.claims import reported
-from study.config import parameter_names
 from study.errors import StudyError
 from study.excitation_reading import quantities
 from tests.conftest import LINEAR, TABLE_1
@@ -43,18 +42,37 @@ def test_the_numbers_the_report_quotes(stated: reported.Reported) -> None:
     assert {q.reported for q in quantities(stated)} >= set(quoted)
 
 
+def test_a_system_of_table_1_without_a_model_is_named(stated: reported.Reported, tmp_path: Path) -> None:
+    reported.check_systems(stated, ROOT / "models")
+    with pytest.raises(StudyError, match=r"names a system that is not in models/"):
+        reported.check_systems(stated, tmp_path / "models")
+
+
+def table() -> str:
+    return (ROOT / "config" / "reported.tsv").read_text(encoding="utf-8").removeprefix(HEADING)
+
+
 @pytest.mark.parametrize(
-    ("name", "said"),
-    [("table_1.dufing.k3", "names a system that is not in models/"), ("table_1.duffing.k_3", "'k_3', which is no")],
+    ("old", "new", "said"),
+    [
+        ("siso_stiffness\t", "siso_stifness\t", "no claim asks for 'siso_stifness'; 'siso_stiffness' is near it"),
+        ("siso_stiffness\t", "zzz\t", "no claim asks for 'zzz'; a new claim's row is listed in"),
+        ("table_1.duffing.k3\t", "", "has no row 'table_1.duffing.k3', which the claims ask for"),
+        ("\t500\t", "\t\t", "'siso_stiffness' has no value; the number that the report states is needed"),
+    ],
 )
-def test_a_number_of_no_system_or_no_parameter_is_refused(tmp_path: Path, name: str, said: str) -> None:
-    rows = load(tmp_path, f"{name}\tTable 1\twhat\t1\tN\n")
-    with pytest.raises(StudyError, match=said):
-        reported.check_table_1(rows, ROOT / "models", parameter_names(ROOT / "models"))
+def test_the_rows_are_those_that_the_claims_ask_for(tmp_path: Path, old: str, new: str, said: str) -> None:
+    lines = table().splitlines(keepends=True)
+    (hit,) = (i for i, line in enumerate(lines) if old in line)
+    lines[hit] = lines[hit].replace(old, new) if new else ""
+    found = load(tmp_path, "".join(lines))
+    with pytest.raises(StudyError) as caught:
+        reported.check_complete(found, tmp_path / "reported.tsv", SCHEMA)
+    assert said in str(caught.value)
 
 
-def test_table_1_names_systems_and_parameters(stated: reported.Reported) -> None:
-    reported.check_table_1(stated, ROOT / "models", parameter_names(ROOT / "models"))
+def test_every_row_is_asked_for(stated: reported.Reported) -> None:
+    reported.check_complete(stated, ROOT / "config" / "reported.tsv", SCHEMA)
 
 
 def test_numbers_of_a_claim_come_with_units(stated: reported.Reported) -> None:

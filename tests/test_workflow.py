@@ -201,7 +201,7 @@ def test_killed_at_work_and_finished_on_one_core_gives_the_same_bytes(built, tmp
         ("cases.tsv", "\tduffing\treport", "\tdufing\treport", "row 2 (case 'duffing'): there is no system 'dufing'"),
         ("config.yaml", "length: 256", "length: 4096", "segments.length is 4096, longer than the record of 2048"),
         ("cases.tsv", "duffing\tduffing", "claims\tduffing", "'claims' is the name of a rule"),
-        ("reported.tsv", "table_1.duffing.k3\t", "table_1.duffing.c3\t", "'table_1.duffing.c3' stands twice"),
+        ("reported.tsv", "table_1.duffing.k3\t", "table_1.dufing.k3\t", "'table_1.duffing.k3' is near it"),
     ],
 )
 def test_bad_configuration_is_refused_in_one_sentence(built, file, old, new, says):

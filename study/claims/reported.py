@@ -1,11 +1,13 @@
 """What the report states: ``config/reported.tsv``."""
 
-from collections.abc import Collection, Mapping
+import difflib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 from study.errors import StudyError
-from study.schema import read_table
+from study.schema import read_table, read_yaml
 
 MANY = 8  # numbers that still read well in one cell
 
@@ -85,24 +87,44 @@ class Reported:
         return "as tabulated" if len(found) > MANY else ", ".join(found) or "as stated"
 
 
-def check_table_1(reported: Reported, models: Path, names: Collection[str]) -> None:
-    """Whether each number of Table 1 is that of a system that there is, and of a parameter.
+def check_complete(reported: Reported, path: Path, schema: Path) -> None:
+    """Whether the rows are those that the claims ask for, by the two lists of ``schema``.
 
     Raises
     ------
     StudyError
-        At the first that is not, naming it.
+        At the first row that no claim asks for, that lacks its value, or that is not there.
+    """
+    lists = cast(dict[str, list[str]], read_yaml(schema)["statements"])
+    known = [*lists["with_a_value"], *lists["in_words"]]
+    for name in reported.statements:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            raise StudyError(
+                f"{path}: no claim asks for {name!r}"
+                + (f"; {near[0]!r} is near it" if near else f"; a new claim's row is listed in {schema}")
+            )
+    for name in known:
+        if name not in reported.statements:
+            raise StudyError(f"{path} has no row {name!r}, which the claims ask for")
+    for name in lists["with_a_value"]:
+        if reported[name].value is None:
+            raise StudyError(f"{path}: {name!r} has no value; the number that the report states is needed")
+
+
+def check_systems(reported: Reported, models: Path) -> None:
+    """Whether each system of Table 1 has its model.
+
+    Raises
+    ------
+    StudyError
+        At the first that has none, naming it.
     """
     for name in reported.statements:
         where, _, rest = name.partition(".")
         system, _, parameter = rest.partition(".")
-        if where != "table_1" or not parameter:
-            continue
-        if not (models / f"{system}.yaml").is_file():
+        if where == "table_1" and parameter and not (models / f"{system}.yaml").is_file():
             raise StudyError(f"config/reported.tsv: {name!r} names a system that is not in {models.name}/")
-        if parameter not in names:
-            known = ", ".join(sorted(names))
-            raise StudyError(f"config/reported.tsv: {name!r} ends in {parameter!r}, which is no parameter: {known}")
 
 
 def load(path: Path, schema: Path) -> Reported:

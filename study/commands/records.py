@@ -41,6 +41,9 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     reading.add_argument(
         "--accept-saturated", action="store_true", help="take a channel that rests at its extreme for what it is"
     )
+    reading.add_argument(
+        "--accept-swapped", action="store_true", help="take force and response as named, though they seem exchanged"
+    )
     judging = parser.add_argument_group("fitting and judging")
     judging.add_argument("--fit", type=span, metavar="A:B", help="samples to fit, A to B - 1 (default: the first half)")
     judging.add_argument("--judge", type=span, metavar="A:B", help="samples to judge (default: the second half)")
@@ -75,29 +78,23 @@ def read_options(arguments: argparse.Namespace) -> "ReadOptions":
         group=arguments.group,
         period=arguments.period,
         accept_saturated=arguments.accept_saturated,
+        accept_swapped=arguments.accept_swapped,
     )
 
 
 def read_records(arguments: argparse.Namespace) -> list["Record"]:
-    """The records; a suspicion that force and response are swapped goes to stderr.
+    """The records, each with a name of its own.
 
     Raises
     ------
     StudyError
         If one cannot be read.
     """
-    import sys
-
     from study.compare.comparison import distinct
-    from study.readers import read_record, suspect_swapped
+    from study.readers import read_record
 
     options = read_options(arguments)
-    records = distinct([read_record(path, options) for path in arguments.records])
-    for record in records:
-        suspicion = suspect_swapped(record)
-        if suspicion is not None:
-            print(f"study: {suspicion}", file=sys.stderr)
-    return list(records)
+    return list(distinct([read_record(path, options) for path in arguments.records]))
 
 
 def plan_of(arguments: argparse.Namespace, record: "Record") -> "Plan":

@@ -56,7 +56,11 @@ def read_record(path: Path, mapping: ReadOptions | None = None) -> Record:
     options = mapping or ReadOptions()
     if beside(path).is_file():
         options = options.over(read_options(beside(path)))
-    return record_from(path, _table(path, data, options), options)
+    record = record_from(path, _table(path, data, options), options)
+    suspicion = None if options.accept_swapped else suspect_swapped(record)
+    if suspicion is not None:
+        raise StudyError(f"{path}: {suspicion}")
+    return record
 
 
 def _head(path: Path) -> bytes:

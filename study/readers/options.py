@@ -11,7 +11,7 @@ from study.yamltext import as_list, as_mapping, read_plain, shown
 
 BESIDE = ".record.yaml"
 WANTED = "a YAML file with 'columns', 'units', 'fs' or 'dt', 'group', 'samples', 'period'"
-KEYS = ("columns", "units", "dt", "fs", "group", "samples", "period", "accept_saturated")
+KEYS = ("columns", "units", "dt", "fs", "group", "samples", "period", "accept_saturated", "accept_swapped")
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,8 @@ class ReadOptions:
         Samples in one period of a periodic excitation.
     accept_saturated : bool
         Take a channel that rests at its extreme value for what it is (a trapezoidal force, say).
+    accept_swapped : bool
+        Take force and response as they are, though they seem to stand in each other's place.
     """
 
     columns: Mapping[str, str | int] = field(default_factory=dict[str, "str | int"])
@@ -46,6 +48,7 @@ class ReadOptions:
     samples: tuple[int, int | None] | None = None
     period: int | None = None
     accept_saturated: bool = False
+    accept_swapped: bool = False
 
     def __post_init__(self) -> None:
         """Refuse what contradicts itself or no record can have."""
@@ -76,6 +79,7 @@ class ReadOptions:
             samples=self.samples if self.samples is not None else other.samples,
             period=self.period if self.period is not None else other.period,
             accept_saturated=self.accept_saturated or other.accept_saturated,
+            accept_swapped=self.accept_swapped or other.accept_swapped,
         )
 
 
@@ -142,6 +146,7 @@ def _options(value: object) -> ReadOptions:
         samples=_samples(given.get("samples")),
         period=_whole("period", given.get("period")),
         accept_saturated=_flag("accept_saturated", given.get("accept_saturated", False)),
+        accept_swapped=_flag("accept_swapped", given.get("accept_swapped", False)),
     )
 
 

@@ -68,9 +68,10 @@ def suspect_swapped(record: Record) -> str | None:
     if swapped.mass * omega.max() ** 2 < abs(swapped.stiffness):  # a spring alone fits too much
         return None
     return (
-        f"{record.name}: force and {motion} seem to be swapped: read the other way round, their ratio is that of a "
-        f"mass on a spring to within {100.0 * swapped.error:.0f} %, as given it misses by {100.0 * given.error:.0f} % "
-        f"(mass {given.mass:.3g}, damping {given.damping:.3g}); exchange the two columns if that is so"
+        f"force and {motion} seem to be swapped: read the other way round, their ratio is that of a mass on a spring "
+        f"to within {100.0 * swapped.error:.0f} %, as given it misses by {100.0 * given.error:.0f} % (mass "
+        f"{given.mass:.3g}, damping {given.damping:.3g}); --column force=... --column {motion}=... with the names "
+        "exchanged is right (or --accept-swapped, 'accept_swapped: true' beside the file, if the record is like that)"
     )
 
 
