@@ -1,6 +1,6 @@
 """Fitting a system in free run that is chaotic, or from starting values that are far off."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -8,15 +8,17 @@ from numpy.typing import NDArray
 
 from study.errors import DivergenceError
 from study.free_run import prepare
+from study.joining import NEGLIGIBLE, fit_pieces, joined
 from study.model import Model
 from study.output_error import FreeRunFit, fit_free_run
 from study.pieces import Pieces, even_restarts, needed_restarts
 from study.record import MOTIONS, Record
 
 Floats = NDArray[np.float64]
-TIES = (0.3, 1.0, 3.0, 10.0)  # ever tighter, see ``fit_free_run``: each step is small enough to find its way
-TIGHT = 30.0  # tied so, pieces know of each other all that the noise lets them
-TRIALS, FIRMER = 8, 30  # free runs at each step of the way, and in the last two
+LOOSE = 12  # free runs that pieces which know nothing of each other are given at first
+SOFT, TRIALS = (0.3, 1.0, 3.0), 5  # ties that lead coefficients near the truth (see ``fit_free_run``); runs with each
+FIRM, FIRMLY = 30.0, 12  # tied so, pieces know of each other most of what the noise lets them
+TIGHT, TIGHTLY = 100.0, 30  # tied so, they are one motion
 GLANCE = 10  # free runs after which a fit of a whole record that has lost the motion is given up
 POOR = 0.05  # of the response's standard deviation: a residual that may hide a motion
 SMOOTH = 0.5  # correlation of neighbouring samples of a residual; white noise has none
@@ -38,10 +40,10 @@ def fit_in_pieces(
 
     The record is cut into pieces of about a period, each from an initial state of its own: no error grows
     far within them, and the search finds its way from poor starting values. If the fitted system needs no
-    cuts, as most do, the whole record is fitted from there in one free run. Otherwise the pieces are tied
-    to one another ever more tightly, until they are one motion that stays beside the measured one (multiple
-    shooting; H. G. Bock, 1983). That is done twice: the first time poor coefficients bend some pieces into
-    motions of their own; with good ones, held for a while, they begin anew.
+    cuts, as most do, the whole record is fitted from there in one free run. Otherwise neighbours are joined
+    (``study.joining``), and the motion that this yields is tied together at all its pieces until it is one
+    that stays beside the measured one (multiple shooting; H. G. Bock, 1983): joining finds the right valley
+    for the states, ties its floor. Where that fails, pieces begin anew once, with the coefficients found.
 
     Parameters, result and errors are those of :func:`study.output_error.fit_free_run`; ``initial`` of the
     result has one row a piece.
@@ -49,22 +51,25 @@ def fit_in_pieces(
     whole = span or (0, len(record))
     pieces = Pieces(record, response, whole, even_restarts(record, response, whole), steps_per_sample)
     begun = model.with_values(dict(start or {}))
-    loose = _fit(begun, pieces, pieces.first_states(begun), held, 0.0, max_iterations)
+    loose = fit_pieces(begun, pieces, pieces.first_states(begun), held, min(LOOSE, max_iterations))
     states = np.atleast_2d(loose.initial)
     if not needed_restarts(loose.model, record, states, whole, pieces.restarts, steps_per_sample):
         return fit_free_run(
             loose.model, record, held=held, response=response, steps_per_sample=steps_per_sample,
             span=whole, max_iterations=max_iterations,
         )  # fmt: skip
-    near = _tightened(begun, pieces, states, held, TIES)
-    again = _tightened(near.model, pieces, pieces.first_states(near.model), tuple(near.model.values), TIES)
-    firm = _fit(again.model, pieces, again.initial, held, TIES[-1], FIRMER)
-    if not _as_good(firm, loose):
-        return loose
-    tight = _fit(firm.model, pieces, firm.initial, held, TIGHT, FIRMER)
-    # The tighter the ties, the narrower the side valleys in which a search may end; the curvature of one says
-    # nothing of the others. The firm fit's covariance covers what the tight one's values scatter by.
-    return replace(tight, covariance=firm.covariance) if _as_good(tight, loose) else firm
+    if loose.rms < NEGLIGIBLE * float(np.std(record[response][slice(*whole)])):
+        return fit_pieces(loose.model, pieces, states, held, max_iterations)  # ties would believe the integrator more
+    near = fit_pieces(begun, pieces, states, held, TRIALS, SOFT[0])
+    for tie in SOFT[1:]:
+        near = fit_pieces(near.model, pieces, near.initial, held, TRIALS, tie)
+    longer = joined(near, pieces, held)
+    found = _one_motion(longer, pieces, held, loose)
+    if found is not None:
+        return found
+    best = longer if _as_good(longer, loose, np.size(longer.initial)) else loose
+    anew = fit_pieces(best.model, pieces, pieces.first_states(best.model), tuple(best.model.values), TRIALS)
+    return _one_motion(joined(anew, pieces, held), pieces, held, loose) or best
 
 
 def fit_record(
@@ -134,28 +139,22 @@ def _magnifies(found: FreeRunFit, record: Record, response: str, steps: int) -> 
     return bool(needed_restarts(found.model, record, states, whole, restarts, steps))
 
 
-def _tightened(
-    model: Model, pieces: Pieces, states: Floats, held: Collection[str], ties: Sequence[float]
-) -> FreeRunFit:  # fmt: skip
-    """The fit with the last of these ties, by way of the ones before."""
-    found = _fit(model, pieces, states, held, ties[0], TRIALS)
-    for tie in ties[1:]:
-        found = _fit(found.model, pieces, found.initial, held, tie, TRIALS)
-    return found
+def _one_motion(longer: FreeRunFit, pieces: Pieces, held: Collection[str], loose: FreeRunFit) -> FreeRunFit | None:
+    """The fit of pieces tied together, from longer pieces; None if it ends in a side valley."""
+    states = pieces.passing(longer.model, longer.restarts, longer.initial)
+    firm = fit_pieces(longer.model, pieces, states, held, FIRMLY, FIRM)
+    if not _as_good(firm, loose):
+        return None
+    tight = fit_pieces(firm.model, pieces, firm.initial, held, TIGHTLY, TIGHT)
+    # The tighter the ties, the narrower the side valleys in which a search may end; the curvature of one says
+    # nothing of the others. The firm fit's covariance covers what the tight one's values scatter by.
+    return replace(tight, covariance=firm.covariance) if _as_good(tight, loose) else firm
 
 
-def _fit(
-    model: Model, pieces: Pieces, states: Floats, held: Collection[str], tie: float, max_iterations: int
-) -> FreeRunFit:  # fmt: skip
-    return fit_free_run(
-        model, pieces.record, held=held, response=pieces.response, steps_per_sample=pieces.steps_per_sample,
-        span=pieces.span, restarts=pieces.restarts, max_iterations=max_iterations, initial=states, tie=tie,
-    )  # fmt: skip
-
-
-def _as_good(tied: FreeRunFit, loose: FreeRunFit) -> bool:
-    """Whether the misfit of tied pieces is what the loss of their freedom leads one to expect."""
-    given_up = np.size(loose.initial)
-    cost, before = (float(np.sum(fit.residual**2)) for fit in (tied, loose))
-    variance = before / max(len(loose.residual) - len(loose.keys) - given_up, 1)
+def _as_good(found: FreeRunFit, loose: FreeRunFit, left: int = 0) -> bool:
+    """Whether the misfit is what the loss of all free states but those ``left`` leads one to expect."""
+    states = np.size(loose.initial)
+    given_up = states - left
+    cost, before = (float(np.sum(fit.residual**2)) for fit in (found, loose))
+    variance = before / max(len(loose.residual) - len(loose.keys) - states, 1)
     return cost - before < variance * (given_up + DEVIATIONS * np.sqrt(2.0 * given_up))

@@ -130,6 +130,28 @@ class FreeRun:
             self._piece(program, begin, state[i], out[begin:last])
         return out[:, 0], out[:, 1:], state[:-1]
 
+    def passing(self, initial: Mapping[int, Floats]) -> Floats:
+        """State at the first sample of each piece, shape (cuts + 1, states), of a motion in fewer pieces.
+
+        Parameters
+        ----------
+        initial : mapping of arrays, shape (states,)
+            State of the first piece, by the number 0, and of those that begin anew, by theirs.
+
+        Raises
+        ------
+        DivergenceError
+            If the motion leaves the range of finite numbers.
+        """
+        bounds = (0, *self.cuts, self.samples)
+        states, state = np.empty((len(bounds) - 1, len(self.slots) + 1)), np.empty((len(self.slots) + 1, 1))
+        for i, (begin, end) in enumerate(pairwise(bounds)):
+            if i in initial:
+                state[:, 0] = initial[i]
+            states[i] = state[:, 0]
+            self._piece(self.program, begin, state, np.empty((min(end + 1, self.samples) - begin, 1)))
+        return states
+
     def _piece(self, program: Program, first: int, state: Floats, out: Floats) -> None:
         """Response beside its derivatives from one sample on, into ``out``; leaves the state as it is at the end."""
         begin = self.start + first * self.dt

@@ -142,6 +142,18 @@ class Pieces:
         residual = self.record[self.response][slice(*self.span)] - run.respond_by_piece({}, states)[0]
         return np.add.reduceat(residual**2, [0, *(r - self.span[0] for r in self.restarts)])
 
+    def passing(self, model: Model, restarts: Sequence[int], states: Floats) -> Floats:
+        """State at the beginning of each piece of a motion that begins anew at fewer restarts, shape (pieces, states).
+
+        ``states`` are those of its first sample and of its ``restarts``, which are among this span's own.
+        """
+        begins = (self.span[0], *self.restarts)
+        run = prepare(
+            model, self.record, steps_per_sample=self.steps_per_sample, span=self.span, restarts=self.restarts
+        )
+        numbers = [begins.index(r) for r in (self.span[0], *restarts)]
+        return run.passing(dict(zip(numbers, np.atleast_2d(states), strict=True)))
+
     def first_states(self, model: Model) -> Floats:
         """Initial states as the record shows them, smoothed as widely as fits each piece best.
 
