@@ -6,6 +6,7 @@ of the numbers which the simulation yields, not of an idealisation of them.
 """
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
@@ -22,6 +23,7 @@ from study.record import MOTIONS, Record
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+SHARED = 4096  # steps from which on two threads share the pieces; with fewer, starting one takes what it saves
 REMEMBERED = 4  # channels of which the values between the samples are kept
 SIDE = "side of v"  # the input that stands for sgn v while a step lasts
 
@@ -125,9 +127,14 @@ class FreeRun:
         state = np.zeros((len(states), len(self.slots) + 1, out.shape[1]))  # of all pieces: one each would take longer
         state[:, : states.shape[1], 0] = states
         state[:, range(free_states), range(first_free, out.shape[1])] = 1.0
-        for i, (begin, end) in enumerate(pairwise(bounds)):
-            last = min(end + 1, self.samples)  # the next piece writes over the sample at which this one arrives
-            self._piece(program, begin, state[i], out[begin:last])
+        if len(states) == 1 or self.samples * self.steps < SHARED:
+            self._pieces(program, bounds, state, out)
+        else:
+            half = len(states) // 2
+            with ThreadPoolExecutor(1) as beside:
+                other = beside.submit(self._pieces, program, bounds[half:], state[half:], out)
+                self._pieces(program, bounds[: half + 1], state[:half], out)
+                other.result()
         return out[:, 0], out[:, 1:], state[:-1]
 
     def passing(self, initial: Mapping[int, Floats]) -> Floats:
@@ -144,23 +151,23 @@ class FreeRun:
             If the motion leaves the range of finite numbers.
         """
         bounds = (0, *self.cuts, self.samples)
-        states, state = np.empty((len(bounds) - 1, len(self.slots) + 1)), np.empty((len(self.slots) + 1, 1))
-        for i, (begin, end) in enumerate(pairwise(bounds)):
+        states, state = np.empty((len(bounds) - 1, len(self.slots) + 1)), np.empty((1, len(self.slots) + 1, 1))
+        room = np.empty((self.samples, 1))
+        for i, piece in enumerate(pairwise(bounds)):
             if i in initial:
-                state[:, 0] = initial[i]
-            states[i] = state[:, 0]
-            self._piece(self.program, begin, state, np.empty((min(end + 1, self.samples) - begin, 1)))
+                state[0, :, 0] = initial[i]
+            states[i] = state[0, :, 0]
+            self._pieces(self.program, piece, state, room)
         return states
 
-    def _piece(self, program: Program, first: int, state: Floats, out: Floats) -> None:
-        """Response beside its derivatives from one sample on, into ``out``; leaves the state as it is at the end."""
-        begin = self.start + first * self.dt
-        failed = kernels.integrate_variation(
-            program.code, program.first, program.registers, self.slots, self.side,
-            begin, self.dt, self.steps, self.drive[2 * self.steps * first :], state, self.row, out,
+    def _pieces(self, program: Program, bounds: Sequence[int], states: Floats, out: Floats) -> None:
+        """Response beside its derivatives, into ``out``; leaves each piece's state as it is where the next begins."""
+        failed = kernels.integrate_pieces(
+            program.code, program.first, program.registers.copy(), self.slots, self.side, self.start, self.dt,
+            self.steps, self.drive, np.array(bounds), states, self.row, out,
         )  # fmt: skip
         if failed >= 0:
-            time = begin + failed * self.dt
+            time = self.start + failed * self.dt
             raise DivergenceError(f"the free run diverged at t = {time:.4g} s", time)
 
 

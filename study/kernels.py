@@ -416,6 +416,33 @@ def integrate_variation(
 
 
 @compiled
+def integrate_pieces(
+    code: Ints, first: int, r: Floats, slots: Ints, side: int, start: float, dt: float,
+    steps: int, drive: Floats, bounds: Ints, states: Floats, row: int, out: Floats,
+) -> int:  # fmt: skip
+    """:func:`integrate_variation` of one piece after the other, between neighbouring ``bounds``, each from its state.
+
+    A piece runs on to the first sample of the next, which writes over it; the last one leaves that sample to
+    whoever runs the pieces after it.
+    """
+    for i in range(bounds.shape[0] - 1):
+        begin, end = bounds[i], bounds[i + 1]
+        ahead = drive[2 * steps * begin :]
+        if i + 2 < bounds.shape[0]:
+            target = out[begin : end + 1]
+        else:
+            target = np.empty((min(end + 1, out.shape[0]) - begin, out.shape[1]))
+        failed = integrate_variation(
+            code, first, r, slots, side, start + begin * dt, dt, steps, ahead, states[i], row, target
+        )
+        if failed >= 0:
+            return int(begin + failed)
+        if i + 2 == bounds.shape[0]:
+            out[begin:end] = target[: end - begin]
+    return -1
+
+
+@compiled
 def integrate_state(
     code: Ints, first: int, r: Floats, columns: Ints, state: int, output: int, h: float,
     steps: int, data: Floats, out: Floats,
