@@ -1,7 +1,6 @@
-"""How near the width of the report's dead band is found: `python -m benchmarks.width --seeds 40`, two to three minutes.
+"""How near the width of the report's dead band is found: `python -m benchmarks.width --seeds 40`, a minute or two.
 
-The model leaves u_g open; everything else is what a user of ``output_error`` gets. Not part of the tests: one record
-in eight lies beyond 1 %, and which ones, the seeds decide.
+The model leaves u_g open; everything else is what a user of ``output_error`` gets.
 """
 
 import argparse
