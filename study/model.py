@@ -191,6 +191,19 @@ def forward_graph(model: Model, channels: tuple[str, ...] = ()) -> ForwardGraph:
     return ForwardGraph(graph, (acceleration, *rates), (fixed["u"], fixed["v"], *states.values()))
 
 
+def unit_forces(model: Model, channels: tuple[str, ...] = ()) -> tuple[tuple[str, ...], Program]:
+    """Force of each component with a unit coefficient, as a program, and the names of their terms.
+
+    Left out are inertia, and terms with a shape parameter or a state of their own.
+    """
+    graph = Graph()
+    inputs = {n: graph.input(n) for n in ("u", "v", "t", *channels)}
+    terms = [t.term for t in model.terms if not t.term.parameters and t.term.state is None]
+    pairs = [(term.name, c) for term in terms for c in term.components if c.order < 2]
+    outputs = [_unit_force(graph, c, inputs, None) for _, c in pairs]
+    return tuple(name for name, _ in pairs), graph.program(outputs)
+
+
 def _unit_force(graph: Graph, component: Component, names: Mapping[str, int], rate: int | None) -> int:
     """Force of a component with a unit coefficient: its shape, or the shape's derivative by the chain rule."""
     shape = expression.build(graph, component.shape, names)

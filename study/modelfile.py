@@ -26,6 +26,7 @@ from study.errors import StudyError
 from study.files import read_text, replace_file
 from study.graph import Graph
 from study.model import Model, ModelTerm, free
+from study.repeated import repeated_force
 from study.terms import Term
 from study.yamltext import as_list, as_mapping, scalar, shown
 
@@ -172,7 +173,11 @@ def _model(document: object, stem: str) -> Model:
         raise StudyError(f"'terms' is {what}; a list such as [inertia, linear_damping, linear_stiffness] is right")
     if len(entries) > MOST_TERMS:
         raise StudyError(f"'terms' has {len(entries)} entries; at most {MOST_TERMS} are read")
-    return Model(name, tuple(_entry(item, number) for number, item in enumerate(entries, 1)))
+    model = Model(name, tuple(_entry(item, number) for number, item in enumerate(entries, 1)))
+    fault = repeated_force(model)
+    if fault is not None:
+        raise StudyError(fault)
+    return model
 
 
 def _entry(item: object, number: int) -> ModelTerm:

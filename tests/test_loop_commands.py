@@ -48,6 +48,7 @@ def test_diagnose_add_history(rig, capsys):
         (["add", "rig.yaml", "no_such_thing", "--data", "rig.csv"], "there is no term 'no_such_thing'"),
         (["add", "rig.yaml", "linear_damping", "--data", "rig.csv"], "in the model already"),
         (["add", "rig.yaml", "mine", "--force", "__import__('os')", "--data", "rig.csv"], "the expression"),
+        (["add", "rig.yaml", "mine", "--force", "2*v", "--data", "rig.csv"], "no other than that of linear_damping"),
         (["diagnose", "rig.csv", "--model", "rig.yaml", "--candidate", "x"], "NAME=FORMULA"),
         (["diagnose", "rig.csv", "--model", "rig.yaml", "--without", "friction"], "there is no term 'friction'"),
         (["diagnose", "none.csv", "--model", "rig.yaml"], "none.csv"),

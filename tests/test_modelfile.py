@@ -10,13 +10,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from study import files, modelfile
 from study.errors import StudyError
 from study.model import Model, ModelTerm, free
 from study.modelfile import add_term, format_model, parse_model, read_model
+from study.repeated import repeated_force
 from study.simulate import simulate
 from study.terms import LIBRARY, custom, get
 
@@ -336,7 +337,9 @@ def models(draw: st.DrawFn) -> Model:
         parameters = tuple(draw(VALUES if p.signed else POSITIVE) for p in term.parameters)
         entries.append(ModelTerm(term, coefficients, parameters))
     name = draw(st.text(min_size=1, max_size=20).filter(lambda s: s.isprintable() and s.strip()))
-    return Model(name, tuple(entries))
+    model = Model(name, tuple(entries))
+    assume(repeated_force(model) is None)  # no file may hold such a one: tests/test_repeated.py
+    return model
 
 
 @settings(deadline=None)

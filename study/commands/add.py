@@ -2,13 +2,14 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from study.commands.command import Command
 from study.commands.records import add_reading_arguments, out_folder, plan_of, read_records
 
 if TYPE_CHECKING:
     from study.compare.comparison import Comparison
+    from study.model import Model
     from study.terms import Term
 
 QUIET = 2.0  # seconds of work before progress is shown
@@ -36,7 +37,7 @@ def _run(arguments: argparse.Namespace) -> None:
     check_folder(folder)
     term = _term(arguments)
     model = read_model(arguments.model)
-    _refuse_second(arguments.model, model.terms, term.name)
+    _refuse_second(arguments.model, model, term)
     steps = ladder.read(arguments.model)
     records = read_records(arguments)
     pairs: list[tuple[Comparison, Comparison]] = []
@@ -64,11 +65,15 @@ def _term(arguments: argparse.Namespace) -> "Term":
     return terms.get(arguments.term)
 
 
-def _refuse_second(path: Path, entries: Any, name: str) -> None:
+def _refuse_second(path: Path, model: "Model", term: "Term") -> None:
     from study.errors import StudyError
+    from study.repeated import repeated_force
 
-    if any(entry.name == name for entry in entries):
-        raise StudyError(f"{path}: {name} is in the model already; an effect can be added once")
+    if term.name in model:
+        raise StudyError(f"{path}: {term.name} is in the model already; an effect can be added once")
+    fault = repeated_force(model.with_term(term))
+    if fault is not None:
+        raise StudyError(f"{path}: {fault}")
 
 
 COMMAND = Command(

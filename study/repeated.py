@@ -1,0 +1,73 @@
+"""A user's own term that says nothing, or what other terms of the model say already."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study import expression
+from study.model import Model, unit_forces
+from study.terms import LIBRARY
+
+Floats = NDArray[np.float64]
+POINTS, FEWEST = 512, 32  # random motions at which formulas are compared, and how many of them must be finite
+DECADES = 6.0  # their sizes lie so far on either side of one: a record's unit of length is unknown
+NOTHING = 1e-150  # a force below cannot be told from zero
+SAME = 1e-10  # share of a formula that others do not account for: rounding
+TAKES_PART = 1e-6  # share of a formula that another accounts for
+
+
+def repeated_force(model: Model) -> str | None:
+    """A sentence on the first own term that no record could tell from others, or that is zero; None if all are new.
+
+    Among the others are terms whose coefficient is to be estimated: one that is held takes nothing over. Terms
+    with a shape parameter or a memory are not, as what they say depends on their values.
+    """
+    if all(t.name in LIBRARY for t in model.terms):
+        return None
+    names, values = _forces(model)
+    size = np.max(np.abs(values), axis=0)
+    held = {t.name for t in model.terms if None not in t.coefficients}
+    unknown = np.array([name not in held for name in names])
+    for i in (i for i, name in enumerate(names) if name not in LIBRARY):
+        if size[i] < NOTHING:
+            return f"the force of {names[i]!r} is zero at every motion; a formula that changes with u, v or t is right"
+        others = np.flatnonzero(unknown & (size >= NOTHING) & (np.arange(len(names)) != i))
+        shares = _shares(values[:, i], values[:, others]) if unknown[i] else None
+        if shares is not None:
+            parts = dict.fromkeys(names[j] for j, share in zip(others, shares, strict=True) if share > TAKES_PART)
+            return (
+                f"the force of {names[i]!r} is no other than that of {' and '.join(parts)}, which the model has "
+                "already; no record can tell them apart, so leave one of them out"
+            )
+    return None
+
+
+def _forces(model: Model) -> tuple[tuple[str, ...], Floats]:
+    """Names of the terms, and their forces with unit coefficients at random motions, shape (points, components)."""
+    from study import kernels  # compiled code is loaded only where a formula asks for it
+
+    used = {n for t in model.terms if t.name not in LIBRARY for n in expression.names(t.term.components[0].shape)}
+    channels = tuple(sorted(used - {"u", "v", "t"}))
+    names, program = unit_forces(model, channels)
+    rng = np.random.default_rng(1990)
+    shape = (POINTS, 3 + len(channels))
+    data = rng.standard_normal(shape) * 10.0 ** rng.uniform(-DECADES, DECADES, shape)
+    positions = np.array([program.inputs[n] for n in ("u", "v", "t", *channels)], dtype=np.int64)
+    values = np.empty((POINTS, len(names)))
+    kernels.evaluate(program.code, program.first, program.registers.copy(), positions, data, program.outputs, values)
+    finite = np.all(np.isfinite(values), axis=1)
+    return names, values[finite] if np.count_nonzero(finite) >= FEWEST else np.eye(len(names))
+
+
+def _shares(wanted: Floats, others: Floats) -> Floats | None:
+    """Largest share of each other formula in a wanted one; None if they do not make it up.
+
+    Every motion counts alike, whatever its size: u + 1e-9 u^3 is not u.
+    """
+    row = np.maximum(np.abs(wanted), np.max(np.abs(others), axis=1, initial=0.0))
+    row = np.maximum(row, NOTHING)
+    rows, target = others / row[:, None], wanted / row
+    size: Floats = np.max(np.abs(rows), axis=0)
+    found = np.asarray(np.linalg.lstsq(rows / size, target, rcond=1e-12)[0], dtype=np.float64)
+    parts = found * rows / size
+    left = float(np.linalg.norm(target - np.sum(parts, axis=1)))
+    return np.max(np.abs(parts), axis=0) if left < SAME * float(np.linalg.norm(target)) else None
