@@ -294,6 +294,7 @@ OPTIONS: dict[str, tuple[ReadOptions, tuple[str, ...]]] = {
     "samples from beyond the end": (ReadOptions(samples=(90, None)), ("90", "64")),
     "too few samples": (ReadOptions(samples=(10, 12)), ("2 samples", "16")),
     "period too long": (ReadOptions(period=65), ("65", "64")),
+    "period of what does not repeat": (ReadOptions(period=16), ("16 samples later differs by", "repeats")),
     "group of a text": (ReadOptions(group="run"), ("'run'", "leave it out")),
     "nonsense unit": (ReadOptions(units={"force": "bananas"}), ("'bananas'", "N, kN")),
     "unit of nothing": (ReadOptions(units={"velocity": "m/s"}), ("'velocity'", "channels")),

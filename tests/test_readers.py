@@ -328,9 +328,9 @@ def test_yaml_beside_the_file_and_options_over_it(tmp_path: Path) -> None:
     path = tmp_path / "rig.csv"
     path.write_text("V1,V2\n" + rows(",", ".", FORCE, DISPLACEMENT))
     mapping = "columns: {force: V1, displacement: V2}\nunits: {force: V, displacement: V}\n"
-    (tmp_path / "rig.record.yaml").write_text(mapping + "fs: 50\nsamples: [4, 36]\nperiod: 8\n")
+    (tmp_path / "rig.record.yaml").write_text(mapping + "fs: 50\nsamples: [4, 36]\nperiod: 32\n")
     record = read_record(path)
-    assert (len(record), record.dt, record.period, record.start) == (32, 0.02, 8, 0.08)
+    assert (len(record), record.dt, record.period, record.start) == (32, 0.02, 32, 0.08)
     assert record.units["displacement"] == "V"
     np.testing.assert_array_equal(record["force"], FORCE[4:36])
     other = read_record(path, ReadOptions(columns={"force": "V2", "displacement": "V1"}, dt=0.5, units={"force": "mV"}))

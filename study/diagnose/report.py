@@ -18,7 +18,9 @@ def table(found: Diagnosis, force: str, length: str) -> str:
 
     head = ["", "effect", "explains", "error with it", "coefficient", "p", "changes by", "tied with"]
     rows = [_shown(i, row, force, length) for i, row in enumerate(found.candidates[:SHOWN], start=1)]
-    return tabulate(rows, head, tablefmt="simple", disable_numparse=True)
+    shown = tabulate(rows, head, tablefmt="simple", disable_numparse=True)
+    more = len(found.candidates) - SHOWN
+    return f"{shown}\n... and {more} more, in diagnosis.json" if more > 0 else shown
 
 
 def _shown(place: int, row: Ranked, force: str, length: str) -> list[str]:

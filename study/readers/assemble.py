@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from study.errors import StudyError
 from study.readers import checks
@@ -15,7 +16,9 @@ from study.readers.table import Column, Table
 from study.readers.unit_names import ROLES, is_unit, parse_unit, role_unit
 from study.record import MOTIONS, SI_UNITS, Record
 
+Floats = NDArray[np.float64]
 AGREE = 0.01  # share by which a given interval may differ from that of the times
+AGAIN = 0.7  # of its rms: a force that changes by more after a period does not repeat (a random one changes by 1.4)
 
 
 def record_from(path: Path, table: Table, options: ReadOptions) -> Record:
@@ -40,7 +43,8 @@ def record_from(path: Path, table: Table, options: ReadOptions) -> Record:
     dt, start = _sampling(path, kept, units, cut, options, first)
     channels = {role: c.values for role, c in kept.items() if role != "time"}
     named = {role: unit for role, unit in units.items() if role in channels}
-    return Record(dt, channels, {**SI_UNITS, **named}, _name(path, options), start, _period(path, roles, options))
+    period = _period(path, roles, channels["force"], options)
+    return Record(dt, channels, {**SI_UNITS, **named}, _name(path, options), start, period)
 
 
 def _name(path: Path, options: ReadOptions) -> str:
@@ -130,8 +134,16 @@ def _sampling(
     return dt, table.start + dt * first
 
 
-def _period(path: Path, roles: Mapping[str, Column], options: ReadOptions) -> int | None:
+def _period(path: Path, roles: Mapping[str, Column], force: Floats, options: ReadOptions) -> int | None:
     length = len(roles["force"].values)
-    if options.period is not None and options.period > length:
+    if options.period is None:
+        return roles["force"].period
+    if options.period > length:
         raise StudyError(f"{path}: a period of {options.period} samples is given; the record has {length}")
-    return options.period if options.period is not None else roles["force"].period
+    change = checks.change_after(force, options.period)
+    if change > AGAIN:
+        raise StudyError(
+            f"{path}: a period of {options.period} samples is given, and the force {options.period} samples later "
+            f"differs by {100.0 * change:.0f} % of its rms; the number of samples after which it repeats is right"
+        )
+    return options.period

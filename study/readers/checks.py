@@ -32,6 +32,12 @@ def constant(values: Floats) -> str | None:
     return f"is {values[0] + 0.0:g} throughout; a signal that moves is right"
 
 
+def change_after(values: Floats, period: int) -> float:
+    """Rms of the change of a channel after so many samples over its own standard deviation; 0 in a single period."""
+    later, size = values[period:] - values[: len(values) - period], float(np.std(values))
+    return float(np.sqrt(np.mean(later**2))) / size if len(later) and size > 0.0 else 0.0
+
+
 def saturated(values: Floats) -> str | None:
     """A sentence on a channel that rests at its highest or lowest value.
 
