@@ -88,6 +88,9 @@ def complete(record: Record, cutoff: float | None = None) -> CompletedRecord:
     return _derived(record, measured, cutoff, says)
 
 
+_OPERATION = {1: "derivative", 2: "second derivative", -1: "integral", -2: "double integral"}
+
+
 def _derived(record: Record, measured: list[str], cutoff: float | None, says: tuple[str, ...]) -> CompletedRecord:
     """Each missing motion from the nearest measured one, by derivatives if there is a choice."""
     integrates = MOTIONS.index(measured[0]) > 0
@@ -101,8 +104,9 @@ def _derived(record: Record, measured: list[str], cutoff: float | None, says: tu
         source = below[-1] if below else measured[0]
         order = level - MOTIONS.index(source)
         found[name] = derivative(record[source], record.dt, order, low)
-        how = f"derivative {order}" if order > 0 else f"integral {-order}, above {low:.4g} Hz,"
-        sentences.append(f"{name} is {how} of the {source}")
+        sentences.append(
+            f"{name} is the {_OPERATION[order]} of the {source}{f' above {low:.4g} Hz' if order < 0 else ''}"
+        )
     edge = min(int(np.ceil(SETTLED / (low * record.dt))), len(record) // 4) if integrates else NEAR_END
     return CompletedRecord(record.with_channels(found), (low, 0.5 / record.dt), edge, tuple(sentences))
 

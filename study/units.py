@@ -8,6 +8,7 @@ from study import expression
 
 Dimensions = tuple[Fraction, Fraction]  # powers of length and of time
 NONE: Dimensions = (Fraction(0), Fraction(0))
+MASS: Dimensions = (Fraction(1), Fraction(-2))  # of an acceleration: what a mass stands before
 VARIABLES: dict[str, Dimensions] = {
     "u": (Fraction(1), Fraction(0)),
     "v": (Fraction(1), Fraction(-1)),
@@ -83,6 +84,8 @@ def compose(force: str, length: str, powers: Dimensions | None) -> str:
     """
     if powers is None:
         return f"{force} per unit of the formula"
+    if (force, length, powers) == ("N", "m", MASS):
+        return "kg"
     over = [_power(unit, p) for unit, p in ((length, powers[0]), ("s", powers[1])) if p > 0]
     up = [_power(unit, -p) for unit, p in ((length, powers[0]), ("s", powers[1])) if p < 0]
     label = " ".join([force, *up])

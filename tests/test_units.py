@@ -37,7 +37,7 @@ def test_known_names_extend_the_variables() -> None:
 @pytest.mark.parametrize(
     ("powers", "unit"),
     [
-        ((0, 0), "N"), ((1, 0), "N/m"), ((3, -1), "N s/m^3"), ((2, -2), "N s^2/m^2"), ((0, 1), "N/s"),
+        ((0, 0), "N"), ((1, 0), "N/m"), ((3, -1), "N s/m^3"), ((2, -2), "N s^2/m^2"), ((1, -2), "kg"), ((0, 1), "N/s"),
         ((1, 1), "N/(m s)"),
         ((-1, 0), "N m"), ((0, -1), "N s"),
     ],
