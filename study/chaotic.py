@@ -7,12 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.errors import DivergenceError
-from study.free_run import prepare
 from study.joining import NEGLIGIBLE, fit_pieces, joined
 from study.model import Model
 from study.output_error import FreeRunFit, fit_free_run
 from study.pieces import Pieces, even_restarts, needed_restarts
-from study.record import MOTIONS, Record
+from study.record import Record
 
 Floats = NDArray[np.float64]
 LOOSE = 12  # free runs that pieces which know nothing of each other are given at first
@@ -84,11 +83,11 @@ def fit_record(
 ) -> FreeRunFit:
     """Fit a model to a whole record: in one free run where that holds, in pieces where it does not.
 
-    One free run is believed if the fit converges, leaves no part of the motion (a residual that is large and
-    smooth), and the fitted system does not magnify a disturbance tenfold anywhere on its way
-    (``study.pieces.needed_restarts``, from the exact sensitivities). A system that does loses the record
-    however true the model, and its sum of squares is full of side valleys; in pieces it takes half the steps,
-    which are many enough for their length. Parameters and result are those of
+    The first runs take half the steps, which costs half as much and leads as near. One free run is believed if
+    the fit converges, leaves no part of the motion (a residual that is large and smooth), and the fitted system
+    does not magnify a disturbance tenfold anywhere on its way (``study.pieces.needed_restarts``, from the exact
+    sensitivities). A system that does loses the record however true the model, and its sum of squares is full of
+    side valleys; half the steps are many enough for pieces of it. Parameters and result are those of
     :func:`study.output_error.fit_free_run`.
 
     Raises
@@ -98,26 +97,26 @@ def fit_record(
     StudyError
         As :func:`study.output_error.fit_free_run`.
     """
+    coarse = max(steps_per_sample // 2, 1)
     try:
-        found = fit_free_run(
-            model, record, start=start, held=held, response=response, steps_per_sample=steps_per_sample,
+        near = fit_free_run(
+            model, record, start=start, held=held, response=response, steps_per_sample=coarse,
             max_iterations=min(GLANCE, max_iterations),
         )  # fmt: skip
-        if not found.converged and max_iterations > GLANCE and not _astray(found, record[response]):
+        if not _astray(near, record[response]):
             found = fit_free_run(
-                found.model, record, held=held, response=response, steps_per_sample=steps_per_sample,
-                max_iterations=max_iterations - GLANCE, initial=found.initial,
+                near.model, record, held=held, response=response, steps_per_sample=steps_per_sample,
+                max_iterations=max_iterations, initial=near.initial,
             )  # fmt: skip
-        if found.converged and not (
-            _astray(found, record[response]) or _magnifies(found, record, response, steps_per_sample)
-        ):
-            return found
+            if found.converged and not (
+                _astray(found, record[response]) or _magnifies(found, record, response, steps_per_sample)
+            ):
+                return found
     except DivergenceError:
         pass
     return fit_in_pieces(
-        model, record, start=start, held=held, response=response, steps_per_sample=max(steps_per_sample // 2, 1),
-        max_iterations=max_iterations,
-    )  # fmt: skip
+        model, record, start=start, held=held, response=response, steps_per_sample=coarse, max_iterations=max_iterations
+    )
 
 
 def _astray(found: FreeRunFit, measured: Floats) -> bool:
@@ -131,12 +130,9 @@ def _astray(found: FreeRunFit, measured: Floats) -> bool:
 def _magnifies(found: FreeRunFit, record: Record, response: str, steps: int) -> bool:
     """Whether disturbances of a fitted free run grow, as those of a chaotic one do."""
     whole = (0, len(record))
-    restarts = even_restarts(record, response, whole)
-    states = np.zeros((len(restarts) + 1, len(found.initial)))
-    for i, motion in enumerate(MOTIONS[:2]):
-        run = prepare(found.model, record, response=motion, steps_per_sample=steps)
-        states[:, i] = run.respond({}, found.initial)[0][[0, *restarts]]
-    return bool(needed_restarts(found.model, record, states, whole, restarts, steps))
+    pieces = Pieces(record, response, whole, even_restarts(record, response, whole), steps)
+    states = pieces.passing(found.model, (), found.initial)
+    return bool(needed_restarts(found.model, record, states, whole, pieces.restarts, steps))
 
 
 def _one_motion(longer: FreeRunFit, pieces: Pieces, held: Collection[str], loose: FreeRunFit) -> FreeRunFit | None:
