@@ -15,7 +15,7 @@ from study.record import Record
 
 Floats = NDArray[np.float64]
 LOOSE = 12  # free runs that pieces which know nothing of each other are given at first
-SOFT, TRIALS = (0.3, 1.0, 3.0), 5  # ties that lead coefficients near the truth (see ``fit_free_run``); runs with each
+SOFT, SOFTLY = (0.3, 1.0, 3.0), 5  # ties that lead coefficients near the truth (see ``fit_free_run``); runs with each
 FIRM, FIRMLY = 30.0, 12  # tied so, pieces know of each other most of what the noise lets them
 TIGHT, TIGHTLY = 100.0, 30  # tied so, they are one motion
 GLANCE = 10  # free runs after which a fit of a whole record that has lost the motion is given up
@@ -59,15 +59,15 @@ def fit_in_pieces(
         )  # fmt: skip
     if loose.rms < NEGLIGIBLE * float(np.std(record[response][slice(*whole)])):
         return fit_pieces(loose.model, pieces, states, held, max_iterations)  # ties would believe the integrator more
-    near = fit_pieces(begun, pieces, states, held, TRIALS, SOFT[0])
+    near = fit_pieces(begun, pieces, states, held, SOFTLY, SOFT[0])
     for tie in SOFT[1:]:
-        near = fit_pieces(near.model, pieces, near.initial, held, TRIALS, tie)
+        near = fit_pieces(near.model, pieces, near.initial, held, SOFTLY, tie)
     longer = joined(near, pieces, held)
     found = _one_motion(longer, pieces, held, loose)
     if found is not None:
         return found
     best = longer if _as_good(longer, loose, np.size(longer.initial)) else loose
-    anew = fit_pieces(best.model, pieces, pieces.first_states(best.model), tuple(best.model.values), TRIALS)
+    anew = fit_pieces(best.model, pieces, pieces.first_states(best.model), tuple(best.model.values), SOFTLY)
     return _one_motion(joined(anew, pieces, held), pieces, held, loose) or best
 
 

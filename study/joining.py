@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from study.errors import DivergenceError
 from study.model import Model
 from study.output_error import FreeRunFit, fit_free_run
 from study.pieces import Pieces
@@ -44,7 +45,10 @@ def joined(found: FreeRunFit, pieces: Pieces, held: Collection[str]) -> FreeRunF
         Keys that keep their value.
     """
     for _ in range(DOUBLINGS):
-        longer = _pairs_joined(found, pieces, held)
+        try:
+            longer = _pairs_joined(found, pieces, held)
+        except DivergenceError:  # a wrong model may bear short pieces alone
+            return found
         if len(longer.restarts) == len(found.restarts):
             return longer
         found = longer

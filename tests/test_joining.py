@@ -80,6 +80,16 @@ def test_what_is_no_one_motion_is_left_apart(chaotic):
     assert struck in joined(loose, pieces, tuple(model.values)).restarts
 
 
+def test_pieces_stay_as_they_are_where_longer_ones_run_away(systems, records):
+    """A softening spring which loses its hold within a second; pieces of a fifth of one are over before."""
+    model = systems["duffing"].with_values({"k3": -1e7})
+    pieces = in_pieces(records["duffing"].part(0, 2048), range(10, 2048, 10))
+    loose = fit_pieces(model, pieces, pieces.first_states(model), tuple(model.values), 3)
+    left = joined(loose, pieces, tuple(model.values))
+    assert np.all(np.isfinite(left.residual))
+    assert left.restarts
+
+
 def test_a_clean_record_needs_no_ties(systems, records):
     model, record = systems["dead_band"], records["dead_band"].part(0, 4096)
     start = {"dead_band.u_g": 0.00275}
