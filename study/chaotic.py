@@ -67,8 +67,11 @@ def fit_in_pieces(
     if found is not None:
         return found
     best = longer if _as_good(longer, loose, np.size(longer.initial)) else loose
-    anew = fit_pieces(best.model, pieces, pieces.first_states(best.model), tuple(best.model.values), SOFTLY)
-    return _one_motion(joined(anew, pieces, held), pieces, held, loose) or best
+    try:
+        anew = fit_pieces(best.model, pieces, pieces.first_states(best.model), tuple(best.model.values), SOFTLY)
+        return _one_motion(joined(anew, pieces, held), pieces, held, loose) or best
+    except DivergenceError:  # a wrong model may bear the states of the fit alone
+        return best
 
 
 def fit_record(
