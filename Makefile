@@ -15,8 +15,9 @@ report: study
 test: $(READY)
 	$(MAKE) --no-print-directory -j2 lint checks
 
+# As many workers as cores: more threads would only wait for each other.
 checks: $(READY)
-	$(BIN)/pytest -n logical --dist loadfile --no-loadscope-reorder -p no:benchmark
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n logical --dist loadfile --no-loadscope-reorder -p no:benchmark
 
 lint: $(READY)
 	$(BIN)/ruff check

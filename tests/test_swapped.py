@@ -102,11 +102,11 @@ def test_the_user_may_insist(tmp_path: Path) -> None:
 
 
 def test_hidden_effects_do_not_look_swapped() -> None:
-    """Over 400 other trials none was suspected, and 95 % of the swapped ones were."""
+    """Over 400 other trials none was suspected, and 95 % of the swapped ones were (docs/tool.md)."""
     caught = 0
-    for seed in range(8):
-        record = trials.make_trial(seed, hidden=[trials.HIDDEN[2 * seed]]).record
+    for seed in range(4):
+        record = trials.make_trial(seed, hidden=[trials.HIDDEN[4 * seed]]).record
         motion = next(m for m in MOTIONS if m in record)
         assert suspect_swapped(record) is None
         caught += suspect_swapped(Record(record.dt, {"force": record[motion], motion: record["force"]})) is not None
-    assert caught >= 6
+    assert caught >= 3
