@@ -57,7 +57,7 @@ def fit_in_pieces(
             loose.model, record, held=held, response=response, steps_per_sample=steps_per_sample,
             span=whole, max_iterations=max_iterations,
         )  # fmt: skip
-    if loose.rms < NEGLIGIBLE * float(np.std(record[response][slice(*whole)])):
+    if loose.rms < NEGLIGIBLE * pieces.spread:
         return fit_pieces(loose.model, pieces, states, held, max_iterations)  # ties would believe the integrator more
     near = fit_pieces(begun, pieces, states, held, SOFTLY, SOFT[0])
     for tie in SOFT[1:]:

@@ -77,7 +77,7 @@ def _restarted(pieces: Pieces, begins: NDArray[np.int64]) -> Pieces:
 def _variance(found: FreeRunFit, pieces: Pieces) -> float:
     """Of the noise, from the middle of the squares: pieces in a side valley count little."""
     middle = float(np.median(found.residual**2)) / _quantile(1, 0.5)
-    return max(middle, (NEGLIGIBLE * float(np.std(pieces.record[pieces.response][slice(*pieces.span)]))) ** 2)
+    return max(middle, (NEGLIGIBLE * pieces.spread) ** 2)
 
 
 def _quantile(freedom: int, chance: float) -> float:

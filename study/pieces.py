@@ -133,6 +133,11 @@ class Pieces:
     restarts: tuple[int, ...]
     steps_per_sample: int
 
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the measured response within the span."""
+        return float(np.std(self.record[self.response][slice(*self.span)]))
+
     def misfits(self, model: Model, states: Floats) -> Floats:
         """Sum of squares of the residual of each piece, shape (pieces,)."""
         run = prepare(
