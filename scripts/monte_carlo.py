@@ -17,7 +17,7 @@ JUDGED = {"rates": ensemble.rates, "errors": estimator_errors.errors}
 
 def main(
     models: Sequence[str], records: Sequence[Mapping[str, Any]], identifications: Sequence[Mapping[str, Any]],
-    seeds: range, judged: str, output: str,
+    seeds: range, judged: str, kept: Sequence[str], output: str,
 ) -> None:  # fmt: skip
     def found(model: str, record: Mapping[str, Any], identification: Mapping[str, Any]) -> pd.DataFrame:
         def progress(done: int) -> None:
@@ -29,7 +29,10 @@ def main(
 
     judge = JUDGED[judged]
     parts = [judge(found(*told)) for told in zip(models, records, identifications, strict=True)]
-    tables.write_csv(pd.concat(parts, ignore_index=True), Path(output))
+    table = pd.concat(parts, ignore_index=True)
+    for path in kept:
+        table = estimator_errors.with_more_seeds(table, pd.read_csv(path), path)
+    tables.write_csv(table, Path(output))
 
 
 if "snakemake" in globals():
@@ -38,5 +41,5 @@ if "snakemake" in globals():
         main(
             step.input.models, step.params.records, step.params.identifications,
             range(step.params.first_seed, step.params.first_seed + step.params.seeds), step.params.judged,
-            step.output.table,
+            step.input.get("kept", ()), step.output.table,
         )  # fmt: skip

@@ -12,8 +12,11 @@ Floats = NDArray[np.float64]
 BASIS = "miso"  # the report's estimator: gains are over its errors
 COLUMNS = [
     "case", "estimator", "parameter", "true", "kind", "median_error", "standard_error", "gain",
-    "bias", "bias_error", "scatter", "seeds", "found", "noted",
+    "bias", "bias_error", "scatter", "seeds", "found", "noted", "first_error", "source",
 ]  # fmt: skip
+FIRST = 2  # seeds whose median stands apart: by it a later run shows that it gives the same errors
+ALIKE = 0.01  # of a median error: further apart, two runs are not the same
+OWN = "this run"
 
 
 def errors(estimates: pd.DataFrame) -> pd.DataFrame:
@@ -32,12 +35,13 @@ def errors(estimates: pd.DataFrame) -> pd.DataFrame:
         that gives no estimate is farther off than any other. ``standard_error`` is that of the median, whatever
         the distribution. ``gain`` is the median error of MI/SO over this one. ``bias`` and ``scatter`` are
         mean and standard deviation of the signed error. ``found`` of ``seeds`` give an estimate, ``noted`` of
-        them with a note, such as that the search did not converge.
+        them with a note, such as that the search did not converge. ``first_error`` is the median over the
+        first ``FIRST`` seeds alone, ``source`` where the other numbers come from.
     """
-    seeds = {str(case): int(group["seed"].nunique()) for case, group in estimates.groupby("case")}
+    seeds = {str(case): sorted(group["seed"].unique()) for case, group in estimates.groupby("case")}
     rows: list[dict[str, Any]] = []
     for (case, estimator, parameter), group in estimates.groupby(["case", "estimator", "parameter"], sort=False):
-        count, true = seeds[str(case)], float(group["true"].iloc[0])
+        first, count, true = seeds[str(case)][:FIRST], len(seeds[str(case)]), float(group["true"].iloc[0])
         signed = (group["estimate"].to_numpy(dtype=np.float64) - true) / (abs(true) or 1.0)
         median, error = middle(np.abs(signed), count)
         scatter = float(np.std(signed, ddof=1)) if len(signed) > 1 else math.nan
@@ -56,9 +60,41 @@ def errors(estimates: pd.DataFrame) -> pd.DataFrame:
                 "seeds": count,
                 "found": len(group),
                 "noted": int(group["note"].astype(bool).sum()),
+                "first_error": middle(np.abs(signed[group["seed"].isin(first)]), len(first))[0],
+                "source": OWN,
             }
         )
     return with_gains(pd.DataFrame(rows, columns=COLUMNS))
+
+
+def with_more_seeds(own: pd.DataFrame, kept: pd.DataFrame, source: str) -> pd.DataFrame:
+    """The errors of a run, and in place of its few seeds a kept table's many, where the two are of the same study.
+
+    A case's rows give way if the kept table has each of them over more seeds, and its first seeds came out the
+    same, to ``ALIKE`` in every parameter of every estimator: other settings and other code would show there.
+
+    Parameters
+    ----------
+    own, kept : DataFrame
+        As :func:`errors` gives them.
+    source : str
+        Where ``kept`` lies, for the column of that name.
+
+    Returns
+    -------
+    DataFrame
+        The rows of ``own``, in its order; ``first_error`` is always that of ``own``.
+    """
+    keys = ["case", "estimator", "parameter"]
+    many = kept.set_index(keys).reindex(pd.MultiIndex.from_frame(own[keys])).reset_index()[COLUMNS]
+    same = (
+        (many["seeds"].to_numpy() > own["seeds"].to_numpy())
+        & np.isclose(many["true"], own["true"], rtol=1e-9, atol=0.0)
+        & np.isclose(many["first_error"], own["first_error"], rtol=ALIKE, atol=0.0)
+    )
+    whole = pd.Series(same, index=own.index).groupby(own["case"]).transform("all")
+    many = many.set_axis(own.index).assign(first_error=own["first_error"], source=source)
+    return pd.concat([own[~whole], many[whole]]).sort_index().astype(own.dtypes.to_dict())
 
 
 def middle(sizes: Floats, count: int) -> tuple[float, float]:
