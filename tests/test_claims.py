@@ -77,6 +77,9 @@ def test_a_claim_that_fails_says_what_and_why() -> None:
     claim = verdict.conclude(one_statement(), "a", MET, MISSED, because="of this")
     assert claim.verdict == "partly"
     assert claim.why == "x 1, where the criterion is x above 2: of this"
+    others = [verdict.Condition("c", f"m {i}", False, f"r {i}") for i in (1, 1, 2, 3)]
+    assert verdict.conclude(one_statement(), "a", *others, because="of this").why == "r 1 (2 more like it): of this"
+    assert verdict.conclude(one_statement(), "a", *others).why == "r 1; r 2; r 3"
 
 
 def test_together_is_met_only_as_a_whole() -> None:

@@ -62,8 +62,7 @@ def conclude(reported: Reported, name: str, *conditions: Condition, because: str
     """
     statement = reported[name]
     conditions = tuple(sorted(conditions, key=lambda c: c.met))  # what fails decides, and stands first
-    failed = [reason(c) for c in conditions if not c.met]
-    reasons = [_joined(failed) + (f": {because}" if because else "")] if failed else []
+    failed = list(dict.fromkeys(reason(c) for c in conditions if not c.met))
     return Claim(
         id=name,
         where=statement.where,
@@ -72,8 +71,16 @@ def conclude(reported: Reported, name: str, *conditions: Condition, because: str
         measured=_joined([c.measured for c in conditions]),
         criterion=_joined([c.criterion for c in conditions]),
         verdict=verdict([c.met for c in conditions]),
-        why=_joined(reasons),
+        why=_sentence(failed, because) if failed else "",
     )
+
+
+def _sentence(failed: list[str], because: str) -> str:
+    """Why a claim fails; of many conditions with one reason the first, as all of them stand under ``measured``."""
+    if not because:
+        return _joined(failed)
+    more = len(failed) - 1
+    return f"{failed[0]}{f' ({more} more like it)' if more else ''}: {because}"
 
 
 def reason(condition: Condition) -> str:
