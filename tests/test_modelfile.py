@@ -3,8 +3,6 @@
 import errno
 import math
 import os
-import resource
-import stat
 import time
 from pathlib import Path
 
@@ -13,9 +11,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from study import files, modelfile
 from study.errors import StudyError
-from study.model import Model, ModelTerm, free
+from study.model import Model, ModelTerm
 from study.modelfile import add_term, format_model, parse_model, read_model
 from study.repeated import repeated_force
 from study.simulate import simulate
@@ -353,170 +350,3 @@ def test_numpy_numbers_are_written_as_numbers() -> None:
     assert "value: 1.5}" in format_model(model)
     with pytest.raises(StudyError, match="m of inertia is nan"):
         format_model(Model("rig", (ModelTerm(get("inertia"), (math.nan,), ()),)))
-
-
-# Adding a term leaves the rest as the user wrote it.
-
-LAYOUTS = {
-    "block": "# rig\nname: 'rig'  # quoted\nterms:\n  - inertia  # free\n  - {term: linear_stiffness, value: 3.5e2}\n",
-    "indentless": "terms:\n- inertia\n- linear_damping\nname: rig\n",
-    "comments_behind": "terms:\n  - inertia # last\n\n  # tried: coulomb_friction\n\n# the end\nname: rig\n",
-    "mapping_last": "terms:\n  - term: linear_stiffness\n    value: 355.3 # N/m\n    # a note\nname: rig\n",
-    "values_last": "terms:\n  - term: harmonic_force\n    values:\n      fh_cos: 1\n      fh_sin: 2\nname: rig\n",
-    "no_newline": "name: rig\nterms:\n  - inertia",
-    "no_newline_comment": "name: rig\nterms:\n  - inertia # c",
-    "flow": "name: rig\nterms: [inertia, 'linear_damping' ]  # short\n",
-    "flow_lines": "name: rig\nterms: [\n  inertia,   # mass\n  {term: linear_damping, value: 1},  # damper\n]\n",
-    "flow_document": "{name: rig, terms: [inertia]}\n",
-    "carriage_returns": "name: rig\r\nterms:\r\n  - inertia\r\n  - linear_damping # c\r\n# end\r\n",
-    "quoted": 'name: rig\nterms:\n  - "inertia"\n  - {term: own, force: "u*\\\n      v"}\n',
-    "folded": "name: rig\nterms:\n  - inertia\n  - term: own\n    force: >-\n      u*abs(u)\n      + v\n\n# end\n",
-    "literal_at_end": "name: rig\nterms:\n  - inertia\n  - term: own\n    force: |\n      u*abs(u)\n",
-    "byte_order_mark": "\ufeffname: rig\nterms:\n  - inertia\n",
-    "document_marks": "---\nname: rig\nterms:\n  - inertia\n...\n",
-    "multi_line_plain": "name: rig\nterms:\n  - term: own\n    force: u*v\n      + u\n# end\n",
-    "compact": "terms: [inertia]",
-    "key_in_name": "name: terms\nterms:\n    -   inertia\n",
-    "not_ascii": "name: Prüfstand № 7 🛠\nterms:\n  - inertia  # Masse\n",
-}
-
-
-@pytest.mark.parametrize("layout", LAYOUTS)
-@pytest.mark.parametrize(
-    "entry",
-    [
-        free(get("quadratic_damping")),
-        ModelTerm(get("one_sided_contact"), (1.25e25,), (-1e-7,)),
-        ModelTerm(get("periodic_stiffness"), (None, 3.0), (2.0,)),
-        free(custom("null", "max(u, 0)*temperature")),
-    ],
-    ids=lambda e: e.name,
-)
-def test_adding_keeps_every_byte(layout: str, entry: ModelTerm, tmp_path: Path) -> None:
-    path = tmp_path / "rig.yaml"
-    old = LAYOUTS[layout].encode()
-    path.write_bytes(old)
-    before = read_model(path)
-    after = add_term(path, entry)
-    assert after == read_model(path) == before.with_term(entry)
-    new = path.read_bytes()
-    start = next((i for i, (a, b) in enumerate(zip(old, new, strict=False)) if a != b), len(old))
-    assert new[: start + len(new) - len(old)] + old[start:] == new  # one stretch was put in, nothing else changed
-    assert b"\r\n" not in old or new.count(b"\n") == new.count(b"\r\n")
-
-
-def test_adding_reads_like_what_the_user_would_write(tmp_path: Path) -> None:
-    path = tmp_path / "rig.yaml"
-    path.write_text(LAYOUTS["block"])
-    add_term(path, get("quadratic_damping"))
-    add_term(path, ModelTerm(get("dead_band"), (None,), (0.0025,)))
-    assert path.read_text() == LAYOUTS["block"] + "  - quadratic_damping\n  - {term: dead_band, u_g: 0.0025}\n"
-    path.write_bytes(LAYOUTS["carriage_returns"].encode())
-    add_term(path, get("cubic_stiffness"))
-    assert path.read_bytes().endswith(b"  - linear_damping # c\r\n  - cubic_stiffness\r\n# end\r\n")
-
-
-def test_adding_twice_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "rig.yaml"
-    path.write_text("terms: [inertia]\n")
-    with pytest.raises(StudyError, match="'inertia' is already in this model"):
-        add_term(path, get("inertia"))
-    assert path.read_text() == "terms: [inertia]\n"
-
-
-def test_a_layout_without_a_clear_place_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "rig.yaml"
-    path.write_text("terms: [inertia]\n")
-    monkeypatch.setattr(modelfile.yamltext, "with_entry", lambda text, *_: f"{text}!")
-    with pytest.raises(StudyError, match="add '- cubic_stiffness' to 'terms' by hand"):
-        add_term(path, get("cubic_stiffness"))
-    assert path.read_text() == "terms: [inertia]\n"
-
-
-# Writing is one step.
-
-
-@pytest.mark.parametrize("mode", [0o600, 0o640, 0o664, 0o755])
-def test_permission_bits_stay(mode: int, tmp_path: Path) -> None:
-    path = tmp_path / "rig.yaml"
-    path.write_text("terms: [inertia]\n")
-    path.chmod(mode)
-    add_term(path, get("cubic_stiffness"))
-    assert stat.S_IMODE(path.stat().st_mode) == mode
-
-
-def test_a_link_stays_a_link(tmp_path: Path) -> None:
-    (tmp_path / "real.yaml").write_text("terms: [inertia]\n")
-    (tmp_path / "rig.yaml").symlink_to("real.yaml")
-    add_term(tmp_path / "rig.yaml", get("cubic_stiffness"))
-    assert (tmp_path / "rig.yaml").is_symlink()
-    assert "cubic_stiffness" in read_model(tmp_path / "real.yaml")
-
-
-def test_a_new_file_has_the_users_permissions(tmp_path: Path) -> None:
-    old = os.umask(0o027)
-    try:
-        files.replace_file(tmp_path / "new.yaml", b"x")
-    finally:
-        os.umask(old)
-    assert stat.S_IMODE((tmp_path / "new.yaml").stat().st_mode) == 0o640
-
-
-def test_no_space_left_keeps_the_old_file(tmp_path: Path) -> None:
-    """The kernel refuses the write half way, as on a full disk: here by the limit on the size of a file."""
-    path = tmp_path / "rig.yaml"
-    old = b"# " + b"x" * 5000 + b"\nterms: [inertia]\n"
-    path.write_bytes(old)
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
-    try:
-        with pytest.raises(StudyError, match=r"rig\.yaml: cannot be written .* and is as it was"):
-            add_term(path, get("cubic_stiffness"))
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    assert path.read_bytes() == old
-    assert list(tmp_path.iterdir()) == [path]
-
-
-@pytest.mark.parametrize("step", ["fsync", "replace"])
-def test_a_failure_at_any_step_keeps_the_old_file(step: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "rig.yaml"
-    path.write_text("terms: [inertia]\n")
-
-    def fail(*_: object) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(*((os, "fsync") if step == "fsync" else (Path, "replace")), fail)
-    with pytest.raises(StudyError, match="No space left on device"):
-        add_term(path, get("cubic_stiffness"))
-    assert path.read_text() == "terms: [inertia]\n"
-    assert list(tmp_path.iterdir()) == [path]
-
-
-def test_an_interrupt_leaves_nothing_behind(tmp_path: Path) -> None:
-    path = tmp_path / "rig.yaml"
-    path.write_text("old")
-
-    def interrupted() -> None:
-        with files.replacing(path) as beside:
-            beside.write_text("half")
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        interrupted()
-    assert path.read_text() == "old"
-    assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_write_protected_file_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "rig.yaml"
-    path.write_text("terms: [inertia]\n")
-    monkeypatch.setattr(os, "access", lambda *_: False)  # as for anybody but root
-    with pytest.raises(StudyError, match="write-protected"):
-        add_term(path, get("cubic_stiffness"))
-    assert path.read_text() == "terms: [inertia]\n"
-
-
-def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(StudyError, match="No such file or directory"):
-        files.replace_file(tmp_path / "none" / "rig.yaml", b"x")
