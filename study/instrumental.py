@@ -31,11 +31,13 @@ NODES = 15  # of the Gauss-Hermite rule: exact for shapes up to the power 29, cl
 NOISY = {"u": "displacement", "v": "velocity"}  # what a formula calls the channels that carry noise
 TINY = float(np.finfo(np.float64).tiny)
 _pinv = cast(Any, np.linalg.pinv)  # its annotation leaves the element type open
+STRETCHES = 16  # of the record, that the errors of coefficients are judged by, ...
+FEWEST, SPAN = 8, 1  # ... how many are enough, and how many segments long each is at least
 FAINT = 1e-8  # noise below this share of a channel's mean square is the rounding of the free run
 
 
-def cross_spectra(inputs: Sequence[Input], record: Record, clean: Record, segments: Segments) -> SpectralMatrix:
-    """Spectral matrix of q instruments, then q corrected inputs, then the force.
+def channels(inputs: Sequence[Input], record: Record, clean: Record) -> list[Floats]:
+    """q instruments, then q corrected inputs, then the force.
 
     Parameters
     ----------
@@ -45,13 +47,18 @@ def cross_spectra(inputs: Sequence[Input], record: Record, clean: Record, segmen
         As measured.
     clean : Record
         The same, its displacement and velocity those of the fitted model in free run.
-    segments : Segments
-        How both are cut.
     """
     instruments = [history(item, clean) for item in inputs]
-    return spectra.cross_spectra(
-        [*instruments, *corrected(inputs, record, clean), record["force"]], record.dt, segments
-    )
+    return [*instruments, *corrected(inputs, record, clean), record["force"]]
+
+
+def stretches(values: Sequence[Floats], dt: float, segments: Segments) -> list[SpectralMatrix]:
+    """Spectral matrices of stretches of the record, which have nothing in common; none if it is too short for them."""
+    count = min(STRETCHES, len(values[0]) // (SPAN * segments.length))
+    if count < FEWEST:
+        return []
+    length = len(values[0]) // count
+    return [spectra.cross_spectra([v[i * length :][:length] for v in values], dt, segments) for i in range(count)]
 
 
 def responses(matrix: SpectralMatrix) -> Responses:
@@ -60,7 +67,7 @@ def responses(matrix: SpectralMatrix) -> Responses:
     Parameters
     ----------
     matrix : SpectralMatrix
-        As :func:`cross_spectra` gives it.
+        Of :func:`channels`.
     """
     density, count = matrix.density, matrix.density.shape[1] // 2
     scale = np.sqrt(np.maximum(np.einsum("fii->fi", density).real, TINY))
@@ -75,23 +82,35 @@ def responses(matrix: SpectralMatrix) -> Responses:
     return Responses(matrix.frequency, response, covariance, noise)
 
 
-def fit(matrix: SpectralMatrix, inputs: Sequence[Input], band: tuple[float, float], known: Complexes) -> Estimate:
+def fit(
+    matrix: SpectralMatrix,
+    inputs: Sequence[Input],
+    band: tuple[float, float],
+    known: Complexes,
+    parts: Sequence[SpectralMatrix] = (),
+) -> Estimate:
     """Coefficients of all inputs from all lines of a band at once.
 
     With ``Psi`` the instruments and ``Phi`` the inputs, each times its powers of ``j 2 pi f``, the
     coefficients solve ``Re sum Psi^H Phi / G_ee theta = Re sum Psi^H F / G_ee``. Fitting A_j(f) line by line
     would weigh lines by errors that are estimated with them, which biases under much noise.
 
+    What noise leaves of a corrected cube is that noise times u^2, which is loud where the motion is large. Errors
+    are therefore judged by the scatter between stretches of the record; by G_ee, as if it were stationary, where the
+    record is too short for that.
+
     Parameters
     ----------
     matrix : SpectralMatrix
-        As :func:`cross_spectra` gives it.
+        Of :func:`channels`.
     inputs : sequence of Input
         What each A_j is made of.
     band : pair of float
         Lines from the first to the second frequency (Hz) are used.
     known : complex array, shape (q, lines)
         A_j(f) of the fitted model: what it leaves of the force, G_ee, weighs the lines.
+    parts : sequence of SpectralMatrix
+        As :func:`stretches` gives them.
     """
     keep = (matrix.frequency >= band[0]) & (matrix.frequency <= band[1])
     density, count = matrix.density[keep], len(inputs)
@@ -100,15 +119,35 @@ def fit(matrix: SpectralMatrix, inputs: Sequence[Input], band: tuple[float, floa
     powers = np.concatenate([item.powers(matrix.frequency[keep]) for item in inputs], axis=1)
     owner = np.repeat(np.arange(count), [len(item.parts) for item in inputs])
     weighted = powers.conj() / noise[:, None]
-    own, through = density[:, owner][:, :, owner], density[:, owner][:, :, count + owner]
+    own = density[:, owner][:, :, owner]
     size = np.sqrt(np.einsum("fp,fpp,fp->p", weighted, own, powers).real)
-    normal = np.einsum("fp,fpq,fq->pq", weighted, through, powers).real / np.outer(size, size)
-    right = np.einsum("fp,fp->p", weighted, density[:, owner, -1]).real / size
-    spread = np.einsum("fp,fpq,fq->pq", weighted, own, powers).real / np.outer(size, size)
-    inverse: Floats = np.asarray(_pinv(normal), dtype=np.float64) / size[:, None]
-    share = matrix.segments.line_inflation() / (2.0 * matrix.averages)
+
+    def equations(lines: Complexes) -> tuple[Floats, Floats]:
+        through = lines[:, owner][:, :, count + owner]
+        normal = np.einsum("fp,fpq,fq->pq", weighted, through, powers).real / np.outer(size, size)
+        return normal, np.einsum("fp,fp->p", weighted, lines[:, owner, -1]).real / size
+
+    normal, right = equations(density)
+    inverse: Floats = np.asarray(_pinv(normal), dtype=np.float64)
+    scaled = inverse @ right
+    if parts:
+        covariance = _jackknife([equations(p.density[keep]) for p in parts])
+        covariance *= sum(p.averages for p in parts) / matrix.averages  # the whole has segments across the joints
+    else:
+        spread = np.einsum("fp,fpq,fq->pq", weighted, own, powers).real / np.outer(size, size)
+        spread *= matrix.segments.line_inflation() / (2.0 * matrix.averages)
+        covariance = inverse @ spread @ inverse.T
     symbols = tuple(part.symbol for item in inputs for part in item.parts)
-    return Estimate(symbols, inverse @ right, share * inverse @ spread @ inverse.T)
+    return Estimate(symbols, scaled / size, covariance / np.outer(size, size))
+
+
+def _jackknife(equations: Sequence[tuple[Floats, Floats]]) -> Floats:
+    """Covariance of the solution of all equations together by leaving out those of one stretch after the other."""
+    left, right = (np.stack(side) for side in zip(*equations, strict=True))
+    inverses = np.asarray(_pinv(np.sum(left, axis=0) - left), dtype=np.float64)
+    without = np.einsum("gpq,gq->gp", inverses, np.sum(right, axis=0) - right)
+    off = without - np.mean(without, axis=0)
+    return np.asarray((len(off) - 1.0) / len(off) * off.T @ off, dtype=np.float64)
 
 
 def _without_instruments(matrix: SpectralMatrix) -> SpectralMatrix:

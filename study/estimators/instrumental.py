@@ -18,10 +18,12 @@ def identify(model: Model, record: Record, settings: Settings) -> Identified:
     found = output_error.fit(model, record, settings)
     inputs = reverse_inputs(found.model)
     clean = clean_motion(found, record)
-    matrix = instrumental.cross_spectra(inputs, record, clean, settings.segments)
+    values = instrumental.channels(inputs, record, clean)
+    matrix = spectra.cross_spectra(values, record.dt, settings.segments)
     estimate = instrumental.fit(
-        matrix, inputs, settings.band, parametric.response(inputs, found.estimate, matrix.frequency)
-    )
+        matrix, inputs, settings.band, parametric.response(inputs, found.estimate, matrix.frequency),
+        instrumental.stretches(values, record.dt, settings.segments),
+    )  # fmt: skip
     note = "" if found.converged else found.message
     own = spectra.cross_spectra([*histories(inputs, clean), record["force"]], record.dt, settings.segments)
     return Identified(
