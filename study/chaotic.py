@@ -112,7 +112,7 @@ def fit_record(
                 max_iterations=max_iterations, initial=near.initial,
             )  # fmt: skip
             if found.converged and not (
-                _astray(found, record[response]) or _magnifies(found, record, response, steps_per_sample)
+                _astray(found, record[response]) or magnifies(found, record, response, steps_per_sample)
             ):
                 return found
     except DivergenceError:
@@ -130,9 +130,11 @@ def _astray(found: FreeRunFit, measured: Floats) -> bool:
     return neighbours > SMOOTH
 
 
-def _magnifies(found: FreeRunFit, record: Record, response: str, steps: int) -> bool:
-    """Whether disturbances of a fitted free run grow, as those of a chaotic one do."""
-    whole = (0, len(record))
+def magnifies(
+    found: FreeRunFit, record: Record, response: str, steps: int, span: tuple[int, int] | None = None
+) -> bool:
+    """Whether disturbances of a fitted free run grow along a span of the record, as those of a chaotic one do."""
+    whole = span or (0, len(record))
     pieces = Pieces(record, response, whole, even_restarts(record, response, whole), steps)
     states = pieces.passing(found.model, (), found.initial)
     return bool(needed_restarts(found.model, record, states, whole, pieces.restarts, steps))

@@ -9,6 +9,7 @@ they get it by ``X_j = g_j(u + n) - (E[g_j(u^ + n)] - g_j(u^))``, whatever the s
 The measured response still decides: A_j(f) is free to differ from the form that the model gives it.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, cast
@@ -138,7 +139,8 @@ def fit(
         spread *= matrix.segments.line_inflation() / (2.0 * matrix.averages)
         covariance = inverse @ spread @ inverse.T
     symbols = tuple(part.symbol for item in inputs for part in item.parts)
-    return Estimate(symbols, scaled / size, covariance / np.outer(size, size))
+    freedom = len(parts) - 1.0 if parts else math.inf
+    return Estimate(symbols, scaled / size, covariance / np.outer(size, size), freedom)
 
 
 def _jackknife(equations: Sequence[tuple[Floats, Floats]]) -> Floats:

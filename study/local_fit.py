@@ -71,7 +71,7 @@ def fit(lines: Lines, inputs: Sequence[Input], band: tuple[float, float], how: L
     residual = (target - design @ values) / each
     covariance = _scatter(inverse * each, design.T / each, residual, index.ravel(), lines.samples)
     symbols = tuple(p.symbol for (_, p), known in zip(parts, heard, strict=True) if known)
-    return Estimate(symbols, values / size, covariance / np.outer(size, size))
+    return Estimate(symbols, values / size, covariance / np.outer(size, size), STRETCHES - 1.0)
 
 
 def _inverse(design: Complexes) -> Complexes:

@@ -1,5 +1,6 @@
 """From frequency response functions A_j(f) to coefficients with standard errors."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -26,11 +27,14 @@ class Estimate:
         Estimates.
     covariance : array, shape (p, p)
         Their random-error covariance.
+    freedom : float
+        Degrees of freedom that it rests on; few where it comes from the scatter between few parts of a record.
     """
 
     symbols: tuple[str, ...]
     values: Floats
     covariance: Floats
+    freedom: float = math.inf
 
     def __getitem__(self, symbol: str) -> float:
         """One estimate."""

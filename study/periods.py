@@ -112,7 +112,7 @@ def fit(record: Record, inputs: Sequence[Input], band: tuple[float, float]) -> E
     values, covariance = _solve(equations, own[:, :, heard] / scale, periods.force)
     symbols = [p.symbol for item in inputs for p in item.parts]
     known = tuple(s for s, h in zip(symbols, heard, strict=True) if h)
-    return Estimate(known, values / scale, covariance / np.outer(scale, scale))
+    return Estimate(known, values / scale, covariance / np.outer(scale, scale), count - 1.0)
 
 
 @dataclass(frozen=True)

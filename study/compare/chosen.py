@@ -5,11 +5,13 @@ What the reverse estimators find on the same part of the record can stand in its
 without leakage, or one that allows for noise on the force.
 """
 
-from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from study import estimators, fitting
+from study.chaotic import magnifies
 from study.compare.noise import segments_of
 from study.errors import StudyError
 from study.estimators.base import Settings
@@ -17,15 +19,28 @@ from study.fitting import Plan
 from study.model import Model
 from study.motion import CompletedRecord
 from study.output_error import FreeRunFit, fit_free_run
-from study.spectra import autospectrum
+from study.parameters import Estimate
+from study.record import Record
+from study.spectra import Segments, cross_spectra
 
 FREE_RUN = "output_error"
 STEPS = 8  # per sample: no coefficient is fitted in free run, so that many cost little
+FOLLOWED, SMOOTHED = 0.5, 5  # coherence, over so many lines, up to the last of which the displacement is no noise
+LOST = 0.05  # of the standard deviation of the response: a free run that misses by less has not lost the motion
+CHAOTIC = (
+    "the fitted system magnifies disturbances, as a chaotic one does: its free run loses the measured motion however "
+    "true the model, so that the coefficients come from pieces of the record, the response error says little, and "
+    "the error of the force says how good the model is"
+)
 
 
-def fit_by(
-    name: str, model: Model, completed: CompletedRecord, how: Plan
-) -> tuple[FreeRunFit, Plan, Mapping[str, float]]:
+def has_lost(found: FreeRunFit, completed: CompletedRecord, how: Plan) -> bool:
+    """Whether a fit in one free run has lost the motion because its system magnifies disturbances."""
+    size = float(np.std(completed.record[how.response][slice(*how.fit)]))
+    return found.rms > LOST * size and magnifies(found, completed.record, how.response, how.steps_per_sample, how.fit)
+
+
+def fit_by(name: str, model: Model, completed: CompletedRecord, how: Plan) -> tuple[FreeRunFit, Plan, Estimate]:
     """What an estimator finds on the fitting part, as a fit whose initial state alone was found in free run.
 
     Parameters
@@ -33,7 +48,7 @@ def fit_by(
     name : str
         Of the estimator.
     model : Model
-        Shape parameters known, coefficients open.
+        Coefficients open; shape parameters too, for estimators that find them.
     completed : CompletedRecord
         Record with all three motions.
     how : Plan
@@ -41,13 +56,14 @@ def fit_by(
 
     Returns
     -------
-    FreeRunFit, Plan, mapping of float
-        The fit, the plan with its steps per sample, and the standard error of each coefficient.
+    FreeRunFit, Plan, Estimate
+        The fit, which has converged if the estimator's own search has; the plan with its steps per sample; and
+        what the estimator found.
 
     Raises
     ------
     StudyError
-        If the model holds a coefficient, or the estimator does not find all of them.
+        If the model holds what the estimator finds, or the estimator does not find all that is open.
     """
     held = [key for key in fitting.held_keys(model) if "." not in key]
     if held:
@@ -58,15 +74,20 @@ def fit_by(
     first, last = max(how.fit[0], completed.edge), min(how.fit[1], len(completed.record) - completed.edge)
     part = completed.record.part(first, last)
     cut = segments_of(len(part))
-    frequency, density = autospectrum(part["force"], part.dt, cut)
-    loud = frequency[(density > fitting.FAINT * np.max(density)) & (frequency <= completed.band[1])]
-    band = max(completed.band[0], float(frequency[1])), float(loud[-1])
-    estimate = estimators.identify(name, model, part, Settings(cut, band)).estimate
-    missing = [key for key in model.values if "." not in key and (estimate is None or key not in estimate)]
-    if estimate is None or missing:
+    band = _lines(part, completed.band, cut)
+    identified = estimators.identify(name, model, part, Settings(cut, band))
+    estimate = _together(identified.estimate, identified.shapes)
+    missing = [key for key, value in model.values.items() if value is None and key not in estimate]
+    if missing:
         raise StudyError(
             f"the estimator {name} finds no {', '.join(missing)} in {part.name} from {band[0]:.3g} to "
             f"{band[1]:.3g} Hz; take {FREE_RUN} or another"
+        )
+    given = [key for key in estimate.symbols if model.values[key] is not None]
+    if given:
+        raise StudyError(
+            f"model {model.name!r} gives {', '.join(given)}; the estimator {name} finds that from the record: leave it "
+            f"open, or take {FREE_RUN}"
         )
     known = model.with_values({key: estimate[key] for key in estimate.symbols})
     how = fitting.with_steps(how, STEPS)
@@ -74,4 +95,30 @@ def fit_by(
         known, completed.record, held=tuple(known.values), response=how.response,
         steps_per_sample=STEPS, span=how.fit,
     )  # fmt: skip
-    return run, how, {key: estimate.error(key) for key in estimate.symbols}
+    run = replace(run, converged=not identified.note, message=identified.note or run.message)
+    return run, how, estimate
+
+
+def _lines(part: Record, within: tuple[float, float], cut: Segments) -> tuple[float, float]:
+    """The band in which the force is heard, up to where noise takes over from the displacement."""
+    matrix = cross_spectra([part["force"], part["displacement"]], part.dt, cut)
+    g, frequency = matrix.density, matrix.frequency
+    force, motion = g[:, 0, 0].real, g[:, 1, 1].real
+    loud = (force > fitting.FAINT * np.max(force)) & (frequency <= within[1])
+    together = np.convolve(np.abs(g[:, 0, 1]) ** 2, np.ones(SMOOTHED), "same")
+    coherence = together / np.maximum(np.convolve(force * motion, np.ones(SMOOTHED), "same"), np.finfo(float).tiny)
+    followed = loud & (coherence > FOLLOWED)
+    return max(within[0], float(frequency[1])), float(frequency[followed if np.any(followed) else loud][-1])
+
+
+def _together(estimate: Estimate | None, shapes: Estimate | None) -> Estimate:
+    """Coefficients and shape parameters, found apart from each other, as one estimate."""
+    parts = [part for part in (estimate, shapes) if part is not None]
+    if len(parts) == 1:
+        return parts[0]
+    return Estimate(
+        tuple(symbol for part in parts for symbol in part.symbols),
+        np.concatenate([part.values for part in parts]) if parts else np.zeros(0),
+        np.asarray(block_diag(*(part.covariance for part in parts)), dtype=np.float64),
+        min((part.freedom for part in parts), default=np.inf),
+    )

@@ -7,7 +7,7 @@ import numpy as np
 
 from study import fitting
 from study.compare.amplitude import Growths, growths
-from study.compare.chosen import FREE_RUN, fit_by
+from study.compare.chosen import CHAOTIC, FREE_RUN, fit_by, has_lost
 from study.compare.fitted import Coefficient, coefficients, fit_model
 from study.compare.frequency import Band, bands
 from study.compare.judged import Judged, judge
@@ -22,6 +22,7 @@ from study.fitting import Plan
 from study.model import Model
 from study.motion import complete
 from study.output_error import FreeRunFit
+from study.parameters import Estimate
 from study.record import Record
 
 STEPS = 5  # reports of progress a record
@@ -141,11 +142,15 @@ def compare(
     told("motions")
     completed = complete(record, cutoff)
     told("fit")
-    errors: Mapping[str, float] = {}
+    known: Estimate | None = None
+    notes = completed.says
     if estimator == FREE_RUN:
         found, how = fit_model(model, completed.record, how, start)
     else:
-        found, how, errors = fit_by(estimator, model, completed, how)
+        found, how, known = fit_by(estimator, model, completed, how)
+    if estimator == FREE_RUN and not fitting.held_keys(model) and has_lost(found, completed, how):
+        found, how, known = fit_by(estimator, model, completed, how)
+        notes = (*notes, CHAOTIC)
     told("free run")
     judged = judge(found, completed.record, how, completed.band[0])
     noise = noise_of(judged, completed.record, how.judge[1])
@@ -153,13 +158,14 @@ def compare(
     in_reverse = local_force_error if estimator == "local_polynomial" else force_error
     force = in_reverse(found.model, completed, how, noise)
     told("where it fails")
-    lacking = restoring(found.model, (*found.keys, *errors), judged, noise, completed.record, how)
+    fitted = (*found.keys, *(known.symbols if known else ()))
+    lacking = restoring(found.model, fitted, judged, noise, completed.record, how)
     return Comparison(
         model=model,
         record=completed.record,
         how=how,
         found=found,
-        coefficients=coefficients(found, completed.record, how, errors),
+        coefficients=coefficients(found, completed.record, how, known),
         judged=judged,
         noise=noise,
         force=force,
@@ -167,7 +173,7 @@ def compare(
         restoring=lacking,
         growths=None if noise.alone else growths(lacking),
         time=along_time(judged),
-        notes=completed.says,
+        notes=notes,
         estimator=estimator,
     )
 

@@ -1,10 +1,12 @@
 """The fit that a comparison stands on: what the model leaves open, estimated on the fitting part."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri, stdtrit
 
 from study import fitting, units
 from study.chaotic import fit_in_pieces
@@ -17,12 +19,12 @@ from study.inputs import history, reverse_inputs
 from study.model import Model, ModelTerm
 from study.motion import complete
 from study.output_error import FreeRunFit
+from study.parameters import Estimate
 from study.pieces import angular_rate
 from study.record import Record
 from study.terms import LIBRARY, QUANTITIES
 
 Floats = NDArray[np.float64]
-TWO_SIDED_95 = 1.959964  # standard errors
 POOR = 0.05  # of the rms response: a fit that leaves more is tried again from pieces
 PERIODS = 50.0  # of the motion, in the stretch that the pieces are cut from ...
 SHORT, LONG = 512, 2048  # ... and its limits in samples
@@ -44,6 +46,8 @@ class Coefficient:
         Standard error, which allows for a residual that is no white noise; None if the value was held.
     unit : str
         In the units of the record.
+    freedom : float
+        Degrees of freedom of the standard error.
     """
 
     key: str
@@ -51,6 +55,7 @@ class Coefficient:
     value: float
     error: float | None
     unit: str
+    freedom: float = math.inf
 
     @property
     def held(self) -> bool:
@@ -59,10 +64,16 @@ class Coefficient:
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """95 % confidence interval; None if the value was held."""
+        """95 % confidence interval, by Student's t; None if the value was held."""
         if self.error is None:
             return None
-        return self.value - TWO_SIDED_95 * self.error, self.value + TWO_SIDED_95 * self.error
+        half = _quantile(self.freedom) * self.error
+        return self.value - half, self.value + half
+
+
+def _quantile(freedom: float) -> float:
+    """Standard errors on either side that hold 95 %."""
+    return float(stdtrit(freedom, 0.975)) if math.isfinite(freedom) else float(ndtri(0.975))
 
 
 def fit_model(
@@ -197,20 +208,21 @@ def _with_shape(
 
 
 def coefficients(
-    found: FreeRunFit, record: Record, how: Plan, known: Mapping[str, float] | None = None
+    found: FreeRunFit, record: Record, how: Plan, known: Estimate | None = None
 ) -> tuple[Coefficient, ...]:
     """Every coefficient with its standard error and unit, in the order of the model.
 
-    ``known`` holds the standard errors of what was not found in free run.
+    ``known`` is what was not found by this fit.
     """
-    errors = dict(known or {})
+    errors = {key: known.error(key) for key in known.symbols} if known else {}
+    freedom = known.freedom if known else math.inf
     if found.keys:
         covariance = clustered_covariance(fitting.linearise(found, record, how), found.residual)
         deviations = np.sqrt(np.diag(covariance))
         errors |= {key: float(deviations[i]) for i, key in enumerate(found.keys)}
     force, length = record.units.get("force", "N"), record.units.get("displacement", "m")
     return tuple(
-        Coefficient(key, entry.name, float(value), errors.get(key), _unit(entry, key, force, length))
+        Coefficient(key, entry.name, float(value), errors.get(key), _unit(entry, key, force, length), freedom)
         for entry in found.model.terms
         for key, value in entry.values.items()
         if value is not None

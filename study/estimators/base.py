@@ -65,6 +65,8 @@ class Identified:
         The coefficients themselves, as the model names them, for estimators that find them together.
     note : str
         What is to be known before the estimates are used, such as that a search did not converge; mostly empty.
+    shapes : Estimate or None
+        Shape parameters that the estimator found by the way, where ``estimate`` has none.
     analysis : MisoResult or None
         Coherences, for estimators whose ``responses`` have none of their own.
     """
@@ -74,6 +76,7 @@ class Identified:
     parameters: tuple[Parameter, ...]
     estimate: Estimate | None = None
     note: str = ""
+    shapes: Estimate | None = None
     analysis: MisoResult | None = None
 
 

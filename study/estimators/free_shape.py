@@ -3,8 +3,6 @@
 from study.estimators import miso, output_error
 from study.estimators.base import Identified, Settings, named_parameters
 from study.model import Model
-from study.output_error import FreeRunFit
-from study.parameters import Estimate
 from study.record import Record
 
 
@@ -19,12 +17,7 @@ def identify(model: Model, record: Record, settings: Settings) -> Identified:
     found = output_error.fit(model.with_values(dict.fromkeys(shapes)), record, settings)
     known = model.with_values({key: found.estimate[key] for key in shapes})
     result = miso.identify(known, record, settings)
-    own = named_parameters(_of(found, shapes))
+    own = output_error.shapes_of(found, shapes)
     note = "" if found.converged else found.message
-    return Identified(result.inputs, result.responses, (*result.parameters, *own), result.estimate, note)
-
-
-def _of(found: FreeRunFit, keys: tuple[str, ...]) -> Estimate:
-    """Some of the estimates of a fit."""
-    places = [found.keys.index(key) for key in keys]
-    return Estimate(keys, found.values[places], found.covariance[places][:, places])
+    named = (*result.parameters, *named_parameters(own))
+    return Identified(result.inputs, result.responses, named, result.estimate, note, own)

@@ -26,9 +26,9 @@ def identify(model: Model, record: Record, settings: Settings) -> Identified:
     )  # fmt: skip
     note = "" if found.converged else found.message
     own = spectra.cross_spectra([*histories(inputs, clean), record["force"]], record.dt, settings.segments)
-    return Identified(
-        inputs, instrumental.responses(matrix), named_parameters(estimate), estimate, note, miso.analyse(own)
-    )  # fmt: skip
+    shapes = output_error.shapes_of(found, [key for key in model.values if "." in key])
+    named = (*named_parameters(estimate), *named_parameters(shapes))
+    return Identified(inputs, instrumental.responses(matrix), named, estimate, note, shapes, miso.analyse(own))
 
 
 def clean_motion(found: FreeRunFit, record: Record) -> Record:

@@ -1,14 +1,17 @@
 """Output error: the model runs free under the measured force and is fitted to the measured displacement."""
 
+from collections.abc import Collection
 from functools import lru_cache
 
-from study import parametric, spectra
+from study import fitting, parametric, spectra
 from study.chaotic import fit_record
+from study.errors import DivergenceError
 from study.estimators import miso
 from study.estimators.base import Identified, Settings, named_parameters
 from study.inputs import histories, reverse_inputs
 from study.model import Model
 from study.output_error import FreeRunFit
+from study.parameters import Estimate
 from study.record import Record
 from study.shapes import shape_keys, with_starting_shapes
 
@@ -28,11 +31,46 @@ def identify(model: Model, record: Record, settings: Settings) -> Identified:
     return Identified(inputs, result, named_parameters(estimate), estimate, note)
 
 
+def shapes_of(found: FreeRunFit, keys: Collection[str]) -> Estimate:
+    """Of what a fit estimated, the shape parameters of these names."""
+    places = [i for i, key in enumerate(found.keys) if key in keys]
+    symbols = tuple(found.keys[i] for i in places)
+    return Estimate(symbols, found.values[places], found.covariance[places][:, places])
+
+
 @lru_cache(maxsize=KEPT)
 def fit(model: Model, record: Record, settings: Settings) -> FreeRunFit:
-    """The fit in free run that the estimate is made of; kept a while, for instruments rest on the same one."""
-    begun = with_starting_shapes(model, record)
+    """The fit in free run that the estimate is made of; kept a while, for instruments rest on the same one.
+
+    Where the MI/SO estimate leads nowhere, as under much noise, or with inputs that it cannot tell apart, the search
+    begins anew with the best linear approximation.
+
+    Raises
+    ------
+    DivergenceError
+        If the model diverges from both starts.
+    StudyError
+        If force and displacement have nothing in common.
+    """
+    begun, held = with_starting_shapes(model, record), shape_keys(model)
     first = miso.identify(begun, record, settings).estimate
     assert first is not None  # MI/SO finds all coefficients together
     start = dict(zip(first.symbols, (float(v) for v in first.values), strict=True))
-    return fit_record(begun, record, start=start, held=shape_keys(model))
+    try:
+        found = fit_record(begun, record, start=start, held=held)
+    except DivergenceError:
+        return fit_record(begun, record, start=_linear(begun, record), held=held)
+    if found.converged:
+        return found
+    try:
+        again = fit_record(begun, record, start=_linear(begun, record), held=held)
+    except DivergenceError:
+        return found
+    return again if again.rms < found.rms else found
+
+
+def _linear(model: Model, record: Record) -> dict[str, float]:
+    """Coefficients of the best linear approximation, and none of the others."""
+    everything = fitting.Plan("displacement", (0, len(record)), (0, len(record)))
+    start = fitting.linear_start(model, record, everything)
+    return {key: value for key, value in start.items() if "." not in key}
