@@ -1,5 +1,6 @@
 """Snakemake step: record -> frequency response functions, coherences and parameters."""
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,8 @@ from study.step import one_sentence
 def main(model: str, record: str, outputs: dict[str, str], settings: dict[str, Any]) -> None:
     system = read_model(Path(model))
     found = identify_case(system, read_csv(Path(record)), settings)
+    for note in (f.note for f in found.values() if f.note):
+        print(f"{settings['case']}: {note}", file=sys.stderr)
     tables.write_csv(tables.frequency_responses(system, found), Path(outputs["responses"]))
     tables.write_csv(tables.coherences(found), Path(outputs["coherences"]))
     tables.write_csv(tables.parameters(settings["case"], system, found, settings), Path(outputs["parameters"]))

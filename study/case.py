@@ -70,7 +70,17 @@ def estimator_settings(settings: Table) -> Settings:
 
 
 def identify_case(model: Model, record: Record, settings: Table) -> dict[str, Identified]:
-    """What each of the configured estimators finds in a record, by the estimator's name."""
+    """What each of the configured estimators finds in a record, by the estimator's name.
+
+    One whose model diverges finds nothing, and its note says so: the others are none the worse for it.
+    """
     assumed, told = assumed_model(model, settings), estimator_settings(settings)
     record = replace(record, period=settings.get("period", record.period))
-    return {name: estimators.identify(name, assumed, record, told) for name in settings["estimators"]}
+    return {name: _identified(name, assumed, record, told) for name in settings["estimators"]}
+
+
+def _identified(name: str, model: Model, record: Record, told: Settings) -> Identified:
+    try:
+        return estimators.identify(name, model, record, told)
+    except DivergenceError as error:
+        return Identified((), None, (), note=f"{name} finds nothing in {record.name}: {error}")

@@ -1,13 +1,16 @@
 """A case from settings to estimates."""
 
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from study import tables
 from study.case import assumed_model, estimator_settings, identify_case, make_record
 from study.config import load
 from study.errors import DivergenceError, StudyError
+from study.estimators import ESTIMATORS
 
 CONFIG = load(Path(__file__).parent.parent / "config")
 
@@ -64,3 +67,32 @@ def test_every_configured_estimator_is_asked(systems, records):
     found = identify_case(systems["linear"], records["linear"], told)
     assert list(found) == told["estimators"]
     assert [len(found[name].inputs) for name in ("siso", "miso")] == [1, 2], "the assumed cubic stiffness is an input"
+
+
+def test_an_estimator_whose_model_diverges_leaves_the_others_alone(systems, records, monkeypatch):
+    def diverges(*_):
+        raise DivergenceError("the free run diverges", 1.0)
+
+    monkeypatch.setitem(ESTIMATORS, "output_error", __name__)
+    monkeypatch.setattr(sys.modules[__name__], "identify", diverges, raising=False)
+    told = CONFIG.identification_settings("linear") | {"estimators": ["miso", "output_error"]}
+    found = identify_case(systems["linear"], records["linear"], told)
+    assert found["output_error"].note.startswith("output_error finds nothing in linear: the free run diverges")
+    assert found["output_error"].parameters == ()
+    assert found["miso"].estimate is not None
+    assert set(tables.parameters("linear", systems["linear"], found, told)["estimator"]) == {"miso"}
+
+
+def test_every_estimator_but_miso_tells_a_relaxation_from_the_spring(make_model):
+    """Both are linear in u: spectra of segments cannot part them, and what MI/SO gives diverges in a free run."""
+    effects = {"linear_damping": {"c": 3.77}, "linear_stiffness": {"k": 355.3}}
+    shape = {"relaxation": {"kr": 100.0, "relaxation.tau": 0.1}}
+    model = make_model("r", {"inertia": {"m": 1.0}, **effects, **shape})
+    record = make_record(model, settings("linear"))
+    told = CONFIG.identification_settings("linear") | {
+        "estimators": ["miso", "output_error", "instrumental"], "also_assumed": "",
+    }  # fmt: skip
+    found = identify_case(model, record, told)
+    assert found["miso"].estimate["m"] < 0.0
+    for name, share in (("output_error", 1e-4), ("instrumental", 0.02)):
+        assert found[name].estimate["kr"] == pytest.approx(100.0, rel=share), name

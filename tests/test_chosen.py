@@ -6,17 +6,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study import cli
+from study import cli, estimators
+from study.compare.chosen import CHAOTIC
 from study.compare.comparison import Comparison, compare
+from study.compare.fitted import Coefficient
 from study.compare.local_reverse import local_force_error
 from study.compare.report import document, summary
 from study.errors import StudyError
-from study.excitation import Excitation, force
+from study.estimators.base import Settings
+from study.excitation import Excitation, displacement_noise, force
 from study.fitting import Plan
 from study.model import Model, free
 from study.motion import CompletedRecord
 from study.record import Record, write_csv
 from study.simulate import Integrator, simulate
+from study.spectra import Segments
 from study.terms import get
 
 NAMES = ("inertia", "linear_damping", "linear_stiffness", "cubic_stiffness")
@@ -76,6 +80,68 @@ def test_noise_on_the_force_is_allowed_for_where_there_are_periods() -> None:
     found = compare(OPEN, made, estimator="errors_in_variables")
     assert all(abs(error) < 4.0 for error in off(found).values()), off(found)
     assert found.force.inputs, "the rest of the comparison is as ever"
+
+
+def simulated(model: Model, noise: float, seed: int, samples: int = 8192) -> Record:
+    made = simulate(model, force(Excitation(), samples, 0.02, seed), 0.02, Integrator("rk4", 8))
+    u = made["displacement"]
+    return Record(0.02, {"force": made["force"], "displacement": u + displacement_noise(u, noise, seed)}, name="rig")
+
+
+def test_a_chaotic_motion_that_one_free_run_loses_is_fitted_in_pieces(systems: dict[str, Model]) -> None:
+    """The Dead-Band system with nothing given: one free run ends in a side valley, far from the truth."""
+    model = systems["dead_band"]
+    found = compare(model.with_values(dict.fromkeys(model.values)), simulated(model, 0.05, 1))
+    assert CHAOTIC in found.notes
+    for c in found.coefficients:
+        assert c.interval is not None
+        true = model.values[c.key]
+        assert true is not None
+        assert abs(c.value - true) < 4.0 * (c.interval[1] - c.interval[0]) / 3.92, c.key
+        assert c.value == pytest.approx(true, rel=0.02)
+
+
+def test_a_regular_motion_is_not_called_chaotic(local: Comparison) -> None:
+    assert CHAOTIC not in compare(OPEN, local.record).notes
+    assert CHAOTIC not in local.notes
+
+
+@pytest.mark.parametrize("name", ["instrumental", "miso_free_shape"])
+def test_shape_parameters_come_with_the_coefficients(name: str, systems: dict[str, Model]) -> None:
+    model = systems["mathieu"]
+    believed = model.with_values(dict.fromkeys(model.values))
+    made = simulated(model, 0.0025, 2)
+    found = compare(believed, made, estimator=name)
+    frequency = next(c for c in found.coefficients if c.key == "periodic_stiffness.f_m")
+    assert frequency.error is not None
+    assert abs(frequency.value - 1.0) < 1e-3
+    assert found.response_error < 0.2, "5 % is noise"
+    if name == "miso_free_shape":
+        given = believed.with_values({"periodic_stiffness.f_m": 1.0})
+        with pytest.raises(StudyError, match=r"gives periodic_stiffness\.f_m; the estimator miso_free_shape"):
+            compare(given, made, estimator=name)
+
+
+def test_a_search_that_fails_is_told(local: Comparison, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = estimators.identify("miso", OPEN, local.record, Settings(Segments(), (0.3, 10.0)))
+    monkeypatch.setattr(estimators, "identify", lambda *_: replace(found, note="stuck after 9 free runs"))
+    told = compare(OPEN, local.record, estimator="instrumental")
+    assert not told.found.converged
+    assert "did not arrive at a minimum (stuck after 9 free runs)" in summary([told])
+
+
+def test_lines_that_are_noise_are_left_out() -> None:
+    """Under 5 % noise the displacement is lost above some 8 Hz; MI/SO over these lines finds a third of the mass."""
+    found = {
+        c.key: c for c in compare(OPEN, simulated(OPEN.with_values(VALUES), 0.05, 3), estimator="miso").coefficients
+    }
+    assert found["m"].value == pytest.approx(1.0, rel=0.15)
+
+
+def test_few_degrees_of_freedom_widen_the_interval() -> None:
+    one, many = (Coefficient("k", "linear_stiffness", 1.0, 0.1, "N/m", freedom) for freedom in (1.0, np.inf))
+    assert one.interval == pytest.approx((1.0 - 1.27062, 1.0 + 1.27062), rel=1e-5)
+    assert many.interval == pytest.approx((1.0 - 0.195996, 1.0 + 0.195996), rel=1e-5)
 
 
 def test_what_is_held_and_what_is_not_found(local: Comparison) -> None:
