@@ -111,7 +111,7 @@ def draw(
         If a kind of picture is asked for that there is not.
     """
     shapes = "" if parameters_csv is None else labels.estimated(pd.read_csv(parameters_csv))
-    system = f"{title}, estimated {shapes}" if shapes else title
+    system = f"{title}: {shapes}" if shapes else title
     kinds = {
         "linear": lambda: linear(response_csv, system, highest, drawn),
         "nonlinear": lambda: nonlinear(response_csv, system, highest, drawn),

@@ -10,6 +10,11 @@ from study import estimator_errors
 from study.document import Block, Bullets, Image, Text, table
 from study.figures.styles import look
 
+WHO = (
+    "MI/SO is the report's estimator and SI/SO the ordinary analysis that it is held against. The others are ours: a local "
+    "polynomial fit without leakage, a fit of the model in free run (output error), and A_j(f) with that run as "
+    "instrument. When to use which: [docs/estimators.md](../docs/estimators.md)."
+)
 ENOUGH = 5  # seeds from which a scatter means something
 LARGE = 9950.0  # from here on a number is shown with a power of ten
 
@@ -23,7 +28,7 @@ def opening(errors: pd.DataFrame, noise: Mapping[str, float]) -> list[Block]:
     )
     noisy = errors[(errors["case"].map(noise) > 0.0) & (errors["seeds"] >= ENOUGH)]
     picture = Image("Errors of the estimators by parameter and case", "../figures/estimators.png")
-    found: list[Block] = [Bullets(sentences(errors, noise)), picture, Text(note), by_parameter(errors)]
+    found: list[Block] = [Text(WHO), Bullets(sentences(errors, noise)), picture, Text(note), by_parameter(errors)]
     if len(noisy):
         found += [Text("Under noise on the displacement, bias ± scatter of one estimate, both in %:"), biases(noisy)]
     return found

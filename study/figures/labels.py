@@ -109,7 +109,7 @@ def quantity(value: float, unit: str) -> str:
 
 
 def estimated(parameters: pd.DataFrame) -> str:
-    """Shape parameters that were estimated, with a standard error: ``u_g = 2.5002 ± 0.0011 mm``; empty if none was.
+    """Shape parameters that were estimated: ``u_g = 2.5002 ± 0.0011 mm (given 2.5)``; empty if none was.
 
     An error that the six decimals shown do not reach is left out.
 
@@ -127,10 +127,8 @@ def estimated(parameters: pd.DataFrame) -> str:
         digits = MOST_DIGITS if error == 0.0 else min(max(0, -math.floor(math.log10(error / factor))), MOST_DIGITS)
         symbol = _symbol(str(row["parameter"]))
         stated = f"${symbol}$ = {value / factor:.{digits}f}"
-        if digits < MOST_DIGITS:
-            found.append(f"{stated} ± {error / factor:.{digits}f} {units.pretty(unit)}")
-        else:
-            found.append(f"{stated} {units.pretty(unit)}")
+        within = f" ± {error / factor:.{digits}f}" if digits < MOST_DIGITS else ""
+        found.append(f"{stated}{within} {units.pretty(unit)} (given {float(row['true']) / factor:g})")
     return ", ".join(found)
 
 

@@ -1,0 +1,94 @@
+"""Whether errors are what they say: `python -m benchmarks.intervals`, some minutes; into docs/estimators.md.
+
+The combined system with noise on the displacement, as in the report's Section 5.4, over many seeds: bias and scatter of
+each coefficient, its scatter over the Cramer-Rao bound, and how often the 95 % interval holds the truth.
+"""
+
+import argparse
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from study import document, estimators
+from study.config import load
+from study.ensemble import threaded
+from study.estimators import output_error
+from study.estimators.base import Settings
+from study.excitation import Excitation, displacement_noise, force
+from study.modelfile import read_model
+from study.record import Record
+from study.simulate import Integrator, simulate
+from study.spectra import Segments
+
+Floats = NDArray[np.float64]
+ROOT = Path(__file__).parent.parent
+MODEL = read_model(ROOT / "models" / "duffing_van_der_pol.yaml")
+TOLD = Settings(Segments(), (0.3, 10.0))
+NOISES, NAMES = (0.05, 0.1, 0.2), ("output_error", "instrumental")
+FIRST = 9001
+
+
+def one(noise: float, seed: int) -> list[dict[str, object]]:
+    """Error, standard error and Cramer-Rao bound of each coefficient by each estimator for one record."""
+    sampling = load(ROOT / "config").settings["sampling"]
+    made = simulate(MODEL, force(Excitation(), sampling["samples"], sampling["dt"], seed), sampling["dt"], Integrator())
+    added = displacement_noise(
+        made["displacement"], noise, round(1000.0 * noise) * FIRST + seed
+    )  # another at each level
+    record = Record(made.dt, {"force": made["force"], "displacement": made["displacement"] + added})
+    rows: list[dict[str, object]] = []
+    for name in NAMES:
+        found = estimators.identify(name, MODEL, record, TOLD)
+        fit = output_error.fit(MODEL, record, TOLD)
+        known = np.sqrt(np.mean(added**2)) / fit.rms  # the bound takes the noise's own variance
+        assert found.estimate is not None
+        for key in found.estimate.symbols:
+            true = float(MODEL.numbers()[key])
+            bound = np.sqrt(fit.covariance[fit.keys.index(key), fit.keys.index(key)]) * known
+            rows.append(
+                {
+                    "noise": noise, "estimator": name, "key": key, "error": (found.estimate[key] - true) / true,
+                    "claimed": found.estimate.error(key) / true, "bound": bound / true, "note": bool(found.note),
+                    "widths": float(student.ppf(0.975, found.estimate.freedom)),
+                }
+            )  # fmt: skip
+    return rows
+
+
+def summary(table: pd.DataFrame) -> document.Block:
+    """One row a level of noise, estimator and coefficient."""
+    rows: list[list[str]] = []
+    for (noise, name, key), group in table.groupby(["noise", "estimator", "key"], sort=False):
+        error, claimed = group["error"].to_numpy(), group["claimed"].to_numpy()
+        scatter = float(np.std(error, ddof=1))
+        inside = 100.0 * float(np.mean(np.abs(error) < group["widths"].to_numpy() * claimed))
+        rows.append(
+            [
+                f"{100.0 * noise:g} %", name.replace("_", " "), key, f"{100.0 * scatter:.2g} %",
+                f"{abs(np.mean(error)) / scatter:.2f}", f"{scatter / np.mean(group['bound']):.2f}",
+                f"{scatter / np.sqrt(np.mean(claimed**2)):.2f}", f"{inside:.1f} %",
+            ]
+        )  # fmt: skip
+    heading = ["noise", "estimator", "of", "scatter", "bias / scatter", "scatter / Cramer-Rao bound",
+               "scatter / standard error", "95 % interval holds the truth"]  # fmt: skip
+    return document.table(heading, rows)
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--seeds", type=int, default=200)
+    told = options.parse_args()
+    seeds = range(FIRST, FIRST + told.seeds)
+    rows = [row for noise in NOISES for found in threaded(partial(one, noise), seeds) for row in found]
+    table = pd.DataFrame(rows)
+    missed = int(table["note"].sum())
+    words = f"Over {told.seeds} seeds. {f'{missed} searches did not converge' if missed else 'Every search converged'}."
+    document.put(ROOT / "docs" / "estimators.md", "intervals", [document.Text(words), summary(table)])
+
+
+if __name__ == "__main__":
+    main()
