@@ -9,7 +9,6 @@ import numpy as np
 
 from study import case_names, needs, terms
 from study.errors import StudyError
-from study.estimators import ESTIMATORS
 from study.estimators.base import true_parameters
 from study.excitation import SETTINGS, Excitation, theoretical_autospectrum
 from study.model import Model, forward_graph, free
@@ -84,6 +83,12 @@ class StudyConfig:
             "sampling": self.settings["sampling"],
             "integrator": self.settings["integrator"],
         }
+
+    def ensemble_settings(self, case: str) -> Table:
+        """The same for a job that brings seeds of its own: it does not re-run when those of the study change."""
+        told = self.record_settings(case)
+        told.pop("noise_seed", None)
+        return {**told, "excitation": {key: value for key, value in told["excitation"].items() if key != "seed"}}
 
     def identification_settings(self, case: str) -> Table:
         """What a case's identification depends on beside its record."""
@@ -247,7 +252,7 @@ def _check_settings(settings: Table, where: str) -> None:
             f"{where}: local_polynomial.half_width makes bands of {width} lines; fit_band [{low}, {high}] of "
             f"{sampling['samples']} samples holds fewer"
         )
-    _check_estimators(settings, where)
+    needs.check_estimators(settings, where)
     for name, described in settings["excitations"].items():
         own = ("kind", "seed", "periods", *SETTINGS[described["kind"]])
         for key in described:
@@ -279,19 +284,3 @@ def _check_tolerances(tolerances: Table, known: Sequence[str], where: str) -> No
                 raise StudyError(
                     f"{where}: tolerances.{group} names {name!r}, which is no parameter; known are {', '.join(known)}"
                 )
-
-
-def _check_estimators(settings: Table, where: str) -> None:
-    compared = settings["estimator_errors"]["estimators"]
-    for name in (*settings["estimators"], *settings["monte_carlo"]["estimators"], *compared):
-        if name not in ESTIMATORS:
-            raise StudyError(f"{where}: there is no estimator {name!r}; known are {', '.join(ESTIMATORS)}")
-    if "miso" not in settings["estimators"]:
-        raise StudyError(f"{where}: estimators lacks 'miso', whose coherences are drawn of every case")
-    if "miso" not in compared:
-        raise StudyError(f"{where}: estimator_errors.estimators lacks 'miso', which the others are compared with")
-    for kind, names in settings["drawn"].items():
-        for name in names:
-            if name not in settings["estimators"]:
-                raise StudyError(f"{where}: drawn.{kind} names {name!r}, which is not among the estimators")
-    needs.check_drawn(settings, where)

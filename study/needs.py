@@ -1,10 +1,11 @@
-"""What the report's claims and the figures ask of the settings, so that no job ends in want of it."""
+"""What the report's claims, the estimators and the figures ask of the settings: no job shall end in want of it."""
 
 from typing import Any
 
 import numpy as np
 
 from study.errors import StudyError
+from study.estimators import ESTIMATORS
 from study.excitation import READINGS, SETTINGS, Excitation, theoretical_autospectrum
 
 Table = dict[str, Any]
@@ -28,20 +29,27 @@ def check_claims(settings: Table, where: str) -> None:
     _check_segments(settings, where)
 
 
-def check_drawn(settings: Table, where: str) -> None:
-    """Whether every case has a curve to be drawn.
+def check_estimators(settings: Table, where: str) -> None:
+    """Whether every estimator that is named is there, MI/SO among them, and one with curves among the drawn.
 
     Raises
     ------
     StudyError
-        Where none of the estimators that are drawn has one of every case.
+        At the first that is not.
     """
+    compared = settings["estimator_errors"]["estimators"]
+    for name in (*settings["estimators"], *settings["monte_carlo"]["estimators"], *compared):
+        if name not in ESTIMATORS:
+            raise StudyError(f"{where}: there is no estimator {name!r}; known are {', '.join(ESTIMATORS)}")
+    if "miso" not in settings["estimators"]:
+        raise StudyError(f"{where}: estimators lacks 'miso', whose coherences are drawn of every case")
+    if "miso" not in compared:
+        raise StudyError(f"{where}: estimator_errors.estimators lacks 'miso', which the others are compared with")
     for kind, names in settings["drawn"].items():
-        if not set(names) & set(CURVES):
-            raise StudyError(
-                f"{where}: drawn.{kind} is [{', '.join(names)}], of which none has curves of every case; "
-                f"one of {', '.join(CURVES)} is needed"
-            )
+        for name in names:
+            if name not in settings["estimators"]:
+                raise StudyError(f"{where}: drawn.{kind} names {name!r}, which is not among the estimators")
+    _check_drawn(settings, where)
 
 
 def check_periods(excitation: Table, settings: Table) -> None:
@@ -81,6 +89,16 @@ def check_reached(excitation: Table, settings: Table) -> None:
             f"fit_band of config.yaml is [{low}, {high}]; the excitation begins at {force.lowest:g} Hz, "
             f"and four lines of {resolution:g} Hz or more must lie above"
         )
+
+
+def _check_drawn(settings: Table, where: str) -> None:
+    """Whether every case has a curve to be drawn."""
+    for kind, names in settings["drawn"].items():
+        if not set(names) & set(CURVES):
+            raise StudyError(
+                f"{where}: drawn.{kind} is [{', '.join(names)}], of which none has curves of every case; "
+                f"one of {', '.join(CURVES)} is needed"
+            )
 
 
 def _check_force(settings: Table, where: str) -> None:

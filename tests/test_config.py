@@ -68,6 +68,7 @@ def test_settings_of_a_case():
     assert study.drawn("noise_10") == study.settings["drawn"]["with_noise"]
     assert study.drawn("linear") == study.settings["drawn"]["without_noise"]
     assert record["excitation"]["seed"] == study.settings["excitations"]["report"]["seed"]
+    assert "seed" not in str(study.ensemble_settings("noise_10")), "an ensemble brings seeds of its own"
     assert study.identification_settings("dead_band")["relative"]["c"] == 0.05, "a case's own tolerance holds"
     assert study.identification_settings("duffing")["relative"]["c"] == 0.02
     assert study.identification_settings("linear")["also_assumed"] == "cubic_stiffness"
