@@ -1,7 +1,6 @@
 # Figures of each case, and its name as a target. Their files are named by the report's numbers, which no
 # wildcard can say: one rule a case.
 from study.config import IDENTIFIED
-from study.errors import StudyError
 
 DESCRIBED = {
     "linear": "A_1: magnitude and phase",
@@ -13,11 +12,6 @@ DESCRIBED = {
     "force_history": "force history and autospectrum",
     "force_histogram": "histogram of the force",
 }
-
-with one_sentence():
-    for _rule in workflow.rules:
-        if _rule.name in [*STUDY.cases, "all"]:
-            raise StudyError(f"config/cases.tsv: {_rule.name!r} is the name of a rule; give the case another")
 
 for _case in STUDY.cases:
 

@@ -28,6 +28,10 @@ def record_settings(wildcards):
     return STUDY.record_settings(wildcards.case)
 
 
+def ensemble_settings(wildcards):
+    return STUDY.ensemble_settings(wildcards.case)
+
+
 def identification_settings(wildcards):
     return STUDY.identification_settings(wildcards.case)
 

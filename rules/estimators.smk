@@ -23,7 +23,7 @@ rule estimator_errors:
         ),
     params:
         **ERRORS,
-        records=[STUDY.record_settings(case) for case in STUDY.cases],
+        records=[STUDY.ensemble_settings(case) for case in STUDY.cases],
         identifications=[compared_settings(case) for case in STUDY.cases],
         seeds=COMPARED["seeds"],
     benchmark:
@@ -37,7 +37,7 @@ use rule ensemble as many_errors with:
         table=f"results/{MANY}/{{case}}.csv",
     params:
         **ERRORS,
-        records=lambda wildcards: [record_settings(wildcards)],
+        records=lambda wildcards: [ensemble_settings(wildcards)],
         identifications=lambda wildcards: [compared_settings(wildcards.case)],
         seeds=COMPARED["many"],
     benchmark:

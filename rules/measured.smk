@@ -8,10 +8,7 @@ from dataclasses import asdict
 from study import measurements
 
 with one_sentence():
-    MEASUREMENTS = measurements.load(Path("config"))
-    for _name in MEASUREMENTS:
-        if _name in STUDY.cases:
-            raise StudyError(f"config/measurements.tsv: {_name!r} is a case of config/cases.tsv; take another name")
+    MEASUREMENTS = measurements.load(Path("config"), STUDY.cases)
 
 CODE["measured"] = rests_on(Path("scripts/measured.py"))
 CODE["measured"] += [f"study/explore/page.{ending}" for ending in ("html", "css", "js")]

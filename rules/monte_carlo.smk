@@ -6,7 +6,7 @@ rule ensemble:
     output:
         table="results/monte_carlo/{case}.csv",
     params:
-        records=lambda wildcards: [record_settings(wildcards)],
+        records=lambda wildcards: [ensemble_settings(wildcards)],
         identifications=monte_carlo_settings,
         judged="rates",
         seeds=STUDY.settings["monte_carlo"]["seeds"],

@@ -9,6 +9,7 @@ import pandas as pd
 from study import tables
 from study.claims import evidence, reported, table
 from study.claims.verdict import Claim
+from study.files import replace_file
 from study.step import one_sentence
 
 
@@ -22,7 +23,7 @@ def main(models: str, statements: str, schema: str, steps: str, settings: dict[s
 
     judged = table.judge(found, stated, progress)
     tables.write_csv(judged, Path(csv))
-    Path(page).write_text(table.page(judged), encoding="utf-8")
+    replace_file(Path(page), table.page(judged).encode())
 
 
 if "snakemake" in globals():

@@ -18,7 +18,6 @@ from study.record import read_csv
 from study.step import one_sentence
 
 HIGHEST = 10.0  # hertz, as in the figures of A_j
-STRETCH = 512  # samples of the force that are shown: the report's subrecord
 
 
 @dataclass(frozen=True)
@@ -61,12 +60,12 @@ def periodic_lines(source: Source, segments: spectra.Segments) -> Figure:
 
 
 def force_history(source: Source, segments: spectra.Segments) -> Figure:
-    """A stretch of the force and its autospectrum (Figure 16)."""
+    """A stretch of the force as long as a segment, the report's subrecord, and its autospectrum (Figure 16)."""
     record = read_csv(source.record)
     figure, axes = page.page(
         "Excitation", "Force history (segment) and autospectrum", rows=2, legend_rows=0, share=False
     )
-    shown = record.part(0, STRETCH)
+    shown = record.part(0, segments.length)
     motion.history(axes[0], shown.time, shown["force"], "force", record.units["force"])
     frequency, density = spectra.autospectrum(record["force"], record.dt, segments)
     motion.autospectrum(axes[1], frequency, density, record.units["force"], float(frequency[-1]))

@@ -7,6 +7,7 @@ from study import integrator_study, tables
 from study.claims.evidence import Drive, models_of, record_settings
 from study.claims.simulation import SYSTEMS
 from study.excitation import READINGS
+from study.files import replace_file
 from study.step import one_sentence
 
 SHARE = 5  # differences on the same forces scatter little: a fifth of the ensemble's seeds is plenty
@@ -23,7 +24,7 @@ def main(models: str, settings: dict[str, Any], csv: str, page: str) -> None:
         record, settings, range(first, first + count), readings,
     )  # fmt: skip
     tables.write_csv(table, Path(csv))
-    Path(page).write_text(integrator_study.page(table), encoding="utf-8")
+    replace_file(Path(page), integrator_study.page(table).encode())
 
 
 if "snakemake" in globals():

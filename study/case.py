@@ -26,7 +26,7 @@ def make_record(model: Model, settings: Table, *, seed: int | None = None, noise
     model : Model
         Every value known.
     settings : mapping
-        ``StudyConfig.record_settings`` of the case.
+        ``StudyConfig.record_settings`` of the case, or ``ensemble_settings`` where the seeds are given.
     seed, noise_seed : int, optional
         In place of the configured seeds, for ensembles.
 
@@ -41,7 +41,7 @@ def make_record(model: Model, settings: Table, *, seed: int | None = None, noise
         If the response leaves the range of finite numbers.
     """
     sampling, described = settings["sampling"], dict(settings["excitation"])
-    own = described.pop("seed")
+    own = described.pop("seed", seed)
     excitation = Excitation(level=settings["level"], **described)
     values = force(excitation, sampling["samples"], sampling["dt"], own if seed is None else seed)
     try:

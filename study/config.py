@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from study import terms
+from study import case_names, needs, terms
 from study.errors import StudyError
-from study.estimators import ESTIMATORS
 from study.estimators.base import true_parameters
 from study.excitation import SETTINGS, Excitation, theoretical_autospectrum
 from study.model import Model, forward_graph, free
@@ -85,6 +84,12 @@ class StudyConfig:
             "integrator": self.settings["integrator"],
         }
 
+    def ensemble_settings(self, case: str) -> Table:
+        """The same for a job that brings seeds of its own: it does not re-run when those of the study change."""
+        told = self.record_settings(case)
+        told.pop("noise_seed", None)
+        return {**told, "excitation": {key: value for key, value in told["excitation"].items() if key != "seed"}}
+
     def identification_settings(self, case: str) -> Table:
         """What a case's identification depends on beside its record."""
         tolerances = self.settings["tolerances"]
@@ -128,14 +133,18 @@ def load(folder: Path) -> StudyConfig:
     _check_settings(settings, str(source))
     cases: dict[str, Case] = {}
     figures: dict[str, str] = {}
+    taken = case_names.taken(folder.parent, settings["estimator_errors"]["many"])
     for where, row in numbered_rows(folder / "cases.tsv", folder / "schemas" / "cases.schema.yaml"):
         if row["case"] in cases:
             raise StudyError(f"{where}: the case stands twice; each name may be used once")
+        if row["case"] in taken:
+            raise StudyError(f"{where}: {row['case']!r} is the name of {taken[row['case']]}; give the case another")
         cases[row["case"]] = _case(row, where, settings, folder.parent / "models", figures)
     for name in settings["tolerances"].get("of_case", {}):
         if name not in cases and not (folder.parent / "models" / f"{name}.yaml").is_file():
             raise StudyError(f"{source}: tolerances.of_case names {name!r}, which is neither a case nor a system")
     _check_tolerances(settings["tolerances"], parameter_names(folder.parent / "models"), str(source))
+    needs.check_claims(settings, str(source))
     return StudyConfig(settings, cases)
 
 
@@ -150,7 +159,8 @@ def _case(row: Table, where: str, settings: Table, models: Path, taken: dict[str
     try:
         model = _complete_model(path)
         _check_assumed(model, row["also_assumed"], settings)
-        _check_periods(settings["excitations"][row["excitation"]], settings)
+        needs.check_periods(settings["excitations"][row["excitation"]], settings)
+        needs.check_reached(settings["excitations"][row["excitation"]], settings)
     except StudyError as error:
         raise StudyError(f"{where}: {error}") from None
     figures = _figures(row, where, taken)
@@ -209,22 +219,18 @@ def _check_assumed(model: Model, extra: str, settings: Table) -> None:
             raise StudyError(f"also_assumed {extra!r} needs a value for {term.parameters[0].name}; take a term without")
         model = model.with_term(term)
     inputs = len({c.shape for entry in model.terms for c in entry.term.components})
-    count = Segments(**settings["segments"]).count(settings["sampling"]["samples"])
+    cut, samples = Segments(**settings["segments"]), settings["sampling"]["samples"]
+    count, worth = cut.count(samples), cut.effective_averages(samples)
     if count <= inputs:
         raise StudyError(
             f"segments of config.yaml cut the record into {count}; {inputs} inputs need {inputs + 1} or more"
         )
-    LocalPolynomial(**settings["local_polynomial"]).check(inputs)
-
-
-def _check_periods(excitation: Table, settings: Table) -> None:
-    """Whether there are periods for those estimators that stand on them."""
-    needed, periods = settings["settle_periods"] + 4, excitation.get("periods", 1)
-    if "errors_in_variables" in settings["estimators"] and periods < needed:
+    if worth <= inputs:
         raise StudyError(
-            f"the excitation has {periods} period{'s' if periods > 1 else ''}; the estimator errors_in_variables needs "
-            f"settle_periods and four more, {needed}"
+            f"segments of config.yaml cut the record into {count} that are worth {worth:.3g} averages, as they "
+            f"overlap; {inputs} inputs need more than {inputs}: shorter segments are right"
         )
+    LocalPolynomial(**settings["local_polynomial"]).check(inputs)
 
 
 def _check_settings(settings: Table, where: str) -> None:
@@ -246,7 +252,7 @@ def _check_settings(settings: Table, where: str) -> None:
             f"{where}: local_polynomial.half_width makes bands of {width} lines; fit_band [{low}, {high}] of "
             f"{sampling['samples']} samples holds fewer"
         )
-    _check_estimators(settings, where)
+    needs.check_estimators(settings, where)
     for name, described in settings["excitations"].items():
         own = ("kind", "seed", "periods", *SETTINGS[described["kind"]])
         for key in described:
@@ -278,18 +284,3 @@ def _check_tolerances(tolerances: Table, known: Sequence[str], where: str) -> No
                 raise StudyError(
                     f"{where}: tolerances.{group} names {name!r}, which is no parameter; known are {', '.join(known)}"
                 )
-
-
-def _check_estimators(settings: Table, where: str) -> None:
-    compared = settings["estimator_errors"]["estimators"]
-    for name in (*settings["estimators"], *settings["monte_carlo"]["estimators"], *compared):
-        if name not in ESTIMATORS:
-            raise StudyError(f"{where}: there is no estimator {name!r}; known are {', '.join(ESTIMATORS)}")
-    if "miso" not in settings["estimators"]:
-        raise StudyError(f"{where}: estimators lacks 'miso', whose coherences are drawn of every case")
-    if "miso" not in compared:
-        raise StudyError(f"{where}: estimator_errors.estimators lacks 'miso', which the others are compared with")
-    for kind, names in settings["drawn"].items():
-        for name in names:
-            if name not in settings["estimators"]:
-                raise StudyError(f"{where}: drawn.{kind} names {name!r}, which is not among the estimators")

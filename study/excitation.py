@@ -102,6 +102,13 @@ class Excitation:
             return self.cutoff
         return max(self.start_frequency, self.stop_frequency)
 
+    @property
+    def lowest(self) -> float:
+        """Frequency in Hz below which the force holds nothing."""
+        if self.kind in ("gaussian_lowpass", "pierson_moskowitz"):
+            return 0.0
+        return min(self.start_frequency, self.stop_frequency)
+
 
 def force(excitation: Excitation, samples: int, dt: float, seed: int) -> Floats:
     """A force history.

@@ -2,7 +2,7 @@
 
 import os
 import shlex
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -44,8 +44,15 @@ def data_folder() -> Path:
     return Path(os.environ.get(VARIABLE[1:]) or BESIDE)
 
 
-def load(folder: Path) -> Mapping[str, Measurement]:
+def load(folder: Path, cases: Collection[str] = ()) -> Mapping[str, Measurement]:
     """Read ``measurements.tsv`` of a folder; whether the data are there is not asked.
+
+    Parameters
+    ----------
+    folder : Path
+        ``config/``.
+    cases : collection of str
+        Names that a record may not have, nor the target of its climb.
 
     Raises
     ------
@@ -56,6 +63,9 @@ def load(folder: Path) -> Mapping[str, Measurement]:
     for where, row in numbered_rows(folder / "measurements.tsv", folder / "schemas" / "measurements.schema.yaml"):
         if row["record"] in found:
             raise StudyError(f"{where}: the record stands twice; each name may be used once")
+        for name in (row["record"], f"{row['record']}_climb"):
+            if name in cases:
+                raise StudyError(f"{where}: {name!r} is a case of cases.tsv; give the record or the case another name")
         model = folder.parent / "models" / f"{row['model']}.yaml"
         if not model.is_file():
             known = ", ".join(sorted(p.stem for p in (folder.parent / "models").rglob("*.yaml")))

@@ -13,6 +13,7 @@ from ruamel.yaml.error import YAMLError
 from study.errors import StudyError
 
 Table = dict[str, Any]
+SHOWN = 64  # letters of a cell that a sentence repeats
 
 
 def read_yaml(path: Path) -> Table:
@@ -49,7 +50,7 @@ def read_table(path: Path, schema: Path) -> list[Table]:
 def numbered_rows(path: Path, schema: Path) -> list[tuple[str, Table]]:
     """The same, each row with the words that say where it stands; rows count as an editor's lines do."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # a spreadsheet begins the file with a byte-order mark
     except OSError as error:
         raise StudyError(f"{path} cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
@@ -82,11 +83,16 @@ def _row(number: int, cells: Sequence[str], heading: Sequence[str], path: Path, 
             f"{path}, row {number} has {len(cells)} cells where the heading has {len(heading)}; "
             "cells are separated by tabs"
         )
-    where = f"{path}, row {number} ({heading[0]} {cells[0]!r})"
+    where = f"{path}, row {number} ({heading[0]} {_short(cells[0])!r})"
     pairs = zip(heading, cells, strict=True)
     row = {column: _cell(text, rules["properties"][column], f"{where}: {column}") for column, text in pairs}
     check(row, rules, where)
     return where, row
+
+
+def _short(text: str) -> str:
+    """A cell in a sentence: its beginning where it is long."""
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
 
 
 def _cell(text: str, rule: Table, where: str) -> object:
@@ -127,6 +133,9 @@ def _sentence(error: Any) -> str:
         allowed = cast(Table, error.schema).get("properties", {})
         extra = [key for key in cast(Table, error.instance) if key not in allowed]
         return f"{place + ': ' if place else ''}unknown key {extra[0]!r}; known are {', '.join(allowed)}"
+    words = cast(Table, error.schema).get("description", "")
+    if error.validator in ("pattern", "maxLength") and words:  # a pattern tells nobody what would be right
+        return f"{place} is not right: {_short(str(error.instance))!r}; right {words}"
     message = " ".join(str(error.message).split())
     return f"{place} is not right: {message[:300]}" if place else message[:300]
 

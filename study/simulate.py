@@ -18,6 +18,7 @@ from study.model import Model, forward_program
 from study.record import SI_UNITS, Record
 
 Floats = NDArray[np.float64]
+PLENTY = 8  # steps per sample with which a system that can be held is held
 METHODS = {"abm4": kernels.integrate_abm4, "rk4": kernels.integrate_rk4}
 
 
@@ -102,7 +103,7 @@ def simulate(
         start, dt, settings.steps_per_sample, drive, state, out,
     )  # fmt: skip
     if failed >= 0:
-        _diverged(model, force, dt, start + failed * dt)
+        _diverged(model, force, settings.steps_per_sample, start + failed * dt)
     channels = {"force": force, "displacement": out[:, 0], "velocity": out[:, 1], "acceleration": out[:, 2]}
     return Record(dt, {**channels, **extra}, {**SI_UNITS, **(units or {})}, model.name, start)
 
@@ -118,10 +119,18 @@ def _check(model: Model, channels: Mapping[str, Floats], initial: Sequence[float
         raise StudyError(f"{len(initial)} initial values were given; model {model.name!r} has {states} states")
 
 
-def _diverged(model: Model, force: Floats, dt: float, time: float) -> None:
+def _diverged(model: Model, force: Floats, steps: int, time: float) -> None:
+    """Say what would help: more steps where there are few; with many it is the system that runs away."""
     level = float(np.mean(force**2))
+    if steps < PLENTY:
+        advice = f"take more steps per sample than {steps}, a lower level, or check the signs of the coefficients"
+    else:
+        advice = (
+            f"at {steps} steps per sample it is the system itself that runs away at this level; take a lower level or "
+            "another stiffness, or check the signs of the coefficients"
+        )
     raise DivergenceError(
         f"the simulation of {model.name!r} diverged at t = {time:.4g} s under a force of mean square {level:.4g}; "
-        f"take more steps per sample than one in {dt:g} s, a lower level, or check the signs of the coefficients",
+        + advice,
         time,
     )

@@ -2,13 +2,23 @@
 
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from study import measurements
 from study.config import load
 from study.errors import StudyError
+from study.estimators import ESTIMATORS, identify
+from study.estimators.base import Settings
+from study.excitation import Excitation, force
+from study.modelfile import read_model
+from study.needs import CURVES
 from study.schema import read_table, read_yaml
+from study.simulate import simulate
+from study.spectra import Segments
 
 ROOT = Path(__file__).parent.parent
 ROW = "duffing\tduffing\treport\t1.0\t0\t\t21\t22\t23\t24\t3\t\t\t\tDuffing system"
@@ -58,6 +68,7 @@ def test_settings_of_a_case():
     assert study.drawn("noise_10") == study.settings["drawn"]["with_noise"]
     assert study.drawn("linear") == study.settings["drawn"]["without_noise"]
     assert record["excitation"]["seed"] == study.settings["excitations"]["report"]["seed"]
+    assert "seed" not in str(study.ensemble_settings("noise_10")), "an ensemble brings seeds of its own"
     assert study.identification_settings("dead_band")["relative"]["c"] == 0.05, "a case's own tolerance holds"
     assert study.identification_settings("duffing")["relative"]["c"] == 0.02
     assert study.identification_settings("linear")["also_assumed"] == "cubic_stiffness"
@@ -101,13 +112,18 @@ def test_figures_without_a_number_are_named_after_the_case(folder):
         ("cutoff: 12.5", "cutoff: 125", "excitations.report: the excitation reaches 125 Hz"),
         ("cutoff: 12.5", "periods: 7", "excitations.report: 8192 samples do not hold 7 whole periods"),
         ("cutoff: 12.5", "peak_frequency: 2.0", "excitations.report has peak_frequency, which means nothing to a"),
-        ("    k3: 0.005", "    k_3: 0.005", "tolerances.relative names 'k_3', which is no parameter; known are"),
+        (
+            "    k3: 0.005",
+            "    k3: 0.005\n    k_3: 0.005",
+            "tolerances.relative names 'k_3', which is no parameter; known",
+        ),
         ("{k: 0.01,", "{kk: 0.01,", "tolerances.of_case.dead_band names 'kk', which is no parameter"),
         ("seed: 1990", "seed: -1", "excitations.report.seed is not right: -1 is less than the minimum of 0"),
         ("method: abm4", "method: abm5", "integrator.method is not right: 'abm5' is not one of"),
         ("dead_band: {k", "deadband: {k", "of_case names 'deadband', which is neither a case nor a system"),
         ("sampling:\n", "sampling: [\n", "config.yaml is not valid YAML"),
         ("fit_band: [0.3, 10.0]", "", "'fit_band' is a required property"),
+        ("samples: 8192", "samples: 8192000000000", "8192000000000 is greater than the maximum of 100000000"),
     ],
 )
 def test_faults_of_the_settings(folder, old, new, says):
@@ -134,8 +150,11 @@ def test_faults_of_the_settings(folder, old, new, says):
         (ROW.replace("\t0\t\t", "\t0\tcubic_stiffness\t"), "lists the term 'cubic_stiffness' twice"),
         (ROW.replace("\t3\t\t", "\t3\t9\t"), "autospectrum is 9; its lines need a term periodic_stiffness"),
         (ROW.replace("\t3\t", "\t"), "has 14 cells where the heading has 15"),
-        (ROW.replace("duffing\tduffing", "Duffing\tduffing"), "case is not right: 'Duffing' does not match"),
-        (ROW.replace("duffing\tduffing", "../up\tduffing"), "case is not right: '../up' does not match"),
+        (
+            ROW.replace("duffing\tduffing", "Duffing\tduffing"),
+            "case is not right: 'Duffing'; right are up to 64 of a to z",
+        ),
+        (ROW.replace("duffing\tduffing", "../up\tduffing"), "case is not right: '../up'; right are up to 64 of a to z"),
         (ROW + "\n" + ROW, "row 4 (case 'duffing'): the case stands twice"),
     ],
 )
@@ -144,6 +163,125 @@ def test_faults_of_a_row(folder, new, says):
     sentence = refused(folder)
     assert re.match(rf"{re.escape(str(folder / 'cases.tsv'))}, row [34]( \(case '.*'\))?:? ", sentence)
     assert says in sentence
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        (
+            "    reading: raw\n",
+            "",
+            "excitations.report has no reading, which the claims name; it may be raw or filtered",
+        ),
+        (
+            "  report:\n    kind",
+            "  mine:\n    kind",
+            "excitations names mine, not 'report'; the claims judge a force of",
+        ),
+        (
+            "kind: gaussian_lowpass\n    reading: raw",
+            "kind: pierson_moskowitz",
+            "excitations.report.kind is 'pierson_moskowitz'; the claims judge a gaussian_lowpass there",
+        ),
+        ("    k3: 0.005\n", "", "tolerances.relative is not right: 'k3' is a required property"),
+        ("    f_n: 0.003\n", "", "tolerances.relative is not right: 'f_n' is a required property"),
+        ("    k: 1.78 ", "    # ", "tolerances.absolute is not right: 'k' is a required property"),
+        (
+            "fit_band: [0.3, 10.0]",
+            "fit_band: [5.0, 10.0]",
+            "it must begin at 1.902 Hz or below and end at 4 Hz or above",
+        ),
+        ("length: 512", "length: 2048", "segments.length is 2048; the claims cut segments of 4 times that too"),
+        ("length: 512", "length: 2048", "a record of 8192 samples must hold for more than 2 averages: 1024 is right"),
+        (
+            "without_noise: [siso, miso, local_polynomial, miso_free_shape]",
+            "without_noise: [miso_hand_read]",
+            "drawn.without_noise is [miso_hand_read], of which none has curves of every case; one of siso, miso",
+        ),
+        ("dt: 0.02 ", "dt: 0.05 ", "the excitation reaches 12.5 Hz, above the Nyquist frequency of 10 Hz"),
+    ],
+)
+def test_what_the_claims_and_figures_need(folder, old, new, says):
+    """Each of these ended in a traceback of a job that ran for minutes."""
+    spoil(folder / "config.yaml", old, new)
+    if new.startswith("  mine"):
+        table = folder / "cases.tsv"
+        table.write_text(table.read_text().replace("\treport\t", "\tmine\t"))
+    sentence = refused(folder)
+    assert sentence.startswith(str(folder / "config.yaml"))
+    assert says in sentence
+
+
+def test_claims_put_every_kind_of_force_in_place_of_the_reports(folder):
+    spoil(folder / "config.yaml", "cutoff: 12.5", "cutoff: 9.0")
+    spoil(folder / "config.yaml", "dt: 0.02 ", "dt: 0.05 ")
+    spoil(folder / "config.yaml", "fit_band: [0.3, 10.0]", "fit_band: [0.3, 8.0]")
+    assert "the claims put a random_phase_multisine in place of excitations.report: the excitation reaches" in refused(
+        folder
+    )
+
+
+def test_a_band_beyond_the_force(folder):
+    spoil(folder / "config.yaml", "fit_band: [0.3, 10.0]", "fit_band: [13, 24]")
+    sentence = refused(folder)
+    assert "row 2 (case 'linear'): fit_band of config.yaml is [13, 24]; the excitation has nothing above" in sentence
+    assert "12.5 Hz, where the band must end" in sentence
+
+
+def test_a_band_below_the_force(folder):
+    lines = "excitations:\n  lines: {kind: swept_sine, start_frequency: 9.9, stop_frequency: 12.0, seed: 1}\n"
+    spoil(folder / "config.yaml", "excitations:\n", lines)
+    spoil(folder / "cases.tsv", ROW, ROW.replace("report", "lines"))
+    assert "the excitation begins at 9.9 Hz, and four lines of 0.0976562 Hz or more must lie above" in refused(folder)
+
+
+def test_segments_that_overlap_so_far_that_they_are_one(folder):
+    spoil(folder / "config.yaml", "length: 512", "length: 5000")
+    spoil(folder / "config.yaml", "overlap: 0.5", "overlap: 0.95")
+    spoil(folder / "config.yaml", "window: hann", "window: boxcar")
+    assert "that are worth 1.56 averages, as they overlap; 2 inputs need more" in refused(folder)
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_who_has_curves_to_be_drawn_of_every_case(name):
+    """A linear system has least to show: no shape parameter, one input."""
+    model = read_model(ROOT / "models" / "linear.yaml")
+    values = force(Excitation(), 2048, 0.02, 1)
+    record = replace(simulate(model, np.tile(values, 6), 0.02), period=2048)
+    found = identify(name, model, record, Settings(Segments(256), (0.3, 10.0)))
+    assert (found.responses is not None) == (name in CURVES)
+
+
+@pytest.mark.parametrize("name", ["all", "claims", "record", "draw_many_errors", "benchmarks", "estimators_200"])
+def test_names_that_are_taken(folder, name):
+    shutil.copytree(ROOT / "rules", folder.parent / "rules")
+    spoil(folder / "cases.tsv", "\nduffing\t", f"\n{name}\t")
+    sentence = refused(folder)
+    assert f"cases.tsv, row 3 (case '{name}'): '{name}' is the name of a" in sentence
+    assert sentence.endswith("give the case another")
+
+
+@pytest.mark.parametrize(
+    "name", ["draw.duffing", "compare.silverbox", "claims.csv", "summary.md", "v_.2", "v2.", "a" * 65, "a" * 300]
+)
+def test_names_that_no_file_or_rule_may_have(folder, name):
+    spoil(folder / "cases.tsv", "\nduffing\t", f"\n{name}\t")
+    sentence = refused(folder)
+    assert "cases.tsv, row 3 (case '" in sentence
+    assert f"case is not right: '{name[:64]}" in sentence
+    assert sentence.endswith("a dot between two digits alone")
+
+
+def test_a_record_that_is_a_case(folder):
+    for name in ("silverbox", "silverbox_climb"):
+        with pytest.raises(StudyError, match=rf"row 2 \(record 'silverbox'\): '{name}' is a case of cases.tsv"):
+            measurements.load(folder, [name])
+
+
+def test_a_byte_order_mark_is_none_of_the_table(folder):
+    table = folder / "cases.tsv"
+    table.write_bytes(b"\xef\xbb\xbf" + table.read_bytes())
+    assert load(folder).cases == load(ROOT / "config").cases
 
 
 def test_rows_are_counted_as_an_editor_counts_lines(folder):

@@ -19,6 +19,7 @@ from study.errors import StudyError
 from study.figures import coherence, curves, distribution, labels, motion, page, response, styles
 from study.preliminary import Pattern, histogram
 from study.record import SI_UNITS, Record, write_csv
+from study.spectra import Segments
 from study.terms import LIBRARY
 
 ROOT = Path(__file__).parent.parent
@@ -413,6 +414,13 @@ def test_preliminary_figures(draw_preliminary, products, tmp_path, system, kind,
     draw_preliminary.draw(source, {kind: [output]}, style=SHEET, segments={"length": 256})
     assert b"</svg>" in output.read_bytes()
     check_layout(seen[0])
+
+
+@pytest.mark.parametrize("length", [128, 256])
+def test_the_stretch_of_force_is_as_long_as_a_segment(draw_preliminary, products, length):
+    source = draw_preliminary.Source(products("plain")[0], ROOT / "models" / "linear.yaml", "")
+    figure = draw_preliminary.force_history(source, Segments(length))
+    assert len(figure.axes[0].lines[0].get_xdata()) == length
 
 
 def test_preliminary_refuses_an_unknown_kind(draw_preliminary, products, tmp_path):

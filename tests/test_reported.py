@@ -89,6 +89,18 @@ def test_numbers_of_a_claim_come_with_units(stated: reported.Reported) -> None:
         ("a\tp. 1\twhat\t1\n", "has 4 cells"),
         ("A b\tp. 1\twhat\t1\tHz\n", "'A b'"),
         ("a\t\twhat\t1\tHz\n", "where"),
+        (
+            "noise_random_only.low\tp. 1\twhat\t5\t\n",
+            "value is not right: 5.0 is greater than or equal to the maximum of 1",
+        ),
+        ("duffing_share\tp. 1\twhat\t90\t\n", "value is not right: 90.0 is greater than or equal to the maximum of 1"),
+        (
+            "dead_band_error\tp. 1\twhat\t-0.07\t\n",
+            "value is not right: -0.07 is less than or equal to the minimum of 0",
+        ),
+        ("levels_invariant.lowest\tp. 1\twhat\t-0.2\tN^2\n", "value is not right: -0.2 is less than or equal to the"),
+        ("a\tp. 1\twhat\t-3\tHz\n", "value is not right: -3.0 is less than the minimum of 0"),
+        ("table_1.linear.zeta\tp. 1\twhat\t-0.1\t\n", "value is not right: -0.1 is less than the minimum of 0"),
     ],
 )
 def test_a_bad_row_is_named(tmp_path: Path, rows: str, said: str) -> None:

@@ -1,21 +1,28 @@
 """Simulation: observed order, agreement with SciPy, closed forms, divergence, determinism."""
 
+import re
+import textwrap
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from study.case import make_record
+from study.config import load
 from study.errors import DivergenceError, StudyError
 from study.excitation import Excitation, force
 from study.inputs import histories, reverse_inputs
 from study.miso import analyse
 from study.model import Model
+from study.modelfile import read_model
 from study.parameters import fit
 from study.simulate import Integrator, simulate
 from study.spectra import Segments, cross_spectra
 from study.terms import custom
 
+ROOT = Path(__file__).parents[1]
 DT = 0.02
 NAMES = ("linear", "duffing", "van_der_pol", "duffing_van_der_pol", "mathieu", "dead_band", "extreme")
 
@@ -156,7 +163,34 @@ def test_divergence_names_model_time_and_level(systems: dict[str, Model]) -> Non
     with pytest.raises(DivergenceError, match=r"'van_der_pol' diverged at t = .* mean square (0\.9|1\.0)") as caught:
         simulate(systems["van_der_pol"], drive, DT, Integrator("abm4", 1))
     assert 0.0 < caught.value.time < 8192 * DT
+    assert "take more steps per sample than 1, a lower level" in str(caught.value)
     simulate(systems["van_der_pol"], drive, DT, Integrator("abm4", 8))
+
+
+def test_more_steps_are_advised_only_where_they_may_help(systems: dict[str, Model]) -> None:
+    """A softening spring lets go whatever the step."""
+    model = systems["duffing"].with_values({"k3": -2.0e6})
+    drive = force(Excitation(level=4.0), 2048, DT, 1)
+    with pytest.raises(
+        DivergenceError, match="at 16 steps per sample it is the system itself that runs away"
+    ) as caught:
+        simulate(model, drive, DT, Integrator("abm4", 16))
+    assert "more steps" not in str(caught.value)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 1990])
+def test_the_example_of_the_first_page_stays_at_the_studys_level(seed: int, tmp_path: Path) -> None:
+    """A system that a reader copies from README.md must not run away under the study's excitation."""
+    block = re.search(r"  ```yaml\n(.*?)  ```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    assert block is not None
+    (tmp_path / "softening.yaml").write_text(textwrap.dedent(block[1]), encoding="utf-8")
+    model = read_model(tmp_path / "softening.yaml")
+    study = load(ROOT / "config")
+    told = {**study.ensemble_settings("duffing"), "case": model.name, "level": 1.0}
+    made = make_record(model, told, seed=seed)
+    assert len(made["displacement"]) == 8192
+    hold = np.sqrt(model.numbers()["k"] / -model.numbers()["k3"])  # beyond it the cubic spring pushes outwards
+    assert np.abs(made["displacement"]).max() < 0.75 * hold, "it stays with a margin for other seeds"
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])

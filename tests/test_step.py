@@ -1,5 +1,6 @@
 """What the steps of the workflow share: one sentence for a fault, one run at a time, the modules they rest on."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -102,3 +103,11 @@ def test_simulation_does_not_rest_on_identification():
     names = {Path(p).name for p in found}
     assert {"simulate.py", "kernels.py", "excitation.py", "terms.py", "record.py"} <= names
     assert not {"miso.py", "parameters.py", "spectra.py", "inputs.py", "local_polynomial.py"} & names
+
+
+def test_steps_write_files_that_are_never_half_there():
+    """By ``study.files`` or ``tables.write_csv``: what ``write_text`` began stays as a killed run leaves it."""
+    for path in sorted((ROOT / "scripts").glob("*.py")):
+        assert not re.search(r"[.](write_text|write_bytes|to_csv[(](Path|output|page|csv)\b)", path.read_text()), (
+            path.name
+        )

@@ -147,7 +147,7 @@ def test_touched_style_draws_again_and_nothing_else(built):
 
 @pytest.mark.parametrize(
     ("file", "old", "new"),
-    [("config.yaml", "seed: 7", "seed: 8"), ("cases.tsv", "other\t1.0\t0.05", "other\t1.0\t0.06")],
+    [("config.yaml", "seed: 7}", "seed: 8}"), ("cases.tsv", "other\t1.0\t0.05", "other\t1.0\t0.06")],
 )
 def test_a_changed_seed_or_row_runs_its_case_alone(built, file, old, new):
     with edited(built / "config" / file, old, new):
@@ -156,13 +156,26 @@ def test_a_changed_seed_or_row_runs_its_case_alone(built, file, old, new):
         "record": 1, "identify": 1, "draw.noisy": 1
     }  # fmt: skip
     assert not {"draw.duffing", "draw_preliminary.duffing", "claims", "excitation_reading"} & set(jobs)
+    assert ("estimator_errors" in jobs) == (file == "cases.tsv"), "ensembles have seeds of their own"
+
+
+@pytest.mark.parametrize(("old", "new"), [("seed: 7}", "seed: 8}"), ("noise_seed: 54", "noise_seed: 55")])
+def test_seeds_of_the_study_are_no_business_of_the_ensembles(built, old, new):
+    target = "results/monte_carlo/noisy.csv"
+    run(built, "-j1", target)
+    try:
+        assert planned(built, target) == {}
+        with edited(built / "config" / "config.yaml", old, new):
+            assert planned(built, target) == {}
+    finally:
+        (built / target).unlink()
 
 
 def test_the_seed_of_the_noise_is_no_business_of_what_has_none(built):
     with edited(built / "config" / "config.yaml", "noise_seed: 54", "noise_seed: 55"):
         jobs = planned(built)
     assert (jobs["record"], jobs["identify"], jobs["claims"]) == (1, 1, 1), "claims judge the study's own noisy records"
-    assert not {"draw.duffing", "excitation_reading", "integrator_steps"} & set(jobs)
+    assert not {"draw.duffing", "excitation_reading", "integrator_steps", "estimator_errors"} & set(jobs)
 
 
 def test_targets_by_name_and_by_number(built):
@@ -201,7 +214,10 @@ def test_killed_at_work_and_finished_on_one_core_gives_the_same_bytes(built, tmp
     [
         ("cases.tsv", "\tduffing\treport", "\tdufing\treport", "row 2 (case 'duffing'): there is no system 'dufing'"),
         ("config.yaml", "length: 256", "length: 4096", "segments.length is 4096, longer than the record of 2048"),
-        ("cases.tsv", "duffing\tduffing", "claims\tduffing", "'claims' is the name of a rule"),
+        ("cases.tsv", "duffing\tduffing", "claims\tduffing", "row 2 (case 'claims'): 'claims' is the name of a rule"),
+        ("cases.tsv", "duffing\tduffing", "all\tduffing", "row 2 (case 'all'): 'all' is the name of a rule"),
+        ("cases.tsv", "duffing\tduffing", "draw.noisy\tduffing", "row 2 (case 'draw.noisy'): case is not right"),
+        ("cases.tsv", "duffing\tduffing", "silverbox_climb\tduffing", "'silverbox_climb' is a case of cases.tsv"),
         ("reported.tsv", "table_1.duffing.k3\t", "table_1.dufing.k3\t", "'table_1.duffing.k3' is near it"),
     ],
 )
