@@ -11,8 +11,8 @@ from study.document import Block, Bullets, Image, Text, table
 from study.figures.styles import look
 
 WHO = (
-    "MI/SO is the report's estimator and SI/SO the ordinary analysis that it is held against. The others are ours: a local "
-    "polynomial fit without leakage, a fit of the model in free run (output error), and A_j(f) with that run as "
+    "MI/SO is the report's estimator, SI/SO the ordinary analysis that it is held against. The others are ours: a "
+    "local polynomial fit without leakage, a fit of the model in free run (output error), and A_j(f) with that run as "
     "instrument. When to use which: [docs/estimators.md](../docs/estimators.md)."
 )
 ENOUGH = 5  # seeds from which a scatter means something
