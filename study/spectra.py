@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import rfft, rfftfreq
+from scipy.fft import rfftfreq
 
 from study.errors import StudyError
 
@@ -212,6 +212,7 @@ def _add_products(total: Complexes, channels: Sequence[Floats], count: int, cut:
     taper = cut.taper()
     views = [np.lib.stride_tricks.sliding_window_view(c, cut.length)[:: cut.hop] for c in channels]
     room = np.empty((len(views), CHUNK, cut.length))  # used again and again: fresh memory costs as much as a transform
+    transformed = np.empty((len(views), CHUNK, len(total)), dtype=np.complex128)
     turned = np.empty((len(total), len(views), CHUNK), dtype=np.complex128)
     mirrored = np.empty_like(turned)
     for first in range(0, count, CHUNK):
@@ -219,7 +220,8 @@ def _add_products(total: Complexes, channels: Sequence[Floats], count: int, cut:
         tapered, lines, conjugate = room[:, :size], turned[..., :size], mirrored[..., :size]
         for view, out in zip(views, tapered, strict=True):
             np.multiply(view[first : first + size], taper, out=out)
-        lines[:] = np.asarray(rfft(tapered)).transpose(2, 0, 1)
+        np.fft.rfft(tapered, out=transformed[:, :size])
+        lines[:] = transformed[:, :size].transpose(2, 0, 1)
         np.conjugate(lines, out=conjugate)
         total += conjugate @ lines.transpose(0, 2, 1)
 
