@@ -21,7 +21,7 @@ CODE = {
 NOISE = {name: case.noise for name, case in STUDY.cases.items()}
 STYLE = "config/study.mplstyle"
 ENDINGS = ("png", "svg")
-IDENTIFIED_FILES = ("frequency_response.csv", "coherence.csv", "parameters.csv")
+IDENTIFIED_FILES = ("frequency_response.csv", "coherence.csv", "noise.csv", "parameters.csv")
 
 
 def record_settings(wildcards):

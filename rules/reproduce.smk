@@ -26,6 +26,7 @@ rule identify:
     output:
         responses="results/{case}/frequency_response.csv",
         coherences="results/{case}/coherence.csv",
+        noise="results/{case}/noise.csv",
         parameters="results/{case}/parameters.csv",
     params:
         settings=identification_settings,

@@ -18,6 +18,7 @@ def main(model: str, record: str, outputs: dict[str, str], settings: dict[str, A
         print(f"{settings['case']}: {note}", file=sys.stderr)
     tables.write_csv(tables.frequency_responses(system, found), Path(outputs["responses"]))
     tables.write_csv(tables.coherences(found), Path(outputs["coherences"]))
+    tables.write_csv(tables.noise_spectra(found), Path(outputs["noise"]))
     tables.write_csv(tables.parameters(settings["case"], system, found, settings), Path(outputs["parameters"]))
 
 

@@ -19,6 +19,7 @@ FILES = (
     ("`results/<case>/record.csv`", "the record: time, force, displacement, velocity, acceleration"),
     ("`results/<case>/frequency_response.csv`", "A_j(f) by estimator with its standard error, and the exact function"),
     ("`results/<case>/coherence.csv`", "ordinary, partial and cumulative coherences"),
+    ("`results/<case>/noise.csv`", "G_nn, the spectrum of what each estimator's inputs leave of the force"),
     ("`results/<case>/parameters.csv`", "parameters of the case; `results/parameters.csv` holds those of all cases"),
     ("`figures/figure_<number>.png`, `.svg`", "the report's Figures 2 to 8 and 16 to 61, by its numbers"),
     ("`results/estimators.csv`, `figures/estimators.png`", "error of each estimator, and its gain over MI/SO"),
@@ -137,9 +138,11 @@ def parameters(tables: Tables) -> list[Block]:
         rows.append([str(case), str(parameter), f"{limit['true']:.6g}", _tolerance(limit), *cells])
     note = (
         "In SI units (kg, N s/m, N/m, Hz, N/m^3, N s/m^3, rad); with its standard error, and the error against the "
-        "true value. In bold what lies outside the tolerance. The standard errors are Bendat and Piersol's for random "
-        "noise, with the effective number of averages under overlap (claims.md, `averages`). Without noise MI/SO "
-        "leaves leakage, which they overrate: `snakemake -j2 monte_carlo` sets them against the scatter over seeds."
+        "true value. In bold what lies outside the tolerance. The standard errors of SI/SO and MI/SO are Bendat and "
+        "Piersol's for random noise, with the effective number of averages under overlap (claims.md, `averages`). "
+        "Without noise MI/SO leaves leakage, which they overrate: `snakemake -j2 monte_carlo` sets them against the "
+        "scatter over seeds. The other estimators' come from what they leave, as noise; without noise that is what "
+        "steps and sampling cut off, which they underrate up to a hundredfold ([docs](../docs/estimators.md))."
     )
     heading = ["case", "parameter", "true", "tolerance", *(name.replace("_", " ") for name in names)]
     return [Text(note), table(heading, rows)]

@@ -26,6 +26,8 @@ COHERENCE_COLUMNS = [
     "frequency", "estimator", "input", "shape", "terms", "ordinary", "partial", "contribution", "cumulative",
 ]  # fmt: skip
 
+NOISE_COLUMNS = ["frequency", "estimator", "noise"]
+
 
 def parameters(case: str, model: Model, found: Mapping[str, Identified], settings: Table) -> pd.DataFrame:
     """Every parameter of every estimator, one row each (``PARAMETER_COLUMNS``).
@@ -110,6 +112,16 @@ def coherences(found: Mapping[str, Identified]) -> pd.DataFrame:
                 )
             )
     return _together(frames, COHERENCE_COLUMNS)
+
+
+def noise_spectra(found: Mapping[str, Identified]) -> pd.DataFrame:
+    """G_nn of each estimator that has it, what its inputs leave of the force (4.44), in N^2/Hz, in long form."""
+    frames = [
+        pd.DataFrame({"frequency": result.frequency, "estimator": estimator, "noise": result.noise})
+        for estimator, result in ((name, identified.responses) for name, identified in found.items())
+        if result is not None
+    ]
+    return _together(frames, NOISE_COLUMNS)
 
 
 def _together(frames: Sequence[pd.DataFrame], columns: list[str]) -> pd.DataFrame:

@@ -93,6 +93,14 @@ def test_coherences_name_their_terms(found):
     assert (last.to_numpy() >= own[own["input"] == 1]["cumulative"].to_numpy() - 1e-12).all()
 
 
+def test_noise_spectra_are_what_the_inputs_leave_of_the_force(found):
+    table = tables.noise_spectra(found)
+    assert list(table) == tables.NOISE_COLUMNS
+    own, result = table[table["estimator"] == "miso"], found["miso"].responses
+    np.testing.assert_allclose(own["noise"], (1.0 - result.multiple) * result.output, atol=1e-12 * result.output.max())
+    assert set(table["estimator"]) == {name for name, f in found.items() if f.responses is not None}
+
+
 def test_an_estimator_has_what_it_has(systems, found):
     """Parameters alone, responses without coherences, or both."""
     bare = {"a": Identified(found["miso"].inputs, None, found["miso"].parameters)}
@@ -100,6 +108,7 @@ def test_an_estimator_has_what_it_has(systems, found):
     whole = tables.frequency_responses(systems["duffing_van_der_pol"], found)
     assert list(tables.frequency_responses(systems["duffing_van_der_pol"], bare)) == list(whole)
     assert list(tables.coherences(bare)) == list(tables.coherences(found))
+    assert list(tables.noise_spectra(bare)) == tables.NOISE_COLUMNS
     own = found["miso"].responses
     plain = Responses(own.frequency, own.response, own.covariance, own.noise)
     curves = {"a": Identified(found["miso"].inputs, plain, ())}

@@ -93,7 +93,7 @@ def built(tmp_path_factory):
 
 def test_a_row_of_the_table_gives_every_product(built):
     for case in ("duffing", "noisy"):
-        for name in ("record.csv", "frequency_response.csv", "coherence.csv", "parameters.csv"):
+        for name in ("record.csv", "frequency_response.csv", "coherence.csv", "noise.csv", "parameters.csv"):
             assert (built / "results" / case / name).stat().st_size > 100
     drawn = {path.name for path in (built / "figures").iterdir()}
     stems = ["figure_21", "figure_22", "figure_23", "figure_24", "figure_3", "figure_53", "figure_54", "figure_55"]
