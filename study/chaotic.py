@@ -106,13 +106,13 @@ def fit_record(
             model, record, start=start, held=held, response=response, steps_per_sample=coarse,
             max_iterations=min(GLANCE, max_iterations),
         )  # fmt: skip
-        if not _astray(near, record[response]):
+        if not astray(near, record[response]):
             found = fit_free_run(
                 near.model, record, held=held, response=response, steps_per_sample=steps_per_sample,
                 max_iterations=max_iterations, initial=near.initial,
             )  # fmt: skip
             if found.converged and not (
-                _astray(found, record[response]) or magnifies(found, record, response, steps_per_sample)
+                astray(found, record[response]) or magnifies(found, record, response, steps_per_sample)
             ):
                 return found
     except DivergenceError:
@@ -122,7 +122,7 @@ def fit_record(
     )
 
 
-def _astray(found: FreeRunFit, measured: Floats) -> bool:
+def astray(found: FreeRunFit, measured: Floats) -> bool:
     """Whether a fit ended in a side valley: what it leaves is a good part of the response, and looks like motion."""
     if found.rms < POOR * float(np.std(measured)):
         return False

@@ -4,7 +4,7 @@ from collections.abc import Collection
 from functools import lru_cache
 
 from study import fitting, parametric, spectra
-from study.chaotic import fit_record
+from study.chaotic import astray, fit_record
 from study.errors import DivergenceError
 from study.estimators import miso
 from study.estimators.base import Identified, Settings, named_parameters
@@ -60,7 +60,7 @@ def fit(model: Model, record: Record, settings: Settings) -> FreeRunFit:
         found = fit_record(begun, record, start=start, held=held)
     except DivergenceError:
         return fit_record(begun, record, start=_linear(begun, record), held=held)
-    if found.converged:
+    if found.converged or not astray(found, record["displacement"]):
         return found
     try:
         again = fit_record(begun, record, start=_linear(begun, record), held=held)
