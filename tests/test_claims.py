@@ -147,7 +147,7 @@ def test_every_failure_has_a_reason_and_no_success_has(judged: pd.DataFrame) -> 
         ("linear_leakage", "reproduced"),
         ("averages", "partly"),
         ("added_terms", "partly"),
-        ("error_free", "not reproduced"),  # at the level of the fixture runs diverge as well
+        ("error_free", "not reproduced"),
         ("exact_stiffness", "not reproduced"),
         ("duffing_share", "not reproduced"),
         ("dead_band_share", "not reproduced"),
@@ -231,6 +231,34 @@ def test_steps_take_the_integrator_s_error_away(steps: pd.DataFrame) -> None:
     assert abs(error["abm4", 2]) < 0.05
     assert abs(error["abm4", 8]) < 1e-4
     assert abs(error["rk4", 4]) < 1e-4
+
+
+def integrated(error: float, diverged: int = 0) -> list[dict[str, Any]]:
+    """Rows of the integrator study: one system, one parameter moved by a share, runs lost in the other reading."""
+    row = {"system": "linear", "method": "abm4", "steps_per_sample": 1, "true": 1.0, "standard_error": 1e-4, "seeds": 4}
+    return [
+        {**row, "reading": reading, "parameter": name, "relative_error": error, "diverged": lost}
+        for reading, lost in (("raw", 0), ("filtered", diverged))
+        for name in ("k", "f_n", "m", "c", "zeta")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("error", "diverged", "said"),
+    [
+        (1e-4, 0, "reproduced"),
+        (1e-4, 2, "partly"),
+        (0.1, 0, "not reproduced"),  # runs that merely end make nothing free of error
+        (0.1, 2, "not reproduced"),
+    ],
+)
+def test_a_run_that_diverges_makes_error_free_worse_and_none_makes_it_better(
+    settings: dict[str, Any], report: Reported, error: float, diverged: int, said: str
+) -> None:
+    some = evidence.gather(settings, evidence.models_of(ROOT / "models"), integrated(error, diverged))
+    claim = simulation.error_free(some, report)
+    assert claim.verdict == said
+    assert ("2 of 4 runs of linear diverge (unit variance filtered)" in claim.measured) == (diverged == 2)
 
 
 def test_diverged_runs_are_counted_by_name(steps: pd.DataFrame) -> None:
