@@ -16,6 +16,9 @@ from study.claims import reported as stated
 from study.claims.reported import Reported, Statement
 from study.claims.sample import Sample, departure
 from study.claims.verdict import Condition
+from study.modelfile import read_model
+from study.preliminary import model_restoring_force, natural_frequency
+from study.record import Record
 
 ROOT = Path(__file__).parents[1]
 SEEDS = 6
@@ -214,6 +217,21 @@ def test_the_same_evidence_twice(settings: dict[str, Any], found: evidence.Evide
 def test_the_dead_band_is_read_from_its_pattern(found: evidence.Evidence) -> None:
     record = found.records(evidence.Drive("dead_band"))[0]
     assert preliminary.read_dead_band(record, 1.0) == pytest.approx(0.0025, rel=0.05)
+
+
+@pytest.mark.parametrize("pace", [0.8, 1.25])
+def test_the_envelope_is_that_of_the_figures_harmonic_motion(pace: float) -> None:
+    """A slower motion than one at f_n stays within by as much as it is slower; a faster one stands beyond it."""
+    model = read_model(ROOT / "models" / "linear.yaml")
+    omega, time = 2.0 * math.pi * pace * natural_frequency(model.numbers()), 0.001 * np.arange(8000)
+    u, v = np.sin(omega * time), omega * np.cos(omega * time)
+    force = model_restoring_force(model, u, v, time) - omega**2 * u
+    record = Record(
+        0.001, {"force": force, "displacement": u, "velocity": v, "acceleration": -(omega**2) * u}, name="harmonic"
+    )
+    inside, width = preliminary.envelope(model, record, 1.0)
+    assert width == pytest.approx(pace, rel=1e-3)
+    assert (inside > 0.99) == (pace < 1.0)
 
 
 def test_raw_is_the_nearer_reading(found: evidence.Evidence, report: Reported) -> None:
