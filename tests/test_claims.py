@@ -1,6 +1,7 @@
 """Claims: verdicts follow from what is measured."""
 
 import math
+import re
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,9 +10,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.integrate import solve_ivp
 
 from study import config, excitation_reading, integrator_study
-from study.claims import damping, duffing, evidence, levels, preliminary, sample, simulation, table, verdict
+from study.claims import damping, duffing, evidence, levels, preliminary, response, sample, simulation, table, verdict
 from study.claims import reported as stated
 from study.claims.reported import Reported, Statement
 from study.claims.sample import Sample, departure
@@ -232,6 +234,48 @@ def test_the_envelope_is_that_of_the_figures_harmonic_motion(pace: float) -> Non
     inside, width = preliminary.envelope(model, record, 1.0)
     assert width == pytest.approx(pace, rel=1e-3)
     assert (inside > 0.99) == (pace < 1.0)
+
+
+def test_what_the_cubic_terms_add_at_the_lowest_level_is_what_siso_finds_too_much(
+    found: evidence.Evidence, report: Reported
+) -> None:
+    spring, damper = levels.cubic_shares(found, report, 0.2)
+    single = found.at("duffing_van_der_pol", 0.2)
+    assert single.siso("k").mean / 355.3 - 1.0 == pytest.approx(spring, rel=0.2)
+    assert single.siso("c").mean / 3.77 - 1.0 == pytest.approx(damper, rel=0.2)
+    assert f"adds {100 * spring:.0f} % to the force that follows u" in levels.similar(found, report).why
+
+
+def test_a_histogram_is_far_from_gaussian_by_its_shape_not_by_its_length(
+    found: evidence.Evidence, report: Reported
+) -> None:
+    claim = damping.combined_histogram(found, report)
+    assert "2.6 % lie beyond two standard deviations where a Gaussian has 4.6 %" in claim.why
+    record = found.records(evidence.Drive("duffing_van_der_pol"))[0]["displacement"]
+    short = np.split(record, 8)
+    assert np.mean([sample.kurtosis(s) for s in short]) == pytest.approx(sample.kurtosis(record), abs=0.1)
+    gaussian = np.random.default_rng(3).standard_normal(100_000)
+    assert sample.outer_share(gaussian) == pytest.approx(sample.GAUSSIAN_OUTER_SHARE, rel=0.05)
+
+
+def test_the_resonance_of_the_fast_mathieu_system_is_drawn_towards_half_its_stiffness_s_frequency(
+    found: evidence.Evidence, report: Reported
+) -> None:
+    """Floquet's exponents of u'' + c u' + (k + k_m cos) u = 0 say where its lines are."""
+    model = read_model(ROOT / "models" / "mathieu.yaml").numbers()
+    period, (c, k, k_m) = 0.2, (model[n] for n in ("c", "k", "km_cos"))
+
+    def slope(t: float, y: Any) -> list[float]:
+        return [y[1], -c * y[1] - (k + k_m * math.cos(2.0 * math.pi * t / period)) * y[0]]
+
+    ends = [solve_ivp(slope, (0.0, period), y0, rtol=1e-9, atol=1e-12).y[:, -1] for y0 in ([1.0, 0.0], [0.0, 1.0])]
+    turn = abs(np.angle(np.linalg.eigvals(np.array(ends).T)[0])) / (2.0 * math.pi)  # of a cycle in each period
+    line = (1.0 - turn) / period
+    assert 2.5 < line < 2.9
+    claim = response.mathieu_fast(found, report)
+    said = re.search(r"to ([0-9.]+) Hz, and its sum with f_m to ([0-9.]+) Hz", claim.why)
+    assert said
+    assert [float(x) for x in said.groups()] == pytest.approx([line, 5.0 + line], abs=0.11)
 
 
 def test_raw_is_the_nearer_reading(found: evidence.Evidence, report: Reported) -> None:
