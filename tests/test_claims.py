@@ -192,6 +192,7 @@ def changed(folder: Path, settings: Mapping[str, Any], system: str, old: str, ne
             [duffing.duffing_cubic, duffing.siso_stiffness, preliminary.duffing_pattern, simulation.table_1],
         ),
         ("duffing_van_der_pol", "2.0e6", "1.0e6", [damping.combined_cubic, levels.invariant]),
+        ("linear", "3.77", "3.9", [preliminary.oval_width]),
         ("dead_band", "0.0025", "0.0035", [simulation.stiffness_gap, preliminary.dead_band_pattern]),
     ],
 )  # fmt: skip
