@@ -13,7 +13,19 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from study import config, excitation_reading, integrator_study
-from study.claims import damping, duffing, evidence, levels, preliminary, response, sample, simulation, table, verdict
+from study.claims import (
+    damping,
+    duffing,
+    evidence,
+    instruments,
+    levels,
+    preliminary,
+    response,
+    sample,
+    simulation,
+    table,
+    verdict,
+)
 from study.claims import reported as stated
 from study.claims.reported import Reported, Statement
 from study.claims.sample import Sample, departure
@@ -277,6 +289,25 @@ def test_the_resonance_of_the_fast_mathieu_system_is_drawn_towards_half_its_stif
     said = re.search(r"to ([0-9.]+) Hz, and its sum with f_m to ([0-9.]+) Hz", claim.why)
     assert said
     assert [float(x) for x in said.groups()] == pytest.approx([line, 5.0 + line], abs=0.11)
+
+
+def test_instruments_are_judged_at_every_noise_by_their_own_bias(
+    monkeypatch: pytest.MonkeyPatch, found: evidence.Evidence, report: Reported
+) -> None:
+    asked: list[float] = []
+
+    def off(_: evidence.Evidence, __: Reported, noise: float) -> dict[str, Sample]:
+        asked.append(noise)
+        return {"m": Sample((-0.098, 0.0) if noise == 0.1 else (-0.01, 0.02)), "c": Sample((-0.2, 0.21))}
+
+    monkeypatch.setattr(instruments, "biases", off)
+    claim = instruments.unbiased(found, report)
+    assert asked == [0.05, 0.1, 0.2]
+    assert claim.verdict == "reproduced", "a bias below the limit, and scatter that explains it"
+    assert "10 % noise: m -4.9 +- 4.9 %, c +0.5 +- 20 %" in claim.measured
+    assert not instruments.small("m", Sample((-0.06, -0.06))).met
+    assert not instruments.random("m", Sample((-0.0101, -0.0099))).met, "small, but more than scatter explains"
+    assert instruments.small("m", Sample((-0.0101, -0.0099))).met
 
 
 def test_raw_is_the_nearer_reading(found: evidence.Evidence, report: Reported) -> None:
