@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from matplotlib import style as styles
 from matplotlib.figure import Figure
 
@@ -32,11 +31,9 @@ class Source:
 def pattern(source: Source) -> Figure:
     """Restoring force against displacement (Figures 2 to 7): as large a harmonic motion as the random one."""
     record, model = read_csv(source.record), read_model(source.model)
-    values = model.numbers()
-    random = preliminary.random_pattern(record, values["m"])
-    frequency = preliminary.natural_frequency(values)
+    random = preliminary.random_pattern(record, model.numbers()["m"])
+    amplitude, frequency = preliminary.harmonic_beside(model, record)
     cycles = preliminary.closing_cycles(model, frequency)
-    amplitude = float(np.abs(random.displacement).max())
     harmonic = preliminary.harmonic_pattern(model, amplitude, frequency, cycles)
     figure, axes = page.page(source.title, "Restoring force against displacement", columns=2, width=7.6, panel=3.1)
     left, right = axes

@@ -135,6 +135,16 @@ def harmonic_pattern(model: Model, amplitude: float, frequency: float, cycles: i
     return Pattern(displacement, model_restoring_force(model, displacement, velocity, time))
 
 
+def harmonic_beside(model: Model, record: Record) -> tuple[float, float]:
+    """Amplitude and frequency (hertz) of the harmonic motion that a random one is laid beside.
+
+    The amplitude is the record's largest. The captions of Figures 2 to 7 give no frequency; the only one that
+    Section 3.2 speaks of is the natural frequency, which the random response is said to fluctuate close to. The
+    record's own frequency would fit the one pattern to the other before they are compared.
+    """
+    return float(np.abs(record["displacement"]).max()), natural_frequency(model.numbers())
+
+
 def closing_cycles(model: Model, frequency: float) -> int:
     """Cycles of a harmonic motion (``frequency`` in hertz) that span a period of the model's periodic stiffness."""
     slow = model.values.get("periodic_stiffness.f_m")

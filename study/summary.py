@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 
 from study import error_pages
-from study.claims.verdict import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED
+from study.claims.verdict import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED, SEPARATOR
 from study.document import Block, Bullets, Heading, Text, table
 
 INTRODUCTION = (
@@ -112,19 +112,24 @@ def numbers(tables: Tables) -> list[Block]:
     stated = tables.claims[~tables.claims["reported"].isin(["as stated", "as tabulated"])]
     note = (
         "Ours: mean over the seeds of an ensemble with its standard error, and the study's own record in brackets. "
-        "Of statements with several conditions one is shown, one that fails where any does; [claims.md](claims.md) has "
-        "them all."
+        "Of statements with several conditions as many are shown as the report gives numbers, those that fail first; "
+        "[claims.md](claims.md) has them all."
     )
     return [Text(note), statements(stated)]
 
 
 def statements(claims: pd.DataFrame) -> Block:
-    """One row a claim; of those with several conditions the first, which fails where any does."""
+    """One row a claim; of what was measured as many parts as the report gives numbers, those that fail first."""
     rows = [
-        [row["where"], row["claim"], row["reported"], str(row["measured"]).split("; ")[0], row["verdict"]]
+        [row["where"], row["claim"], row["reported"], measured_parts(row["reported"], row["measured"]), row["verdict"]]
         for _, row in claims.iterrows()
     ]
     return table(["where", "what", "report", "ours", "verdict"], rows)
+
+
+def measured_parts(reported: str, measured: str) -> str:
+    """The first parts of ``measured``, one for each number of ``reported`` (one where it says "as stated")."""
+    return SEPARATOR.join(measured.split(SEPARATOR)[: len(reported.split(", "))])
 
 
 def parameters(tables: Tables) -> list[Block]:

@@ -1,6 +1,7 @@
 """Claims: verdicts follow from what is measured."""
 
 import math
+import re
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,13 +10,29 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.integrate import solve_ivp
 
 from study import config, excitation_reading, integrator_study
-from study.claims import damping, duffing, evidence, levels, preliminary, sample, simulation, table, verdict
+from study.claims import (
+    damping,
+    duffing,
+    evidence,
+    instruments,
+    levels,
+    preliminary,
+    response,
+    sample,
+    simulation,
+    table,
+    verdict,
+)
 from study.claims import reported as stated
 from study.claims.reported import Reported, Statement
 from study.claims.sample import Sample, departure
 from study.claims.verdict import Condition
+from study.modelfile import read_model
+from study.preliminary import model_restoring_force, natural_frequency
+from study.record import Record
 
 ROOT = Path(__file__).parents[1]
 SEEDS = 6
@@ -147,7 +164,7 @@ def test_every_failure_has_a_reason_and_no_success_has(judged: pd.DataFrame) -> 
         ("linear_leakage", "reproduced"),
         ("averages", "partly"),
         ("added_terms", "partly"),
-        ("error_free", "not reproduced"),  # at the level of the fixture runs diverge as well
+        ("error_free", "not reproduced"),
         ("exact_stiffness", "not reproduced"),
         ("duffing_share", "not reproduced"),
         ("dead_band_share", "not reproduced"),
@@ -187,6 +204,7 @@ def changed(folder: Path, settings: Mapping[str, Any], system: str, old: str, ne
             [duffing.duffing_cubic, duffing.siso_stiffness, preliminary.duffing_pattern, simulation.table_1],
         ),
         ("duffing_van_der_pol", "2.0e6", "1.0e6", [damping.combined_cubic, levels.invariant]),
+        ("linear", "3.77", "3.9", [preliminary.oval_width]),
         ("dead_band", "0.0025", "0.0035", [simulation.stiffness_gap, preliminary.dead_band_pattern]),
     ],
 )  # fmt: skip
@@ -216,6 +234,82 @@ def test_the_dead_band_is_read_from_its_pattern(found: evidence.Evidence) -> Non
     assert preliminary.read_dead_band(record, 1.0) == pytest.approx(0.0025, rel=0.05)
 
 
+@pytest.mark.parametrize("pace", [0.8, 1.25])
+def test_the_envelope_is_that_of_the_figures_harmonic_motion(pace: float) -> None:
+    """A slower motion than one at f_n stays within by as much as it is slower; a faster one stands beyond it."""
+    model = read_model(ROOT / "models" / "linear.yaml")
+    omega, time = 2.0 * math.pi * pace * natural_frequency(model.numbers()), 0.001 * np.arange(8000)
+    u, v = np.sin(omega * time), omega * np.cos(omega * time)
+    force = model_restoring_force(model, u, v, time) - omega**2 * u
+    record = Record(
+        0.001, {"force": force, "displacement": u, "velocity": v, "acceleration": -(omega**2) * u}, name="harmonic"
+    )
+    inside, width = preliminary.envelope(model, record, 1.0)
+    assert width == pytest.approx(pace, rel=1e-3)
+    assert (inside > 0.99) == (pace < 1.0)
+
+
+def test_what_the_cubic_terms_add_at_the_lowest_level_is_what_siso_finds_too_much(
+    found: evidence.Evidence, report: Reported
+) -> None:
+    spring, damper = levels.cubic_shares(found, report, 0.2)
+    single = found.at("duffing_van_der_pol", 0.2)
+    assert single.siso("k").mean / 355.3 - 1.0 == pytest.approx(spring, rel=0.2)
+    assert single.siso("c").mean / 3.77 - 1.0 == pytest.approx(damper, rel=0.2)
+    assert f"adds {100 * spring:.0f} % to the force that follows u" in levels.similar(found, report).why
+
+
+def test_a_histogram_is_far_from_gaussian_by_its_shape_not_by_its_length(
+    found: evidence.Evidence, report: Reported
+) -> None:
+    claim = damping.combined_histogram(found, report)
+    assert "2.6 % lie beyond two standard deviations where a Gaussian has 4.6 %" in claim.why
+    record = found.records(evidence.Drive("duffing_van_der_pol"))[0]["displacement"]
+    short = np.split(record, 8)
+    assert np.mean([sample.kurtosis(s) for s in short]) == pytest.approx(sample.kurtosis(record), abs=0.1)
+    gaussian = np.random.default_rng(3).standard_normal(100_000)
+    assert sample.outer_share(gaussian) == pytest.approx(sample.GAUSSIAN_OUTER_SHARE, rel=0.05)
+
+
+def test_the_resonance_of_the_fast_mathieu_system_is_drawn_towards_half_its_stiffness_s_frequency(
+    found: evidence.Evidence, report: Reported
+) -> None:
+    """Floquet's exponents of u'' + c u' + (k + k_m cos) u = 0 say where its lines are."""
+    model = read_model(ROOT / "models" / "mathieu.yaml").numbers()
+    period, (c, k, k_m) = 0.2, (model[n] for n in ("c", "k", "km_cos"))
+
+    def slope(t: float, y: Any) -> list[float]:
+        return [y[1], -c * y[1] - (k + k_m * math.cos(2.0 * math.pi * t / period)) * y[0]]
+
+    ends = [solve_ivp(slope, (0.0, period), y0, rtol=1e-9, atol=1e-12).y[:, -1] for y0 in ([1.0, 0.0], [0.0, 1.0])]
+    turn = abs(np.angle(np.linalg.eigvals(np.array(ends).T)[0])) / (2.0 * math.pi)  # of a cycle in each period
+    line = (1.0 - turn) / period
+    assert 2.5 < line < 2.9
+    claim = response.mathieu_fast(found, report)
+    said = re.search(r"to ([0-9.]+) Hz, and its sum with f_m to ([0-9.]+) Hz", claim.why)
+    assert said
+    assert [float(x) for x in said.groups()] == pytest.approx([line, 5.0 + line], abs=0.11)
+
+
+def test_instruments_are_judged_at_every_noise_by_their_own_bias(
+    monkeypatch: pytest.MonkeyPatch, found: evidence.Evidence, report: Reported
+) -> None:
+    asked: list[float] = []
+
+    def off(_: evidence.Evidence, __: Reported, noise: float) -> dict[str, Sample]:
+        asked.append(noise)
+        return {"m": Sample((-0.098, 0.0) if noise == 0.1 else (-0.01, 0.02)), "c": Sample((-0.2, 0.21))}
+
+    monkeypatch.setattr(instruments, "biases", off)
+    claim = instruments.unbiased(found, report)
+    assert asked == [0.05, 0.1, 0.2]
+    assert claim.verdict == "reproduced", "a bias below the limit, and scatter that explains it"
+    assert "10 % noise: m -4.9 +- 4.9 %, c +0.5 +- 20 %" in claim.measured
+    assert not instruments.small("m", Sample((-0.06, -0.06))).met
+    assert not instruments.random("m", Sample((-0.0101, -0.0099))).met, "small, but more than scatter explains"
+    assert instruments.small("m", Sample((-0.0101, -0.0099))).met
+
+
 def test_raw_is_the_nearer_reading(found: evidence.Evidence, report: Reported) -> None:
     rows = excitation_reading.study(found, report)
     assert excitation_reading.preferred(list(rows["nearer"])) == "raw"
@@ -231,6 +325,34 @@ def test_steps_take_the_integrator_s_error_away(steps: pd.DataFrame) -> None:
     assert abs(error["abm4", 2]) < 0.05
     assert abs(error["abm4", 8]) < 1e-4
     assert abs(error["rk4", 4]) < 1e-4
+
+
+def integrated(error: float, diverged: int = 0) -> list[dict[str, Any]]:
+    """Rows of the integrator study: one system, one parameter moved by a share, runs lost in the other reading."""
+    row = {"system": "linear", "method": "abm4", "steps_per_sample": 1, "true": 1.0, "standard_error": 1e-4, "seeds": 4}
+    return [
+        {**row, "reading": reading, "parameter": name, "relative_error": error, "diverged": lost}
+        for reading, lost in (("raw", 0), ("filtered", diverged))
+        for name in ("k", "f_n", "m", "c", "zeta")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("error", "diverged", "said"),
+    [
+        (1e-4, 0, "reproduced"),
+        (1e-4, 2, "partly"),
+        (0.1, 0, "not reproduced"),  # runs that merely end make nothing free of error
+        (0.1, 2, "not reproduced"),
+    ],
+)
+def test_a_run_that_diverges_makes_error_free_worse_and_none_makes_it_better(
+    settings: dict[str, Any], report: Reported, error: float, diverged: int, said: str
+) -> None:
+    some = evidence.gather(settings, evidence.models_of(ROOT / "models"), integrated(error, diverged))
+    claim = simulation.error_free(some, report)
+    assert claim.verdict == said
+    assert ("2 of 4 runs of linear diverge (unit variance filtered)" in claim.measured) == (diverged == 2)
 
 
 def test_diverged_runs_are_counted_by_name(steps: pd.DataFrame) -> None:

@@ -71,6 +71,15 @@ def test_mathieu_pattern_closes_after_one_period_of_the_stiffness():
     assert preliminary.closing_cycles(read_model(MODELS / "duffing.yaml"), 3.0) == 1
 
 
+def test_the_harmonic_motion_beside_a_record_has_its_amplitude_and_the_natural_frequency():
+    model = read_model(MODELS / "duffing.yaml")  # its response swings faster than f_n
+    record = response(model)
+    amplitude, frequency = preliminary.harmonic_beside(model, record)
+    assert amplitude == np.abs(record["displacement"]).max()
+    assert frequency == preliminary.natural_frequency(model.numbers())
+    assert np.std(record["velocity"]) / np.std(record["displacement"]) > 1.1 * 2.0 * np.pi * frequency
+
+
 @pytest.mark.parametrize(
     ("natural", "modulation", "expected"), [(3.0, 1.0, (2.0, 3.0, 4.0)), (3.0, 5.0, (2.0, 3.0, 8.0))]
 )

@@ -89,6 +89,20 @@ def test_numbers_show_what_was_stated_with_a_number(tables):
     assert "All is well" not in page
 
 
+@pytest.mark.parametrize(
+    ("reported", "shown"),
+    [
+        ("500 N/m", "a 1"),
+        ("as stated", "a 1"),
+        ("2 Hz, 4 Hz", "a 1; b 2"),
+        ("0.2 N^2, 0.5 N^2, 1 N^2, 2 N^2", "a 1; b 2; c 3"),
+    ],
+)
+def test_as_many_parts_are_shown_as_the_report_gives_numbers(reported, shown):
+    row = CLAIMS.iloc[[0]].assign(reported=reported, measured="a 1; b 2; c 3")
+    assert f"| {reported} | {shown} | reproduced |" in flat(document.markdown([summary.statements(row)]))
+
+
 def test_run_times_add_up(tables):
     page = flat(document.markdown(summary.run_times(tables)))
     assert "| record | 2 | 3.0 | 2.0 |" in page

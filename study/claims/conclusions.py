@@ -30,7 +30,7 @@ SPECTRA = {
 
 
 def conclusion_3(evidence: Evidence, reported: Reported) -> Claim:
-    """Four terms that the combined system does not have, assumed beside its own."""
+    """Two terms that the combined system does not have, assumed beside its own."""
     more = ("quadratic_stiffness", "quintic_stiffness")
     ensemble = evidence.ensemble(Drive(COMBINED), Assumed(plus=more))
     found = recovered(evidence, reported, COMBINED, ensemble, PARTS)

@@ -4,6 +4,7 @@ import math
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from study.claims.common import near_unity, recovered
 from study.claims.damping import COMBINED
@@ -15,6 +16,7 @@ from study.claims.verdict import Claim, Condition, at_least, close, conclude, to
 from study.ensemble import NOISE_OFFSET, threaded
 from study.excitation import displacement_noise
 
+Floats = NDArray[np.float64]
 PARTS = ("m", "c", "k", "k3", "c3")
 SIGNIFICANT_BIAS = 0.05  # "not significant": below 5 % of the exact value
 STRONG_BELOW = 5.0  # hertz: half of the band, which holds the response's resonance
@@ -43,7 +45,9 @@ def siso_climbs(evidence: Evidence, reported: Reported) -> Claim:
 
 def similar(evidence: Evidence, reported: Reported) -> Claim:
     """SI/SO and MI/SO at the lowest level."""
-    ensemble = evidence.at(COMBINED, levels(reported)[0])
+    level = levels(reported)[0]
+    ensemble = evidence.at(COMBINED, level)
+    spring, damper = cubic_shares(evidence, reported, level)
     return conclude(
         reported, "levels_similar",
         *(
@@ -51,7 +55,23 @@ def similar(evidence: Evidence, reported: Reported) -> Claim:
                   f"SI/SO's {n} is {ensemble.siso(n).mean:.4g} where MI/SO's is {ensemble.miso(n).mean:.4g}")
             for n in ("f_n", "k", "m", "c")
         ),
+        because=f"even at {level:g} N^2 the cubic spring adds {100 * spring:.0f} % to the force that follows u and the "
+        f"cubic damper {100 * damper:.0f} % to that which follows the velocity: SI/SO takes them for k and c",
     )  # fmt: skip
+
+
+def cubic_shares(evidence: Evidence, reported: Reported, level: float) -> tuple[float, float]:
+    """What the cubic spring adds to k, and the cubic damper to c, by least squares along the records: as shares."""
+    k, c, k3, c3 = (reported.table_1(COMBINED, n) for n in ("k", "c", "k3", "c3"))
+    drive = Drive(COMBINED, level)
+    spring = evidence.each(drive, lambda r: k3 / k * _on(r["displacement"] ** 3, r["displacement"]))
+    damper = evidence.each(drive, lambda r: c3 / c * _on(r["displacement"] ** 2 * r["velocity"], r["velocity"]))
+    return spring.mean, damper.mean
+
+
+def _on(values: Floats, motion: Floats) -> float:
+    """Coefficient of a motion in some values, by least squares."""
+    return float(values @ motion / (motion @ motion))
 
 
 def coherences(evidence: Evidence, reported: Reported) -> Claim:

@@ -163,3 +163,12 @@ def central_share(values: Floats) -> float:
 
 
 GAUSSIAN_CENTRAL_SHARE = math.erf(0.5 / math.sqrt(2.0))
+
+
+def outer_share(values: Floats) -> float:
+    """Share of the values beyond two standard deviations of the mean; 0.046 for a Gaussian."""
+    centred = values - np.mean(values)
+    return float(np.mean(np.abs(centred) > 2.0 * np.std(centred)))
+
+
+GAUSSIAN_OUTER_SHARE = math.erfc(2.0 / math.sqrt(2.0))

@@ -11,6 +11,7 @@ from study.claims.reported import Reported
 from study.claims.sample import Sample
 
 REPRODUCED, PARTLY, NOT_REPRODUCED = "reproduced", "partly", "not reproduced"
+SEPARATOR = "; "  # between the parts of what was measured, one a condition
 BESIDE = "beside"  # begins the place of what is no statement of the report: judged, but not counted among them
 
 
@@ -100,7 +101,7 @@ def together(label: str, conditions: Sequence[Condition]) -> Condition:
 
 
 def _joined(parts: list[str]) -> str:
-    return "; ".join(dict.fromkeys(p for p in parts if p))
+    return SEPARATOR.join(dict.fromkeys(p for p in parts if p))
 
 
 def close(label: str, found: Sample, target: float, relative: float, why: str = "") -> Condition:
