@@ -16,35 +16,25 @@ NAMES = (*PARTS, "f_n")
 
 
 def unbiased(evidence: Evidence, reported: Reported) -> Claim:
-    """The conditions of ``noise_random_only`` and ``noise_linear``, and those of A_1 on A_2 too.
+    """The condition of ``noise_linear`` on A_1, put to A_2 as well: the plain bias against the exact values.
 
-    Both are put to the plain bias against the exact values. Scatter alone explains any bias where it is large enough,
-    so that the limit of ``noise_linear`` to a significant bias holds as well.
+    That errors are random only is not claimed: over 200 seeds (docs/estimators.md) a few tenths of a per cent are left.
     """
-    conditions: list[Condition] = []
-    for noise in noises(reported):
-        found = biases(evidence, reported, noise)
-        label = f"{100 * noise:g} % noise"
-        conditions += [
-            together(label, [random(n, off) for n, off in found.items()]),
-            together(label, [small(n, off) for n, off in found.items()]),
-        ]
-    return conclude(reported, "noise_instruments", *conditions)
-
-
-def random(name: str, off: Sample) -> Condition:
-    """A bias that scatter alone explains."""
-    return _below(3.0 * off.error, "3 standard errors of zero", name, off)
+    return conclude(
+        reported, "noise_instruments",
+        *(
+            together(f"{100 * noise:g} % noise", [small(n, off) for n, off in biases(evidence, reported, noise).items()])
+            for noise in noises(reported)
+        ),
+    )  # fmt: skip
 
 
 def small(name: str, off: Sample) -> Condition:
     """A bias that is not significant, in the sense of ``noise_linear``."""
-    return _below(SIGNIFICANT_BIAS, f"{100 * SIGNIFICANT_BIAS:g} %", name, off)
-
-
-def _below(limit: float, said: str, name: str, off: Sample) -> Condition:
     text = f"{name} {100 * off.mean:+.3g} +- {100 * off.error:.2g} %"
-    return Condition(f"mean bias of {name} within {said}", text, abs(off.mean) <= limit, text)
+    return Condition(
+        f"mean bias of {name} within {100 * SIGNIFICANT_BIAS:g} %", text, abs(off.mean) <= SIGNIFICANT_BIAS, text
+    )
 
 
 def biases(evidence: Evidence, reported: Reported, noise: float) -> dict[str, Sample]:
