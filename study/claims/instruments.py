@@ -20,13 +20,12 @@ def unbiased(evidence: Evidence, reported: Reported) -> Claim:
 
     That errors are random only is not claimed: over 200 seeds (docs/estimators.md) a few tenths of a per cent are left.
     """
-    return conclude(
-        reported, "noise_instruments",
-        *(
-            together(f"{100 * noise:g} % noise", [small(n, off) for n, off in biases(evidence, reported, noise).items()])
-            for noise in noises(reported)
-        ),
-    )  # fmt: skip
+    found = {noise: biases(evidence, reported, noise) for noise in noises(reported)}
+    conditions = (
+        together(f"{100 * noise:g} % noise", [small(name, off) for name, off in own.items()])
+        for noise, own in found.items()
+    )
+    return conclude(reported, "noise_instruments", *conditions)
 
 
 def small(name: str, off: Sample) -> Condition:
