@@ -16,6 +16,7 @@ LOOKS = (("C1", (0, (5.0, 2.0))), ("C2", (0, (1.5, 1.2))), ("C3", (0, (7.0, 1.5,
 MARKS = ("o", "s", "^", "v")
 APART = 9  # lines between two circles: the curve under them stays to be seen
 ALL = ("C0", "-")  # the last curve is the multiple coherence: what the whole model explains
+OTHER_MOTION = {"instrumental": "fitted model's own motion"}  # near one whatever the model: it is no test
 
 
 def cumulative(axes: Axes, shares: Sequence[InputCoherence]) -> Axes:
@@ -42,12 +43,13 @@ def cumulative(axes: Axes, shares: Sequence[InputCoherence]) -> Axes:
 
 def beside(axes: Axes, shares: Sequence[InputCoherence], estimator: str) -> Axes:
     """Cumulative coherences of a further estimator as marks on a hair line, one label for each curve."""
+    whose = OTHER_MOTION.get(estimator, look(estimator).label)
     for index, share in enumerate(shares):
         plus = "+ " if index else ""
         axes.plot(
             share.frequency, share.cumulative, MARKS[index % len(MARKS)], linestyle="-", color="black", linewidth=0.4,
             markerfacecolor="none", markersize=5.0, markeredgewidth=0.9, zorder=2.95,
-            markevery=(APART * index // len(shares), APART), label=f"{look(estimator).label}: {plus}{_shape(share)}",
+            markevery=(APART * index // len(shares), APART), label=f"{whose}: {plus}{_shape(share)}",
         )  # fmt: skip
     return axes
 
