@@ -231,7 +231,7 @@ def test_what_is_no_readable_file(tmp_path: Path) -> None:
         read_model(tmp_path)
     with pytest.raises(StudyError, match="not a regular file"):
         read_model(Path("/dev/null"))
-    with pytest.raises(StudyError, match="null byte"):
+    with pytest.raises(StudyError, match=r"null (byte|character)"):
         read_model(Path("a\0b"))
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     with pytest.raises(StudyError, match="loop"):
