@@ -211,7 +211,7 @@ def _complete_model(path: Path) -> Model:
 def _check_assumed(model: Model, extra: str, settings: Table) -> None:
     """Whether the record can tell the inputs of the assumed model apart."""
     from study.local_polynomial import LocalPolynomial
-    from study.spectra import Segments  # a second of SciPy, for those alone who load a configuration
+    from study.spectra import Segments
 
     if extra:
         term = terms.get(extra)

@@ -142,7 +142,7 @@ def _check_band(settings: Table, where: str) -> None:
 
 
 def _check_segments(settings: Table, where: str) -> None:
-    from study.spectra import Segments  # a second of SciPy, for those alone who load a configuration
+    from study.spectra import Segments  # SciPy, for those alone who load a configuration
 
     told, samples = settings["segments"], settings["sampling"]["samples"]
 

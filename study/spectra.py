@@ -55,7 +55,9 @@ class Segments:
 
     def taper(self) -> Floats:
         """The window's samples, shape (length,)."""
-        from scipy.signal import get_window  # a third of a second, which not every step that knows segments needs
+        if self.window == "hann":  # SciPy's signal package takes longer to load than most steps of the study to run
+            return np.hanning(self.length + 1)[:-1]
+        from scipy.signal import get_window
 
         return np.asarray(get_window(self.window, self.length), dtype=np.float64)
 

@@ -26,6 +26,7 @@ def channels() -> list[np.ndarray]:
 @pytest.mark.parametrize("overlap", [0.0, 0.5, 0.75])
 def test_agrees_with_scipy(channels: list[np.ndarray], window: str, length: int, overlap: float) -> None:
     cut = Segments(length, overlap, window)
+    np.testing.assert_allclose(cut.taper(), signal.get_window(window, length), rtol=0.0, atol=1e-15)
     matrix = cross_spectra(channels, DT, cut)
     for i, x in enumerate(channels):
         for j, y in enumerate(channels):

@@ -27,6 +27,7 @@ FREE_RUN = "output_error"
 STEPS = 8  # per sample: no coefficient is fitted in free run, so that many cost little
 FOLLOWED, SMOOTHED = 0.5, 5  # coherence, over so many lines, up to the last of which the displacement is no noise
 LOST = 0.05  # of the standard deviation of the response: a free run that misses by less has not lost the motion
+LOOKED = 4096  # samples: a chaotic motion magnifies disturbances long before
 CHAOTIC = (
     "the fitted system magnifies disturbances, as a chaotic one does: its free run loses the measured motion however "
     "true the model, so that the coefficients come from pieces of the record, the response error says little, and "
@@ -37,7 +38,8 @@ CHAOTIC = (
 def has_lost(found: FreeRunFit, completed: CompletedRecord, how: Plan) -> bool:
     """Whether a fit in one free run has lost the motion because its system magnifies disturbances."""
     size = float(np.std(completed.record[how.response][slice(*how.fit)]))
-    return found.rms > LOST * size and magnifies(found, completed.record, how.response, how.steps_per_sample, how.fit)
+    stretch = how.fit[0], min(how.fit[1], how.fit[0] + LOOKED)
+    return found.rms > LOST * size and magnifies(found, completed.record, how.response, how.steps_per_sample, stretch)
 
 
 def fit_by(name: str, model: Model, completed: CompletedRecord, how: Plan) -> tuple[FreeRunFit, Plan, Estimate]:
