@@ -21,6 +21,7 @@ NAMES = {
     "miso_in_pieces": "MI/SO, record read in pieces", "miso_whole": "MI/SO, record in memory",
     "local_polynomial": "`local_polynomial`", "output_error": "`output_error`", "simulation": "simulation",
 }  # fmt: skip
+MARKS = ("o-", "s--", "^-.", "D-", "v:")  # told apart in grey
 REFERENCE = 10**5
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 PLACE = re.compile(r"(<!-- cost -->\n).*?(<!-- /cost -->)", re.DOTALL)
@@ -69,17 +70,17 @@ def picture(measured: Measured, path: Path) -> None:
 
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
     left, right = figure.subplots(1, 2)
-    for task, name in NAMES.items():
+    for (task, name), mark in zip(NAMES.items(), MARKS, strict=True):
         sizes = sorted(size for known, size in measured if known == task)
         label = name.replace("`", "")
-        left.loglog(sizes, [measured[task, s][0] for s in sizes], "o-", label=label)
-        right.loglog(sizes, [max(measured[task, s][1] / 1e6, 1.0) for s in sizes], "o-", label=label)
+        left.loglog(sizes, [measured[task, s][0] for s in sizes], mark, label=label)
+        right.loglog(sizes, [max(measured[task, s][1] / 1e6, 1.0) for s in sizes], mark, label=label)
     sizes = sorted({size for _, size in measured})
     first = measured["miso_in_pieces", REFERENCE][0] / REFERENCE
     left.loglog(sizes, [0.4 * first * s for s in sizes], "k:", label="in proportion to the size")
     left.set(xlabel="samples", ylabel="processor time (s)")
     right.set(xlabel="samples", ylabel="peak memory (MB), at least 1")
-    left.legend(fontsize="x-small")
+    left.legend(fontsize="x-small", handlelength=3.5)
     figure.savefig(path, dpi=110, metadata={"Software": None})
 
 
