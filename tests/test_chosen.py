@@ -101,6 +101,17 @@ def test_a_chaotic_motion_that_one_free_run_loses_is_fitted_in_pieces(systems: d
         assert c.value == pytest.approx(true, rel=0.02)
 
 
+def test_where_pieces_fail_too_the_free_run_stands(local: Comparison, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> None:
+        raise StudyError("nothing in common")
+
+    monkeypatch.setattr("study.compare.comparison.has_lost", lambda *_: True)
+    monkeypatch.setattr("study.compare.comparison.fit_by", fails)
+    found = compare(OPEN, local.record)
+    assert CHAOTIC not in found.notes
+    assert all(abs(error) < 4.0 for error in off(found).values())
+
+
 def test_a_regular_motion_is_not_called_chaotic(local: Comparison) -> None:
     assert CHAOTIC not in compare(OPEN, local.record).notes
     assert CHAOTIC not in local.notes

@@ -1,6 +1,7 @@
 """Compare a model with measured records: how good it is, and where it fails."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -149,8 +150,9 @@ def compare(
     else:
         found, how, known = fit_by(estimator, model, completed, how)
     if estimator == FREE_RUN and not fitting.held_keys(model) and has_lost(found, completed, how):
-        found, how, known = fit_by(estimator, model, completed, how)
-        notes = (*notes, CHAOTIC)
+        with suppress(StudyError):  # where pieces fail as well, the one free run is what there is
+            found, how, known = fit_by(estimator, model, completed, how)
+            notes = (*notes, CHAOTIC)
     told("free run")
     judged = judge(found, completed.record, how, completed.band[0])
     noise = noise_of(judged, completed.record, how.judge[1])
