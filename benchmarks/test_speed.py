@@ -59,7 +59,7 @@ def channels(count: int = 4, samples: int = 1_000_000):
 @pytest.mark.benchmark(group="cross-spectral matrix, 4 channels of 1,000,000 samples")
 def test_matrix(benchmark):
     data = channels()
-    benchmark.pedantic(lambda: cross_spectra(data, DT), rounds=3, warmup_rounds=1)
+    benchmark.pedantic(lambda: cross_spectra(data, DT), rounds=15, warmup_rounds=1)
 
 
 @pytest.mark.benchmark(group="cross-spectral matrix, 4 channels of 1,000,000 samples")
@@ -68,18 +68,21 @@ def test_matrix_by_scipy_csd(benchmark):
     benchmark.pedantic(lambda: [[csd(x, y, 1 / DT, nperseg=512, detrend=False) for x in data] for y in data], rounds=2)
 
 
+@pytest.mark.parametrize("windowed", [False, True], ids=["bare", "windowed"])
 @pytest.mark.benchmark(group="cross-spectral matrix, 4 channels of 1,000,000 samples")
-def test_bare_ffts(benchmark):
-    """What no estimate can do without: one FFT a segment and channel, not even windowed."""
+def test_ffts(benchmark, windowed):
+    """What no estimate can do without: one FFT a segment and channel, and its window."""
     data, cut = channels(), Segments()
+    taper = cut.taper()
 
     def run():
         for x in data:
             view = np.lib.stride_tricks.sliding_window_view(x, cut.length)[:: cut.hop]
             for first in range(0, len(view), 256):
-                np.fft.rfft(view[first : first + 256])
+                part = view[first : first + 256]
+                np.fft.rfft(part * taper if windowed else part)
 
-    benchmark.pedantic(run, rounds=3, warmup_rounds=1)
+    benchmark.pedantic(run, rounds=15, warmup_rounds=1)
 
 
 def reverse_channels(samples: int):
