@@ -7,13 +7,13 @@ algebra than one in a single piece.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
 Floats = NDArray[np.float64]
+BLOCK = 32  # samples, of which products are summed together
 INDISTINCT = 1e-12  # eigenvalue of a scaled normal matrix below which variables cannot be told apart
 
 
@@ -120,6 +120,25 @@ def _tridiagonal(own: Floats, links: Floats, damping: float, right: Floats) -> F
     return np.asarray(solved, dtype=np.float64).reshape(count, f, m)
 
 
+def _products(rows: Floats, begins: Sequence[int]) -> Floats:
+    """``X^T X`` of the rows X of each piece, shape (N, columns, columns).
+
+    Pieces are cut to blocks alike in length, short ones filled up with zeros: one product of all blocks together
+    takes a sixth of the time of hundreds of small ones.
+    """
+    if len(begins) == 1:
+        return np.asarray((rows.T @ rows)[None], dtype=np.float64)
+    lengths = np.diff([*begins, len(rows)])
+    block = min(int(np.max(lengths)), BLOCK)
+    counts = -(-lengths // block)
+    first = np.cumsum(counts) - counts
+    offset = block * (np.arange(np.sum(counts)) - np.repeat(first, counts))[:, None] + np.arange(block)
+    inside = offset < np.repeat(lengths, counts)[:, None]
+    filled = np.concatenate([rows, np.zeros((1, rows.shape[1]))])
+    blocks = filled[np.where(inside, np.repeat(begins, counts)[:, None] + offset, len(rows))]
+    return np.asarray(np.add.reduceat(blocks.transpose(0, 2, 1) @ blocks, first), dtype=np.float64)
+
+
 def normal_equations(
     residual: Floats, jacobian: Floats, shared: int, begins: Sequence[int], ties: Ties | None = None
 ) -> tuple[Floats, Normal]:
@@ -144,9 +163,8 @@ def normal_equations(
         Length of each column, one where it is zero.
     normal : Normal
     """
-    bounds = (*begins, len(residual))
-    grams = np.stack([jacobian[a:b].T @ jacobian[a:b] for a, b in pairwise(bounds)])
-    rights = np.stack([jacobian[a:b].T @ residual[a:b] for a, b in pairwise(bounds)])
+    products = _products(np.column_stack([jacobian, residual]), begins)
+    grams, rights = products[:, :-1, :-1], products[:, :-1, -1]
     links = None
     if ties is not None:
         turned = ties.jacobian.transpose(0, 2, 1)

@@ -1,18 +1,31 @@
 """Shape parameters that a model leaves open: where a fit of them begins.
 
-The search is that of the diagnosis (``study.diagnose``): the width of a dead band, a gap, a relaxation time
-or the frequency of a stiffness are tried where they explain most of what the model without the term leaves.
+Each point of a search over them (``study.shape_search``: the width of a dead band, a gap, a relaxation time or the
+frequency of a stiffness) is fitted to a part of the record. One free run tells points apart best, unless the
+system is chaotic: then it ends in a side valley at every point, while the misfit in pieces of a period falls
+smoothly towards the truth.
 """
 
+from collections.abc import Collection
 from dataclasses import replace
 
-from study import fitting
-from study.diagnose import candidates, search
-from study.errors import StudyError
-from study.model import Model
+import numpy as np
+from numpy.typing import NDArray
+
+from study import fitting, shape_search
+from study.chaotic import astray, magnifies
+from study.errors import DivergenceError, StudyError
+from study.fitting import Plan
+from study.joining import fit_pieces
+from study.model import Model, ModelTerm
+from study.output_error import FreeRunFit
+from study.pieces import Pieces, even_restarts
 from study.record import Record
 
-SEARCHED = 2048  # samples, at most: a start needs no more, and a chaotic system is lost sooner or later
+Floats = NDArray[np.float64]
+SEARCHED = 2048  # samples, at most: a start needs no more
+SHORT, LONG = 15, 40  # free runs of a fit with the shape held, and of one with it open
+FEW = 8  # ... in pieces, which find their way sooner
 
 
 def shape_keys(model: Model) -> tuple[str, ...]:
@@ -22,9 +35,9 @@ def shape_keys(model: Model) -> tuple[str, ...]:
 
 
 def with_starting_shapes(model: Model, record: Record) -> Model:
-    """The model with a starting value for each shape parameter that it leaves open.
+    """The model with starting values for shape parameters that it leaves open, and for its coefficients.
 
-    Its coefficients, which are not looked at, keep their values.
+    A model that leaves none open is returned as it is.
 
     Raises
     ------
@@ -36,12 +49,70 @@ def with_starting_shapes(model: Model, record: Record) -> Model:
         return model
     how = fitting.shortened(fitting.plan(record), SEARCHED)
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
-    found = fitting.fit(known, record, how, shape_keys(known))
+    values: dict[str, float] | None = None
     for entry in unknown:
-        trial = candidates.attempt(entry.term, search.baseline(found, record, how), record, how, shape_keys(known))
-        if trial is None:
+        before = fitting.fit(known, record, how, shape_keys(known), values, SHORT)
+        found = _in_one_run(before, entry, record, how) or _in_pieces(before, entry, record, how)
+        if found is None:
             names = ", ".join(p.name for p, v in zip(entry.term.parameters, entry.parameters, strict=True) if v is None)
             raise StudyError(f"{record.name!r} does not show {names} of {entry.name}; give it in the model")
-        found = trial.found
-    values = found.model.values
-    return model.with_values({key: values[key] for key, value in model.values.items() if value is None and "." in key})
+        known, values = found.model, dict(zip(found.keys, found.values.tolist(), strict=True))
+    return model.with_values(known.values)
+
+
+def _in_one_run(before: FreeRunFit, entry: ModelTerm, record: Record, how: Plan) -> FreeRunFit | None:
+    """The model with a term, fitted in one free run from the best points of a search; None where that goes astray."""
+    model = before.model.with_term(entry)
+    given, own = shape_keys(model), entry.keys[len(entry.coefficients) :]
+    values = {key: value for key, value in before.model.values.items() if value is not None}
+    measured, best = record[how.response][slice(*how.fit)], None
+    for point in shape_search.starts(entry.term, shape_search.baseline(before, record, how), record, how):
+        begun = model.with_values(values | dict(zip(entry.keys, point.coefficients + point.parameters, strict=True)))
+        found = _fitted(begun.with_values(_given(entry)), record, how, (*given, *own), SHORT)
+        if found is None:
+            continue
+        if best is None and astray(found, measured) and magnifies(
+            found, record, how.response, how.steps_per_sample, how.fit
+        ):  # fmt: skip
+            return None
+        best = found if best is None or found.rms < best.rms else best
+    found = best and (_fitted(best.model, record, how, given, LONG) or best)
+    return None if found is None or astray(found, measured) else found
+
+
+def _fitted(model: Model, record: Record, how: Plan, held: tuple[str, ...], runs: int) -> FreeRunFit | None:
+    values = {key: value for key, value in model.values.items() if value is not None}
+    try:
+        return fitting.fit(model, record, how, held, values, runs)
+    except DivergenceError:
+        return None
+
+
+def _in_pieces(before: FreeRunFit, entry: ModelTerm, record: Record, how: Plan) -> FreeRunFit | None:
+    """The same in pieces of a period, from every point of the search; None where there is no finite response."""
+    model = before.model.with_term(entry)
+    given, own = shape_keys(model), entry.keys[len(entry.coefficients) :]
+    restarts = even_restarts(record, how.response, how.fit)
+    pieces = Pieces(record, how.response, how.fit, restarts, how.steps_per_sample)
+    start = fitting.linear_start(model, record, how)
+    begun = model.with_values({key: value for key, value in start.items() if "." not in key})
+    best, states = None, None
+    for point in shape_search.grid(entry.term, shape_search.baseline(before, record, how), record, how):
+        shaped = begun.with_values(dict(zip(own, point, strict=True)) | _given(entry))
+        states = pieces.first_states(shaped) if states is None else states
+        found = _fitted_pieces(shaped, pieces, states, (*given, *own))
+        if found is not None and (best is None or found.rms < best.rms):
+            best = found
+    return best and (_fitted_pieces(best.model, pieces, best.initial, given) or best)
+
+
+def _fitted_pieces(model: Model, pieces: Pieces, states: Floats, held: Collection[str]) -> FreeRunFit | None:
+    try:
+        return fit_pieces(model, pieces, states, held, FEW)
+    except DivergenceError:
+        return None
+
+
+def _given(entry: ModelTerm) -> dict[str, float | None]:
+    """Shape parameters of a term that are known."""
+    return {key: value for key, value in entry.values.items() if "." in key and value is not None}

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from study import fitting, trials
+from study import fitting, shape_search, trials
 from study.compare.fitted import fit_model
-from study.diagnose import candidates, nature, pairs, preselect, search, steadiness
+from study.diagnose import candidates, nature, pairs, preselect, steadiness
 from study.diagnose.ranking import rank
 from study.excitation import Excitation, force
 from study.model import free
@@ -17,7 +17,7 @@ from study.terms import get
 def left_by(model, record):
     how = fitting.plan(record)
     found, _ = fit_model(model, record, how)
-    return nature.leftover(found, search.baseline(found, record, how), record, how)
+    return nature.leftover(found, shape_search.baseline(found, record, how), record, how)
 
 
 def test_an_imitator_under_noise_leaves_a_shape_and_the_truth_leaves_none():
@@ -57,7 +57,7 @@ def two_effects():
     made = trials.make_trial(93001, ("quadratic_stiffness", "quadratic_damping"), 0.01, "displacement")
     how = fitting.plan(made.record)
     found, _ = fit_model(made.believed, made.record, how)
-    base = search.baseline(found, made.record, how)
+    base = shape_search.baseline(found, made.record, how)
     terms = [get(n) for n in ("quadratic_stiffness", "quadratic_damping", "cubic_stiffness", "bilinear_stiffness")]
     tried = candidates.try_all(terms, base, made.record, how, ())
     return made, how, base, rank(tried, fitting.held_out_residual(found, made.record, how), made.record, how)
@@ -81,7 +81,7 @@ def test_a_candidate_whose_fits_all_lost_the_motion_begins_in_pieces():
     made = trials.make_trial(97072, ("quintic_stiffness",), 0.05, "displacement")
     how = fitting.plan(made.record)
     found, _ = fit_model(made.believed, made.record, how)
-    base = search.baseline(found, made.record, how)
+    base = shape_search.baseline(found, made.record, how)
     tried = candidates.attempt(get("quintic_stiffness"), base, made.record, how, ())
     assert tried is not None
     size = np.std(made.record["displacement"])

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri, stdtrit
 
-from study import fitting, units
+from study import fitting, shape_search, units
 from study.chaotic import fit_in_pieces
-from study.diagnose import search
 from study.diagnose.score import clustered_covariance
 from study.errors import DivergenceError, StudyError
 from study.fitting import Plan
@@ -195,7 +194,7 @@ def _with_shape(
     known = {key: value for key, value in before.model.values.items() if value is not None}
     grown = before.model.with_term(entry)
     fits: list[FreeRunFit] = []
-    for point in search.starts(entry.term, search.baseline(before, record, how), record, how):
+    for point in shape_search.starts(entry.term, shape_search.baseline(before, record, how), record, how):
         begin = known | dict(zip(entry.keys, point.coefficients + point.parameters, strict=True)) | given
         try:
             fits.append(fitting.fit(grown.with_values(begin), record, how, _held(grown, held), begin))

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study import fitting
+from study import fitting, shape_search
 from study.compare.fitted import from_pieces
-from study.diagnose import search
-from study.diagnose.search import Baseline
+from study.shape_search import Baseline
 from study.errors import StudyError
 from study.fitting import Plan
 from study.model import Model, free
@@ -131,7 +130,7 @@ def _starts(term: Term, base: Baseline, record: Record, how: Plan) -> list[dict[
     That matters where the model without the candidate was driven to a far corner by its lack.
     """
     fitted = {key: v for key, v in base.found.model.values.items() if v is not None}
-    points = search.starts(term, base, record, how)
+    points = shape_search.starts(term, base, record, how)
     keys, zero = free(term).keys, (0.0,) * len(term.components)
     begins = [fitted | dict(zip(keys, zero + p.parameters, strict=True)) for p in points]
     if points:

@@ -17,7 +17,7 @@ from scipy.signal import lfilter
 
 from study import fitting
 from study.diagnose import score
-from study.diagnose.search import Baseline, modulation_lines, residual_lines
+from study.shape_search import Baseline, modulation_lines, residual_lines
 from study.errors import DivergenceError
 from study.fitting import Plan
 from study.free_run import prepare

@@ -13,7 +13,7 @@ from study.diagnose import preselect
 from study.diagnose.candidates import SHORT, THREADS
 from study.diagnose.preselect import PairStart
 from study.diagnose.ranking import Ranked
-from study.diagnose.search import Baseline
+from study.shape_search import Baseline
 from study.errors import StudyError
 from study.fitting import Plan
 from study.output_error import FreeRunFit

@@ -15,7 +15,7 @@ from scipy.fft import rfft, rfftfreq
 from scipy.signal import get_window
 
 from study.diagnose.ranking import Ranked
-from study.diagnose.search import Baseline, sensitivity
+from study.shape_search import Baseline, sensitivity
 from study.errors import StudyError
 from study.fitting import FAINT, Plan
 from study.inputs import history, reverse_inputs

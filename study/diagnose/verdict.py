@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study import fitting, noise_floor
+from study import fitting, noise_floor, shape_search
 from study.compare.fitted import fit_model
-from study.diagnose import candidates, nature, pairs, score, search
+from study.diagnose import candidates, nature, pairs, score
 from study.diagnose.pairs import Pair
 from study.diagnose.ranking import UNSTEADY, Ranked, changes, curves, rank, wavers
-from study.diagnose.search import Baseline
+from study.shape_search import Baseline
 from study.errors import DivergenceError
 from study.fitting import Plan
 from study.model import Model
@@ -115,7 +115,7 @@ def diagnose(
             how = finer
     residual, diverged = _held_out(found, record, how)
     short = fitting.shortened(how, SEARCHED)
-    base = search.baseline(_refitted(found, record, how, short, held), record, short)
+    base = shape_search.baseline(_refitted(found, record, how, short, held), record, short)
     terms = candidates.candidate_terms(base, extra, without)
     trials = candidates.try_all(terms, base, record, short, held, progress)
     if short != how:
@@ -207,7 +207,7 @@ def _explaining_pair(
     if found is not None and _explains(found, rows, size, record, short):
         return found
     for row in rows[:PAIRED]:
-        beside = search.baseline(_refitted(row.found, record, how, short, held), record, short)
+        beside = shape_search.baseline(_refitted(row.found, record, how, short, held), record, short)
         others = [r.term for r in rows if r.name != row.name]
         seconds = candidates.try_all(others, beside, record, short, held)
         second = min(seconds, key=lambda t: float(t.residual @ t.residual), default=None)
@@ -239,7 +239,7 @@ def _lack(found: FreeRunFit, error: float, record: Record, how: Plan) -> float:
     Structure that is as broad as noise is not seen in a spectrum; it still depends on the motion.
     """
     short = fitting.shortened(how, len(found.residual))
-    left = nature.leftover(found, search.baseline(found, record, short), record, short)
+    left = nature.leftover(found, shape_search.baseline(found, record, short), record, short)
     shares = nature.explained_by(left)
     share = max(share for name, share in shares.items() if name != "time")
     return error * float(np.sqrt(max(share if share > LACK else 0.0, nature.significant(left, CHANCE))))

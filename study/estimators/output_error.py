@@ -20,8 +20,6 @@ KEPT = 4  # fits: those of the records that the threads are at
 
 def identify(model: Model, record: Record, settings: Settings) -> Identified:
     """Coefficients, and shape parameters that the model leaves open; A_j(f) of the form that they give it.
-
-    The search begins with the MI/SO estimate of the same record.
     """
     found = fit(model, record, settings)
     inputs, estimate = reverse_inputs(found.model), found.estimate
@@ -42,7 +40,8 @@ def shapes_of(found: FreeRunFit, keys: Collection[str]) -> Estimate:
 def fit(model: Model, record: Record, settings: Settings) -> FreeRunFit:
     """The fit in free run that the estimate is made of; kept a while, for instruments rest on the same one.
 
-    Where the MI/SO estimate leads nowhere, as under much noise, or with inputs that it cannot tell apart, the search
+    The search begins with the MI/SO estimate, or where shape parameters are open with what their search found.
+    Where that leads nowhere, as under much noise, or with inputs that it cannot tell apart, the search
     begins anew with the best linear approximation.
 
     Raises
@@ -53,9 +52,7 @@ def fit(model: Model, record: Record, settings: Settings) -> FreeRunFit:
         If force and displacement have nothing in common.
     """
     begun, held = with_starting_shapes(model, record), shape_keys(model)
-    first = miso.identify(begun, record, settings).estimate
-    assert first is not None  # MI/SO finds all coefficients together
-    start = dict(zip(first.symbols, (float(v) for v in first.values), strict=True))
+    start = _reverse(model, record, settings) if begun is model else {}
     try:
         found = fit_record(begun, record, start=start, held=held)
     except DivergenceError:
@@ -67,6 +64,13 @@ def fit(model: Model, record: Record, settings: Settings) -> FreeRunFit:
     except DivergenceError:
         return found
     return again if again.rms < found.rms else found
+
+
+def _reverse(model: Model, record: Record, settings: Settings) -> dict[str, float]:
+    """Coefficients by MI/SO."""
+    found = miso.identify(model, record, settings).estimate
+    assert found is not None  # MI/SO finds all coefficients together
+    return dict(zip(found.symbols, (float(v) for v in found.values), strict=True))
 
 
 def _linear(model: Model, record: Record) -> dict[str, float]:

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from study import expression, fitting
+from study import expression, fitting, shape_search
 from study.compare.comparison import Comparison, compare, lacking_with
 from study.compare.report import rung as ladder_step
 from study.compare.restoring import Restoring
-from study.diagnose import candidates, search
+from study.diagnose import candidates
 from study.diagnose.candidates import Trial
 from study.diagnose.files import in_words
 from study.diagnose.ranking import Ranked, rank
@@ -247,7 +247,7 @@ def _attempted(term: Term, found: Diagnosis, session: Session) -> Trial:
     record, how, held = session.record, session.how, fitting.held_keys(session.now.model)
     short = fitting.shortened(how, len(found.candidates[-1].found.residual)) if found.candidates else how
     fit = found.found if short == how else fitting.fit(found.found.model, record, short, held, session.now.values)
-    trial = candidates.attempt(term, search.baseline(fit, record, short), record, short, held)
+    trial = candidates.attempt(term, shape_search.baseline(fit, record, short), record, short, held)
     if trial is None:
         raise _no_response(term)
     return trial if short == how else candidates.refitted(trial, record, how, held)

@@ -97,7 +97,7 @@ def _run(model: Model, record: Record, how: Plan, keys: Sequence[str]) -> FreeRu
 def starts(term: Term, base: Baseline, record: Record, how: Plan) -> list[Start]:
     """The best points of the search over a candidate's shape parameters, best first."""
     tried: list[Start] = []
-    for parameters in _grid(term, base, record, how):
+    for parameters in grid(term, base, record, how):
         point = _try(term, parameters, base, record, how)
         if point is not None:
             tried.append(point)
@@ -140,7 +140,7 @@ def _try(
     return Start(parameters, tuple(float(a) for a in amounts), share)
 
 
-def _grid(term: Term, base: Baseline, record: Record, how: Plan) -> list[tuple[float, ...]]:
+def grid(term: Term, base: Baseline, record: Record, how: Plan) -> list[tuple[float, ...]]:
     """Points to try: amplitudes from the motion, times from the resonance, frequencies from spectra."""
     if not term.parameters:
         return [()]
