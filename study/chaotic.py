@@ -10,7 +10,7 @@ from study.errors import DivergenceError
 from study.joining import NEGLIGIBLE, fit_pieces, joined
 from study.model import Model
 from study.output_error import FreeRunFit, fit_free_run
-from study.pieces import Pieces, even_restarts, needed_restarts
+from study.pieces import Pieces, even_restarts, needed_restarts, rough_steps
 from study.record import Record
 
 Floats = NDArray[np.float64]
@@ -19,6 +19,7 @@ SOFT, SOFTLY = (0.3, 1.0, 3.0), 5  # ties that lead coefficients near the truth 
 FIRM, FIRMLY = 30.0, 12  # tied so, pieces know of each other most of what the noise lets them
 TIGHT, TIGHTLY = 100.0, 30  # tied so, they are one motion
 GLANCE = 10  # free runs after which a fit of a whole record that has lost the motion is given up
+CLEAN = 0.01  # of the response's standard deviation: a residual to which long steps of the integrator may add
 POOR = 0.05  # of the response's standard deviation: a residual that may hide a motion
 SMOOTH = 0.5  # correlation of neighbouring samples of a residual; white noise has none
 DEVIATIONS = 3.0  # by how many standard deviations the misfit may exceed what fewer unknowns explain
@@ -49,8 +50,11 @@ def fit_in_pieces(
     """
     whole = span or (0, len(record))
     pieces = Pieces(record, response, whole, even_restarts(record, response, whole), steps_per_sample)
+    rough = replace(pieces, steps_per_sample=rough_steps(record, response, steps_per_sample))
     begun = model.with_values(dict(start or {}))
-    loose = fit_pieces(begun, pieces, pieces.first_states(begun), held, min(LOOSE, max_iterations))
+    loose = fit_pieces(begun, rough, rough.first_states(begun), held, min(LOOSE, max_iterations))
+    if loose.rms < CLEAN * pieces.spread:  # long steps would show
+        loose = fit_pieces(loose.model, pieces, loose.initial, held, min(LOOSE, max_iterations))
     states = np.atleast_2d(loose.initial)
     if not needed_restarts(loose.model, record, states, whole, pieces.restarts, steps_per_sample):
         return fit_free_run(
@@ -59,16 +63,16 @@ def fit_in_pieces(
         )  # fmt: skip
     if loose.rms < NEGLIGIBLE * pieces.spread:
         return fit_pieces(loose.model, pieces, states, held, max_iterations)  # ties would believe the integrator more
-    near = fit_pieces(begun, pieces, states, held, SOFTLY, SOFT[0])
+    near = fit_pieces(begun, rough, states, held, SOFTLY, SOFT[0])
     for tie in SOFT[1:]:
-        near = fit_pieces(near.model, pieces, near.initial, held, SOFTLY, tie)
+        near = fit_pieces(near.model, rough, near.initial, held, SOFTLY, tie)
     longer = joined(near, pieces, held)
     found = _one_motion(longer, pieces, held, loose)
     if found is not None:
         return found
     best = longer if _as_good(longer, loose, np.size(longer.initial)) else loose
     try:
-        anew = fit_pieces(best.model, pieces, pieces.first_states(best.model), tuple(best.model.values), SOFTLY)
+        anew = fit_pieces(best.model, rough, rough.first_states(best.model), tuple(best.model.values), SOFTLY)
         return _one_motion(joined(anew, pieces, held), pieces, held, loose) or best
     except DivergenceError:  # a wrong model may bear the states of the fit alone
         return best
@@ -86,7 +90,7 @@ def fit_record(
 ) -> FreeRunFit:
     """Fit a model to a whole record: in one free run where that holds, in pieces where it does not.
 
-    The first runs take half the steps, which costs half as much and leads as near. One free run is believed if
+    The first runs take fewer steps, which cost less and lead as near. One free run is believed if
     the fit converges, leaves no part of the motion (a residual that is large and smooth), and the fitted system
     does not magnify a disturbance tenfold anywhere on its way (``study.pieces.needed_restarts``, from the exact
     sensitivities). A system that does loses the record however true the model, and its sum of squares is full of
@@ -103,7 +107,8 @@ def fit_record(
     coarse = max(steps_per_sample // 2, 1)
     try:
         near = fit_free_run(
-            model, record, start=start, held=held, response=response, steps_per_sample=coarse,
+            model, record, start=start, held=held, response=response,
+            steps_per_sample=rough_steps(record, response, coarse),
             max_iterations=min(GLANCE, max_iterations),
         )  # fmt: skip
         if not astray(near, record[response]):

@@ -130,7 +130,7 @@ class FreeRun:
         if len(states) == 1 or self.samples * self.steps < SHARED:
             self._pieces(program, bounds, state, out)
         else:
-            half = len(states) // 2
+            half = 1 + int(np.argmin(np.abs(np.array(bounds[1:-1]) - self.samples / 2)))  # pieces differ in length
             with ThreadPoolExecutor(1) as beside:
                 other = beside.submit(self._pieces, program, bounds[half:], state[half:], out)
                 self._pieces(program, bounds[: half + 1], state[:half], out)

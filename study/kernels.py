@@ -216,11 +216,14 @@ def _variation(
     for c in range(columns):
         w[2, 0, c] = w[1, 1, c]
     for i in range(1, n):
-        w[2, i, 0] = r[slots[i - 1, 0]]
-        for c in range(1, columns):
-            w[2, i, c] = r[slots[i - 1, n + c]] if n + c < slots.shape[1] else 0.0
+        w[2, i, 0] = r[np.uint64(slots[i - 1, 0])]
+        known = min(columns, slots.shape[1] - n)
+        for c in range(1, known):
+            w[2, i, c] = r[np.uint64(slots[i - 1, n + c])]
+        for c in range(known, columns):
+            w[2, i, c] = 0.0
         for m in range(n):
-            partial = r[slots[i - 1, 1 + m]]
+            partial = r[np.uint64(slots[i - 1, 1 + m])]
             if partial != 0.0:
                 for c in range(1, columns):
                     w[2, i, c] += partial * w[1, m, c]

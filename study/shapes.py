@@ -19,13 +19,13 @@ from study.fitting import Plan
 from study.joining import fit_pieces
 from study.model import Model, ModelTerm
 from study.output_error import FreeRunFit
-from study.pieces import Pieces, even_restarts
+from study.pieces import Pieces, even_restarts, rough_steps
 from study.record import Record
 
 Floats = NDArray[np.float64]
 SEARCHED = 2048  # samples, at most: a start needs no more
 SHORT, LONG = 15, 40  # free runs of a fit with the shape held, and of one with it open
-FEW = 8  # ... in pieces, which find their way sooner
+FEW = 5  # ... in pieces, which find their way sooner
 
 
 def shape_keys(model: Model) -> tuple[str, ...]:
@@ -48,6 +48,7 @@ def with_starting_shapes(model: Model, record: Record) -> Model:
     if not unknown:
         return model
     how = fitting.shortened(fitting.plan(record), SEARCHED)
+    how = fitting.with_steps(how, rough_steps(record, how.response, how.steps_per_sample))
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
     values: dict[str, float] | None = None
     for entry in unknown:
@@ -71,9 +72,7 @@ def _in_one_run(before: FreeRunFit, entry: ModelTerm, record: Record, how: Plan)
         found = _fitted(begun.with_values(_given(entry)), record, how, (*given, *own), SHORT)
         if found is None:
             continue
-        if best is None and astray(found, measured) and magnifies(
-            found, record, how.response, how.steps_per_sample, how.fit
-        ):  # fmt: skip
+        if not found.converged and magnifies(found, record, how.response, how.steps_per_sample, how.fit):
             return None
         best = found if best is None or found.rms < best.rms else best
     found = best and (_fitted(best.model, record, how, given, LONG) or best)
@@ -101,6 +100,7 @@ def _in_pieces(before: FreeRunFit, entry: ModelTerm, record: Record, how: Plan) 
         shaped = begun.with_values(dict(zip(own, point, strict=True)) | _given(entry))
         states = pieces.first_states(shaped) if states is None else states
         found = _fitted_pieces(shaped, pieces, states, (*given, *own))
+        states = states if found is None else found.initial
         if found is not None and (best is None or found.rms < best.rms):
             best = found
     return best and (_fitted_pieces(best.model, pieces, best.initial, given) or best)

@@ -10,10 +10,9 @@ from study.chaotic import fit_record
 from study.errors import StudyError
 from study.estimators.base import Settings
 from study.excitation import displacement_noise
-from study.free_run import predict
 from study.output_error import fit_free_run
-from study.record import Record
 from study.shapes import shape_keys, with_starting_shapes
+from study.simulate import simulate
 from study.spectra import Segments
 
 TOLD = Settings(Segments(512), (0.3, 10.0))
@@ -70,16 +69,26 @@ def test_width_of_a_dead_band(fraction, systems, records):
 
 @pytest.mark.parametrize("name", HIDDEN)
 def test_the_rest_of_the_library(name, make_model, report_force):
+    """... of which MI/SO tells no relaxation: it finds a negative mass, and no fit should begin there."""
     model = make_model(name, {**LINEAR, name: HIDDEN[name]})
-    clean = predict(model, Record(0.02, {"force": report_force}), steps_per_sample=8)
+    clean = simulate(model, report_force, 0.02)
     for seed in (1, 2):
-        record = noisy(Record(0.02, {"force": report_force, "displacement": clean}), 0.02, seed).part(0, 4096)
-        begun = with_starting_shapes(opened(model), record)
-        fit = fit_record(begun, record, start={k: 0.9 * v for k, v in model.values.items() if "." not in k})
-        assert fit.converged
-        true = np.array([model.values[key] for key in fit.keys])
-        assert np.max(np.abs(fit.values - true) / np.sqrt(np.diag(fit.covariance))) < 4.0
-        assert set(shape_keys(begun)) <= set(fit.keys)
+        record = noisy(clean, 0.02, seed).part(0, 4096)
+        found = estimators.identify("output_error", opened(model), record, TOLD)
+        assert not found.note
+        true = np.array([model.values[key] for key in found.estimate.symbols])
+        errors = np.sqrt(np.diag(found.estimate.covariance))
+        assert np.max(np.abs(found.estimate.values - true) / errors) < 4.0
+        assert set(found.estimate.symbols) == set(model.values)
+
+
+@pytest.mark.parametrize("seed", [11, 12, 13])
+def test_a_chaotic_system_gives_its_start_in_pieces(seed, systems, records):
+    """In one free run every width leaves the motion, and the best of them says little."""
+    model, record = systems["dead_band"], noisy(records["dead_band"], 0.05, seed)
+    begun = with_starting_shapes(opened(model), record)
+    for key, true in model.values.items():
+        assert begun.values[key] == pytest.approx(true, rel=0.3)
 
 
 def test_given_shapes_are_kept(systems, records):

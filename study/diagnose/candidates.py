@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from study import fitting, shape_search
 from study.compare.fitted import from_pieces
-from study.shape_search import Baseline
 from study.errors import StudyError
 from study.fitting import Plan
 from study.model import Model, free
 from study.output_error import FreeRunFit
 from study.record import Record
 from study.reverse_start import reverse_start
+from study.shape_search import Baseline
 from study.terms import LIBRARY, Term
 
 Floats = NDArray[np.float64]

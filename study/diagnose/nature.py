@@ -17,7 +17,6 @@ from scipy.signal import lfilter
 
 from study import fitting
 from study.diagnose import score
-from study.shape_search import Baseline, modulation_lines, residual_lines
 from study.errors import DivergenceError
 from study.fitting import Plan
 from study.free_run import prepare
@@ -25,6 +24,7 @@ from study.linear import least_squares
 from study.model import ModelTerm
 from study.output_error import FreeRunFit
 from study.record import MOTIONS, Record
+from study.shape_search import Baseline, modulation_lines, residual_lines
 from study.terms import custom
 
 Floats = NDArray[np.float64]

@@ -15,7 +15,6 @@ from scipy.fft import rfft, rfftfreq
 from scipy.signal import get_window
 
 from study.diagnose.ranking import Ranked
-from study.shape_search import Baseline, sensitivity
 from study.errors import StudyError
 from study.fitting import FAINT, Plan
 from study.inputs import history, reverse_inputs
@@ -23,6 +22,7 @@ from study.linear import least_squares
 from study.model import Model, ModelTerm
 from study.motion import complete
 from study.record import Record
+from study.shape_search import Baseline, sensitivity
 
 Floats = NDArray[np.float64]
 TRIED = 10  # pairs that each of the two answers puts first

@@ -11,12 +11,12 @@ from study.compare.fitted import fit_model
 from study.diagnose import candidates, nature, pairs, score
 from study.diagnose.pairs import Pair
 from study.diagnose.ranking import UNSTEADY, Ranked, changes, curves, rank, wavers
-from study.shape_search import Baseline
 from study.errors import DivergenceError
 from study.fitting import Plan
 from study.model import Model
 from study.output_error import FreeRunFit
 from study.record import Record
+from study.shape_search import Baseline
 from study.terms import Term
 
 Floats = NDArray[np.float64]

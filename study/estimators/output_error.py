@@ -19,8 +19,7 @@ KEPT = 4  # fits: those of the records that the threads are at
 
 
 def identify(model: Model, record: Record, settings: Settings) -> Identified:
-    """Coefficients, and shape parameters that the model leaves open; A_j(f) of the form that they give it.
-    """
+    """Coefficients, and shape parameters that the model leaves open; A_j(f) of the form that they give it."""
     found = fit(model, record, settings)
     inputs, estimate = reverse_inputs(found.model), found.estimate
     matrix = spectra.cross_spectra([*histories(inputs, record), record["force"]], record.dt, settings.segments)
