@@ -94,7 +94,9 @@ def simulate(
     _check(model, {"force": force, **extra}, initial)
     program = forward_program(model, tuple(extra))
     factor = 2 * settings.steps_per_sample
-    drive = np.column_stack([between_samples(x, factor) for x in (force, *extra.values())])
+    drive = between_samples(force, factor)[:, None]
+    if extra:  # a copy, which for a long record takes longer than the integration
+        drive = np.column_stack([drive, *(between_samples(x, factor) for x in extra.values())])
     state = np.zeros(2 + len(model.states))
     state[: len(initial)] = initial
     out = np.empty((len(force), 1 + len(state)))
