@@ -120,6 +120,16 @@ def test_curves_are_of_the_form_of_the_model(systems, records):
     assert np.sqrt(result.covariance[-1, 0, 0].real) > estimate.error("k")
 
 
+@pytest.mark.parametrize("name", ["linear", "duffing", "mathieu", "dead_band"])
+def test_without_noise_the_errors_are_those_of_the_steps(name, systems, records):
+    """Of which the residual alone says nothing: it gives errors that are fifty times too small."""
+    model = systems[name]
+    found = estimators.identify("output_error", model, records[name], TOLD).estimate
+    off = {key: abs(found[key] - model.values[key]) / found.error(key) for key in ("m", "k")}
+    assert max(off.values()) < 3.0
+    assert min(off.values()) > 0.3 or name == "dead_band"  # at its corners the order is lower
+
+
 def test_a_search_that_does_not_arrive_says_so(systems, records, monkeypatch):
     def hasty(model, record, **told):
         return fit_free_run(model, record, **told, max_iterations=1)
