@@ -21,6 +21,7 @@ from study.model import Model, ModelTerm
 from study.output_error import FreeRunFit
 from study.pieces import Pieces, even_restarts, rough_steps
 from study.record import Record
+from study.shape_search import Baseline
 
 Floats = NDArray[np.float64]
 SEARCHED = 2048  # samples, at most: a start needs no more
@@ -53,7 +54,8 @@ def with_starting_shapes(model: Model, record: Record) -> Model:
     values: dict[str, float] | None = None
     for entry in unknown:
         before = fitting.fit(known, record, how, shape_keys(known), values, SHORT)
-        found = _in_one_run(before, entry, record, how) or _in_pieces(before, entry, record, how)
+        base = shape_search.baseline(before, record, how)
+        found = _in_one_run(base, entry, record, how) or _in_pieces(base, entry, record, how)
         if found is None:
             names = ", ".join(p.name for p, v in zip(entry.term.parameters, entry.parameters, strict=True) if v is None)
             raise StudyError(f"{record.name!r} does not show {names} of {entry.name}; give it in the model")
@@ -61,13 +63,13 @@ def with_starting_shapes(model: Model, record: Record) -> Model:
     return model.with_values(known.values)
 
 
-def _in_one_run(before: FreeRunFit, entry: ModelTerm, record: Record, how: Plan) -> FreeRunFit | None:
+def _in_one_run(base: Baseline, entry: ModelTerm, record: Record, how: Plan) -> FreeRunFit | None:
     """The model with a term, fitted in one free run from the best points of a search; None where that goes astray."""
-    model = before.model.with_term(entry)
+    model = base.found.model.with_term(entry)
     given, own = shape_keys(model), entry.keys[len(entry.coefficients) :]
-    values = {key: value for key, value in before.model.values.items() if value is not None}
+    values = {key: value for key, value in base.found.model.values.items() if value is not None}
     measured, best = record[how.response][slice(*how.fit)], None
-    for point in shape_search.starts(entry.term, shape_search.baseline(before, record, how), record, how):
+    for point in shape_search.starts(entry.term, base, record, how):
         begun = model.with_values(values | dict(zip(entry.keys, point.coefficients + point.parameters, strict=True)))
         found = _fitted(begun.with_values(_given(entry)), record, how, (*given, *own), SHORT)
         if found is None:
@@ -87,16 +89,16 @@ def _fitted(model: Model, record: Record, how: Plan, held: tuple[str, ...], runs
         return None
 
 
-def _in_pieces(before: FreeRunFit, entry: ModelTerm, record: Record, how: Plan) -> FreeRunFit | None:
+def _in_pieces(base: Baseline, entry: ModelTerm, record: Record, how: Plan) -> FreeRunFit | None:
     """The same in pieces of a period, from every point of the search; None where there is no finite response."""
-    model = before.model.with_term(entry)
+    model = base.found.model.with_term(entry)
     given, own = shape_keys(model), entry.keys[len(entry.coefficients) :]
     restarts = even_restarts(record, how.response, how.fit)
     pieces = Pieces(record, how.response, how.fit, restarts, how.steps_per_sample)
     start = fitting.linear_start(model, record, how)
     begun = model.with_values({key: value for key, value in start.items() if "." not in key})
     best, states = None, None
-    for point in shape_search.grid(entry.term, shape_search.baseline(before, record, how), record, how):
+    for point in shape_search.grid(entry.term, base, record, how):
         shaped = begun.with_values(dict(zip(own, point, strict=True)) | _given(entry))
         states = pieces.first_states(shaped) if states is None else states
         found = _fitted_pieces(shaped, pieces, states, (*given, *own))
