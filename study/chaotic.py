@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.errors import DivergenceError
-from study.joining import NEGLIGIBLE, fit_pieces, joined
+from study.joining import NEAR, NEGLIGIBLE, fit_pieces, joined
 from study.model import Model
 from study.output_error import FreeRunFit, fit_free_run
 from study.pieces import Pieces, even_restarts, needed_restarts, rough_steps
 from study.record import Record
 
 Floats = NDArray[np.float64]
+ROUNDS = 2  # times that pieces are joined and tied, at most
 LOOSE = 12  # free runs that pieces which know nothing of each other are given at first
 SOFT, SOFTLY = (0.3, 1.0, 3.0), 5  # ties that lead coefficients near the truth (see ``fit_free_run``); runs with each
 FIRM, FIRMLY = 30.0, 12  # tied so, pieces know of each other most of what the noise lets them
@@ -43,7 +44,7 @@ def fit_in_pieces(
     cuts, as most do, the whole record is fitted from there in one free run. Otherwise neighbours are joined
     (``study.joining``), and the motion that this yields is tied together at all its pieces until it is one
     that stays beside the measured one (multiple shooting; H. G. Bock, 1983): joining finds the right valley
-    for the states, ties its floor. Where that fails, pieces begin anew once, with the coefficients found.
+    for the states, ties its floor. Where that fails, pieces begin anew, with the coefficients of the longest that held.
 
     Parameters, result and errors are those of :func:`study.output_error.fit_free_run`; ``initial`` of the
     result has one row a piece.
@@ -63,19 +64,10 @@ def fit_in_pieces(
         )  # fmt: skip
     if loose.rms < NEGLIGIBLE * pieces.spread:
         return fit_pieces(loose.model, pieces, states, held, max_iterations)  # ties would believe the integrator more
-    near = fit_pieces(begun, rough, states, held, SOFTLY, SOFT[0])
+    near = fit_pieces(begun, rough, states, held, SOFTLY, SOFT[0], NEAR)
     for tie in SOFT[1:]:
-        near = fit_pieces(near.model, rough, near.initial, held, SOFTLY, tie)
-    longer = joined(near, pieces, held)
-    found = _one_motion(longer, pieces, held, loose)
-    if found is not None:
-        return found
-    best = longer if _as_good(longer, loose, np.size(longer.initial)) else loose
-    try:
-        anew = fit_pieces(best.model, rough, rough.first_states(best.model), tuple(best.model.values), SOFTLY)
-        return _one_motion(joined(anew, pieces, held), pieces, held, loose) or best
-    except DivergenceError:  # a wrong model may bear the states of the fit alone
-        return best
+        near = fit_pieces(near.model, rough, near.initial, held, SOFTLY, tie, NEAR)
+    return _joined_and_tied(near, loose, pieces, rough, held)
 
 
 def fit_record(
@@ -145,10 +137,29 @@ def magnifies(
     return bool(needed_restarts(found.model, record, states, whole, pieces.restarts, steps))
 
 
+def _joined_and_tied(
+    near: FreeRunFit, loose: FreeRunFit, pieces: Pieces, rough: Pieces, held: Collection[str]
+) -> FreeRunFit:  # fmt: skip
+    """One motion if it is found, else the longest pieces that leave no more than the loose ones lead one to expect."""
+    best = loose
+    for rounds_left in reversed(range(ROUNDS)):
+        longer = joined(near, pieces, held)
+        found = _one_motion(longer[-1], pieces, held, loose)
+        if found is not None:
+            return found
+        best = next((fit for fit in reversed(longer) if _as_good(fit, loose, np.size(fit.initial))), best)
+        try:
+            if rounds_left:
+                near = fit_pieces(best.model, rough, rough.first_states(best.model), tuple(best.model.values), SOFTLY)
+        except DivergenceError:  # a wrong model may bear the states of the fit alone
+            break
+    return best
+
+
 def _one_motion(longer: FreeRunFit, pieces: Pieces, held: Collection[str], loose: FreeRunFit) -> FreeRunFit | None:
     """The fit of pieces tied together, from longer pieces; None if it ends in a side valley."""
     states = pieces.passing(longer.model, longer.restarts, longer.initial)
-    firm = fit_pieces(longer.model, pieces, states, held, FIRMLY, FIRM)
+    firm = fit_pieces(longer.model, pieces, states, held, FIRMLY, FIRM, NEAR)
     if not _as_good(firm, loose):
         return None
     tight = fit_pieces(firm.model, pieces, firm.initial, held, TIGHTLY, TIGHT)

@@ -85,7 +85,9 @@ class End:
     message: str
 
 
-def minimise(linearise: Callable[[Floats], Point | None], point: Point, size: float, max_iterations: int) -> End:
+def minimise(
+    linearise: Callable[[Floats], Point | None], point: Point, size: float, max_iterations: int, offset: float = OFFSET
+) -> End:
     """Search from a point, with Nielsen's damping.
 
     Parameters
@@ -98,6 +100,8 @@ def minimise(linearise: Callable[[Floats], Point | None], point: Point, size: fl
         Root of the sum of squares of the measured response.
     max_iterations : int
         Trials after which to give up.
+    offset : float
+        How near a minimum counts as one: length of the next step in standard errors.
     """
     count = len(point.x)
     freedom = max(len(point.residual) - count, 1)
@@ -105,7 +109,7 @@ def minimise(linearise: Callable[[Floats], Point | None], point: Point, size: fl
     for iteration in range(1, max_iterations + 1):
         one = count * point.cost / freedom  # what a step of one standard error brings
         fall = point.normal.decrement()
-        if fall <= OFFSET**2 * one or fall <= (ROUNDING * size) ** 2:
+        if fall <= offset**2 * one or fall <= (ROUNDING * size) ** 2:
             return End(point, True, iteration, f"converged after {iteration} free runs")
         costs.append(point.cost)
         if len(costs) > PATIENCE and costs[-1 - PATIENCE] - point.cost < MATTERS * one:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from study.errors import DivergenceError, StudyError
 from study.free_run import FreeRun, prepare
-from study.levenberg import End, Point, minimise, point_at
+from study.levenberg import OFFSET, End, Point, minimise, point_at
 from study.model import Model
 from study.normal import Ties
 from study.parameters import Estimate
@@ -93,6 +93,7 @@ def fit_free_run(
     max_iterations: int = 60,
     initial: str | Floats = "estimate",
     tie: float = 0.0,
+    offset: float = OFFSET,
 ) -> FreeRunFit:
     """Fit a model in free run.
 
@@ -123,6 +124,8 @@ def fit_free_run(
     tie : float
         Weight of the gaps between pieces, as shares of the spread of the states, beside that of the
         residual as a share of the response's. From 100 on the pieces are one motion, all but exactly.
+    offset : float
+        How near a minimum counts as one: length of the next step in standard errors.
 
     Returns
     -------
@@ -156,7 +159,7 @@ def fit_free_run(
         states[:, :2] = starting_states(record, response, (first, *restarts))
     measured = record[response][first : first + run.samples]
     problem = _Problem(run, measured, free, _weights(tie, measured, states))
-    end = problem.search(np.array([*begin.values(), *states.ravel()]), max_iterations)
+    end = problem.search(np.array([*begin.values(), *states.ravel()]), max_iterations, offset)
     return replace(_result(model, problem, end), restarts=tuple(restarts), steps_per_sample=steps_per_sample)
 
 
@@ -215,13 +218,13 @@ class _Problem:
         begins = (0, *self.run.cuts)
         return point_at(x, self.measured - response, jacobian, len(self.run.keys), begins, ties)
 
-    def search(self, x: Floats, max_iterations: int) -> End:
+    def search(self, x: Floats, max_iterations: int, offset: float) -> End:
         """The minimum near x."""
         point = self.linearise(x)
         if point is None:
             values = ", ".join(f"{key} = {v:g}" for key, v in zip(self.run.keys, x, strict=False))
             raise DivergenceError(f"the free run diverges with the starting values {values}", self.run.start)
-        return minimise(self.linearise, point, float(np.linalg.norm(self.measured)), max_iterations)
+        return minimise(self.linearise, point, float(np.linalg.norm(self.measured)), max_iterations, offset)
 
 
 def _result(model: Model, problem: _Problem, end: End) -> FreeRunFit:

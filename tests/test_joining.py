@@ -53,7 +53,7 @@ def test_neighbours_are_joined_to_long_pieces_beside_the_true_motion(chaotic):
     record, clean, model = chaotic
     pieces = in_pieces(record)
     loose = fit_pieces(model, pieces, pieces.first_states(model), (), 12)
-    longer = joined(loose, pieces, ())
+    longer = joined(loose, pieces, ())[-1]
     assert len(longer.restarts) < len(pieces.restarts) / 10
     assert set(longer.restarts) < set(pieces.restarts)
     noise = np.sqrt(NOISE) * np.std(clean["displacement"])
@@ -77,7 +77,7 @@ def test_what_is_no_one_motion_is_left_apart(chaotic):
     restarts = range(128, 4096, 128)
     pieces = in_pieces(record, restarts)
     loose = fit_pieces(model, pieces, pieces.first_states(model), tuple(model.values), 12)
-    assert struck in joined(loose, pieces, tuple(model.values)).restarts
+    assert struck in joined(loose, pieces, tuple(model.values))[-1].restarts
 
 
 def test_pieces_stay_as_they_are_where_longer_ones_run_away(systems, records):
@@ -85,7 +85,7 @@ def test_pieces_stay_as_they_are_where_longer_ones_run_away(systems, records):
     model = systems["duffing"].with_values({"k3": -1e7})
     pieces = in_pieces(records["duffing"].part(0, 2048), range(10, 2048, 10))
     loose = fit_pieces(model, pieces, pieces.first_states(model), tuple(model.values), 3)
-    left = joined(loose, pieces, tuple(model.values))
+    left = joined(loose, pieces, tuple(model.values))[-1]
     assert np.all(np.isfinite(left.residual))
     assert left.restarts
 
