@@ -147,8 +147,9 @@ def parameters(tables: Tables) -> list[Block]:
         "true value. In bold what lies outside the tolerance. The standard errors of SI/SO and MI/SO are Bendat and "
         "Piersol's for random noise, with the effective number of averages under overlap (claims.md, `averages`). "
         "Without noise MI/SO leaves leakage, which they overrate: `snakemake -j2 monte_carlo` sets them against the "
-        "scatter over seeds. The other estimators' come from what they leave, as noise; without noise that is what "
-        "steps and sampling cut off, which they underrate up to a hundredfold ([docs](../docs/estimators.md))."
+        "scatter over seeds. The other estimators' come from what they leave, as noise; output error adds what the "
+        "steps of its free run cut off. Without noise local polynomials leave next to nothing, and underrate "
+        "what sampling cuts off up to fiftyfold ([docs](../docs/estimators.md))."
     )
     heading = ["case", "parameter", "true", "tolerance", *(name.replace("_", " ") for name in names)]
     return [Text(note), table(heading, rows)]
