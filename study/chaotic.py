@@ -51,11 +51,16 @@ def fit_in_pieces(
     """
     whole = span or (0, len(record))
     pieces = Pieces(record, response, whole, even_restarts(record, response, whole), steps_per_sample)
-    rough = replace(pieces, steps_per_sample=rough_steps(record, response, steps_per_sample))
     begun = model.with_values(dict(start or {}))
-    loose = fit_pieces(begun, rough, rough.first_states(begun), held, min(LOOSE, max_iterations))
+    rough = replace(pieces, steps_per_sample=rough_steps(record, response, steps_per_sample, begun.values))
+    runs = min(LOOSE, max_iterations)
+    try:
+        loose = fit_pieces(begun, rough, rough.first_states(begun), held, runs)
+    except DivergenceError:  # much damping or a short memory asks for shorter steps than the oscillation does
+        rough = pieces
+        loose = fit_pieces(begun, rough, rough.first_states(begun), held, runs)
     if loose.rms < CLEAN * pieces.spread:  # long steps would show
-        loose = fit_pieces(loose.model, pieces, loose.initial, held, min(LOOSE, max_iterations))
+        loose = fit_pieces(loose.model, pieces, loose.initial, held, runs)
     states = np.atleast_2d(loose.initial)
     if not needed_restarts(loose.model, record, states, whole, pieces.restarts, steps_per_sample):
         return fit_free_run(
@@ -100,7 +105,7 @@ def fit_record(
     try:
         near = fit_free_run(
             model, record, start=start, held=held, response=response,
-            steps_per_sample=rough_steps(record, response, coarse),
+            steps_per_sample=rough_steps(record, response, coarse, model.values | dict(start or {})),
             max_iterations=min(GLANCE, max_iterations),
         )  # fmt: skip
         if not astray(near, record[response]):

@@ -5,7 +5,7 @@ run has nothing to do with the measured motion, however true the model. Pieces t
 growth, each with an initial state of its own, keep the fit well posed (multiple shooting; H. G. Bock, 1983).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -61,12 +61,15 @@ def _smoothing(first: int, count: int, half: int) -> Floats:
     return np.asarray(inverse[:2], dtype=np.float64)
 
 
-def rough_steps(record: Record, response: str, most: int) -> int:
+def rough_steps(record: Record, response: str, most: int, values: Mapping[str, float | None]) -> int:
     """Steps in a sampling interval with which a search may begin, ``most`` at most.
 
-    One Runge-Kutta step of half a radian shifts the phase of an oscillation by a four-thousandth of a radian.
+    One Runge-Kutta step of half a radian shifts the phase of an oscillation by a four-thousandth of a radian. What
+    counts is the faster of the motion and the free motion with these ``values`` of m, c and k.
     """
-    return int(np.clip(np.ceil(angular_rate(record[response], record.dt) * record.dt / ROUGH), 1, most))
+    own = np.abs(np.roots([values.get(key) or 0.0 for key in ("m", "c", "k")]))
+    rate = max(angular_rate(record[response], record.dt), *own.tolist())
+    return int(np.clip(np.ceil(rate * record.dt / ROUGH), 1, most))
 
 
 def even_restarts(record: Record, response: str, span: tuple[int, int]) -> tuple[int, ...]:

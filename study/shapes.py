@@ -49,9 +49,9 @@ def with_starting_shapes(model: Model, record: Record) -> Model:
     if not unknown:
         return model
     how = fitting.shortened(fitting.plan(record), SEARCHED)
-    how = fitting.with_steps(how, rough_steps(record, how.response, how.steps_per_sample))
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
-    values: dict[str, float] | None = None
+    values = fitting.linear_start(known, record, how)
+    how = fitting.with_steps(how, rough_steps(record, how.response, how.steps_per_sample, values))
     for entry in unknown:
         before = fitting.fit(known, record, how, shape_keys(known), values, SHORT)
         base = shape_search.baseline(before, record, how)

@@ -9,8 +9,9 @@ from study.chaotic import fit_in_pieces
 from study.excitation import displacement_noise
 from study.free_run import predict
 from study.joining import fit_pieces, joined
-from study.pieces import Pieces, even_restarts
+from study.pieces import Pieces, even_restarts, rough_steps
 from study.record import Record
+from study.simulate import simulate
 
 NOISE = 0.05
 
@@ -109,3 +110,22 @@ def test_the_width_is_found_within_its_errors_which_are_below_a_hundredth(system
     assert abs(width - 0.0025) < 3.5 * error
     assert error < 0.01 * 0.0025
     assert found.residual @ found.residual < 1.05 * float(noise @ noise)
+
+
+@pytest.mark.parametrize(("c", "k", "steps"), [(3.77, 355.3, 1), (3.77, 1e4, 4), (200.0, 355.3, 8), (3.77, 1e6, 8)])
+def test_a_search_begins_with_as_few_steps_as_motion_and_model_bear(c, k, steps, systems, records):
+    values = systems["linear"].values | {"c": c, "k": k}
+    assert rough_steps(records["linear"], "displacement", 8, values) == steps
+
+
+@pytest.mark.parametrize(("c", "k"), [(200.0, 355.3), (3.77, 5e3)])
+def test_a_stiff_system_is_found_from_afar(c, k, make_model, report_force):
+    """Of which the displacement is slow: steps that suit it alone would make the free run grow without end."""
+    terms = {"inertia": {"m": 1.0}, "linear_damping": {"c": c}, "linear_stiffness": {"k": k}}
+    model = make_model("stiff", terms)
+    record = simulate(model, report_force, 0.02).part(0, 2048)
+    start = {"c": 0.7 * c, "k": 1.3 * k}
+    found = fit_in_pieces(model, record, start=start, steps_per_sample=8)
+    assert found.converged
+    assert found.estimate["c"] == pytest.approx(c, rel=0.02)
+    assert found.estimate["k"] == pytest.approx(k, rel=0.02)
