@@ -10,8 +10,9 @@ from study.errors import DivergenceError
 from study.joining import NEAR, NEGLIGIBLE, fit_pieces, joined
 from study.model import Model
 from study.output_error import FreeRunFit, fit_free_run
-from study.pieces import Pieces, even_restarts, needed_restarts, rough_steps
+from study.pieces import Pieces, even_restarts, needed_restarts
 from study.record import Record
+from study.stiffness import needed_steps
 
 Floats = NDArray[np.float64]
 ROUNDS = 2  # times that pieces are joined and tied, at most
@@ -52,13 +53,9 @@ def fit_in_pieces(
     whole = span or (0, len(record))
     pieces = Pieces(record, response, whole, even_restarts(record, response, whole), steps_per_sample)
     begun = model.with_values(dict(start or {}))
-    rough = replace(pieces, steps_per_sample=rough_steps(record, response, steps_per_sample, begun.values))
+    rough = replace(pieces, steps_per_sample=needed_steps(begun, record, response, steps_per_sample).rough)
     runs = min(LOOSE, max_iterations)
-    try:
-        loose = fit_pieces(begun, rough, rough.first_states(begun), held, runs)
-    except DivergenceError:  # much damping or a short memory asks for shorter steps than the oscillation does
-        rough = pieces
-        loose = fit_pieces(begun, rough, rough.first_states(begun), held, runs)
+    loose = fit_pieces(begun, rough, rough.first_states(begun), held, runs)
     if loose.rms < CLEAN * pieces.spread:  # long steps would show
         loose = fit_pieces(loose.model, pieces, loose.initial, held, runs)
     states = np.atleast_2d(loose.initial)
@@ -82,17 +79,17 @@ def fit_record(
     start: Mapping[str, float] | None = None,
     held: Collection[str] = (),
     response: str = "displacement",
-    steps_per_sample: int = 4,
+    steps_per_sample: int | None = None,
     max_iterations: int = 60,
 ) -> FreeRunFit:
     """Fit a model to a whole record: in one free run where that holds, in pieces where it does not.
 
-    The first runs take fewer steps, which cost less and lead as near. One free run is believed if
-    the fit converges, leaves no part of the motion (a residual that is large and smooth), and the fitted system
-    does not magnify a disturbance tenfold anywhere on its way (``study.pieces.needed_restarts``, from the exact
-    sensitivities). A system that does loses the record however true the model, and its sum of squares is full of
-    side valleys; half the steps are many enough for pieces of it. Parameters and result are those of
-    :func:`study.output_error.fit_free_run`.
+    Steps are those that the starting model needs (``study.stiffness``) unless they are given; the first runs take
+    fewer, which cost less and lead as near. One free run is believed if the fit converges, leaves no part of the
+    motion (a residual that is large and smooth), and the fitted system does not magnify a disturbance tenfold anywhere
+    on its way (``study.pieces.needed_restarts``, from the exact sensitivities). A system that does loses the record
+    however true the model, and its sum of squares is full of side valleys; half the steps are many enough for pieces
+    of it. Parameters and result are those of :func:`study.output_error.fit_free_run`.
 
     Raises
     ------
@@ -101,20 +98,21 @@ def fit_record(
     StudyError
         As :func:`study.output_error.fit_free_run`.
     """
-    coarse = max(steps_per_sample // 2, 1)
+    steps = needed_steps(model.with_values(dict(start or {})), record, response, steps_per_sample)
+    coarse = max(steps.fine // 2, 1)
     try:
         near = fit_free_run(
             model, record, start=start, held=held, response=response,
-            steps_per_sample=rough_steps(record, response, coarse, model.values | dict(start or {})),
+            steps_per_sample=min(steps.rough, coarse),
             max_iterations=min(GLANCE, max_iterations),
         )  # fmt: skip
         if not astray(near, record[response]):
             found = fit_free_run(
-                near.model, record, held=held, response=response, steps_per_sample=steps_per_sample,
+                near.model, record, held=held, response=response, steps_per_sample=steps.fine,
                 max_iterations=max_iterations, initial=near.initial,
             )  # fmt: skip
             if found.converged and not (
-                astray(found, record[response]) or magnifies(found, record, response, steps_per_sample)
+                astray(found, record[response]) or magnifies(found, record, response, steps.fine)
             ):
                 return found
     except DivergenceError:
@@ -147,18 +145,24 @@ def _joined_and_tied(
 ) -> FreeRunFit:  # fmt: skip
     """One motion if it is found, else the longest pieces that leave no more than the loose ones lead one to expect."""
     best = loose
-    for rounds_left in reversed(range(ROUNDS)):
-        longer = joined(near, pieces, held)
-        found = _one_motion(longer[-1], pieces, held, loose)
-        if found is not None:
-            return found
-        best = next((fit for fit in reversed(longer) if _as_good(fit, loose, np.size(fit.initial))), best)
-        try:
+    try:
+        for rounds_left in reversed(range(ROUNDS)):
+            longer = joined(near, pieces, held)
+            good = (fit for fit in reversed(longer[1:]) if _as_good(fit, loose, np.size(fit.initial)))
+            best = next(good, best)
+            found = _one_motion(longer[-1], pieces, held, loose)
+            if found is not None:
+                return found
             if rounds_left:
                 near = fit_pieces(best.model, rough, rough.first_states(best.model), tuple(best.model.values), SOFTLY)
-        except DivergenceError:  # a wrong model may bear the states of the fit alone
-            break
-    return best
+    except DivergenceError:  # a wrong model may bear the states of the fit alone
+        pass
+    if best is loose:
+        best = fit_pieces(loose.model, pieces, loose.initial, held, SOFTLY)
+    count = len(best.restarts) + 1
+    return replace(
+        best, converged=False, message=f"no single motion follows the record; {count} pieces of it were fitted"
+    )  # fmt: skip
 
 
 def _one_motion(longer: FreeRunFit, pieces: Pieces, held: Collection[str], loose: FreeRunFit) -> FreeRunFit | None:

@@ -47,6 +47,11 @@ def joined(found: FreeRunFit, pieces: Pieces, held: Collection[str]) -> list[Fre
         The shortest pieces.
     held : collection of str
         Keys that keep their value.
+
+    Returns
+    -------
+    list of FreeRunFit
+        ``found``, then the fit after each time.
     """
     fits = [found]
     for _ in range(DOUBLINGS):

@@ -5,7 +5,7 @@ run has nothing to do with the measured motion, however true the model. Pieces t
 growth, each with an initial state of its own, keep the fit well posed (multiple shooting; H. G. Bock, 1983).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -21,7 +21,6 @@ Floats = NDArray[np.float64]
 GROWTH = 10.0  # by how much a disturbance may be magnified within a piece
 PERIODS = 1.0  # length of the pieces that a search from afar begins with
 REACH = 0.2  # of a period: half width of the cubic that smooths a displacement into a state
-ROUGH = 0.5  # of a radian of the motion: step of a search's first runs, which lead near and no more
 REACHES = (0.07, 0.15, REACH, 0.3)  # those that are tried where it matters
 
 
@@ -59,17 +58,6 @@ def _smoothing(first: int, count: int, half: int) -> Floats:
     offset = (first + np.arange(count)) / half
     inverse = np.linalg.pinv(np.vander(offset, min(4, count), increasing=True))
     return np.asarray(inverse[:2], dtype=np.float64)
-
-
-def rough_steps(record: Record, response: str, most: int, values: Mapping[str, float | None]) -> int:
-    """Steps in a sampling interval with which a search may begin, ``most`` at most.
-
-    One Runge-Kutta step of half a radian shifts the phase of an oscillation by a four-thousandth of a radian. What
-    counts is the faster of the motion and the free motion with these ``values`` of m, c and k.
-    """
-    own = np.abs(np.roots([values.get(key) or 0.0 for key in ("m", "c", "k")]))
-    rate = max(angular_rate(record[response], record.dt), *own.tolist())
-    return int(np.clip(np.ceil(rate * record.dt / ROUGH), 1, most))
 
 
 def even_restarts(record: Record, response: str, span: tuple[int, int]) -> tuple[int, ...]:

@@ -19,9 +19,10 @@ from study.fitting import Plan
 from study.joining import fit_pieces
 from study.model import Model, ModelTerm
 from study.output_error import FreeRunFit
-from study.pieces import Pieces, even_restarts, rough_steps
+from study.pieces import Pieces, even_restarts
 from study.record import Record
 from study.shape_search import Baseline
+from study.stiffness import needed_steps
 
 Floats = NDArray[np.float64]
 SEARCHED = 2048  # samples, at most: a start needs no more
@@ -51,7 +52,9 @@ def with_starting_shapes(model: Model, record: Record) -> Model:
     how = fitting.shortened(fitting.plan(record), SEARCHED)
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
     values = fitting.linear_start(known, record, how)
-    how = fitting.with_steps(how, rough_steps(record, how.response, how.steps_per_sample, values))
+    begun = known.with_values(values)
+    if not any(t.term.state for t in unknown):  # of which some points of a search have a short memory
+        how = fitting.with_steps(how, needed_steps(begun, record, how.response, how.steps_per_sample).rough)
     for entry in unknown:
         before = fitting.fit(known, record, how, shape_keys(known), values, SHORT)
         base = shape_search.baseline(before, record, how)

@@ -1,0 +1,63 @@
+"""How many steps a free run of a model needs in each sampling interval of a record."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study import kernels
+from study.free_run import prepare
+from study.model import Model
+from study.pieces import angular_rate, starting_states
+from study.record import Record
+
+Floats = NDArray[np.float64]
+POINTS = 64  # of the motion, at which the equation of motion is linearised
+ROUGH = 0.5  # largest step, as a product with the fastest rate, of a search's first runs: they lead near and no more
+FINE = 0.125  # ... with the middle rate, of the runs that estimates come from
+FEWEST, MOST = 4, 32  # steps of those
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Steps in each sampling interval, for the first runs of a search and for the last."""
+
+    rough: int
+    fine: int
+
+
+def needed_steps(model: Model, record: Record, response: str = "displacement", most: int | None = None) -> Steps:
+    """Steps that suit the motion and the model with its present values, all known.
+
+    ``most`` sets those of the last runs. A Runge-Kutta step h of an oscillation of rate w shifts its phase by
+    ``(h w)^5 / 120`` and grows without end above ``h w = 2.8``, which heavy damping or a short memory reaches though
+    the motion is slow. So rates are the largest eigenvalues of the equation of motion, linearised along the motion.
+    """
+    rates = _rates(model, record, response)
+    if not np.all(np.isfinite(rates)):
+        return Steps(most or FEWEST, most or FEWEST)
+    fine = most or int(np.clip(np.ceil(np.median(rates) * record.dt / FINE), FEWEST, MOST))
+    fastest = max(float(np.max(rates)), angular_rate(record[response], record.dt))
+    return Steps(int(np.clip(np.ceil(fastest * record.dt / ROUGH), 1, fine)), fine)
+
+
+def _rates(model: Model, record: Record, response: str) -> Floats:
+    """Magnitude of the largest eigenvalue at each point, in rad/s, shape (points,)."""
+    run = prepare(model, record, steps_per_sample=1)
+    states = len(run.slots) + 1
+    samples = np.unique(np.linspace(0, len(record) - 1, POINTS).astype(np.int64))
+    point = np.column_stack([starting_states(record, response, samples.tolist()), record.time[samples]])
+    data = np.column_stack([point, run.drive[2 * samples]])
+    columns = np.arange(data.shape[1], dtype=np.int64)
+    partial = np.empty((len(samples), (states - 1) * states))
+    with np.errstate(all="ignore"):
+        kernels.evaluate(
+            run.program.code, run.program.first, run.program.registers.copy(), columns, data,
+            run.slots[:, 1 : 1 + states].ravel(), partial,
+        )  # fmt: skip
+    if not np.all(np.isfinite(partial)):
+        return np.full(len(samples), np.inf)
+    jacobian = np.zeros((len(samples), states, states))
+    jacobian[:, 0, 1] = 1.0
+    jacobian[:, 1:] = partial.reshape(len(samples), states - 1, states)
+    return np.asarray(np.max(np.abs(np.linalg.eigvals(jacobian)), axis=1), dtype=np.float64)
