@@ -52,7 +52,7 @@ def with_starting_shapes(model: Model, record: Record) -> Model:
     how = fitting.shortened(fitting.plan(record), SEARCHED)
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
     values = fitting.linear_start(known, record, how)
-    begun = known.with_values(values)
+    begun = known.with_values({key: value for key, value in values.items() if key not in shape_keys(known)})
     if not any(t.term.state for t in unknown):  # of which some points of a search have a short memory
         how = fitting.with_steps(how, needed_steps(begun, record, how.response, how.steps_per_sample).rough)
     for entry in unknown:
