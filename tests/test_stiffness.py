@@ -44,6 +44,16 @@ def test_a_short_memory_is_fitted_with_its_errors(seed, make_model):
     assert fit.estimate["kr"] == pytest.approx(2000.0, rel=0.01)
 
 
+def test_what_the_steps_shift_is_followed_along_directions_that_are_hard_to_tell_apart(make_model):
+    """A memory that is short beside the motion is nearly a damping: kr and c trade places over many runs."""
+    model = make_model("memory", {**LINEAR, "relaxation": {"kr": 2000.0, "relaxation.tau": 0.008}})
+    record = simulate(model, force(Excitation(), 4096, 0.02, 1), 0.02, Integrator("rk4", 32))
+    asked = model.with_values({"relaxation.tau": None})
+    found = estimators.identify("output_error", asked, record, Settings(Segments(512), (0.3, 10.0))).estimate
+    for key in ("c", "kr", "relaxation.tau"):
+        assert abs(found[key] - model.values[key]) < 3.0 * found.error(key)
+
+
 @pytest.mark.parametrize("apart", [1, 3, 4])
 def test_coarse_sampling_does_not_bias_what_noise_leaves(apart, systems):
     """Sixteen to four samples in a period of the resonance; the force has nothing above the Nyquist frequency."""
