@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from study import tables
-from study.case import identify_case
+from study.identify_case import identify_case
 from study.modelfile import read_model
 from study.record import read_csv
 from study.step import one_sentence

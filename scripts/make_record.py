@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from study.case import make_record
 from study.files import replacing
+from study.make_record import make_record
 from study.modelfile import read_model
 from study.record import write_csv
 from study.step import one_sentence

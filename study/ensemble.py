@@ -9,8 +9,9 @@ from typing import Any, TypeVar
 import pandas as pd
 
 from study import tables
-from study.case import identify_case, make_record
 from study.errors import DivergenceError
+from study.identify_case import identify_case
+from study.make_record import make_record
 from study.model import Model
 
 Table = Mapping[str, Any]

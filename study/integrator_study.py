@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from study.case import estimator_settings, make_record
 from study.ensemble import threaded
 from study.errors import DivergenceError
 from study.estimators import miso
 from study.estimators.base import Settings, true_parameters
+from study.identify_case import estimator_settings
+from study.make_record import make_record
 from study.model import Model
 
 Table = Mapping[str, Any]

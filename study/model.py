@@ -96,6 +96,11 @@ class Model:
         return {key: value for t in self.terms for key, value in t.values.items()}
 
     @property
+    def held_keys(self) -> tuple[str, ...]:
+        """The keys whose values the model gives: a fit holds them and estimates the rest."""
+        return tuple(key for key, value in self.values.items() if value is not None)
+
+    @property
     def states(self) -> tuple[ModelTerm, ...]:
         """The terms that carry a state of their own."""
         return tuple(t for t in self.terms if t.term.state is not None)

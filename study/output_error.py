@@ -18,8 +18,8 @@ from study.levenberg import OFFSET, End, Point, minimise, point_at
 from study.model import Model
 from study.normal import Ties
 from study.parameters import Estimate
-from study.pieces import starting_states
 from study.record import Record
+from study.states import starting_states
 
 Floats = NDArray[np.float64]
 POSITIVE = ("m", "u_g", "tau", "f_m", "f")  # coefficients and shape parameters without meaning below zero

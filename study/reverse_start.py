@@ -8,10 +8,11 @@ import numpy as np
 
 from study import miso, parameters
 from study.errors import StudyError
-from study.fitting import FAINT, Plan
+from study.held_out import FAINT
 from study.inputs import histories, reverse_inputs
 from study.model import Model
 from study.motion import complete
+from study.plan import Plan
 from study.record import Record
 from study.spectra import Segments, cross_spectra
 

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, rfft, rfftfreq
 
-from study import fitting
+from study import held_out
 from study.errors import StudyError
-from study.fitting import Plan
 from study.free_run import FreeRun, prepare
 from study.linear import least_squares
 from study.model import Model, ModelTerm, free
 from study.output_error import FreeRunFit
+from study.plan import Plan
 from study.record import MOTIONS, Record
 from study.terms import Term, get
 
@@ -77,14 +77,14 @@ class Start:
 
 def baseline(found: FreeRunFit, record: Record, how: Plan) -> Baseline:
     """Prepare a fitted model for the search."""
-    jacobian = fitting.linearise(found, record, how)
+    jacobian = held_out.linearise(found, record, how)
     scale = np.linalg.norm(jacobian, axis=0)
     basis = np.linalg.qr(jacobian / np.where(scale > 0.0, scale, 1.0))[0]
     motion = prepare(found.model, record, response="displacement", steps_per_sample=how.steps_per_sample, span=how.fit)
     displacement, _ = motion.respond({}, found.initial)
-    linear = fitting.linear_start(found.model, record, how)
+    linear = held_out.linear_start(found.model, record, how)
     oscillator = Model("linear", tuple(free(get(n)) for n in ("inertia", "linear_damping", "linear_stiffness")))
-    approximation = fitting.linear_start(oscillator, record, how)
+    approximation = held_out.linear_start(oscillator, record, how)
     return Baseline(found, basis, displacement, linear, approximation, record.dt, MOTIONS.index(how.response))
 
 

@@ -12,14 +12,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study import fitting, shape_search
+from study import held_out, shape_search
 from study.chaotic import astray, magnifies
 from study.errors import DivergenceError, StudyError
-from study.fitting import Plan
 from study.joining import fit_pieces
 from study.model import Model, ModelTerm
 from study.output_error import FreeRunFit
 from study.pieces import Pieces, even_restarts
+from study.plan import Plan, make_plan, shortened, with_steps
 from study.record import Record
 from study.shape_search import Baseline
 from study.stiffness import needed_steps
@@ -49,14 +49,14 @@ def with_starting_shapes(model: Model, record: Record) -> Model:
     unknown = tuple(t for t in model.terms if None in t.parameters)
     if not unknown:
         return model
-    how = fitting.shortened(fitting.plan(record), SEARCHED)
+    how = shortened(make_plan(record), SEARCHED)
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
-    values = fitting.linear_start(known, record, how)
+    values = held_out.linear_start(known, record, how)
     begun = known.with_values({key: value for key, value in values.items() if key not in shape_keys(known)})
     if not any(t.term.state for t in unknown):  # of which some points of a search have a short memory
-        how = fitting.with_steps(how, needed_steps(begun, record, how.response, how.steps_per_sample).rough)
+        how = with_steps(how, needed_steps(begun, record, how.response, how.steps_per_sample).rough)
     for entry in unknown:
-        before = fitting.fit(known, record, how, shape_keys(known), values, SHORT)
+        before = held_out.fit(known, record, how, shape_keys(known), values, SHORT)
         base = shape_search.baseline(before, record, how)
         found = _in_one_run(base, entry, record, how) or _in_pieces(base, entry, record, how)
         if found is None:
@@ -87,7 +87,7 @@ def _in_one_run(base: Baseline, entry: ModelTerm, record: Record, how: Plan) -> 
 def _fitted(model: Model, record: Record, how: Plan, held: tuple[str, ...], runs: int) -> FreeRunFit | None:
     values = {key: value for key, value in model.values.items() if value is not None}
     try:
-        return fitting.fit(model, record, how, held, values, runs)
+        return held_out.fit(model, record, how, held, values, runs)
     except DivergenceError:
         return None
 
@@ -98,7 +98,7 @@ def _in_pieces(base: Baseline, entry: ModelTerm, record: Record, how: Plan) -> F
     given, own = shape_keys(model), entry.keys[len(entry.coefficients) :]
     restarts = even_restarts(record, how.response, how.fit)
     pieces = Pieces(record, how.response, how.fit, restarts, how.steps_per_sample)
-    start = fitting.linear_start(model, record, how)
+    start = held_out.linear_start(model, record, how)
     begun = model.with_values({key: value for key, value in start.items() if "." not in key})
     best, states = None, None
     for point in shape_search.grid(entry.term, base, record, how):

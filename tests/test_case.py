@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from study import tables
-from study.case import assumed_model, estimator_settings, identify_case, make_record
 from study.config import load
 from study.errors import DivergenceError, StudyError
 from study.estimators import ESTIMATORS
+from study.identify_case import assumed_model, estimator_settings, identify_case
+from study.make_record import make_record
 
 CONFIG = load(Path(__file__).parent.parent / "config")
 

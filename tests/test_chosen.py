@@ -15,9 +15,9 @@ from study.compare.report import document, summary
 from study.errors import StudyError
 from study.estimators.base import Settings
 from study.excitation import Excitation, displacement_noise, force
-from study.fitting import Plan
 from study.model import Model, free
 from study.motion import CompletedRecord
+from study.plan import Plan
 from study.record import Record, write_csv
 from study.simulate import Integrator, simulate
 from study.spectra import Segments

@@ -16,8 +16,8 @@ from study.compare.report import as_json, document, summary, tables
 from study.compare.says import says, says_of_all
 from study.errors import StudyError
 from study.excitation import Excitation, force
-from study.fitting import Plan, plan
 from study.model import Model, ModelTerm, free
+from study.plan import Plan, make_plan
 from study.record import Record
 from study.simulate import Integrator, simulate
 from study.terms import get
@@ -179,7 +179,7 @@ def test_the_judged_part_has_no_influence_on_the_fit() -> None:
 
 def test_ranges_apart_from_each_other_are_judged_from_a_state_of_their_own() -> None:
     record = measured(model(**VALUES), drive(), 0.05)
-    found = compare(model(), record, plan(record, (5000, 8000), (100, 3000)))
+    found = compare(model(), record, make_plan(record, (5000, 8000), (100, 3000)))
     assert found.response_error == pytest.approx(0.05, rel=0.1)
     assert len(found.judged.measured) == 2900
 

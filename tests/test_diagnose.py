@@ -4,12 +4,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study import fitting, noise_floor, trials
+from study import held_out, noise_floor, trials
 from study.diagnose import report, score, steadiness
 from study.diagnose.says import sentences
 from study.diagnose.separate import separating_level
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN, diagnose
 from study.model import ModelTerm
+from study.plan import make_plan
 from study.record import Record
 from study.simulate import Integrator, simulate
 from study.terms import LIBRARY, custom
@@ -23,7 +24,7 @@ def all_but(*names: str) -> tuple[str, ...]:
 
 
 def found_in(trial: trials.Trial, **options: object):
-    how = fitting.plan(trial.record)
+    how = make_plan(trial.record)
     return diagnose(trial.believed, trial.record, how, **options), how
 
 
@@ -54,8 +55,8 @@ def test_the_hidden_effect_is_named_with_its_coefficient(drag, drag_found):
 def test_adding_it_comes_as_near_as_the_true_model(drag, drag_found):
     found, how = drag_found
     start = {k: v for k, v in drag.truth.values.items() if v is not None}
-    true = fitting.fit(drag.truth, drag.record, how, (), start)
-    of_truth = np.std(fitting.held_out_residual(true, drag.record, how))
+    true = held_out.fit(drag.truth, drag.record, how, (), start)
+    of_truth = np.std(held_out.held_out_residual(true, drag.record, how))
     assert np.std(found.candidates[0].residual) < 1.05 * of_truth
 
 
@@ -96,7 +97,7 @@ def test_a_small_effect_is_not_given_the_name_of_what_takes_a_little_of_it(syste
     record = Record(DT, {"force": report_force, "displacement": history})
     believed = systems["linear"].with_values(dict.fromkeys(systems["linear"].values))
     few = all_but("dead_band", "cubic_stiffness")
-    found = diagnose(believed, record, fitting.plan(record), without=few)
+    found = diagnose(believed, record, make_plan(record), without=few)
     assert found.response_error < 0.01
     assert found.candidates[0].p_value < 0.01
     assert found.verdict == UNKNOWN
@@ -199,12 +200,12 @@ def test_noise_floor_of_noise_and_of_noise_with_a_tone():
 
 
 def test_the_judging_part_is_never_fitted(drag):
-    how = fitting.plan(drag.record)
+    how = make_plan(drag.record)
     first, last = how.judge
     changed = drag.record["displacement"].copy()
     changed[first:last] *= 3.0
-    one = fitting.fit(drag.believed, drag.record, how, ())
-    other = fitting.fit(
+    one = held_out.fit(drag.believed, drag.record, how, ())
+    other = held_out.fit(
         drag.believed, Record(drag.record.dt, {**drag.record.channels, "displacement": changed}), how, ()
     )
     assert np.array_equal(one.values, other.values)
@@ -213,7 +214,7 @@ def test_the_judging_part_is_never_fitted(drag):
 def test_a_model_that_runs_away_is_diagnosed_all_the_same() -> None:
     made = trials.make_trial(7_000_122, ("displacement_damping", "quadratic_damping"), 0.0, "acceleration")
     few = all_but("displacement_damping", "quadratic_damping", "van_der_pol_damping", "cubic_stiffness")
-    found = diagnose(made.believed, made.record, fitting.plan(made.record), without=few)
+    found = diagnose(made.believed, made.record, make_plan(made.record), without=few)
     assert found.diverged
     assert found.response_error == pytest.approx(1.0)
     assert set(found.pair) == {"displacement_damping", "quadratic_damping"}

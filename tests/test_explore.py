@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study import cli, fitting, ladder, modelfile, trials
+from study import cli, ladder, modelfile, trials
 from study.compare.links import links
 from study.compare.surface import curve, surface
 from study.errors import StudyError
@@ -18,6 +18,7 @@ from study.explore.desk import Desk
 from study.explore.files import PAGE, files
 from study.explore.saved import saved
 from study.model import Model, free
+from study.plan import make_plan
 from study.terms import get
 
 TEXT = """# the rig in hall 3
@@ -37,7 +38,7 @@ def trial() -> trials.Trial:
 @pytest.fixture(scope="module")
 def begun(trial: trials.Trial) -> sessions.Session:
     record = replace(trial.record.part(0, 4096), name="rig")
-    return sessions.begin(trial.believed, record, fitting.plan(record))
+    return sessions.begin(trial.believed, record, make_plan(record))
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,8 @@ each of seven effects, at a seed of its own that was fixed before it was first r
 
 import pytest
 
-from study import fitting
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN, Diagnosis, diagnose
+from study.plan import make_plan
 from study.terms import LIBRARY
 from study.trials import Trial, make_trial, runs
 from study.trials.runs import Order
@@ -22,7 +22,7 @@ RESPONSES = ("displacement", "acceleration")
 
 
 def diagnosed(trial: Trial, without: tuple[str, ...] = ()) -> Diagnosis:
-    return diagnose(trial.believed, trial.record, fitting.plan(trial.record), without=without)
+    return diagnose(trial.believed, trial.record, make_plan(trial.record), without=without)
 
 
 @pytest.mark.parametrize(("place", "name"), list(EFFECTS.items()))
@@ -34,7 +34,7 @@ def test_hidden_effect_comes_first_or_is_named_in_the_tie(place: int, name: str)
     assert found.verdict == MISSING
     assert name == first.name or name in first.tied_with
     assert first.response_error < found.response_error
-    truth = runs.error_of_truth(trial, fitting.plan(trial.record))
+    truth = runs.error_of_truth(trial, make_plan(trial.record))
     assert first.response_error < 1.05 * truth + 1e-6  # where nothing is noise, the rounding of the fit
 
 

@@ -3,19 +3,20 @@
 import numpy as np
 import pytest
 
-from study import fitting, shape_search, trials
+from study import held_out, shape_search, trials
 from study.compare.fitted import fit_model
 from study.diagnose import candidates, nature, pairs, preselect, steadiness
 from study.diagnose.ranking import rank
 from study.excitation import Excitation, force
 from study.model import free
+from study.plan import make_plan
 from study.record import Record
 from study.simulate import Integrator, simulate
 from study.terms import get
 
 
 def left_by(model, record):
-    how = fitting.plan(record)
+    how = make_plan(record)
     found, _ = fit_model(model, record, how)
     return nature.leftover(found, shape_search.baseline(found, record, how), record, how)
 
@@ -55,12 +56,12 @@ def test_few_strong_blocks_do_not_make_a_coefficient_move():
 @pytest.fixture(scope="module")
 def two_effects():
     made = trials.make_trial(93001, ("quadratic_stiffness", "quadratic_damping"), 0.01, "displacement")
-    how = fitting.plan(made.record)
+    how = make_plan(made.record)
     found, _ = fit_model(made.believed, made.record, how)
     base = shape_search.baseline(found, made.record, how)
     terms = [get(n) for n in ("quadratic_stiffness", "quadratic_damping", "cubic_stiffness", "bilinear_stiffness")]
     tried = candidates.try_all(terms, base, made.record, how, ())
-    return made, how, base, rank(tried, fitting.held_out_residual(found, made.record, how), made.record, how)
+    return made, how, base, rank(tried, held_out.held_out_residual(found, made.record, how), made.record, how)
 
 
 def test_both_of_two_effects_are_the_best_pair(two_effects):
@@ -79,7 +80,7 @@ def test_each_way_of_preselecting_names_the_pair(two_effects):
 
 def test_a_candidate_whose_fits_all_lost_the_motion_begins_in_pieces():
     made = trials.make_trial(97072, ("quintic_stiffness",), 0.05, "displacement")
-    how = fitting.plan(made.record)
+    how = make_plan(made.record)
     found, _ = fit_model(made.believed, made.record, how)
     base = shape_search.baseline(found, made.record, how)
     tried = candidates.attempt(get("quintic_stiffness"), base, made.record, how, ())

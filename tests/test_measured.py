@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from study import fitting
+from study import held_out
 from study.diagnose.verdict import MISSING, diagnose
 from study.measurements import data_folder
 from study.model import Model, free
+from study.plan import make_plan
 from study.record import Record
 from study.terms import LIBRARY, get
 
@@ -28,7 +29,7 @@ def silverbox() -> Record:
 
 def test_the_silverbox_is_first_of_all_a_duffing_oscillator(silverbox):
     """With the offset of V1 in the model; without it, hysteresis with its free state competes on a short stretch."""
-    how = fitting.plan(silverbox, (40650, 48842), (20000, 28192))
+    how = make_plan(silverbox, (40650, 48842), (20000, 28192))
     found = diagnose(LINEAR.with_term(get("constant_force")), silverbox, how, without=OTHERS)
     assert found.verdict == MISSING
     assert found.candidates[0].name == "cubic_stiffness"
@@ -37,15 +38,15 @@ def test_the_silverbox_is_first_of_all_a_duffing_oscillator(silverbox):
 def test_the_silverbox_hides_a_damping_effect(silverbox):
     """The climb's last rung on the arrow, in millivolts: published physical models stop at 0.39."""
     names = ("cubic_stiffness", "constant_force", "quadratic_stiffness", "quadratic_damping")
-    how = fitting.plan(silverbox, (40650, 57034), (100, 40575))
+    how = make_plan(silverbox, (40650, 57034), (100, 40575))
     rms = []
     for count in (3, 4):
         model = LINEAR
         for name in names[:count]:
             model = model.with_term(get(name))
-        found = fitting.fit(model, silverbox, how, ())
+        found = held_out.fit(model, silverbox, how, ())
         assert found.converged
-        rms.append(1e3 * float(np.sqrt(np.mean(fitting.held_out_residual(found, silverbox, how) ** 2))))
+        rms.append(1e3 * float(np.sqrt(np.mean(held_out.held_out_residual(found, silverbox, how) ** 2))))
     assert rms[0] == pytest.approx(0.39, abs=0.02)
     assert rms[1] < 0.33
 
@@ -54,7 +55,7 @@ def test_the_bouc_wen_benchmark_is_hysteresis_and_no_cubic_stiffness():
     with h5py.File(data_folder() / "boucwen" / "train.h5") as file:
         force, motion = (np.ravel(file[f"multisine/{name}"][()])[:12288] for name in ("u", "y"))
     record = Record(1 / 750, {"force": force, "displacement": motion}, name="boucwen")
-    found = diagnose(LINEAR, record, fitting.plan(record), without=OTHERS)
+    found = diagnose(LINEAR, record, make_plan(record), without=OTHERS)
     first = found.candidates[0]
     assert first.name == "hysteresis"
     assert first.coefficient == pytest.approx(5e4, rel=0.02)

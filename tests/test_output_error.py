@@ -15,10 +15,11 @@ from study.inputs import histories, reverse_inputs
 from study.miso import analyse
 from study.model import Model, free
 from study.output_error import FreeRunFit, fit_free_run
-from study.pieces import REACHES, Pieces, starting_states
+from study.pieces import REACHES, Pieces
 from study.record import MOTIONS, SI_UNITS, Record
 from study.simulate import Integrator, simulate
 from study.spectra import Segments, cross_spectra
+from study.states import starting_states
 from study.terms import LIBRARY, custom
 
 Floats = NDArray[np.float64]

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from study import estimators
-from study.case import identify_case
 from study.errors import StudyError
 from study.estimators.base import Settings
 from study.excitation import Excitation, force
+from study.identify_case import identify_case
 from study.inputs import histories, reverse_inputs
 from study.periods import Periods, fit, steady
 from study.record import Record

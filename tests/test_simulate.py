@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from study.case import make_record
 from study.config import load
 from study.errors import DivergenceError, StudyError
 from study.excitation import Excitation, force
 from study.inputs import histories, reverse_inputs
+from study.make_record import make_record
 from study.miso import analyse
 from study.model import Model
 from study.modelfile import read_model

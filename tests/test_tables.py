@@ -8,10 +8,10 @@ import pandas as pd
 import pytest
 
 from study import tables
-from study.case import identify_case
 from study.config import load
 from study.errors import StudyError
 from study.estimators.base import Identified, Parameter
+from study.identify_case import identify_case
 from study.responses import Responses
 
 CONFIG = load(Path(__file__).parent.parent / "config")

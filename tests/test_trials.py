@@ -8,10 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study import fitting
+from study import held_out
 from study.cli import main
 from study.errors import StudyError
 from study.modelfile import parse_model, read_model
+from study.plan import make_plan
 from study.readers import read_record
 from study.simulate import Integrator, simulate
 from study.terms import LIBRARY
@@ -227,8 +228,8 @@ def test_a_trial_that_cannot_be_made_is_a_row_with_its_trouble(monkeypatch: pyte
 
 def test_what_was_added_may_run_away_and_then_predicts_nothing():
     trial = make_trial(911, ["quadratic_damping"], 0.01, "displacement")
-    how = fitting.plan(trial.record)
-    found = fitting.fit(trial.believed, trial.record, how, ())
+    how = make_plan(trial.record)
+    found = held_out.fit(trial.believed, trial.record, how, ())
     wild = replace(found, model=found.model.with_values({"k": -found.model.numbers()["k"]}))
     assert runs._held_out(found, trial, how) < 1.0
     assert runs._held_out(wild, trial, how) == 1.0

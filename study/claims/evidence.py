@@ -9,13 +9,13 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from study.case import make_record
 from study.claims.sample import Sample, average
 from study.ensemble import NOISE_OFFSET, threaded
 from study.errors import StudyError
 from study.estimators import miso, siso
 from study.estimators.base import Identified, Settings
 from study.estimators.hand_read import read_curve
+from study.make_record import make_record
 from study.miso import MisoResult
 from study.model import Model
 from study.record import Record

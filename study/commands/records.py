@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from study.commands.command import number, whole
 from study.errors import StudyError
+from study.plan import Plan, make_plan
 
 if TYPE_CHECKING:
-    from study.fitting import Plan
     from study.readers import ReadOptions
     from study.record import Record
 
@@ -105,8 +105,6 @@ def plan_of(arguments: argparse.Namespace, record: "Record") -> "Plan":
     StudyError
         If the ranges overlap or leave the record, or it lacks the response asked for.
     """
-    from study import fitting
-
     fit, judge = _within(arguments.fit, record), _within(arguments.judge, record)
     if arguments.response is not None and arguments.response not in record:
         have = ", ".join(m for m in MOTIONS if m in record)
@@ -116,7 +114,7 @@ def plan_of(arguments: argparse.Namespace, record: "Record") -> "Plan":
     if judge is None and fit is not None:
         judge = _other(fit, len(record))
     try:
-        return fitting.plan(record, fit, judge, arguments.response)
+        return make_plan(record, fit, judge, arguments.response)
     except StudyError as error:
         raise StudyError(f"{record.name}: {error}") from None
 

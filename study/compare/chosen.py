@@ -10,16 +10,16 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from study import estimators, fitting
+from study import estimators, held_out
 from study.chaotic import magnifies
 from study.compare.noise import segments_of
 from study.errors import StudyError
 from study.estimators.base import Settings
-from study.fitting import Plan
 from study.model import Model
 from study.motion import CompletedRecord
 from study.output_error import FreeRunFit, fit_free_run
 from study.parameters import Estimate
+from study.plan import Plan, with_steps
 from study.record import Record
 from study.spectra import Segments, cross_spectra
 
@@ -67,7 +67,7 @@ def fit_by(name: str, model: Model, completed: CompletedRecord, how: Plan) -> tu
     StudyError
         If the model holds what the estimator finds, or the estimator does not find all that is open.
     """
-    held = [key for key in fitting.held_keys(model) if "." not in key]
+    held = [key for key in model.held_keys if "." not in key]
     if held:
         raise StudyError(
             f"model {model.name!r} holds {', '.join(held)}; the estimator {name} finds every coefficient: leave them "
@@ -92,7 +92,7 @@ def fit_by(name: str, model: Model, completed: CompletedRecord, how: Plan) -> tu
             f"open, or take {FREE_RUN}"
         )
     known = model.with_values({key: estimate[key] for key in estimate.symbols})
-    how = fitting.with_steps(how, STEPS)
+    how = with_steps(how, STEPS)
     run = fit_free_run(
         known, completed.record, held=tuple(known.values), response=how.response,
         steps_per_sample=STEPS, span=how.fit,
@@ -106,7 +106,7 @@ def _lines(part: Record, within: tuple[float, float], cut: Segments) -> tuple[fl
     matrix = cross_spectra([part["force"], part["displacement"]], part.dt, cut)
     g, frequency = matrix.density, matrix.frequency
     force, motion = g[:, 0, 0].real, g[:, 1, 1].real
-    loud = (force > fitting.FAINT * np.max(force)) & (frequency <= within[1])
+    loud = (force > held_out.FAINT * np.max(force)) & (frequency <= within[1])
     together = np.convolve(np.abs(g[:, 0, 1]) ** 2, np.ones(SMOOTHED), "same")
     coherence = together / np.maximum(np.convolve(force * motion, np.ones(SMOOTHED), "same"), np.finfo(float).tiny)
     followed = loud & (coherence > FOLLOWED)

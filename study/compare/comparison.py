@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from study import fitting
 from study.compare.amplitude import Growths, growths
 from study.compare.chosen import CHAOTIC, FREE_RUN, fit_by, has_lost
 from study.compare.fitted import Coefficient, coefficients, fit_model
@@ -19,11 +18,11 @@ from study.compare.restoring import Restoring, restoring
 from study.compare.reverse import ForceError, force_error
 from study.compare.stretches import AlongTime, along_time
 from study.errors import StudyError
-from study.fitting import Plan
 from study.model import Model
 from study.motion import complete
 from study.output_error import FreeRunFit
 from study.parameters import Estimate
+from study.plan import Plan, make_plan
 from study.record import Record
 
 STEPS = 5  # reports of progress a record
@@ -121,7 +120,7 @@ def compare(
     record : Record
         Force and at least one motion.
     how : Plan, optional
-        What is fitted and what is judged; :func:`study.fitting.plan` if left out.
+        What is fitted and what is judged; :func:`study.plan.make_plan` if left out.
     cutoff : float, optional
         Frequency in hertz above which a measured velocity or acceleration is integrated; what lies below is
         not judged. Found from the record if left out.
@@ -139,7 +138,7 @@ def compare(
         If the model cannot be fitted to this record, or record and plan do not go together.
     """
     told: Progress = progress or (lambda _: None)
-    how = how or fitting.plan(record)
+    how = how or make_plan(record)
     told("motions")
     completed = complete(record, cutoff)
     told("fit")
@@ -149,7 +148,7 @@ def compare(
         found, how = fit_model(model, completed.record, how, start)
     else:
         found, how, known = fit_by(estimator, model, completed, how)
-    if estimator == FREE_RUN and not fitting.held_keys(model) and has_lost(found, completed, how):
+    if estimator == FREE_RUN and not model.held_keys and has_lost(found, completed, how):
         with suppress(StudyError):  # where pieces fail as well, the one free run is what there is
             found, how, known = fit_by(estimator, model, completed, how)
             notes = (*notes, CHAOTIC)

@@ -8,19 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri, stdtrit
 
-from study import fitting, shape_search, units
+from study import held_out, shape_search, units
 from study.chaotic import fit_in_pieces
 from study.diagnose.score import clustered_covariance
 from study.errors import DivergenceError, StudyError
-from study.fitting import Plan
 from study.free_run import prepare
 from study.inputs import history, reverse_inputs
 from study.model import Model, ModelTerm
 from study.motion import complete
 from study.output_error import FreeRunFit
 from study.parameters import Estimate
-from study.pieces import angular_rate
+from study.plan import Plan
 from study.record import Record
+from study.states import angular_rate
 from study.terms import LIBRARY, QUANTITIES
 
 Floats = NDArray[np.float64]
@@ -95,9 +95,9 @@ def fit_model(
     if "inertia" not in model:
         raise StudyError(f"model {model.name!r} has no inertia; a free run needs it")
     _check_own_formulas(model, record)
-    held = fitting.held_keys(model)
+    held = model.held_keys
     if start is not None:
-        return _refined(fitting.fit(model, record, how, held, start), record, how, held)
+        return _refined(held_out.fit(model, record, how, held, start), record, how, held)
     unknown = tuple(t for t in model.terms if None in t.parameters)
     grown = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
     found = _from_afar(grown, record, how, _held(grown, held))
@@ -127,7 +127,7 @@ def _from_afar(model: Model, record: Record, how: Plan, held: tuple[str, ...]) -
     """
     measured = record[how.response][slice(*how.fit)]
     try:
-        found = fitting.fit(model, record, how, held)
+        found = held_out.fit(model, record, how, held)
     except DivergenceError:  # the linear start, with the values that are held, is no system that stays finite
         return from_pieces(model, record, how, held)
     if not found.keys or (found.converged and found.rms < POOR * float(np.std(measured))):
@@ -150,15 +150,15 @@ def from_pieces(model: Model, record: Record, how: Plan, held: tuple[str, ...]) 
     measured = record[how.response][slice(*how.fit)]
     length = round(PERIODS * 2.0 * np.pi / (angular_rate(measured, record.dt) * record.dt))
     span = (how.fit[0], min(how.fit[0] + int(np.clip(length, SHORT, LONG)), how.fit[1]))
-    start = {key: v for key, v in fitting.linear_start(model, record, how).items() if key not in held}
+    start = {key: v for key, v in held_out.linear_start(model, record, how).items() if key not in held}
     near = fit_in_pieces(model, record, start=start, held=held, response=how.response, span=span)
-    return fitting.fit(model, record, how, held, dict(zip(near.keys, near.values.tolist(), strict=True)))
+    return held_out.fit(model, record, how, held, dict(zip(near.keys, near.values.tolist(), strict=True)))
 
 
 def _refined(found: FreeRunFit, record: Record, how: Plan, held: tuple[str, ...]) -> tuple[FreeRunFit, Plan]:
     """The fit with so many steps per sample that halving them shifts no coefficient by what its error shows."""
     while found.keys and how.steps_per_sample < MOST_STEPS:
-        jacobian = fitting.linearise(found, record, how)
+        jacobian = held_out.linearise(found, record, how)
         finer = replace(how, steps_per_sample=2 * how.steps_per_sample)
         runs = [
             prepare(found.model, record, response=p.response, steps_per_sample=p.steps_per_sample, span=p.fit)
@@ -174,7 +174,7 @@ def _refined(found: FreeRunFit, record: Record, how: Plan, held: tuple[str, ...]
             break
         how = finer
         start = dict(zip(found.keys, found.values.tolist(), strict=True))
-        found = fitting.fit(found.model, record, how, held, start)
+        found = held_out.fit(found.model, record, how, held, start)
     return found, how
 
 
@@ -197,7 +197,7 @@ def _with_shape(
     for point in shape_search.starts(entry.term, shape_search.baseline(before, record, how), record, how):
         begin = known | dict(zip(entry.keys, point.coefficients + point.parameters, strict=True)) | given
         try:
-            fits.append(fitting.fit(grown.with_values(begin), record, how, _held(grown, held), begin))
+            fits.append(held_out.fit(grown.with_values(begin), record, how, _held(grown, held), begin))
         except StudyError:
             continue
     if not fits:
@@ -216,7 +216,7 @@ def coefficients(
     errors = {key: known.error(key) for key in known.symbols} if known else {}
     freedom = known.freedom if known else math.inf
     if found.keys:
-        covariance = clustered_covariance(fitting.linearise(found, record, how), found.residual)
+        covariance = clustered_covariance(held_out.linearise(found, record, how), found.residual)
         deviations = np.sqrt(np.diag(covariance))
         errors |= {key: float(deviations[i]) for i, key in enumerate(found.keys)}
     force, length = record.units.get("force", "N"), record.units.get("displacement", "m")

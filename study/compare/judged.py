@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study import motion
-from study.fitting import Plan
 from study.free_run import prepare
 from study.output_error import FreeRunFit, fit_free_run
+from study.plan import Plan
 from study.record import MOTIONS, Record
 
 Floats = NDArray[np.float64]
@@ -88,7 +88,7 @@ def judge(found: FreeRunFit, record: Record, how: Plan, low: float = 0.0) -> Jud
     """Run a fitted model along the judging part.
 
     Where that follows the fitting part the run goes on through both; elsewhere its initial state, and
-    nothing else, is estimated from the judging part (as in ``study.fitting.held_out_residual``).
+    nothing else, is estimated from the judging part (as in ``study.held_out.held_out_residual``).
 
     Parameters
     ----------

@@ -15,11 +15,11 @@ from scipy.fft import rfft
 from study.compare.noise import Noise
 from study.compare.reverse import ForceError, from_noise, lines_to_judge
 from study.errors import StudyError
-from study.fitting import Plan
 from study.inputs import Input, histories, reverse_inputs
 from study.local_polynomial import SPARE, Lines, LocalPolynomial, noise_variance, transform, transients
 from study.model import Model
 from study.motion import CompletedRecord
+from study.plan import Plan
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
-from study import fitting, kernels
+from study import held_out, kernels
 from study.compare.judged import Judged
 from study.compare.noise import Noise
-from study.fitting import Plan
 from study.inputs import history, reverse_inputs
 from study.model import Model, forward_graph, free, with_registers
 from study.motion import SETTLED, derivative
+from study.plan import Plan
 from study.record import MOTIONS, Record
 from study.terms import get
 
@@ -180,7 +180,7 @@ def _states(model: Model, record: Record) -> dict[str, Floats]:
 def _weight(record: Record, how: Plan, frequency: Floats) -> Floats:
     """|H(f)| of the best linear oscillator from force to the measured response."""
     names = ("inertia", "linear_damping", "linear_stiffness")
-    own = fitting.linear_start(Model("linear", tuple(free(get(n)) for n in names)), record, how)
+    own = held_out.linear_start(Model("linear", tuple(free(get(n)) for n in names)), record, how)
     omega = 2.0 * np.pi * np.maximum(frequency, 0.5 * frequency[1])
     damping = max(abs(own["c"]), 2.0 * LEAST_DAMPING * float(np.sqrt(abs(own["k"]) * own["m"])))
     stiffness = np.abs(own["k"] - own["m"] * omega**2 + 1j * omega * damping)

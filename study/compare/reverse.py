@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from study import miso
 from study.compare.noise import Noise, segments_of
-from study.fitting import Plan
 from study.inputs import Input, histories, reverse_inputs
 from study.model import Model
 from study.motion import CompletedRecord
+from study.plan import Plan
 from study.record import MOTIONS
 from study.spectra import Segments, SpectralMatrix, cross_spectra
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study import fitting, shape_search
+from study import held_out, shape_search
 from study.compare.fitted import from_pieces
 from study.errors import StudyError
-from study.fitting import Plan
 from study.model import Model, free
 from study.output_error import FreeRunFit
+from study.plan import Plan
 from study.record import Record
 from study.reverse_start import reverse_start
 from study.shape_search import Baseline
@@ -94,7 +94,7 @@ def attempt(term: Term, base: Baseline, record: Record, how: Plan, held: tuple[s
     if best is None:
         return None
     try:
-        return Trial(term, best, fitting.held_out_residual(best, record, how))
+        return Trial(term, best, held_out.held_out_residual(best, record, how))
     except StudyError:
         return None
 
@@ -110,7 +110,7 @@ def _fit(
     model: Model, record: Record, how: Plan, held: tuple[str, ...], values: dict[str, float], limit: int
 ) -> FreeRunFit | None:
     try:
-        return fitting.fit(model, record, how, held, values, limit)
+        return held_out.fit(model, record, how, held, values, limit)
     except StudyError:
         return None
 
@@ -157,6 +157,6 @@ def refitted(trial: Trial, record: Record, how: Plan, held: tuple[str, ...]) -> 
     if found is None:
         return trial
     try:
-        return Trial(trial.term, found, fitting.held_out_residual(found, record, how))
+        return Trial(trial.term, found, held_out.held_out_residual(found, record, how))
     except StudyError:
         return trial

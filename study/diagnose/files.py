@@ -6,7 +6,7 @@ from study.diagnose import pages, report
 from study.diagnose.says import sentences
 from study.diagnose.separate import advice
 from study.diagnose.verdict import MISSING, Diagnosis
-from study.fitting import Plan
+from study.plan import Plan
 from study.record import Record
 
 

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from scipy.signal import lfilter
 
-from study import fitting
+from study import held_out
 from study.diagnose import score
 from study.errors import DivergenceError
-from study.fitting import Plan
 from study.free_run import prepare
 from study.linear import least_squares
 from study.model import ModelTerm
 from study.output_error import FreeRunFit
+from study.plan import Plan
 from study.record import MOTIONS, Record
 from study.shape_search import Baseline, modulation_lines, residual_lines
 from study.terms import custom
@@ -78,12 +78,12 @@ def leftover(found: FreeRunFit, base: Baseline, record: Record, how: Plan) -> Le
     motions = [_motion(found, record, how, name) for name in MOTIONS[:2]]
     families = _formulas(*(float(np.std(x)) for x in motions))
     shaped = _with_shapes(found, [text for texts in families.values() for text in texts])
-    rows = [*motions, found.residual, fitting.linearise(shaped, record, how)]
+    rows = [*motions, found.residual, held_out.linearise(shaped, record, how)]
     try:
-        start = fitting.judging_start(found, record, how)
-        later = [fitting.held_out_motion(found, record, how, name, start) for name in MOTIONS[:2]]
-        later.append(fitting.held_out_residual(found, record, how, start))
-        later.append(fitting.held_out_derivatives(shaped, record, how, start))
+        start = held_out.judging_start(found, record, how)
+        later = [held_out.held_out_motion(found, record, how, name, start) for name in MOTIONS[:2]]
+        later.append(held_out.held_out_residual(found, record, how, start))
+        later.append(held_out.held_out_derivatives(shaped, record, how, start))
     except DivergenceError:
         split = len(found.residual) // 2
     else:

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study import fitting
+from study import held_out
 from study.diagnose import preselect
 from study.diagnose.candidates import SHORT, THREADS
 from study.diagnose.preselect import PairStart
 from study.diagnose.ranking import Ranked
 from study.errors import StudyError
-from study.fitting import Plan
 from study.output_error import FreeRunFit
+from study.plan import Plan
 from study.record import Record
 from study.shape_search import Baseline
 
@@ -64,8 +64,8 @@ def best_pair(
         first, second = sorted(start.names, key=lambda name: order[name])
         values = {key: v for key, v in start.model.values.items() if v is not None}
         try:
-            found = fitting.fit(start.model, record, how, held, values, SHORT)
-            return Pair((first, second), found, fitting.held_out_residual(found, record, how))
+            found = held_out.fit(start.model, record, how, held, values, SHORT)
+            return Pair((first, second), found, held_out.held_out_residual(found, record, how))
         except StudyError:
             return None
 

@@ -16,11 +16,12 @@ from scipy.signal import get_window
 
 from study.diagnose.ranking import Ranked
 from study.errors import StudyError
-from study.fitting import FAINT, Plan
+from study.held_out import FAINT
 from study.inputs import history, reverse_inputs
 from study.linear import least_squares
 from study.model import Model, ModelTerm
 from study.motion import complete
+from study.plan import Plan
 from study.record import Record
 from study.shape_search import Baseline, sensitivity
 

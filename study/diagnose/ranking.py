@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study import fitting
+from study import held_out
 from study.diagnose import score, steadiness
 from study.diagnose.candidates import Trial
 from study.diagnose.score import Gain
 from study.diagnose.steadiness import Curve
-from study.fitting import Plan
 from study.output_error import FreeRunFit
+from study.plan import Plan, shortened
 from study.record import Record
 from study.terms import Term
 
@@ -136,7 +136,7 @@ def _row(trial: Trial, before: Floats, count: int, size: float, record: Record, 
 
 def _jacobian(found: FreeRunFit, record: Record, how: Plan) -> Floats:
     """Derivatives on the samples that this candidate was fitted on: of a long record, the first ones."""
-    return fitting.linearise(found, record, fitting.shortened(how, len(found.residual)))
+    return held_out.linearise(found, record, shortened(how, len(found.residual)))
 
 
 def _amount(trial: Trial, covariance: Floats) -> tuple[float, float, dict[str, float], dict[str, float]]:

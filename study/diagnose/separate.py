@@ -7,9 +7,9 @@ import numpy as np
 from study.diagnose.ranking import Ranked
 from study.errors import StudyError
 from study.figures.labels import term_names
-from study.fitting import Plan
 from study.free_run import prepare
 from study.linear import least_squares
+from study.plan import Plan
 from study.record import Record
 
 LEVELS = (1.2, 1.5, 1.8, 2.2, 2.7, 3.3, 4.0, 5.0, 0.5, 0.25)

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study import fitting, noise_floor, shape_search
+from study import held_out, noise_floor, shape_search
 from study.compare.fitted import fit_model
 from study.diagnose import candidates, nature, pairs, score
 from study.diagnose.pairs import Pair
 from study.diagnose.ranking import UNSTEADY, Ranked, changes, curves, rank, wavers
 from study.errors import DivergenceError
-from study.fitting import Plan
 from study.model import Model
 from study.output_error import FreeRunFit
+from study.plan import Plan, shortened
 from study.record import Record
 from study.shape_search import Baseline
 from study.terms import Term
@@ -106,15 +106,15 @@ def diagnose(
     StudyError
         If the model cannot be fitted to the record.
     """
-    held = fitting.held_keys(model)
+    held = model.held_keys
     found, finer = fit_model(model, record, how)
     if finer != how:  # the candidates are told apart at the plan's own steps, and so is the model without them
         try:
-            found = fitting.fit(found.model, record, how, held, found.model.numbers())
+            found = held_out.fit(found.model, record, how, held, found.model.numbers())
         except DivergenceError:  # stiff: nothing runs with fewer steps
             how = finer
     residual, diverged = _held_out(found, record, how)
-    short = fitting.shortened(how, SEARCHED)
+    short = shortened(how, SEARCHED)
     base = shape_search.baseline(_refitted(found, record, how, short, held), record, short)
     terms = candidates.candidate_terms(base, extra, without)
     trials = candidates.try_all(terms, base, record, short, held, progress)
@@ -136,7 +136,7 @@ def diagnose(
 def _held_out(found: FreeRunFit, record: Record, how: Plan) -> tuple[Floats, bool]:
     """Held-out residual; all of the response where the free run does not stay finite: then it predicts nothing."""
     try:
-        return fitting.held_out_residual(found, record, how), False
+        return held_out.held_out_residual(found, record, how), False
     except DivergenceError:
         measured = record[how.response][slice(*how.judge)]
         return measured - float(np.mean(measured)), True
@@ -144,7 +144,7 @@ def _held_out(found: FreeRunFit, record: Record, how: Plan) -> tuple[Floats, boo
 
 def _refitted(found: FreeRunFit, record: Record, how: Plan, short: Plan, held: tuple[str, ...]) -> FreeRunFit:
     """The fit on the stretch that the search uses."""
-    return found if short == how else fitting.fit(found.model, record, short, held, found.model.numbers())
+    return found if short == how else held_out.fit(found.model, record, short, held, found.model.numbers())
 
 
 def _floor(residuals: Sequence[Floats], dt: float) -> float:
@@ -202,7 +202,7 @@ def _explaining_pair(
 
     First the best of those that the reverse system puts first; then the first candidates with every other.
     """
-    short = fitting.shortened(how, SEARCHED)
+    short = shortened(how, SEARCHED)
     found = pairs.best_pair(rows, base, record, short, held)
     if found is not None and _explains(found, rows, size, record, short):
         return found
@@ -238,7 +238,7 @@ def _lack(found: FreeRunFit, error: float, record: Record, how: Plan) -> float:
 
     Structure that is as broad as noise is not seen in a spectrum; it still depends on the motion.
     """
-    short = fitting.shortened(how, len(found.residual))
+    short = shortened(how, len(found.residual))
     left = nature.leftover(found, shape_search.baseline(found, record, short), record, short)
     shares = nature.explained_by(left)
     share = max(share for name, share in shares.items() if name != "time")

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from study import fitting, parametric, spectra
+from study import held_out, parametric, spectra
 from study.chaotic import CLEAN, astray, fit_record
 from study.errors import DivergenceError
 from study.estimators import miso
@@ -15,6 +15,7 @@ from study.inputs import histories, reverse_inputs
 from study.model import Model
 from study.output_error import FreeRunFit, fit_free_run
 from study.parameters import Estimate
+from study.plan import Plan
 from study.record import Record
 from study.shapes import shape_keys, with_starting_shapes
 
@@ -104,6 +105,6 @@ def _reverse(model: Model, record: Record, settings: Settings) -> dict[str, floa
 
 def _linear(model: Model, record: Record) -> dict[str, float]:
     """Coefficients of the best linear approximation, and none of the others."""
-    everything = fitting.Plan("displacement", (0, len(record)), (0, len(record)))
-    start = fitting.linear_start(model, record, everything)
+    everything = Plan("displacement", (0, len(record)), (0, len(record)))
+    start = held_out.linear_start(model, record, everything)
     return {key: value for key, value in start.items() if "." not in key}

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from study import expression, fitting, shape_search
+from study import expression, held_out, shape_search
 from study.compare.comparison import Comparison, compare, lacking_with
 from study.compare.report import rung as ladder_step
 from study.compare.restoring import Restoring
@@ -19,8 +19,8 @@ from study.diagnose.files import in_words
 from study.diagnose.ranking import Ranked, rank
 from study.diagnose.verdict import Diagnosis, diagnose
 from study.errors import StudyError
-from study.fitting import Plan
 from study.model import Model
+from study.plan import Plan, shortened
 from study.record import Record
 from study.terms import LIBRARY, Term, custom
 
@@ -244,9 +244,9 @@ def _no_response(term: Term) -> StudyError:
 
 def _attempted(term: Term, found: Diagnosis, session: Session) -> Trial:
     """The present model with a term, fitted as the candidates of its diagnosis were."""
-    record, how, held = session.record, session.how, fitting.held_keys(session.now.model)
-    short = fitting.shortened(how, len(found.candidates[-1].found.residual)) if found.candidates else how
-    fit = found.found if short == how else fitting.fit(found.found.model, record, short, held, session.now.values)
+    record, how, held = session.record, session.how, session.now.model.held_keys
+    short = shortened(how, len(found.candidates[-1].found.residual)) if found.candidates else how
+    fit = found.found if short == how else held_out.fit(found.found.model, record, short, held, session.now.values)
     trial = candidates.attempt(term, shape_search.baseline(fit, record, short), record, short, held)
     if trial is None:
         raise _no_response(term)

@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from study import fitting
+from study import held_out
 from study.compare.fitted import fit_model
 from study.diagnose.verdict import MISSING, Diagnosis, diagnose
 from study.errors import DivergenceError, StudyError
-from study.fitting import Plan
 from study.model import Model, free
 from study.output_error import FreeRunFit
+from study.plan import Plan, make_plan
 from study.terms import Term
 from study.trials.draw import HIDDEN, Trial, make_trial
 
@@ -98,7 +98,7 @@ def run(order: Order) -> Row:
 
 
 def _judged(order: Order, trial: Trial) -> Row:
-    how = fitting.plan(trial.record)
+    how = make_plan(trial.record)
     without = order.hidden if order.kind == REMOVED else ()
     found = diagnose(trial.believed, trial.record, how, without=without)
     first = found.candidates[0]
@@ -160,7 +160,7 @@ def _tied(whole: Diagnosis, hidden: str, named: str) -> bool:
 def error_of_truth(trial: Trial, how: Plan) -> float:
     """Held-out response error of the true model, fitted as any other, from the true values; NaN if it cannot be."""
     try:
-        found = fitting.fit(trial.truth, trial.record, how, (), trial.truth.numbers())
+        found = held_out.fit(trial.truth, trial.record, how, (), trial.truth.numbers())
         return _held_out(found, trial, how)
     except StudyError:
         return math.nan
@@ -169,7 +169,7 @@ def error_of_truth(trial: Trial, how: Plan) -> float:
 def _held_out(found: FreeRunFit, trial: Trial, how: Plan) -> float:
     """Rms of what is left of the judging part over that of the response; all of it where the free run runs away."""
     try:
-        residual = fitting.held_out_residual(found, trial.record, how)
+        residual = held_out.held_out_residual(found, trial.record, how)
     except DivergenceError:
         return 1.0
     return float(np.sqrt(np.mean(residual**2)) / np.std(trial.record[how.response][slice(*how.judge)]))

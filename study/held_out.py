@@ -5,7 +5,7 @@ What both ``compare`` and ``diagnose`` stand on. The fit begins from the best li
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from study.free_run import FreeRun, prepare
 from study.linear import least_squares
 from study.model import Model
 from study.output_error import FreeRunFit, fit_free_run
+from study.plan import Plan
 from study.record import MOTIONS, Record
 from study.spectra import Segments, cross_spectra
 
@@ -23,53 +24,6 @@ LINEAR_ORDERS = {"k": 0, "c": 1, "m": 2}
 FAINT = 1e-3  # ... and whose force is above this share of the strongest line: leakage tells nothing
 SHORT = 512  # samples below which missing coherence may be the record's own shortness
 CHANCE = 0.01  # the linear start uses lines whose coherence noise alone would reach this rarely
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What is fitted and what is judged.
-
-    Attributes
-    ----------
-    response : str
-        The measured motion that free runs are compared with.
-    fit, judge : pair of int
-        First sample and the one after the last of each part; they do not overlap.
-    steps_per_sample : int
-        Runge-Kutta steps in each sampling interval.
-    """
-
-    response: str
-    fit: tuple[int, int]
-    judge: tuple[int, int]
-    steps_per_sample: int = 2
-
-
-def plan(
-    record: Record,
-    fit: tuple[int, int] | None = None,
-    judge: tuple[int, int] | None = None,
-    measured: str | None = None,
-) -> Plan:
-    """Fit the first half and judge the second, unless told otherwise; compare with what was measured.
-
-    Raises
-    ------
-    StudyError
-        If the parts overlap or leave the record.
-    """
-    half = len(record) // 2
-    fit = fit or (0, half)
-    judge = judge or (half, len(record))
-    for name, (first, last) in (("fit", fit), ("judge", judge)):
-        if not 0 <= first < last <= len(record) or last - first < 64:
-            raise StudyError(f"the part to {name}, {first}:{last}, must hold 64 samples or more of {len(record)}")
-    if fit[0] < judge[1] and judge[0] < fit[1]:
-        raise StudyError(f"the parts to fit {fit[0]}:{fit[1]} and to judge {judge[0]}:{judge[1]} overlap")
-    response = measured or next((c for c in MOTIONS if c in record), None)
-    if response is None:
-        raise StudyError(f"record {record.name!r} has no displacement, velocity or acceleration")
-    return Plan(response, fit, judge)
 
 
 def linear_start(model: Model, record: Record, how: Plan) -> dict[str, float]:
@@ -112,11 +66,6 @@ def linear_start(model: Model, record: Record, how: Plan) -> dict[str, float]:
         inertial = omega**2 * weight
         start["m"] = float(np.linalg.norm(target)) / float(np.linalg.norm(inertial))
     return start
-
-
-def held_keys(model: Model) -> tuple[str, ...]:
-    """The keys whose values the model gives: they are held, the rest is fitted."""
-    return tuple(key for key, value in model.values.items() if value is not None)
 
 
 def fit(
@@ -220,11 +169,6 @@ def _judging_run(
     return prepare(found.model, record, keys, response=motion, steps_per_sample=how.steps_per_sample, span=span)
 
 
-def shortened(how: Plan, samples: int) -> Plan:
-    """The same plan with no more than so many samples to fit: enough to tell candidates apart, and sooner done."""
-    return replace(how, fit=(how.fit[0], min(how.fit[1], how.fit[0] + samples)))
-
-
 def linearise(found: FreeRunFit, record: Record, how: Plan) -> Floats:
     """Derivatives of the response on the fitting part, shape (n, keys + 2): keys, then the initial state."""
     run = prepare(
@@ -233,8 +177,3 @@ def linearise(found: FreeRunFit, record: Record, how: Plan) -> Floats:
     )  # fmt: skip
     values = dict(zip(found.keys, (float(v) for v in found.values), strict=True))
     return run.respond(values, found.initial, 2)[1]
-
-
-def with_steps(how: Plan, steps: int) -> Plan:
-    """The same plan with other steps per sample."""
-    return replace(how, steps_per_sample=steps)

@@ -1,0 +1,48 @@
+"""Displacement and velocity at some instants, as a record shows them, and how fast its motion is."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.record import Record
+
+Floats = NDArray[np.float64]
+REACH = 0.2  # of a period: half width of the cubic that smooths a displacement into a state
+
+
+def angular_rate(values: Floats, dt: float) -> float:
+    """Typical angular frequency of a motion in rad/s: rms of its derivative over its own."""
+    size = float(np.std(values))
+    return float(np.sqrt(np.mean(np.diff(values) ** 2))) / (dt * size) if size > 0.0 else 1.0 / dt
+
+
+def starting_states(record: Record, response: str, samples: Sequence[int], reach: float = REACH) -> Floats:
+    """Displacement and velocity at some samples, as well as the record shows them, shape (samples, 2).
+
+    A displacement is smoothed by a cubic over a part of its period, which yields the velocity too; what
+    neither it nor a channel of the record shows is taken as zero.
+    """
+    if response != "displacement":
+        columns = [
+            record[c][list(samples)] if c in record else np.zeros(len(samples)) for c in ("displacement", "velocity")
+        ]
+        return np.column_stack(columns)
+    values = record[response]
+    half = round(reach * 2.0 * np.pi / (angular_rate(values, record.dt) * record.dt))
+    half = int(np.clip(half, 2, max((len(values) - 1) // 2, 1)))
+    states = np.empty((len(samples), 2))
+    for i, sample in enumerate(samples):
+        first = max(0, min(sample - half, len(values) - 2 * half - 1))
+        window = values[first : first + 2 * half + 1]
+        states[i] = _smoothing(first - sample, len(window), half) @ window
+    return states / np.array([1.0, half * record.dt])
+
+
+@lru_cache(maxsize=256)
+def _smoothing(first: int, count: int, half: int) -> Floats:
+    """The linear map from a window to the value and slope of its cubic at zero, shape (2, count)."""
+    offset = (first + np.arange(count)) / half
+    inverse = np.linalg.pinv(np.vander(offset, min(4, count), increasing=True))
+    return np.asarray(inverse[:2], dtype=np.float64)
