@@ -1,0 +1,1 @@
+"""From a record and a model to coefficients with their errors."""

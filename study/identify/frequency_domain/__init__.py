@@ -1,0 +1,1 @@
+"""Identification from spectra of the reverse system: frequency response functions, coherences, coefficients."""

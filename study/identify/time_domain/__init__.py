@@ -1,0 +1,1 @@
+"""Identification by free runs of the model under the measured force."""

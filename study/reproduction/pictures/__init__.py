@@ -1,0 +1,1 @@
+"""Figures that the reproduction alone draws: Axes in, Axes out."""

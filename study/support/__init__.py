@@ -1,0 +1,1 @@
+"""What knows nothing of vibration: files, documents, schemas, units, least squares, statistics."""
