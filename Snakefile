@@ -3,7 +3,7 @@ import sys
 from pathlib import Path
 
 from study.config import load
-from study.step import alone, one_sentence, sweep
+from study.support.workflow_step import alone, one_sentence, sweep
 
 with one_sentence():
     STUDY = load(Path("config"))

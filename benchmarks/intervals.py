@@ -13,16 +13,17 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from study import document, estimators
+from study import estimators
 from study.config import load
 from study.ensemble import threaded
 from study.estimators import output_error
 from study.estimators.base import Settings
-from study.excitation import Excitation, displacement_noise, force
 from study.modelfile import read_model
-from study.record import Record
+from study.records.excitation import Excitation, displacement_noise, force
+from study.records.record import Record
+from study.records.spectra import Segments
 from study.simulate import Integrator, simulate
-from study.spectra import Segments
+from study.support import document
 
 Floats = NDArray[np.float64]
 ROOT = Path(__file__).parent.parent

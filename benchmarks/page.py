@@ -18,8 +18,8 @@ from scripts.page_picture import QUIET, browser
 from study import trials
 from study.explore import session
 from study.explore.view import view
-from study.plan import make_plan
-from study.record import write_csv
+from study.records.plan import make_plan
+from study.records.record import write_csv
 
 ROUNDS = 5
 SEED = 911

@@ -19,8 +19,8 @@ from study import estimators
 from study.estimators.base import Settings
 from study.model import Model
 from study.output_error import fit_free_run
-from study.record import Record
-from study.spectra import Segments
+from study.records.record import Record
+from study.records.spectra import Segments
 
 Coefficients = dict[str, float]
 Method = Callable[[Model, Record], Coefficients]

@@ -12,9 +12,9 @@ import pytest
 from numba import njit
 from scipy.integrate import solve_ivp
 
-from study.excitation import Excitation, force
-from study.interpolation import between_samples
 from study.modelfile import read_model
+from study.records.excitation import Excitation, force
+from study.records.interpolation import between_samples
 from study.simulate import Integrator, simulate
 
 DT, SAMPLES, FINE = 0.02, 1024, 64

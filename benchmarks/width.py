@@ -13,10 +13,10 @@ import numpy as np
 from study import estimators
 from study.config import load
 from study.estimators.base import Settings
-from study.excitation import Excitation, displacement_noise, force
 from study.modelfile import read_model
+from study.records.excitation import Excitation, displacement_noise, force
+from study.records.spectra import Segments
 from study.simulate import Integrator, simulate
-from study.spectra import Segments
 
 ROOT = Path(__file__).parent.parent
 FIRST = 6000

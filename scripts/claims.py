@@ -9,8 +9,8 @@ import pandas as pd
 from study import tables
 from study.claims import evidence, reported, table
 from study.claims.verdict import Claim
-from study.files import replace_file
-from study.step import one_sentence
+from study.support.files import replace_file
+from study.support.workflow_step import one_sentence
 
 
 def main(models: str, statements: str, schema: str, steps: str, settings: dict[str, Any], csv: str, page: str) -> None:

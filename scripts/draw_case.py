@@ -8,11 +8,11 @@ from matplotlib import style as styles
 from matplotlib.figure import Figure
 
 from study import preliminary
-from study.errors import StudyError
 from study.figures import coherence, curves, distribution, labels, page, response
-from study.files import replace_file
-from study.record import read_csv
-from study.step import one_sentence
+from study.records.record import read_csv
+from study.support.errors import StudyError
+from study.support.files import replace_file
+from study.support.workflow_step import one_sentence
 
 HIGHEST = 10.0  # hertz: the report's systems have their dynamics below it (Section 2.2)
 BESIDE = (labels.FREE_SHAPE, "instrumental")  # whose coherences stand over those of MI/SO

@@ -7,8 +7,8 @@ import pandas as pd
 from matplotlib import style as styles
 
 from study.figures import estimator_errors, page
-from study.files import replace_file
-from study.step import one_sentence
+from study.support.files import replace_file
+from study.support.workflow_step import one_sentence
 
 
 def main(table: Path, style: Path, cases: Sequence[str], outputs: Sequence[Path]) -> None:

@@ -8,13 +8,14 @@ from typing import Any
 from matplotlib import style as styles
 from matplotlib.figure import Figure
 
-from study import preliminary, spectra
-from study.errors import StudyError
+from study import preliminary
 from study.figures import distribution, labels, motion, page
-from study.files import replace_file
 from study.modelfile import read_model
-from study.record import read_csv
-from study.step import one_sentence
+from study.records import spectra
+from study.records.record import read_csv
+from study.support.errors import StudyError
+from study.support.files import replace_file
+from study.support.workflow_step import one_sentence
 
 HIGHEST = 10.0  # hertz, as in the figures of A_j
 

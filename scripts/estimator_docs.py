@@ -4,11 +4,12 @@ from pathlib import Path
 
 import pandas as pd
 
-from study import document, error_pages
+from study import error_pages
 from study.config import load
-from study.errors import StudyError
-from study.files import replace_file
-from study.step import one_sentence
+from study.support import document
+from study.support.errors import StudyError
+from study.support.files import replace_file
+from study.support.workflow_step import one_sentence
 
 
 def main(page: Path, table: Path, picture: Path, noise: dict[str, float]) -> None:

@@ -5,7 +5,7 @@ from typing import Any
 
 from study import excitation_reading, tables
 from study.claims import evidence, reported
-from study.step import one_sentence
+from study.support.workflow_step import one_sentence
 
 
 def main(models: str, statements: str, schema: str, settings: dict[str, Any], output: str) -> None:

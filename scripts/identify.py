@@ -7,8 +7,8 @@ from typing import Any
 from study import tables
 from study.identify_case import identify_case
 from study.modelfile import read_model
-from study.record import read_csv
-from study.step import one_sentence
+from study.records.record import read_csv
+from study.support.workflow_step import one_sentence
 
 
 def main(model: str, record: str, outputs: dict[str, str], settings: dict[str, Any]) -> None:

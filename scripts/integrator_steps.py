@@ -6,9 +6,9 @@ from typing import Any
 from study import integrator_study, tables
 from study.claims.evidence import Drive, models_of, record_settings
 from study.claims.simulation import SYSTEMS
-from study.excitation import READINGS
-from study.files import replace_file
-from study.step import one_sentence
+from study.records.excitation import READINGS
+from study.support.files import replace_file
+from study.support.workflow_step import one_sentence
 
 SHARE = 5  # differences on the same forces scatter little: a fifth of the ensemble's seeds is plenty
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from study.errors import StudyError
-from study.files import replace_file
-from study.step import one_sentence
+from study.support.errors import StudyError
+from study.support.files import replace_file
+from study.support.workflow_step import one_sentence
 
 
 def main(tables: Sequence[str], without: Sequence[str], output: str) -> None:

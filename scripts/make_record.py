@@ -3,11 +3,11 @@
 from pathlib import Path
 from typing import Any
 
-from study.files import replacing
 from study.make_record import make_record
 from study.modelfile import read_model
-from study.record import write_csv
-from study.step import one_sentence
+from study.records.record import write_csv
+from study.support.files import replacing
+from study.support.workflow_step import one_sentence
 
 
 def main(model: str, output: str, settings: dict[str, Any]) -> None:

@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import Any
 
 from study.climb import climb, run
-from study.errors import StudyError
-from study.files import replace_file
 from study.measurements import Measurement, check_present
-from study.step import one_sentence
+from study.support.errors import StudyError
+from study.support.files import replace_file
+from study.support.workflow_step import one_sentence
 
 
 def main(what: str, row: Measurement, output: Any) -> None:

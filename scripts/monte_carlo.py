@@ -9,7 +9,7 @@ import pandas as pd
 
 from study import ensemble, estimator_errors, tables
 from study.modelfile import read_model
-from study.step import one_sentence
+from study.support.workflow_step import one_sentence
 
 EVERY = 100  # seeds between two signs of life
 JUDGED = {"rates": ensemble.rates, "errors": estimator_errors.errors}

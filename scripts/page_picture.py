@@ -6,9 +6,9 @@ import shutil
 import sys
 from pathlib import Path
 
-from study.errors import StudyError
-from study.files import replace_file
-from study.step import one_sentence
+from study.support.errors import StudyError
+from study.support.files import replace_file
+from study.support.workflow_step import one_sentence
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome-stable", "google-chrome")
 MISSING = "no Chromium here: 'apt-get install chromium', or name a browser in STUDY_BROWSER"

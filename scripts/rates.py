@@ -6,8 +6,8 @@ from pathlib import Path
 import pandas as pd
 
 from study import ensemble
-from study.files import replace_file
-from study.step import one_sentence
+from study.support.files import replace_file
+from study.support.workflow_step import one_sentence
 
 
 def main(rates: str, noise: dict[str, float], output: str) -> None:

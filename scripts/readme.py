@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from study import document, summary
-from study.errors import StudyError
-from study.step import one_sentence
+from study import summary
+from study.support import document
+from study.support.errors import StudyError
+from study.support.workflow_step import one_sentence
 
 SHOWN = (
     "siso_stiffness", "siso_frequency", "duffing_share", "duffing_cubic", "van_der_pol_damping", "van_der_pol_share",

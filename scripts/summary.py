@@ -6,9 +6,10 @@ from typing import Any
 
 import pandas as pd
 
-from study import document, summary
-from study.files import replace_file
-from study.step import one_sentence
+from study import summary
+from study.support import document
+from study.support.files import replace_file
+from study.support.workflow_step import one_sentence
 
 
 def run_times(paths: Sequence[str]) -> pd.DataFrame:

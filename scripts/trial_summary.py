@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from study import tables
 from study.figures import page
-from study.files import replace_file
-from study.step import one_sentence
+from study.support.files import replace_file
+from study.support.workflow_step import one_sentence
 from study.trials import pictures, reach
 
 KINDS = {"single": "one effect hidden", "pair": "two effects hidden"}

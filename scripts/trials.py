@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 
 from study import tables
-from study.step import one_sentence
+from study.support.workflow_step import one_sentence
 from study.trials import runs
 
 EVERY = 5  # trials between two signs of life

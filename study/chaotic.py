@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study.errors import DivergenceError
 from study.joining import NEAR, NEGLIGIBLE, fit_pieces, joined
 from study.model import Model
 from study.output_error import FreeRunFit, fit_free_run
 from study.pieces import Pieces, even_restarts, needed_restarts
-from study.record import Record
+from study.records.record import Record
 from study.stiffness import needed_steps
+from study.support.errors import DivergenceError
 
 Floats = NDArray[np.float64]
 ROUNDS = 2  # times that pieces are joined and tied, at most

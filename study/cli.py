@@ -15,7 +15,7 @@ from study import __doc__ as summary
 from study import __version__
 from study.commands import add, compare, diagnose, explore, history, simulate, terms, trial
 from study.commands.command import Command
-from study.errors import StudyError
+from study.support.errors import StudyError
 
 COMMANDS: tuple[Command, ...] = (
     compare.COMMAND, diagnose.COMMAND, add.COMMAND, history.COMMAND, explore.COMMAND, terms.COMMAND,

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from study import cli, ladder
 from study.commands.records import plan_of, read_records
-from study.compare.output import write_files
 from study.diagnose import report
 from study.diagnose.files import files as diagnosis_files
 from study.diagnose.verdict import MISSING, Diagnosis
@@ -15,8 +14,9 @@ from study.explore import session as sessions
 from study.explore.files import PAGE, files
 from study.explore.session import Session
 from study.figures.ladder import files as ladder_pictures
-from study.files import read_text
 from study.modelfile import WANTED, parse_model
+from study.support.file_sets import write_files
+from study.support.files import read_text
 
 SAVED = "climb.html"  # the whole climb as one page
 

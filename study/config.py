@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from study import case_names, needs, terms
-from study.errors import StudyError
 from study.estimators.base import true_parameters
-from study.excitation import SETTINGS, Excitation, theoretical_autospectrum
 from study.model import Model, forward_graph, free
 from study.modelfile import read_model
-from study.schema import check, numbered_rows, read_yaml
+from study.records.excitation import SETTINGS, Excitation, theoretical_autospectrum
+from study.support.errors import StudyError
+from study.support.schema import check, numbered_rows, read_yaml
 
 Table = dict[str, Any]
 IDENTIFIED = ("linear", "nonlinear", "coherence", "histogram")  # drawn of every case
@@ -211,7 +211,7 @@ def _complete_model(path: Path) -> Model:
 def _check_assumed(model: Model, extra: str, settings: Table) -> None:
     """Whether the record can tell the inputs of the assumed model apart."""
     from study.local_polynomial import LocalPolynomial
-    from study.spectra import Segments
+    from study.records.spectra import Segments
 
     if extra:
         term = terms.get(extra)

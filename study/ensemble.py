@@ -9,10 +9,10 @@ from typing import Any, TypeVar
 import pandas as pd
 
 from study import tables
-from study.errors import DivergenceError
 from study.identify_case import identify_case
 from study.make_record import make_record
 from study.model import Model
+from study.support.errors import DivergenceError
 
 Table = Mapping[str, Any]
 T = TypeVar("T")

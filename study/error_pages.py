@@ -7,8 +7,8 @@ from typing import Any
 import pandas as pd
 
 from study import estimator_errors
-from study.document import Block, Bullets, Image, Text, table
 from study.figures.styles import look
+from study.support.document import Block, Bullets, Image, Text, table
 
 WHO = (
     "MI/SO is the report's estimator, SI/SO the ordinary analysis that it is held against. The others are ours: a "

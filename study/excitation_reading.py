@@ -10,7 +10,7 @@ import pandas as pd
 from study.claims.evidence import Assumed, Drive, Ensemble, Evidence
 from study.claims.reported import Reported
 from study.claims.sample import Sample
-from study.excitation import READINGS
+from study.records.excitation import READINGS
 
 SURE = 2.0  # standard errors by which one reading must come nearer than the other ...
 TIE = "tie"  # ... or this is said

@@ -8,8 +8,8 @@ import ast
 import math
 from collections.abc import Mapping
 
-from study.errors import StudyError
 from study.graph import Graph, Op
+from study.support.errors import StudyError
 
 LONGEST = 300
 DEEPEST = 40

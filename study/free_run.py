@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study import kernels
-from study.errors import DivergenceError, StudyError
 from study.graph import Op, Program
-from study.interpolation import between_samples
 from study.model import Model, forward_graph, with_registers
-from study.record import MOTIONS, Record
+from study.records.interpolation import between_samples
+from study.records.record import MOTIONS, Record
+from study.support.errors import DivergenceError, StudyError
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -10,14 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.errors import StudyError
 from study.free_run import FreeRun, prepare
-from study.linear import least_squares
 from study.model import Model
 from study.output_error import FreeRunFit, fit_free_run
-from study.plan import Plan
-from study.record import MOTIONS, Record
-from study.spectra import Segments, cross_spectra
+from study.records.plan import Plan
+from study.records.record import MOTIONS, Record
+from study.records.spectra import Segments, cross_spectra
+from study.support.errors import StudyError
+from study.support.least_squares import least_squares
 
 Floats = NDArray[np.float64]
 LINEAR_ORDERS = {"k": 0, "c": 1, "m": 2}

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study import expression, kernels
-from study.errors import StudyError
 from study.graph import Graph
-from study.interpolation import between_samples
 from study.model import Model, ModelTerm, with_registers
-from study.record import Record
+from study.records.interpolation import between_samples
+from study.records.record import Record
+from study.support.errors import StudyError
 from study.terms import Component
 
 Floats = NDArray[np.float64]

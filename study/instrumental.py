@@ -17,14 +17,15 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from study import expression, spectra
+from study import expression
 from study.inputs import Input, history
 from study.miso import COLLINEAR
 from study.parameters import Estimate
 from study.parametric import left_over
-from study.record import Record
+from study.records import spectra
+from study.records.record import Record
+from study.records.spectra import Segments, SpectralMatrix
 from study.responses import Responses
-from study.spectra import Segments, SpectralMatrix
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from study.errors import DivergenceError
-from study.levenberg import OFFSET
 from study.model import Model
 from study.output_error import FreeRunFit, fit_free_run
 from study.pieces import Pieces
+from study.support.errors import DivergenceError
+from study.support.levenberg_marquardt import OFFSET
 
 Floats = NDArray[np.float64]
 DOUBLINGS = 5  # from pieces of a period to pieces of 32, beyond which a chaotic motion has too many side valleys

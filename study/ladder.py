@@ -4,8 +4,8 @@ import json
 from pathlib import Path
 from typing import Any, cast
 
-from study.errors import StudyError
-from study.files import read_text, replace_file
+from study.support.errors import StudyError
+from study.support.files import read_text, replace_file
 
 Step = dict[str, Any]
 

@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft
 
-from study.errors import StudyError
 from study.inputs import Input
 from study.local_polynomial import EXACT, Lines, LocalPolynomial, noise_variance, transients
 from study.parameters import Estimate
+from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from study.errors import DivergenceError
-from study.excitation import Excitation, displacement_noise, force
 from study.model import Model
-from study.record import Record
+from study.records.excitation import Excitation, displacement_noise, force
+from study.records.record import Record
 from study.simulate import Integrator, simulate
+from study.support.errors import DivergenceError
 
 Table = Mapping[str, Any]
 

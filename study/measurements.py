@@ -6,8 +6,8 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from study.errors import StudyError
-from study.schema import numbered_rows
+from study.support.errors import StudyError
+from study.support.schema import numbered_rows
 
 VARIABLE = "$STUDY_DATA"
 BESIDE = Path("../shared/data")  # where data lie that no variable points to

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.errors import StudyError
+from study.records.spectra import SpectralMatrix
 from study.responses import Responses
-from study.spectra import SpectralMatrix
+from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

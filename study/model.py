@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study import expression
-from study.errors import StudyError
 from study.graph import Graph, Program
+from study.support.errors import StudyError
 from study.terms import Component, Term
 
 FIXED_INPUTS = ("u", "v", "t", "force")  # the registers that every forward program begins with

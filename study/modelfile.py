@@ -21,14 +21,15 @@ from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
 
-from study import expression, terms, yamltext
-from study.errors import StudyError
-from study.files import read_text, replace_file
+from study import expression, terms
 from study.graph import Graph
 from study.model import Model, ModelTerm, free
 from study.repeated import repeated_force
+from study.support import yaml_text
+from study.support.errors import StudyError
+from study.support.files import read_text, replace_file
+from study.support.yaml_text import as_list, as_mapping, scalar, shown
 from study.terms import Term
-from study.yamltext import as_list, as_mapping, scalar, shown
 
 MOST_TERMS = 200
 LONGEST_NAME = 100
@@ -60,7 +61,7 @@ def parse_model(text: str, source: Path) -> Model:
         As :func:`read_model`.
     """
     try:
-        return _model(yamltext.read_plain(text), source.stem)
+        return _model(yaml_text.read_plain(text), source.stem)
     except StudyError as error:
         raise StudyError(f"{source}: {error}") from None
 
@@ -121,7 +122,7 @@ def add_term(path: Path, entry: Term | ModelTerm) -> Model:
     if new.name in before:
         raise StudyError(f"{path}: the term {new.name!r} is already in this model; add another one, or edit its entry")
     line = format_entry(new)
-    extended = yamltext.with_entry(text, "terms", line)
+    extended = yaml_text.with_entry(text, "terms", line)
     after = before.with_term(new)
     if not _holds(extended, path, after):
         raise StudyError(f"{path}: its layout leaves no clear place for a new term; add '- {line}' to 'terms' by hand")
@@ -149,9 +150,9 @@ def revised(text: str, source: str, model: Model) -> str:
     before = parse_model(text, Path(source)).terms
     for number, entry in enumerate(model.terms):
         if number >= len(before):
-            text = yamltext.with_entry(text, "terms", format_entry(entry))
+            text = yaml_text.with_entry(text, "terms", format_entry(entry))
         elif entry != before[number]:
-            text = yamltext.with_changed(text, "terms", number, format_entry(entry))
+            text = yaml_text.with_changed(text, "terms", number, format_entry(entry))
     if not _holds(text, Path(source), model):
         raise StudyError(f"{source}: its layout leaves no clear place for a change; one entry a line is right")
     return text

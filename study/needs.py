@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from study.errors import StudyError
 from study.estimators import ESTIMATORS
-from study.excitation import READINGS, SETTINGS, Excitation, theoretical_autospectrum
+from study.records.excitation import READINGS, SETTINGS, Excitation, theoretical_autospectrum
+from study.support.errors import StudyError
 
 Table = dict[str, Any]
 JUDGED, KIND = "report", "gaussian_lowpass"  # the force that the claims judge, Section 2.1
@@ -142,7 +142,7 @@ def _check_band(settings: Table, where: str) -> None:
 
 
 def _check_segments(settings: Table, where: str) -> None:
-    from study.spectra import Segments  # SciPy, for those alone who load a configuration
+    from study.records.spectra import Segments  # SciPy, for those alone who load a configuration
 
     told, samples = settings["segments"], settings["sampling"]["samples"]
 

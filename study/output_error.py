@@ -2,7 +2,7 @@
 
 The force is taken as known and the noise as additive on the response, so no noisy regressor enters and
 the estimate is not biased by noise (the reverse MI/SO estimate is, Section 5.4). The sum of squares is
-minimised by the method of Levenberg and Marquardt (``study.levenberg``) with exact derivatives
+minimised by the method of Levenberg and Marquardt (``study.support.levenberg_marquardt``) with exact derivatives
 (``study.free_run``). A chaotic system is run piece by piece (``study.pieces``, ``study.chaotic``).
 """
 
@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study.errors import DivergenceError, StudyError
 from study.free_run import FreeRun, prepare
-from study.levenberg import OFFSET, End, Point, minimise, point_at
 from study.model import Model
-from study.normal import Ties
 from study.parameters import Estimate
-from study.record import Record
-from study.states import starting_states
+from study.records.record import Record
+from study.records.states import starting_states
+from study.support.block_normal import Ties
+from study.support.errors import DivergenceError, StudyError
+from study.support.levenberg_marquardt import OFFSET, End, Point, minimise, point_at
 
 Floats = NDArray[np.float64]
 POSITIVE = ("m", "u_g", "tau", "f_m", "f")  # coefficients and shape parameters without meaning below zero

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from study.inputs import Input
 from study.parameters import Estimate
+from study.records.spectra import SpectralMatrix
 from study.responses import Responses
-from study.spectra import SpectralMatrix
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 from scipy.fft import rfft
 
 from study import expression
-from study.errors import StudyError
 from study.inputs import Input, histories
 from study.parameters import Estimate
-from study.record import Record
+from study.records.record import Record
+from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

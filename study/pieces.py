@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.errors import DivergenceError
 from study.free_run import prepare
 from study.model import Model
-from study.record import Record
-from study.states import REACH, angular_rate, starting_states
+from study.records.record import Record
+from study.records.states import REACH, angular_rate, starting_states
+from study.support.errors import DivergenceError
 
 Floats = NDArray[np.float64]
 GROWTH = 10.0  # by how much a disturbance may be magnified within a piece

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.errors import StudyError
 from study.model import Model, forward_program
-from study.record import Record
+from study.records.record import Record
+from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
 POINTS_A_CYCLE = 256

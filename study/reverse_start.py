@@ -7,14 +7,14 @@ valleys, in which a fit ends that begins from a linear model where the system is
 import numpy as np
 
 from study import miso, parameters
-from study.errors import StudyError
 from study.held_out import FAINT
 from study.inputs import histories, reverse_inputs
 from study.model import Model
-from study.motion import complete
-from study.plan import Plan
-from study.record import Record
-from study.spectra import Segments, cross_spectra
+from study.records.completion import complete
+from study.records.plan import Plan
+from study.records.record import Record
+from study.records.spectra import Segments, cross_spectra
+from study.support.errors import StudyError
 
 LONGEST, SHORTEST, PARTS = 1024, 64, 12  # samples in a segment, and how many of them at least
 

@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 
 from study import held_out, shape_search
 from study.chaotic import astray, magnifies
-from study.errors import DivergenceError, StudyError
 from study.joining import fit_pieces
 from study.model import Model, ModelTerm
 from study.output_error import FreeRunFit
 from study.pieces import Pieces, even_restarts
-from study.plan import Plan, make_plan, shortened, with_steps
-from study.record import Record
+from study.records.plan import Plan, make_plan, shortened, with_steps
+from study.records.record import Record
 from study.shape_search import Baseline
 from study.stiffness import needed_steps
+from study.support.errors import DivergenceError, StudyError
 
 Floats = NDArray[np.float64]
 SEARCHED = 2048  # samples, at most: a start needs no more

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study import kernels
-from study.errors import DivergenceError, StudyError
-from study.interpolation import between_samples
 from study.model import Model, forward_program
-from study.record import SI_UNITS, Record
+from study.records.interpolation import between_samples
+from study.records.record import SI_UNITS, Record
+from study.support.errors import DivergenceError, StudyError
 
 Floats = NDArray[np.float64]
 PLENTY = 8  # steps per sample with which a system that can be held is held

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from study import kernels
 from study.free_run import prepare
 from study.model import Model
-from study.record import Record
-from study.states import angular_rate, starting_states
+from study.records.record import Record
+from study.records.states import angular_rate, starting_states
 
 Floats = NDArray[np.float64]
 POINTS = 64  # of the motion, at which the equation of motion is linearised

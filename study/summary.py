@@ -8,7 +8,7 @@ import pandas as pd
 
 from study import error_pages
 from study.claims.verdict import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED, SEPARATOR
-from study.document import Block, Bullets, Heading, Text, table
+from study.support.document import Block, Bullets, Heading, Text, table
 
 INTRODUCTION = (
     "Bendat, Palo and Coppolino identify nonlinear systems with one degree of freedom from force and response: "

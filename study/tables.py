@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 
 from study.estimators.base import Identified, true_parameters
-from study.files import replacing
 from study.inputs import Input
 from study.miso import MisoResult
 from study.model import Model
+from study.support.files import replacing
 
 Table = Mapping[str, Any]
 PARAMETER_COLUMNS = [

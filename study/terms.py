@@ -11,8 +11,8 @@ To add an effect, add one entry to ``LIBRARY`` and one row to the parametrised t
 from dataclasses import dataclass, field
 
 from study import expression, units
-from study.errors import StudyError
 from study.graph import Graph
+from study.support.errors import StudyError
 
 
 @dataclass(frozen=True)

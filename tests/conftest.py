@@ -7,10 +7,10 @@ import pytest
 from numpy.typing import NDArray
 
 from study import expression, kernels
-from study.excitation import Excitation, force
 from study.graph import Graph
 from study.model import Model, free, with_registers
-from study.record import Record
+from study.records.excitation import Excitation, force
+from study.records.record import Record
 from study.simulate import Integrator, simulate
 from study.terms import get
 

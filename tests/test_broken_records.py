@@ -14,9 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 
-from study.errors import StudyError
-from study.readers import ReadOptions, read_record
-from study.record import Record
+from study.records.readers import ReadOptions, read_record
+from study.records.record import Record
+from study.support.errors import StudyError
 
 N = 64
 TIME = 0.02 * np.arange(N)

@@ -32,7 +32,7 @@ from study.claims.sample import Sample, departure
 from study.claims.verdict import Condition
 from study.modelfile import read_model
 from study.preliminary import model_restoring_force, natural_frequency
-from study.record import Record
+from study.records.record import Record
 
 ROOT = Path(__file__).parents[1]
 SEEDS = 6

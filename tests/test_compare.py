@@ -14,12 +14,12 @@ from study.compare.judged import Judged
 from study.compare.levels import levels
 from study.compare.report import as_json, document, summary, tables
 from study.compare.says import says, says_of_all
-from study.errors import StudyError
-from study.excitation import Excitation, force
 from study.model import Model, ModelTerm, free
-from study.plan import Plan, make_plan
-from study.record import Record
+from study.records.excitation import Excitation, force
+from study.records.plan import Plan, make_plan
+from study.records.record import Record
 from study.simulate import Integrator, simulate
+from study.support.errors import StudyError
 from study.terms import get
 from study.trials import make_trial
 

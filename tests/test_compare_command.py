@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from study import cli
-from study.compare.output import check_folder, write_files
-from study.errors import StudyError
-from study.excitation import Excitation, force
 from study.model import Model, free
-from study.record import Record, write_csv
+from study.records.excitation import Excitation, force
+from study.records.record import Record, write_csv
 from study.simulate import simulate
+from study.support.errors import StudyError
+from study.support.file_sets import check_folder, write_files
 from study.terms import get
 
 DT = 0.02

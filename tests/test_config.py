@@ -10,15 +10,15 @@ import pytest
 
 from study import measurements
 from study.config import load
-from study.errors import StudyError
 from study.estimators import ESTIMATORS, identify
 from study.estimators.base import Settings
-from study.excitation import Excitation, force
 from study.modelfile import read_model
 from study.needs import CURVES
-from study.schema import read_table, read_yaml
+from study.records.excitation import Excitation, force
+from study.records.spectra import Segments
 from study.simulate import simulate
-from study.spectra import Segments
+from study.support.errors import StudyError
+from study.support.schema import read_table, read_yaml
 
 ROOT = Path(__file__).parent.parent
 ROW = "duffing\tduffing\treport\t1.0\t0\t\t21\t22\t23\t24\t3\t\t\t\tDuffing system"

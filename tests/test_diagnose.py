@@ -4,15 +4,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study import held_out, noise_floor, trials
-from study.diagnose import report, score, steadiness
+from study import held_out, trials
+from study.diagnose import report, steadiness
 from study.diagnose.says import sentences
 from study.diagnose.separate import separating_level
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN, diagnose
 from study.model import ModelTerm
-from study.plan import make_plan
-from study.record import Record
+from study.records import noise_floor
+from study.records.plan import make_plan
+from study.records.record import Record
 from study.simulate import Integrator, simulate
+from study.support import statistics
 from study.terms import LIBRARY, custom
 
 DT = 0.02
@@ -151,15 +153,17 @@ def test_a_true_coefficient_is_flat_and_an_imitators_is_not():
 def test_gain_counts_the_blocks():
     rng = np.random.default_rng(2)
     before = rng.standard_normal(4096)
-    assert score.gain(before, 0.5 * before).explained == pytest.approx(0.75)
-    assert score.gain(before, 0.5 * before).p_value < 1e-6
-    assert score.gain(before, before + 0.1 * rng.standard_normal(4096)).p_value > 1e-3
-    assert score.gain(before, before).p_value == 1.0
+    assert statistics.gain(before, 0.5 * before).explained == pytest.approx(0.75)
+    assert statistics.gain(before, 0.5 * before).p_value < 1e-6
+    assert statistics.gain(before, before + 0.1 * rng.standard_normal(4096)).p_value > 1e-3
+    assert statistics.gain(before, before).p_value == 1.0
 
 
 def test_false_alarms_of_a_gain_are_as_rare_as_its_p_value():
     rng = np.random.default_rng(3)
-    p = [score.gain(noise, noise - 0.2 * useless).p_value for noise, useless in rng.standard_normal((400, 2, 1536))]
+    p = [
+        statistics.gain(noise, noise - 0.2 * useless).p_value for noise, useless in rng.standard_normal((400, 2, 1536))
+    ]
     assert np.mean(np.array(p) < 0.05) == pytest.approx(0.05, abs=0.025)
 
 
@@ -167,7 +171,7 @@ def test_a_small_change_of_the_prediction_that_is_right_is_seen():
     """A hundredth of the residual's power: five standard errors of the agreement, two of the fall of the power."""
     rng = np.random.default_rng(30)
     noise, change = rng.standard_normal((2, 200, 2500))
-    p = [score.gain(n + 0.1 * c, n).p_value for n, c in zip(noise, change, strict=True)]
+    p = [statistics.gain(n + 0.1 * c, n).p_value for n, c in zip(noise, change, strict=True)]
     assert np.mean(np.array(p) < 0.001) > 0.9
 
 
@@ -181,7 +185,7 @@ def test_clustered_errors_match_the_scatter_for_correlated_noise():
         noise = np.convolve(rng.standard_normal(n), np.ones(8), "same")
         amount = solve @ noise
         estimates.append(amount)
-        errors.append(np.sqrt(np.diag(score.clustered_covariance(design, noise - design @ amount))))
+        errors.append(np.sqrt(np.diag(statistics.clustered_covariance(design, noise - design @ amount))))
     ratio = np.mean(errors, axis=0) / np.std(estimates, axis=0)
     assert np.all((ratio > 0.8) & (ratio < 1.25))
 

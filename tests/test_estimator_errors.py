@@ -9,12 +9,13 @@ import pandas as pd
 import pytest
 from matplotlib import style
 
-from study import document, ensemble, error_pages, estimator_errors
+from study import ensemble, error_pages, estimator_errors
 from study.config import load
-from study.errors import StudyError
 from study.estimators import ESTIMATORS
 from study.figures import estimator_errors as drawn
 from study.figures import page
+from study.support import document
+from study.support.errors import StudyError
 
 ROOT = Path(__file__).parent.parent
 CONFIG = load(ROOT / "config")

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from study import estimators
-from study.errors import StudyError
 from study.estimators.base import Settings, named_parameters, true_parameters
 from study.estimators.hand_read import read_linear
 from study.parameters import Estimate
+from study.records.spectra import Segments
 from study.simulate import Integrator, simulate
-from study.spectra import Segments
+from study.support.errors import StudyError
 
 M, C, K = 1.0, 3.77, 355.3
 TOLD = Settings(Segments(512), (0.3, 10.0))

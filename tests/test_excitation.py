@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from study.errors import StudyError
-from study.excitation import Excitation, displacement_noise, force, theoretical_autospectrum
-from study.spectra import Segments, autospectrum
+from study.records.excitation import Excitation, displacement_noise, force, theoretical_autospectrum
+from study.records.spectra import Segments, autospectrum
+from study.support.errors import StudyError
 
 DT, N = 0.02, 8192
 KINDS = {

@@ -11,14 +11,14 @@ import pytest
 from study import cli, ladder, modelfile, trials
 from study.compare.links import links
 from study.compare.surface import curve, surface
-from study.errors import StudyError
 from study.explore import decimate, page, units, view, words
 from study.explore import session as sessions
 from study.explore.desk import Desk
 from study.explore.files import PAGE, files
 from study.explore.saved import saved
 from study.model import Model, free
-from study.plan import make_plan
+from study.records.plan import make_plan
+from study.support.errors import StudyError
 from study.terms import get
 
 TEXT = """# the rig in hall 3

@@ -16,7 +16,7 @@ from playwright.sync_api import Page, TimeoutError, sync_playwright
 
 from scripts.page_picture import MISSING, QUIET, browser
 from study import ladder, modelfile, trials
-from study.record import write_csv
+from study.records.record import write_csv
 
 HOSTILE = "__import__('os').system('touch hacked')"
 ERROR = "#figure-error b"

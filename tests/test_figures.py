@@ -15,11 +15,11 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.mathtext import MathTextParser
 
-from study.errors import StudyError
 from study.figures import coherence, curves, distribution, labels, motion, page, response, styles
 from study.preliminary import Pattern, histogram
-from study.record import SI_UNITS, Record, write_csv
-from study.spectra import Segments
+from study.records.record import SI_UNITS, Record, write_csv
+from study.records.spectra import Segments
+from study.support.errors import StudyError
 from study.terms import LIBRARY
 
 ROOT = Path(__file__).parent.parent

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from study import files
-from study.errors import StudyError
 from study.modelfile import add_term, read_model
+from study.support import files
+from study.support.errors import StudyError
 from study.terms import get
 
 

@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from study.errors import StudyError
 from study.inputs import Part, histories, reverse_inputs
 from study.model import Model
-from study.record import Record
+from study.records.record import Record
+from study.support.errors import StudyError
 from study.terms import custom, get
 
 

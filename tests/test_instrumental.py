@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from study import estimators, instrumental
-from study.errors import StudyError
 from study.estimators.base import Settings
-from study.excitation import displacement_noise
 from study.inputs import Input, Part, history, reverse_inputs
-from study.record import Record
-from study.spectra import Segments
+from study.records.excitation import displacement_noise
+from study.records.record import Record
+from study.records.spectra import Segments
+from study.support.errors import StudyError
 
 TOLD = Settings(Segments(512), (0.3, 10.0))
 NOISE = 0.3

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from study.excitation import Excitation, force
-from study.interpolation import between_samples
+from study.records.excitation import Excitation, force
+from study.records.interpolation import between_samples
 
 
 @pytest.mark.parametrize("samples", [256, 257])

@@ -7,10 +7,10 @@ from study import held_out, shape_search, trials
 from study.compare.fitted import fit_model
 from study.diagnose import candidates, nature, pairs, preselect, steadiness
 from study.diagnose.ranking import rank
-from study.excitation import Excitation, force
 from study.model import free
-from study.plan import make_plan
-from study.record import Record
+from study.records.excitation import Excitation, force
+from study.records.plan import make_plan
+from study.records.record import Record
 from study.simulate import Integrator, simulate
 from study.terms import get
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from study import estimators, local_polynomial
-from study.errors import StudyError
 from study.estimators.base import Settings
-from study.excitation import Excitation, force
 from study.inputs import Input, Part, histories, reverse_inputs
 from study.local_fit import fit
 from study.local_polynomial import Lines, LocalPolynomial, transform
+from study.records.excitation import Excitation, force
+from study.records.spectra import Segments
 from study.simulate import Integrator, simulate
-from study.spectra import Segments
+from study.support.errors import StudyError
 
 BAND = (0.3, 10.0)
 TOLD = Settings(Segments(512), BAND)

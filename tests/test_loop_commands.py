@@ -3,7 +3,7 @@ import json
 import pytest
 
 from study import cli, ladder, trials
-from study.record import write_csv
+from study.records.record import write_csv
 
 
 @pytest.fixture

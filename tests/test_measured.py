@@ -9,8 +9,8 @@ from study import held_out
 from study.diagnose.verdict import MISSING, diagnose
 from study.measurements import data_folder
 from study.model import Model, free
-from study.plan import make_plan
-from study.record import Record
+from study.records.plan import make_plan
+from study.records.record import Record
 from study.terms import LIBRARY, get
 
 LINEAR = Model("linear", tuple(free(get(n)) for n in ("inertia", "linear_damping", "linear_stiffness")))

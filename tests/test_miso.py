@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from study.errors import StudyError
 from study.inputs import histories, reverse_inputs
 from study.miso import MisoResult, analyse
 from study.model import Model
-from study.record import Record
-from study.spectra import Segments, SpectralMatrix, cross_spectra
+from study.records.record import Record
+from study.records.spectra import Segments, SpectralMatrix, cross_spectra
+from study.support.errors import StudyError
 
 DT = 0.02
 CUT = Segments(128)

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study.errors import StudyError
 from study.expression import ExpressionError
 from study.model import Model, forward_graph, forward_program, free
 from study.modelfile import read_model
+from study.support.errors import StudyError
 from study.terms import custom, get
 
 MODELS = Path(__file__).parents[1] / "models"

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from study import modelfile
-from study.errors import StudyError
 from study.model import ModelTerm, free
 from study.modelfile import add_term, read_model
+from study.support.errors import StudyError
 from study.terms import custom, get
 
 LAYOUTS = {

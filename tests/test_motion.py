@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from study.errors import StudyError
 from study.modelfile import read_model
-from study.motion import burg, complete, consistent, derivative, suggest_cutoff
-from study.record import MOTIONS, Record
+from study.records.completion import burg, complete, consistent, derivative, suggest_cutoff
+from study.records.record import MOTIONS, Record
 from study.simulate import Integrator, simulate
+from study.support.errors import StudyError
 
 MODELS = Path(__file__).parents[1] / "models"
 DT = 0.02
@@ -71,7 +71,7 @@ def test_velocity_and_displacement_from_acceleration(case: str, cutoff: float) -
 
 
 def test_spectra_agree_within_the_stated_band() -> None:
-    from study.spectra import cross_spectra
+    from study.records.spectra import cross_spectra
 
     record = simulated("duffing")
     done = complete(only(record, "acceleration"), 0.5)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from study.levenberg import point_at
-from study.normal import Ties
+from study.support.block_normal import Ties
+from study.support.levenberg_marquardt import point_at
 
 
 def test_own_variables_are_eliminated_exactly() -> None:

@@ -9,8 +9,8 @@ from study.inputs import histories, reverse_inputs
 from study.miso import MisoResult, analyse
 from study.model import Model
 from study.parameters import Estimate, fit
-from study.record import Record
-from study.spectra import Segments, cross_spectra
+from study.records.record import Record
+from study.records.spectra import Segments, cross_spectra
 
 DT = 0.02
 BAND = (0.3, 10.0)

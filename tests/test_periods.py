@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from study import estimators
-from study.errors import StudyError
 from study.estimators.base import Settings
-from study.excitation import Excitation, force
 from study.identify_case import identify_case
 from study.inputs import histories, reverse_inputs
 from study.periods import Periods, fit, steady
-from study.record import Record
+from study.records.excitation import Excitation, force
+from study.records.record import Record
+from study.records.spectra import Segments
 from study.simulate import Integrator, simulate
-from study.spectra import Segments
+from study.support.errors import StudyError
 
 BAND, SAMPLES, DT = (0.3, 10.0), 512, 0.02
 TOLD = Settings(Segments(256), BAND)

@@ -7,13 +7,13 @@ import pytest
 from scipy import stats
 
 from study import preliminary
-from study.errors import StudyError
-from study.excitation import Excitation, force
 from study.model import Model
 from study.modelfile import read_model
-from study.record import Record
+from study.records.excitation import Excitation, force
+from study.records.record import Record
+from study.records.spectra import Segments, autospectrum
 from study.simulate import simulate
-from study.spectra import Segments, autospectrum
+from study.support.errors import StudyError
 from study.terms import get
 
 MODELS = Path(__file__).parent.parent / "models"

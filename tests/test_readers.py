@@ -15,9 +15,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 
-from study.errors import StudyError
-from study.readers import ReadOptions, assignments, read_options, read_record
-from study.record import MOTIONS, Record, write_csv
+from study.records.readers import ReadOptions, assignments, read_options, read_record
+from study.records.record import MOTIONS, Record, write_csv
+from study.support.errors import StudyError
 
 DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parents[2] / "shared" / "data"))
 NEEDS_DATA = pytest.mark.skipif(not DATA.is_dir(), reason="the public records are not here")
@@ -415,6 +415,6 @@ def test_heavy_imports_wait() -> None:
     import subprocess
     import sys
 
-    code = "import sys, study.readers; print([m for m in ('h5py', 'pyuff', 'pyarrow') if m in sys.modules])"
+    code = "import sys, study.records.readers; print([m for m in ('h5py', 'pyuff', 'pyarrow') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from study.errors import StudyError
 from study.modelfile import parse_model
+from study.support.errors import StudyError
 
 LINEAR = "  - inertia\n  - linear_damping\n  - linear_stiffness\n"
 

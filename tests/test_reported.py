@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from study.claims import reported
-from study.errors import StudyError
 from study.excitation_reading import quantities
+from study.support.errors import StudyError
 from tests.conftest import LINEAR, TABLE_1
 
 ROOT = Path(__file__).parents[1]

@@ -7,13 +7,13 @@ import pytest
 
 from study import estimators, tables
 from study.chaotic import fit_record
-from study.errors import StudyError
 from study.estimators.base import Settings
-from study.excitation import displacement_noise
 from study.output_error import fit_free_run
+from study.records.excitation import displacement_noise
+from study.records.spectra import Segments
 from study.shapes import shape_keys, with_starting_shapes
 from study.simulate import simulate
-from study.spectra import Segments
+from study.support.errors import StudyError
 
 TOLD = Settings(Segments(512), (0.3, 10.0))
 LINEAR = {"inertia": {"m": 1.0}, "linear_damping": {"c": 3.77}, "linear_stiffness": {"k": 355.3}}

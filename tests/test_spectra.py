@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from study import spectra
-from study.errors import StudyError
-from study.spectra import Segments, autospectrum, cross_spectra, cross_spectra_in_pieces
+from study.records import spectra
+from study.records.spectra import Segments, autospectrum, cross_spectra, cross_spectra_in_pieces
+from study.support.errors import StudyError
 
 DT = 0.02
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from study.errors import StudyError
-from study.files import replacing
-from study.modules import rests_on
-from study.step import alone, one_sentence, sweep
+from study.support.code_dependencies import rests_on
+from study.support.errors import StudyError
+from study.support.files import replacing
+from study.support.workflow_step import alone, one_sentence, sweep
 
 ROOT = Path(__file__).parent.parent
 
@@ -36,7 +36,7 @@ def test_one_run_at_a_time(tmp_path):
 
 
 def test_a_killed_run_holds_nobody_up(tmp_path):
-    script = "import sys, time; from pathlib import Path; from study.step import alone\n"
+    script = "import sys, time; from pathlib import Path; from study.support.workflow_step import alone\n"
     script += "held = alone(Path(sys.argv[1])); print('held', flush=True); time.sleep(60)"
     command = [sys.executable, "-c", script, str(tmp_path / "running")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
@@ -98,7 +98,7 @@ def test_a_module_that_is_no_python_is_named(package):
 
 def test_simulation_does_not_rest_on_identification():
     script = Path("scripts/make_record.py")
-    cut = ["study.estimators", "study.estimators.base", "study.spectra", "study.local_polynomial"]
+    cut = ["study.estimators", "study.estimators.base", "study.records.spectra", "study.local_polynomial"]
     found = rests_on(ROOT / script, without=cut)
     names = {Path(p).name for p in found}
     assert {"simulate.py", "kernels.py", "excitation.py", "terms.py", "record.py"} <= names
@@ -106,7 +106,7 @@ def test_simulation_does_not_rest_on_identification():
 
 
 def test_steps_write_files_that_are_never_half_there():
-    """By ``study.files`` or ``tables.write_csv``: what ``write_text`` began stays as a killed run leaves it."""
+    """By ``study.support.files`` or ``tables.write_csv``: what ``write_text`` began stays as a killed run leaves it."""
     for path in sorted((ROOT / "scripts").glob("*.py")):
         assert not re.search(r"[.](write_text|write_bytes|to_csv[(](Path|output|page|csv)\b)", path.read_text()), (
             path.name

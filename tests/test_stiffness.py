@@ -6,9 +6,9 @@ import pytest
 from study import estimators
 from study.chaotic import fit_record
 from study.estimators.base import Settings
-from study.excitation import Excitation, displacement_noise, force
+from study.records.excitation import Excitation, displacement_noise, force
+from study.records.spectra import Segments
 from study.simulate import Integrator, simulate
-from study.spectra import Segments
 from study.stiffness import Steps, needed_steps
 
 LINEAR = {"inertia": {"m": 1.0}, "linear_damping": {"c": 3.77}, "linear_stiffness": {"k": 355.3}}

@@ -5,7 +5,8 @@ from html.parser import HTMLParser
 import pandas as pd
 import pytest
 
-from study import document, summary
+from study import summary
+from study.support import document
 
 PARAMETERS = pd.DataFrame(
     [

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from study import cli, trials
-from study.errors import StudyError
 from study.model import Model, free
-from study.readers import ReadOptions, read_record, suspect_swapped
-from study.record import MOTIONS, Record, write_csv
+from study.records.readers import ReadOptions, read_record, suspect_swapped
+from study.records.record import MOTIONS, Record, write_csv
 from study.simulate import simulate
+from study.support.errors import StudyError
 from study.terms import LIBRARY
 
 DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parents[2] / "shared" / "data"))

@@ -9,10 +9,10 @@ import pytest
 
 from study import tables
 from study.config import load
-from study.errors import StudyError
 from study.estimators.base import Identified, Parameter
 from study.identify_case import identify_case
 from study.responses import Responses
+from study.support.errors import StudyError
 
 CONFIG = load(Path(__file__).parent.parent / "config")
 JUDGED = {"relative": {"k": 0.01}, "absolute": {"k": 2.0}}

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from study import expression, kernels
-from study.errors import StudyError
-from study.excitation import Excitation, force
 from study.graph import Graph
 from study.inputs import histories, reverse_inputs
 from study.model import Model, forward_graph, free, with_registers
+from study.records.excitation import Excitation, force
 from study.simulate import Integrator, simulate
+from study.support.errors import StudyError
 from study.terms import LIBRARY, Component, Term, custom, get
 
 PERIOD = 10.24  # seconds; the frequencies below are whole multiples of 1/PERIOD, so that time-varying terms close too

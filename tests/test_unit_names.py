@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study.errors import StudyError
-from study.readers.unit_names import parse_unit, role_unit
+from study.support.errors import StudyError
+from study.support.units import parse_unit, role_unit
 
 
 @pytest.mark.parametrize(

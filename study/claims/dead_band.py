@@ -11,8 +11,8 @@ from study.claims.linear import deficit
 from study.claims.reported import Reported
 from study.claims.sample import Sample, share
 from study.claims.verdict import Claim, Condition, at_least, at_most, close, conclude, near, one_record, significant
-from study.excitation import READINGS
 from study.excitation_reading import largest_error
+from study.records.excitation import READINGS
 
 SYSTEM = "dead_band"
 AS_DUFFING = Assumed(plus=("cubic_stiffness",), minus=("dead_band",))

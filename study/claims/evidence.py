@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from study.claims.sample import Sample, average
 from study.ensemble import NOISE_OFFSET, threaded
-from study.errors import StudyError
 from study.estimators import miso, siso
 from study.estimators.base import Identified, Settings
 from study.estimators.hand_read import read_curve
 from study.make_record import make_record
 from study.miso import MisoResult
 from study.model import Model
-from study.record import Record
-from study.spectra import Segments
+from study.records.record import Record
+from study.records.spectra import Segments
+from study.support.errors import StudyError
 from study.terms import get
 
 Floats = NDArray[np.float64]
@@ -241,7 +241,7 @@ def driven_model(models: Mapping[str, Model], drive: Drive) -> Model:
 
 
 def record_settings(settings: Table, drive: Drive) -> dict[str, Any]:
-    """What ``study.case.make_record`` wants, for a drive.
+    """What ``study.make_record.make_record`` wants, for a drive.
 
     Raises
     ------

@@ -9,8 +9,8 @@ from study.claims.verdict import Claim, Condition, conclude, together
 from study.ensemble import threaded
 from study.estimators import instrumental
 from study.estimators.base import Settings
-from study.record import Record
-from study.spectra import Segments
+from study.records.record import Record
+from study.records.spectra import Segments
 
 NAMES = (*PARTS, "f_n")
 

@@ -14,7 +14,7 @@ from study.claims.reported import Reported
 from study.claims.sample import Sample, average
 from study.claims.verdict import Claim, Condition, at_least, close, conclude, together
 from study.ensemble import NOISE_OFFSET, threaded
-from study.excitation import displacement_noise
+from study.records.excitation import displacement_noise
 
 Floats = NDArray[np.float64]
 PARTS = ("m", "c", "k", "k3", "c3")

@@ -12,7 +12,7 @@ from study.claims.sample import Sample, average
 from study.claims.verdict import Claim, Condition, at_most, close, conclude, significant
 from study.estimators.base import Identified
 from study.miso import MisoResult
-from study.spectra import Segments
+from study.records.spectra import Segments
 
 Floats = NDArray[np.float64]
 READ_OFF = 0.05  # what a hand reads off a curve

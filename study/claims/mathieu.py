@@ -3,14 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from study.claims.common import (
-    has_line,
-    in_band,
-    linear_share,
-    local_maxima,
-    near_unity,
-    recovered,
-)
+from study.claims.common import has_line, in_band, linear_share, local_maxima, near_unity, recovered
 from study.claims.duffing import LINEAR_PARTS
 from study.claims.evidence import Analysis, Drive, Evidence
 from study.claims.reported import Reported

@@ -12,7 +12,7 @@ from study.claims.verdict import Claim, Condition, at_least, close, conclude, ne
 from study.ensemble import threaded
 from study.model import Model
 from study.preliminary import harmonic_beside, harmonic_pattern, model_restoring_force, restoring_force
-from study.record import Record
+from study.records.record import Record
 
 Floats = NDArray[np.float64]
 PATTERNS = ("linear", "duffing", "van_der_pol", "duffing_van_der_pol", "mathieu", "dead_band")

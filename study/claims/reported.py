@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
-from study.errors import StudyError
-from study.schema import read_table, read_yaml
+from study.support.errors import StudyError
+from study.support.schema import read_table, read_yaml
 
 MANY = 8  # numbers that still read well in one cell
 

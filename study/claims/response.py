@@ -11,7 +11,7 @@ from study.claims.reported import Reported
 from study.claims.sample import Sample, kurtosis
 from study.claims.verdict import Claim, Condition, at_least, conclude, significant
 from study.preliminary import mathieu_lines
-from study.spectra import Segments, autospectrum
+from study.records.spectra import Segments, autospectrum
 
 Floats = NDArray[np.float64]
 NONLINEAR = ("duffing", "van_der_pol", "duffing_van_der_pol", "mathieu", "dead_band", "extreme")

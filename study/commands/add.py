@@ -29,9 +29,9 @@ def _run(arguments: argparse.Namespace) -> None:
 
     from study import ladder
     from study.compare.comparison import compare
-    from study.compare.output import check_folder, write_files
     from study.compare.report import as_json, document, rung, summary
     from study.modelfile import add_term, read_model
+    from study.support.file_sets import check_folder, write_files
 
     folder = out_folder(arguments)
     check_folder(folder)
@@ -66,8 +66,8 @@ def _term(arguments: argparse.Namespace) -> "Term":
 
 
 def _refuse_second(path: Path, model: "Model", term: "Term") -> None:
-    from study.errors import StudyError
     from study.repeated import repeated_force
+    from study.support.errors import StudyError
 
     if term.name in model:
         raise StudyError(f"{path}: {term.name} is in the model already; an effect can be added once")

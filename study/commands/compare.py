@@ -26,12 +26,12 @@ def _run(arguments: argparse.Namespace) -> None:
     from tqdm import tqdm
 
     from study.compare.comparison import STEPS, across, compare
-    from study.compare.output import check_folder, write_files
     from study.compare.pictures import level_pictures, pictures
     from study.compare.report import as_json, document, summary, tables
     from study.explore.files import PAGE
     from study.explore.saved import of_comparison
     from study.modelfile import read_model
+    from study.support.file_sets import check_folder, write_files
 
     folder = out_folder(arguments)
     check_folder(folder)

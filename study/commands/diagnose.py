@@ -9,7 +9,7 @@ from study.commands.records import add_record_arguments, out_folder, plan_of, re
 
 if TYPE_CHECKING:
     from study.model import Model
-    from study.record import Record
+    from study.records.record import Record
     from study.terms import Term
 
 QUIET = 2.0  # seconds of work before progress is shown
@@ -27,9 +27,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> None:
     from study import terms
-    from study.compare.output import check_folder, write_files
     from study.diagnose.sources import own_candidates
     from study.modelfile import read_model
+    from study.support.file_sets import check_folder, write_files
 
     folder = out_folder(arguments)
     check_folder(folder)

@@ -23,12 +23,12 @@ def _run(arguments: argparse.Namespace) -> None:
 
     from study import ladder
     from study.compare.comparison import STEPS
-    from study.compare.output import check_folder
     from study.explore import session as sessions
     from study.explore.desk import Desk
     from study.explore.server import serve
-    from study.files import read_text
     from study.modelfile import WANTED, parse_model
+    from study.support.file_sets import check_folder
+    from study.support.files import read_text
 
     folder = out_folder(arguments)
     check_folder(folder)

@@ -22,8 +22,8 @@ def _run(arguments: argparse.Namespace) -> None:
         return
     print(ladder.table(steps))
     if arguments.out is not None:
-        from study.compare.output import check_folder, write_files
         from study.figures.ladder import files
+        from study.support.file_sets import check_folder, write_files
 
         check_folder(arguments.out)
         write_files(arguments.out, files(steps, arguments.model.stem) | {"history.json": ladder.as_bytes(steps)})

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from study.commands.command import number, whole
-from study.errors import StudyError
-from study.plan import Plan, make_plan
+from study.records.plan import Plan, make_plan
+from study.support.errors import StudyError
 
 if TYPE_CHECKING:
-    from study.readers import ReadOptions
-    from study.record import Record
+    from study.records.readers import ReadOptions
+    from study.records.record import Record
 
 RANGE = re.compile(r"([0-9]{0,15}):([0-9]{0,15})")
 MOTIONS = ("displacement", "velocity", "acceleration")
@@ -67,7 +67,7 @@ def span(text: str) -> Span:
 
 def read_options(arguments: argparse.Namespace) -> "ReadOptions":
     """What the user says about the files."""
-    from study.readers import ReadOptions, assignments
+    from study.records.readers import ReadOptions, assignments
 
     columns = assignments(arguments.column, "--column")
     return ReadOptions(
@@ -91,7 +91,7 @@ def read_records(arguments: argparse.Namespace) -> list["Record"]:
         If one cannot be read.
     """
     from study.compare.comparison import distinct
-    from study.readers import read_record
+    from study.records.readers import read_record
 
     options = read_options(arguments)
     return list(distinct([read_record(path, options) for path in arguments.records]))

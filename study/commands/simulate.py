@@ -25,11 +25,11 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    from study.excitation import Excitation, force
-    from study.files import replacing
     from study.modelfile import read_model
-    from study.record import write_csv
+    from study.records.excitation import Excitation, force
+    from study.records.record import write_csv
     from study.simulate import Integrator, simulate
+    from study.support.files import replacing
 
     model = read_model(arguments.model)
     excitation = Excitation(level=arguments.level, cutoff=arguments.cutoff)

@@ -13,15 +13,15 @@ from scipy.linalg import block_diag
 from study import estimators, held_out
 from study.chaotic import magnifies
 from study.compare.noise import segments_of
-from study.errors import StudyError
 from study.estimators.base import Settings
 from study.model import Model
-from study.motion import CompletedRecord
 from study.output_error import FreeRunFit, fit_free_run
 from study.parameters import Estimate
-from study.plan import Plan, with_steps
-from study.record import Record
-from study.spectra import Segments, cross_spectra
+from study.records.completion import CompletedRecord
+from study.records.plan import Plan, with_steps
+from study.records.record import Record
+from study.records.spectra import Segments, cross_spectra
+from study.support.errors import StudyError
 
 FREE_RUN = "output_error"
 STEPS = 8  # per sample: no coefficient is fitted in free run, so that many cost little

@@ -17,13 +17,13 @@ from study.compare.noise import Noise, noise_of
 from study.compare.restoring import Restoring, restoring
 from study.compare.reverse import ForceError, force_error
 from study.compare.stretches import AlongTime, along_time
-from study.errors import StudyError
 from study.model import Model
-from study.motion import complete
 from study.output_error import FreeRunFit
 from study.parameters import Estimate
-from study.plan import Plan, make_plan
-from study.record import Record
+from study.records.completion import complete
+from study.records.plan import Plan, make_plan
+from study.records.record import Record
+from study.support.errors import StudyError
 
 STEPS = 5  # reports of progress a record
 Progress = Callable[[str], None]
@@ -120,7 +120,7 @@ def compare(
     record : Record
         Force and at least one motion.
     how : Plan, optional
-        What is fitted and what is judged; :func:`study.plan.make_plan` if left out.
+        What is fitted and what is judged; :func:`study.records.plan.make_plan` if left out.
     cutoff : float, optional
         Frequency in hertz above which a measured velocity or acceleration is integrated; what lies below is
         not judged. Found from the record if left out.

@@ -10,17 +10,17 @@ from scipy.special import ndtri, stdtrit
 
 from study import held_out, shape_search, units
 from study.chaotic import fit_in_pieces
-from study.diagnose.score import clustered_covariance
-from study.errors import DivergenceError, StudyError
 from study.free_run import prepare
 from study.inputs import history, reverse_inputs
 from study.model import Model, ModelTerm
-from study.motion import complete
 from study.output_error import FreeRunFit
 from study.parameters import Estimate
-from study.plan import Plan
-from study.record import Record
-from study.states import angular_rate
+from study.records.completion import complete
+from study.records.plan import Plan
+from study.records.record import Record
+from study.records.states import angular_rate
+from study.support.errors import DivergenceError, StudyError
+from study.support.statistics import clustered_covariance
 from study.terms import LIBRARY, QUANTITIES
 
 Floats = NDArray[np.float64]

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study import motion
 from study.free_run import prepare
 from study.output_error import FreeRunFit, fit_free_run
-from study.plan import Plan
-from study.record import MOTIONS, Record
+from study.records import completion
+from study.records.plan import Plan
+from study.records.record import MOTIONS, Record
 
 Floats = NDArray[np.float64]
 CYCLES = 12  # of the response, in a close-up
@@ -81,7 +81,7 @@ class Judged:
 
     def above(self, values: Floats) -> Floats:
         """Values without what lies below ``low``, shape (n,)."""
-        return motion.derivative(values, self.dt, 0, self.low) if self.low > 0.0 else values
+        return completion.derivative(values, self.dt, 0, self.low) if self.low > 0.0 else values
 
 
 def judge(found: FreeRunFit, record: Record, how: Plan, low: float = 0.0) -> Judged:

@@ -13,7 +13,7 @@ from scipy.fft import rfft, rfftfreq
 
 from study.compare.comparison import Comparison
 from study.compare.surface import CELLS, CLASSES, edges
-from study.spectra import Segments
+from study.records.spectra import Segments
 
 Floats = NDArray[np.float64]
 BLOCKS = 64  # at most

@@ -14,12 +14,12 @@ from scipy.fft import rfft
 
 from study.compare.noise import Noise
 from study.compare.reverse import ForceError, from_noise, lines_to_judge
-from study.errors import StudyError
 from study.inputs import Input, histories, reverse_inputs
 from study.local_polynomial import SPARE, Lines, LocalPolynomial, noise_variance, transform, transients
 from study.model import Model
-from study.motion import CompletedRecord
-from study.plan import Plan
+from study.records.completion import CompletedRecord
+from study.records.plan import Plan
+from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

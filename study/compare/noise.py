@@ -2,7 +2,7 @@
 
 Where the excitation is periodic, what differs between periods is noise, whatever its spectrum
 (Pintelon and Schoukens, System Identification, 2012, Section 2.5). Elsewhere noise is taken as white, at
-the level of the quietest bands of the residual (``study.noise_floor``).
+the level of the quietest bands of the residual (``study.records.noise_floor``).
 """
 
 from dataclasses import dataclass, replace
@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study import noise_floor
 from study.compare.judged import Judged
-from study.record import MOTIONS, Record
-from study.spectra import Segments, autospectrum
+from study.records import noise_floor
+from study.records.record import MOTIONS, Record
+from study.records.spectra import Segments, autospectrum
 
 Floats = NDArray[np.float64]
 AVERAGES = 8  # segments without overlap, at least

@@ -20,9 +20,9 @@ from study.compare.judged import Judged
 from study.compare.noise import Noise
 from study.inputs import history, reverse_inputs
 from study.model import Model, forward_graph, free, with_registers
-from study.motion import SETTLED, derivative
-from study.plan import Plan
-from study.record import MOTIONS, Record
+from study.records.completion import SETTLED, derivative
+from study.records.plan import Plan
+from study.records.record import MOTIONS, Record
 from study.terms import get
 
 Floats = NDArray[np.float64]

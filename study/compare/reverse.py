@@ -15,10 +15,10 @@ from study import miso
 from study.compare.noise import Noise, segments_of
 from study.inputs import Input, histories, reverse_inputs
 from study.model import Model
-from study.motion import CompletedRecord
-from study.plan import Plan
-from study.record import MOTIONS
-from study.spectra import Segments, SpectralMatrix, cross_spectra
+from study.records.completion import CompletedRecord
+from study.records.plan import Plan
+from study.records.record import MOTIONS
+from study.records.spectra import Segments, SpectralMatrix, cross_spectra
 
 Floats = NDArray[np.float64]
 FEWEST_AVERAGES = 4  # for each input

@@ -6,8 +6,8 @@ from study.diagnose import pages, report
 from study.diagnose.says import sentences
 from study.diagnose.separate import advice
 from study.diagnose.verdict import MISSING, Diagnosis
-from study.plan import Plan
-from study.record import Record
+from study.records.plan import Plan
+from study.records.record import Record
 
 
 def in_words(found: Diagnosis, record: Record, how: Plan) -> str:

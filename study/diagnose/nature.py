@@ -16,15 +16,15 @@ from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from scipy.signal import lfilter
 
 from study import held_out
-from study.diagnose import score
-from study.errors import DivergenceError
 from study.free_run import prepare
-from study.linear import least_squares
 from study.model import ModelTerm
 from study.output_error import FreeRunFit
-from study.plan import Plan
-from study.record import MOTIONS, Record
+from study.records.plan import Plan
+from study.records.record import MOTIONS, Record
 from study.shape_search import Baseline, modulation_lines, residual_lines
+from study.support import statistics
+from study.support.errors import DivergenceError
+from study.support.least_squares import least_squares
 from study.terms import custom
 
 Floats = NDArray[np.float64]
@@ -116,7 +116,7 @@ def _motion(found: FreeRunFit, record: Record, how: Plan, name: str) -> Floats:
 def explained_by(left: Leftover) -> dict[str, float]:
     """Held-out share of the residual that each family of shapes explains; at most one, negative for nothing."""
     families = {**left.shapes, "past": _passed(left, _states(left)), "time": _passed(left, _times(left))}
-    return {name: score.gain(*_held_out(left, columns)).explained for name, columns in families.items()}
+    return {name: statistics.gain(*_held_out(left, columns)).explained for name, columns in families.items()}
 
 
 def significant(left: Leftover, level: float) -> float:
@@ -138,7 +138,7 @@ def significant(left: Leftover, level: float) -> float:
         Zero where none is significant.
     """
     columns = np.hstack([*left.shapes.values(), _passed(left, _states(left))])
-    gains = [score.gain(*_held_out(left, column[:, None])) for column in columns.T]
+    gains = [statistics.gain(*_held_out(left, column[:, None])) for column in columns.T]
     return max((g.explained for g in gains if g.p_value * len(gains) < level), default=0.0)
 
 

@@ -13,11 +13,11 @@ from study.diagnose import preselect
 from study.diagnose.candidates import SHORT, THREADS
 from study.diagnose.preselect import PairStart
 from study.diagnose.ranking import Ranked
-from study.errors import StudyError
 from study.output_error import FreeRunFit
-from study.plan import Plan
-from study.record import Record
+from study.records.plan import Plan
+from study.records.record import Record
 from study.shape_search import Baseline
+from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
 SAME = 1e-4  # of the unexplained power: pairs that leave less than this leave nothing

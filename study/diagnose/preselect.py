@@ -15,15 +15,15 @@ from scipy.fft import rfft, rfftfreq
 from scipy.signal import get_window
 
 from study.diagnose.ranking import Ranked
-from study.errors import StudyError
 from study.held_out import FAINT
 from study.inputs import history, reverse_inputs
-from study.linear import least_squares
 from study.model import Model, ModelTerm
-from study.motion import complete
-from study.plan import Plan
-from study.record import Record
+from study.records.completion import complete
+from study.records.plan import Plan
+from study.records.record import Record
 from study.shape_search import Baseline, sensitivity
+from study.support.errors import StudyError
+from study.support.least_squares import least_squares
 
 Floats = NDArray[np.float64]
 TRIED = 10  # pairs that each of the two answers puts first

@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study import held_out
-from study.diagnose import score, steadiness
+from study.diagnose import steadiness
 from study.diagnose.candidates import Trial
-from study.diagnose.score import Gain
 from study.diagnose.steadiness import Curve
 from study.output_error import FreeRunFit
-from study.plan import Plan, shortened
-from study.record import Record
+from study.records.plan import Plan, shortened
+from study.records.record import Record
+from study.support import statistics
+from study.support.statistics import Gain
 from study.terms import Term
 
 Floats = NDArray[np.float64]
@@ -114,8 +115,8 @@ def rank(trials: Sequence[Trial], before: Floats, record: Record, how: Plan) -> 
 
 
 def _row(trial: Trial, before: Floats, count: int, size: float, record: Record, how: Plan) -> Ranked:
-    gain = score.gain(before, trial.residual)
-    covariance = score.clustered_covariance(_jacobian(trial.found, record, how), trial.found.residual)
+    gain = statistics.gain(before, trial.residual)
+    covariance = statistics.clustered_covariance(_jacobian(trial.found, record, how), trial.found.residual)
     coefficient, error, parameters, errors = _amount(trial, covariance)
     return Ranked(
         term=trial.term,
@@ -213,10 +214,10 @@ def _distance(row: Ranked, other: Ranked) -> float:
     """How much worse than the other a candidate is, in standard errors, over both parts of the record."""
     if row is other:
         return 0.0
-    held_out = score.difference(row.residual, other.residual)
+    held_out = statistics.difference(row.residual, other.residual)
     if len(row.found.residual) != len(other.found.residual):
         return held_out
-    both = score.difference(
+    both = statistics.difference(
         np.concatenate([row.found.residual, row.residual]), np.concatenate([other.found.residual, other.residual])
     )
     return max(held_out, both)

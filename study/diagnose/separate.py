@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from study.diagnose.ranking import Ranked
-from study.errors import StudyError
 from study.figures.labels import term_names
 from study.free_run import prepare
-from study.linear import least_squares
-from study.plan import Plan
-from study.record import Record
+from study.records.plan import Plan
+from study.records.record import Record
+from study.support.errors import StudyError
+from study.support.least_squares import least_squares
 
 LEVELS = (1.2, 1.5, 1.8, 2.2, 2.7, 3.3, 4.0, 5.0, 0.5, 0.25)
 DISTINCT = 5.0  # standard errors by which the responses must differ

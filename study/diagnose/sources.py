@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from study.errors import StudyError
+from study.support.errors import StudyError
 from study.terms import Term, custom
 
 

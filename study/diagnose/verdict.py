@@ -6,17 +6,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study import held_out, noise_floor, shape_search
+from study import held_out, shape_search
 from study.compare.fitted import fit_model
-from study.diagnose import candidates, nature, pairs, score
+from study.diagnose import candidates, nature, pairs
 from study.diagnose.pairs import Pair
 from study.diagnose.ranking import UNSTEADY, Ranked, changes, curves, rank, wavers
-from study.errors import DivergenceError
 from study.model import Model
 from study.output_error import FreeRunFit
-from study.plan import Plan, shortened
-from study.record import Record
+from study.records import noise_floor
+from study.records.plan import Plan, shortened
+from study.records.record import Record
 from study.shape_search import Baseline
+from study.support import statistics
+from study.support.errors import DivergenceError
 from study.terms import Term
 
 Floats = NDArray[np.float64]
@@ -220,7 +222,7 @@ def _explaining_pair(
 
 def _explains(pair: Pair, rows: list[Ranked], size: float, record: Record, how: Plan) -> bool:
     """Whether a pair leaves no structure, does more than the first alone, and neither coefficient moves."""
-    more = score.gain(rows[0].residual, pair.residual).p_value * len(rows) < LEVEL
+    more = statistics.gain(rows[0].residual, pair.residual).p_value * len(rows) < LEVEL
     if not more or _left(pair.residual, size, record.dt) > LEFT:
         return False
     error = float(np.sqrt(np.mean(pair.residual**2))) / size

@@ -3,12 +3,12 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
-from study.errors import StudyError
+from study.support.errors import StudyError
 
 if TYPE_CHECKING:  # who only asks which estimators there are waits for none of their modules
     from study.estimators.base import Estimator, Identified, Settings
     from study.model import Model
-    from study.record import Record
+    from study.records.record import Record
 
 ESTIMATORS = {
     "siso": "study.estimators.siso",

@@ -12,9 +12,9 @@ from study.local_polynomial import LocalPolynomial
 from study.miso import MisoResult
 from study.model import Model
 from study.parameters import Estimate
-from study.record import Record
+from study.records.record import Record
+from study.records.spectra import Segments
 from study.responses import Responses
-from study.spectra import Segments
 
 
 @dataclass(frozen=True)

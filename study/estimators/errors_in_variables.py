@@ -4,7 +4,7 @@ from study.estimators.base import Identified, Settings, named_parameters
 from study.inputs import reverse_inputs
 from study.model import Model
 from study.periods import fit, steady
-from study.record import Record
+from study.records.record import Record
 
 
 def identify(model: Model, record: Record, settings: Settings) -> Identified:

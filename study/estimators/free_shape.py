@@ -3,7 +3,7 @@
 from study.estimators import miso, output_error
 from study.estimators.base import Identified, Settings, named_parameters
 from study.model import Model
-from study.record import Record
+from study.records.record import Record
 
 
 def identify(model: Model, record: Record, settings: Settings) -> Identified:

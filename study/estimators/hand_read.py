@@ -9,7 +9,7 @@ from study.estimators import miso
 from study.estimators.base import Identified, Parameter, Settings
 from study.inputs import Input
 from study.model import Model
-from study.record import Record
+from study.records.record import Record
 from study.responses import Responses
 
 LOWEST_LINES = 3  # "the asymptotic behavior of A_1 for f -> 0": the first lines above zero, where no mean is lost

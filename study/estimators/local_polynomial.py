@@ -5,7 +5,7 @@ from study.inputs import histories, reverse_inputs
 from study.local_fit import fit
 from study.local_polynomial import responses, transform
 from study.model import Model
-from study.record import Record
+from study.records.record import Record
 
 
 def identify(model: Model, record: Record, settings: Settings) -> Identified:

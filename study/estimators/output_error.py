@@ -6,18 +6,19 @@ from functools import lru_cache
 
 import numpy as np
 
-from study import held_out, parametric, spectra
+from study import held_out, parametric
 from study.chaotic import CLEAN, astray, fit_record
-from study.errors import DivergenceError
 from study.estimators import miso
 from study.estimators.base import Identified, Settings, named_parameters
 from study.inputs import histories, reverse_inputs
 from study.model import Model
 from study.output_error import FreeRunFit, fit_free_run
 from study.parameters import Estimate
-from study.plan import Plan
-from study.record import Record
+from study.records import spectra
+from study.records.plan import Plan
+from study.records.record import Record
 from study.shapes import shape_keys, with_starting_shapes
+from study.support.errors import DivergenceError
 
 KEPT = 4  # fits: those of the records that the threads are at
 REFINED = 12  # free runs in which a fit follows a change of steps

@@ -1,10 +1,11 @@
 """Single input, single output: the best linear fit, what the report's dashed curves show."""
 
-from study import miso, parameters, spectra
+from study import miso, parameters
 from study.estimators.base import Identified, Settings, named_parameters
 from study.inputs import histories, reverse_inputs
 from study.model import Model
-from study.record import Record
+from study.records import spectra
+from study.records.record import Record
 
 
 def identify(model: Model, record: Record, settings: Settings) -> Identified:

@@ -11,11 +11,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from study.compare.output import write_files
-from study.errors import StudyError
 from study.explore import session as sessions
 from study.explore.files import PAGE, files
 from study.explore.session import Session
+from study.support.errors import StudyError
+from study.support.file_sets import write_files
 
 SETTLE = 0.4  # seconds in which pages are drawn, before a diagnosis takes the processors
 

@@ -13,7 +13,7 @@ from study.compare.surface import CLASSES, curve, surface
 from study.diagnose.ranking import Ranked
 from study.explore import decimate
 from study.explore.session import Rung
-from study.spectra import autospectrum
+from study.records.spectra import autospectrum
 
 if TYPE_CHECKING:
     from study.explore.view import Scales

@@ -10,9 +10,9 @@ from bokeh.document import Document
 from bokeh.server.server import Server
 from bokeh.server.util import bind_sockets
 
-from study.errors import StudyError
 from study.explore.desk import Desk
 from study.explore.live import Watcher
+from study.support.errors import StudyError
 
 HOST = "127.0.0.1"
 USUAL = 5006

@@ -18,10 +18,10 @@ from study.diagnose.candidates import Trial
 from study.diagnose.files import in_words
 from study.diagnose.ranking import Ranked, rank
 from study.diagnose.verdict import Diagnosis, diagnose
-from study.errors import StudyError
 from study.model import Model
-from study.plan import Plan, shortened
-from study.record import Record
+from study.records.plan import Plan, shortened
+from study.records.record import Record
+from study.support.errors import StudyError
 from study.terms import LIBRARY, Term, custom
 
 Step = dict[str, Any]

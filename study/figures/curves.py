@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from study.errors import StudyError
 from study.figures.styles import rank
+from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

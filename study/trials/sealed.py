@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
-from study.errors import StudyError
-from study.files import read_text, replace_file, replacing
 from study.modelfile import format_model
-from study.record import write_csv
+from study.records.record import write_csv
+from study.support.errors import StudyError
+from study.support.files import read_text, replace_file, replacing
 from study.trials.draw import Trial
 
 WANTED = "the answer file of a trial, as 'study trial' writes it"

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study.errors import DivergenceError
 from study.inputs import Input, history, reverse_inputs
-from study.linear import least_squares
 from study.model import Model, ModelTerm
-from study.record import Record
+from study.records.record import Record
 from study.simulate import Integrator, simulate
+from study.support.errors import DivergenceError
+from study.support.least_squares import least_squares
 
 Floats = NDArray[np.float64]
 SHARE = (0.10, 0.40)  # of the rms restoring force, in every trial

@@ -11,7 +11,7 @@ from typing import Any, cast
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
 
-from study.errors import StudyError
+from study.support.errors import StudyError
 
 MOST_EVENTS = 10_000  # names, numbers and brackets in one text
 DEEPEST = 8

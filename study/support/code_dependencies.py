@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
-from study.errors import StudyError
+from study.support.errors import StudyError
 
 
 def rests_on(script: Path, *, also: Iterable[str] = (), without: Collection[str] = ()) -> list[str]:

@@ -17,9 +17,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from study.errors import StudyError
-from study.readers.table import NONE, Column, Floats, Table, split_unit
-from study.readers.unit_names import is_unit
+from study.records.readers.table import NONE, Column, Floats, Table, split_unit
+from study.support.errors import StudyError
+from study.support.units import is_unit
 
 HEAD_BYTES = 200_000
 HEAD_LINES = 200

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from study.readers.table import NONE, Column, Table, split_unit
+from study.records.readers.table import NONE, Column, Table, split_unit
 
 
 def read(path: Path) -> Table:

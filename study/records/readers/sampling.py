@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from study.errors import StudyError
+from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
 JITTER = 0.01  # of the sampling interval: the unevenness of sampling that is taken for even

@@ -8,8 +8,8 @@ from pathlib import Path, PurePosixPath
 
 from tabulate import tabulate
 
-from study.errors import StudyError
-from study.files import replace_file
+from study.support.errors import StudyError
+from study.support.files import replace_file
 
 STYLE = """\
 body { font: 15px/1.45 system-ui, sans-serif; color: #1a1a1a; max-width: 1200px; margin: 1.5em auto; padding: 0 1em }

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.normal import INDISTINCT, Normal, Ties, normal_equations
+from study.support.block_normal import INDISTINCT, Normal, Ties, normal_equations
 
 Floats = NDArray[np.float64]
 OFFSET = 1e-4  # converged when the next step is below this many standard errors (Bates and Watts, 1981)
@@ -61,7 +61,7 @@ class Point:
 def point_at(
     x: Floats, residual: Floats, jacobian: Floats, shared: int, begins: Sequence[int], ties: Ties | None = None
 ) -> Point | None:
-    """The point with this residual and Jacobian (``study.normal``); None if they are not finite.
+    """The point with this residual and Jacobian (``study.support.block_normal``); None if they are not finite.
 
     The gaps of ties count among the residual.
     """

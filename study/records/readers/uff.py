@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from study.errors import StudyError
-from study.readers.sampling import shortest_decimal
-from study.readers.table import Column, Table
+from study.records.readers.sampling import shortest_decimal
+from study.records.readers.table import Column, Table
+from study.support.errors import StudyError
 
 ROUNDING = 5e-6  # the interval stands in the file with six digits
 MARK = re.compile(rb"^ {4}-1 *\r?$", re.MULTILINE)  # before and behind each dataset

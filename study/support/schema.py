@@ -10,7 +10,7 @@ import jsonschema
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from study.errors import StudyError
+from study.support.errors import StudyError
 
 Table = dict[str, Any]
 SHOWN = 64  # letters of a cell that a sentence repeats

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
-from study.errors import StudyError
-from study.files import reason, replacing
+from study.support.errors import StudyError
+from study.support.files import reason, replacing
 
 
 def check_folder(folder: Path) -> None:

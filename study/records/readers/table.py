@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from study.errors import StudyError
-from study.readers.unit_names import is_unit
+from study.support.errors import StudyError
+from study.support.units import is_unit
 
 Floats = NDArray[np.float64]
 Array = NDArray[Any]  # as a file holds it: of any kind of number, or of none

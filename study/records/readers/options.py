@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from study.errors import StudyError
-from study.files import read_text
-from study.yamltext import as_list, as_mapping, read_plain, shown
+from study.support.errors import StudyError
+from study.support.files import read_text
+from study.support.yaml_text import as_list, as_mapping, read_plain, shown
 
 BESIDE = ".record.yaml"
 WANTED = "a YAML file with 'columns', 'units', 'fs' or 'dt', 'group', 'samples', 'period'"

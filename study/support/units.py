@@ -8,7 +8,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from study.errors import StudyError
+from study.support.errors import StudyError
 
 Powers = tuple[int, int, int, int]  # of force, length, time, voltage
 FORCE: Powers = (1, 0, 0, 0)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.record import MOTIONS, Record
-from study.spectra import Segments, cross_spectra
+from study.records.record import MOTIONS, Record
+from study.records.spectra import Segments, cross_spectra
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

@@ -8,11 +8,11 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from study.errors import StudyError
-from study.readers.options import BESIDE, ReadOptions
-from study.readers.table import Column, Table
-from study.readers.unit_names import ROLES, parse_unit
-from study.record import MOTIONS
+from study.records.readers.options import BESIDE, ReadOptions
+from study.records.readers.table import Column, Table
+from study.records.record import MOTIONS
+from study.support.errors import StudyError
+from study.support.units import ROLES, parse_unit
 
 NAMES: dict[str, tuple[str, ...]] = {
     "force": ("f", "force", "input", "fin", "forcein", "inputforce", "excitation", "load", "appliedforce"),

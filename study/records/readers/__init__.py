@@ -5,13 +5,13 @@ What a file is is told by its content first and its name second. Formats are imp
 
 from pathlib import Path
 
-from study.errors import StudyError
-from study.files import reason
-from study.readers.assemble import record_from
-from study.readers.options import ReadOptions, assignments, beside, read_options
-from study.readers.swapped import suspect_swapped
-from study.readers.table import Table
-from study.record import Record
+from study.records.readers.assemble import record_from
+from study.records.readers.options import ReadOptions, assignments, beside, read_options
+from study.records.readers.swapped import suspect_swapped
+from study.records.readers.table import Table
+from study.records.record import Record
+from study.support.errors import StudyError
+from study.support.files import reason
 
 __all__ = ["ReadOptions", "assignments", "read_options", "read_record", "suspect_swapped"]
 
@@ -43,7 +43,7 @@ def read_record(path: Path, mapping: ReadOptions | None = None) -> Record:
     Returns
     -------
     Record
-        Force and at least one motion, as measured; ``study.motion.complete`` gives the others.
+        Force and at least one motion, as measured; ``study.records.completion.complete`` gives the others.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def _kind(path: Path, head: bytes) -> str:
 def _table(path: Path, head: bytes, options: ReadOptions) -> Table:
     kind = _kind(path, head)
     if kind == "text":
-        from study.readers import text
+        from study.records.readers import text
 
         return text.read(path, path.read_bytes())
     import warnings
@@ -124,17 +124,17 @@ def _table(path: Path, head: bytes, options: ReadOptions) -> Table:
 
 def _binary(kind: str, path: Path, options: ReadOptions) -> Table:
     if kind == "hdf5":
-        from study.readers import hdf5
+        from study.records.readers import hdf5
 
         return hdf5.read(path, options.group)
     if kind == "matlab":
-        from study.readers import matlab
+        from study.records.readers import matlab
 
         return matlab.read(path, options.group)
     if kind == "parquet":
-        from study.readers import parquet
+        from study.records.readers import parquet
 
         return parquet.read(path)
-    from study.readers import uff
+    from study.records.readers import uff
 
     return uff.read(path)

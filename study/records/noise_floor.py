@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.errors import StudyError
-from study.spectra import Segments, autospectrum
+from study.records.spectra import Segments, autospectrum
+from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
 BANDS = 20  # or as many as there are lines

@@ -8,7 +8,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
-from study.errors import StudyError
+from study.support.errors import StudyError
 
 BESIDE = ".study-"  # begins the name of a file that is still being written
 LARGEST = 1_000_000  # bytes; the longest sensible text file of a user has a few kilobytes

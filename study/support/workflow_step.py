@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
-from study.errors import StudyError
-from study.files import BESIDE
+from study.support.errors import StudyError
+from study.support.files import BESIDE
 
 FAILED = 2  # as the command line ends on input that cannot be used
 

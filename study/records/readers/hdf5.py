@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from study.errors import StudyError
-from study.readers.table import Table, from_arrays
+from study.records.readers.table import Table, from_arrays
+from study.support.errors import StudyError
 
 UNIT_KEYS = ("units", "unit", "Units", "Unit")
 

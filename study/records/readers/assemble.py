@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from study.errors import StudyError
-from study.readers import checks
-from study.readers.options import ReadOptions
-from study.readers.roles import assign, own_unit
-from study.readers.sampling import even_interval
-from study.readers.table import Column, Table
-from study.readers.unit_names import ROLES, is_unit, parse_unit, role_unit
-from study.record import MOTIONS, SI_UNITS, Record
+from study.records.readers import checks
+from study.records.readers.options import ReadOptions
+from study.records.readers.roles import assign, own_unit
+from study.records.readers.sampling import even_interval
+from study.records.readers.table import Column, Table
+from study.records.record import MOTIONS, SI_UNITS, Record
+from study.support.errors import StudyError
+from study.support.units import ROLES, is_unit, parse_unit, role_unit
 
 Floats = NDArray[np.float64]
 AGREE = 0.01  # share by which a given interval may differ from that of the times

@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from study.record import Record
+from study.records.record import Record
 
 Floats = NDArray[np.float64]
 REACH = 0.2  # of a period: half width of the cubic that smooths a displacement into a state

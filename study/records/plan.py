@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, replace
 
-from study.errors import StudyError
-from study.record import MOTIONS, Record
+from study.records.record import MOTIONS, Record
+from study.support.errors import StudyError
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from typing import Any, cast
 import numpy as np
 from scipy.io import loadmat
 
-from study.errors import StudyError
-from study.readers.hdf5 import in_group
-from study.readers.table import Table, from_arrays
+from study.records.readers.hdf5 import in_group
+from study.records.readers.table import Table, from_arrays
+from study.support.errors import StudyError
 
 
 def read(path: Path, group: str | None) -> Table:

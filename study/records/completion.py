@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from scipy.signal import lfilter, lfiltic
 
-from study.errors import StudyError
-from study.readers.unit_names import ROLES, VOLTAGE, Unit, parse_unit, role_unit
-from study.record import MOTIONS, SI_UNITS, Record
-from study.spectra import Segments, autospectrum
+from study.records.record import MOTIONS, SI_UNITS, Record
+from study.records.spectra import Segments, autospectrum
+from study.support.errors import StudyError
+from study.support.units import ROLES, VOLTAGE, Unit, parse_unit, role_unit
 
 Floats = NDArray[np.float64]
 ORDER = 64  # coefficients of the linear prediction at each end
