@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from study import estimators, miso, parameters
+from study.equations.model_file import read_model
+from study.equations.simulate import Integrator, simulate
 from study.estimators.base import Settings
 from study.inputs import histories, reverse_inputs
-from study.modelfile import read_model
 from study.output_error import fit_free_run
 from study.records.excitation import Excitation, force
 from study.records.record import Record
 from study.records.spectra import Segments, cross_spectra_in_pieces
-from study.simulate import Integrator, simulate
 
 MODEL = read_model(Path(__file__).parent.parent / "models" / "duffing.yaml")
 INPUTS = reverse_inputs(MODEL)

@@ -16,13 +16,13 @@ from scipy.stats import t as student
 from study import estimators
 from study.config import load
 from study.ensemble import threaded
+from study.equations.model_file import read_model
+from study.equations.simulate import Integrator, simulate
 from study.estimators import output_error
 from study.estimators.base import Settings
-from study.modelfile import read_model
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.record import Record
 from study.records.spectra import Segments
-from study.simulate import Integrator, simulate
 from study.support import document
 
 Floats = NDArray[np.float64]

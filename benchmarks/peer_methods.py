@@ -16,8 +16,8 @@ from sysidentpy.model_structure_selection import FROLS
 from sysidentpy.parameter_estimation import LeastSquares
 
 from study import estimators
+from study.equations.model import Model
 from study.estimators.base import Settings
-from study.model import Model
 from study.output_error import fit_free_run
 from study.records.record import Record
 from study.records.spectra import Segments

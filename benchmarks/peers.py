@@ -15,11 +15,11 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from benchmarks.peer_methods import OURS, PEERS, WANTED
-from study.model import Model
-from study.modelfile import read_model
+from study.equations.model import Model
+from study.equations.model_file import read_model
+from study.equations.simulate import Integrator, simulate
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.record import Record
-from study.simulate import Integrator, simulate
 from study.support.files import replace_file
 
 ROOT = Path(__file__).parent.parent

@@ -12,10 +12,10 @@ import pytest
 from numba import njit
 from scipy.integrate import solve_ivp
 
-from study.modelfile import read_model
+from study.equations.model_file import read_model
+from study.equations.simulate import Integrator, simulate
 from study.records.excitation import Excitation, force
 from study.records.interpolation import between_samples
-from study.simulate import Integrator, simulate
 
 DT, SAMPLES, FINE = 0.02, 1024, 64
 TOLERANCES = 10.0 ** -np.arange(3.0, 13.0, 0.5)

@@ -10,15 +10,15 @@ import pytest
 from scipy.signal import csd
 
 from study import miso, parameters
+from study.equations.model import Model, forward_program
+from study.equations.model_file import read_model
+from study.equations.simulate import METHODS, Integrator, simulate
 from study.inputs import histories, reverse_inputs
 from study.local_fit import fit
 from study.local_polynomial import LocalPolynomial, responses, transform
-from study.model import Model, forward_program
-from study.modelfile import read_model
 from study.records.excitation import Excitation, force
 from study.records.interpolation import between_samples
 from study.records.spectra import Segments, cross_spectra
-from study.simulate import METHODS, Integrator, simulate
 
 MODELS = sorted((Path(__file__).parent.parent / "models").glob("*.yaml"))
 DT, SAMPLES, STEPS = 0.02, 8192, 8

@@ -12,11 +12,11 @@ import numpy as np
 
 from study import estimators
 from study.config import load
+from study.equations.model_file import read_model
+from study.equations.simulate import Integrator, simulate
 from study.estimators.base import Settings
-from study.modelfile import read_model
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.spectra import Segments
-from study.simulate import Integrator, simulate
 
 ROOT = Path(__file__).parent.parent
 FIRST = 6000

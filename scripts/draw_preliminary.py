@@ -9,8 +9,8 @@ from matplotlib import style as styles
 from matplotlib.figure import Figure
 
 from study import preliminary
+from study.equations.model_file import read_model
 from study.figures import distribution, labels, motion, page
-from study.modelfile import read_model
 from study.records import spectra
 from study.records.record import read_csv
 from study.support.errors import StudyError

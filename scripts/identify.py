@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from study import tables
+from study.equations.model_file import read_model
 from study.identify_case import identify_case
-from study.modelfile import read_model
 from study.records.record import read_csv
 from study.support.workflow_step import one_sentence
 

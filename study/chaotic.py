@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from study.equations.model import Model
+from study.equations.substeps import needed_steps
 from study.joining import NEAR, NEGLIGIBLE, fit_pieces, joined
-from study.model import Model
 from study.output_error import FreeRunFit, fit_free_run
 from study.pieces import Pieces, even_restarts, needed_restarts
 from study.records.record import Record
-from study.stiffness import needed_steps
 from study.support.errors import DivergenceError
 
 Floats = NDArray[np.float64]
@@ -84,7 +84,7 @@ def fit_record(
 ) -> FreeRunFit:
     """Fit a model to a whole record: in one free run where that holds, in pieces where it does not.
 
-    Steps are those that the starting model needs (``study.stiffness``) unless they are given; the first runs take
+    Steps are those that the starting model needs (``study.equations.substeps``) unless they are given; the first runs take
     fewer, which cost less and lead as near. One free run is believed if the fit converges, leaves no part of the
     motion (a residual that is large and smooth), and the fitted system does not magnify a disturbance tenfold anywhere
     on its way (``study.pieces.needed_restarts``, from the exact sensitivities). A system that does loses the record

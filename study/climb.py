@@ -10,11 +10,11 @@ from study.commands.records import plan_of, read_records
 from study.diagnose import report
 from study.diagnose.files import files as diagnosis_files
 from study.diagnose.verdict import MISSING, Diagnosis
+from study.equations.model_file import WANTED, parse_model
 from study.explore import session as sessions
 from study.explore.files import PAGE, files
 from study.explore.session import Session
 from study.figures.ladder import files as ladder_pictures
-from study.modelfile import WANTED, parse_model
 from study.support.file_sets import write_files
 from study.support.files import read_text
 

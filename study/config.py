@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from study import case_names, needs, terms
+from study import case_names, needs
+from study.equations import terms
+from study.equations.model import Model, forward_graph, free
+from study.equations.model_file import read_model
 from study.estimators.base import true_parameters
-from study.model import Model, forward_graph, free
-from study.modelfile import read_model
 from study.records.excitation import SETTINGS, Excitation, theoretical_autospectrum
 from study.support.errors import StudyError
 from study.support.schema import check, numbered_rows, read_yaml

@@ -9,9 +9,9 @@ from typing import Any, TypeVar
 import pandas as pd
 
 from study import tables
+from study.equations.model import Model
 from study.identify_case import identify_case
 from study.make_record import make_record
-from study.model import Model
 from study.support.errors import DivergenceError
 
 Table = Mapping[str, Any]

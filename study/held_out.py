@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.free_run import FreeRun, prepare
-from study.model import Model
+from study.equations.free_run import FreeRun, prepare
+from study.equations.model import Model
 from study.output_error import FreeRunFit, fit_free_run
 from study.records.plan import Plan
 from study.records.record import MOTIONS, Record

@@ -5,13 +5,13 @@ from dataclasses import replace
 from typing import Any
 
 from study import estimators
+from study.equations.model import Model
+from study.equations.terms import get
 from study.estimators.base import Identified, Settings
 from study.local_polynomial import LocalPolynomial
-from study.model import Model
 from study.records.record import Record
 from study.records.spectra import Segments
 from study.support.errors import DivergenceError
-from study.terms import get
 
 Table = Mapping[str, Any]
 

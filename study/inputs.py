@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study import expression, kernels
-from study.graph import Graph
-from study.model import Model, ModelTerm, with_registers
+from study.equations import kernels
+from study.equations.graph import Graph
+from study.equations.model import Model, ModelTerm, with_registers
+from study.equations.terms import Component
 from study.records.interpolation import between_samples
 from study.records.record import Record
 from study.support.errors import StudyError
-from study.terms import Component
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -120,11 +120,11 @@ def history(item: Input, record: Record) -> Floats:
         As :func:`histories`.
     """
     formula = item.shape if item.state is None else item.state
-    wanted = [n for n in expression.names(formula) if n not in dict(item.parameters) and n != "z"]
+    wanted = [n for n in formula.names(formula) if n not in dict(item.parameters) and n != "z"]
     data = _columns(wanted, formula, record)
     graph = Graph()
     known = {name: graph.input(name) for name in (*wanted, *dict(item.parameters), "z")}
-    program = with_registers(graph.program([expression.build(graph, formula, known)]), dict(item.parameters))
+    program = with_registers(graph.program([formula.build(graph, formula, known)]), dict(item.parameters))
     positions = np.array([program.inputs[n] for n in wanted], dtype=np.int64)
     registers, output = program.registers.copy(), program.outputs
     if item.state is not None:

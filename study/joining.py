@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from study.model import Model
+from study.equations.model import Model
 from study.output_error import FreeRunFit, fit_free_run
 from study.pieces import Pieces
 from study.support.errors import DivergenceError

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from study.model import Model
+from study.equations.model import Model
+from study.equations.simulate import Integrator, simulate
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.record import Record
-from study.simulate import Integrator, simulate
 from study.support.errors import DivergenceError
 
 Table = Mapping[str, Any]

@@ -3,7 +3,7 @@
 The force is taken as known and the noise as additive on the response, so no noisy regressor enters and
 the estimate is not biased by noise (the reverse MI/SO estimate is, Section 5.4). The sum of squares is
 minimised by the method of Levenberg and Marquardt (``study.support.levenberg_marquardt``) with exact derivatives
-(``study.free_run``). A chaotic system is run piece by piece (``study.pieces``, ``study.chaotic``).
+(``study.equations.free_run``). A chaotic system is run piece by piece (``study.pieces``, ``study.chaotic``).
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study.free_run import FreeRun, prepare
-from study.model import Model
+from study.equations.free_run import FreeRun, prepare
+from study.equations.model import Model
 from study.parameters import Estimate
 from study.records.record import Record
 from study.records.states import starting_states

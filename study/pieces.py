@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.free_run import prepare
-from study.model import Model
+from study.equations.free_run import prepare
+from study.equations.model import Model
 from study.records.record import Record
 from study.records.states import REACH, angular_rate, starting_states
 from study.support.errors import DivergenceError

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.model import Model, forward_program
+from study.equations.model import Model, forward_program
 from study.records.record import Record
 from study.support.errors import StudyError
 
@@ -93,7 +93,7 @@ def model_restoring_force(model: Model, displacement: Floats, velocity: Floats, 
     StudyError
         If a value is missing, or a term remembers the past (its force is no function of this motion alone).
     """
-    from study import kernels  # the compiled loops are slow to load; those who draw histograms need none
+    from study.equations import kernels  # the compiled loops are slow to load; those who draw histograms need none
 
     if model.states:
         names = ", ".join(t.name for t in model.states)

@@ -7,9 +7,9 @@ valleys, in which a fit ends that begins from a linear model where the system is
 import numpy as np
 
 from study import miso, parameters
+from study.equations.model import Model
 from study.held_out import FAINT
 from study.inputs import histories, reverse_inputs
-from study.model import Model
 from study.records.completion import complete
 from study.records.plan import Plan
 from study.records.record import Record

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, rfft, rfftfreq
 
 from study import held_out
-from study.free_run import FreeRun, prepare
-from study.model import Model, ModelTerm, free
+from study.equations.free_run import FreeRun, prepare
+from study.equations.model import Model, ModelTerm, free
+from study.equations.terms import Term, get
 from study.output_error import FreeRunFit
 from study.records.plan import Plan
 from study.records.record import MOTIONS, Record
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
-from study.terms import Term, get
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

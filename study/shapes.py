@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from study import held_out, shape_search
 from study.chaotic import astray, magnifies
+from study.equations.model import Model, ModelTerm
+from study.equations.substeps import needed_steps
 from study.joining import fit_pieces
-from study.model import Model, ModelTerm
 from study.output_error import FreeRunFit
 from study.pieces import Pieces, even_restarts
 from study.records.plan import Plan, make_plan, shortened, with_steps
 from study.records.record import Record
 from study.shape_search import Baseline
-from study.stiffness import needed_steps
 from study.support.errors import DivergenceError, StudyError
 
 Floats = NDArray[np.float64]

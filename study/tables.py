@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from study.equations.model import Model
 from study.estimators.base import Identified, true_parameters
 from study.inputs import Input
 from study.miso import MisoResult
-from study.model import Model
 from study.support.files import replacing
 
 Table = Mapping[str, Any]

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from study import expression, kernels
-from study.graph import Graph
-from study.model import Model, free, with_registers
+from study.equations import formula, kernels
+from study.equations.graph import Graph
+from study.equations.model import Model, free, with_registers
+from study.equations.simulate import Integrator, simulate
+from study.equations.terms import get
 from study.records.excitation import Excitation, force
 from study.records.record import Record
-from study.simulate import Integrator, simulate
-from study.terms import get
 
 Floats = NDArray[np.float64]
 DT = 0.02
@@ -93,7 +93,7 @@ def value_of() -> Callable[..., Floats]:
     def value(text: str, **columns: Floats | float) -> Floats:
         graph = Graph()
         known = {name: graph.input(name) for name in columns}
-        program = with_registers(graph.program([expression.build(graph, text, known)]), {})
+        program = with_registers(graph.program([formula.build(graph, text, known)]), {})
         data = np.column_stack([np.atleast_1d(np.asarray(c, dtype=float)) for c in columns.values()])
         out = np.empty((len(data), 1))
         positions = np.array([program.inputs[name] for name in columns], dtype=np.int64)

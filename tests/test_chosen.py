@@ -12,16 +12,16 @@ from study.compare.comparison import Comparison, compare
 from study.compare.fitted import Coefficient
 from study.compare.local_reverse import local_force_error
 from study.compare.report import document, summary
+from study.equations.model import Model, free
+from study.equations.simulate import Integrator, simulate
+from study.equations.terms import get
 from study.estimators.base import Settings
-from study.model import Model, free
 from study.records.completion import CompletedRecord
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.plan import Plan
 from study.records.record import Record, write_csv
 from study.records.spectra import Segments
-from study.simulate import Integrator, simulate
 from study.support.errors import StudyError
-from study.terms import get
 
 NAMES = ("inertia", "linear_damping", "linear_stiffness", "cubic_stiffness")
 VALUES = {"m": 1.0, "c": 3.77, "k": 355.3, "k3": 2e7}

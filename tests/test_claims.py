@@ -30,7 +30,7 @@ from study.claims import reported as stated
 from study.claims.reported import Reported, Statement
 from study.claims.sample import Sample, departure
 from study.claims.verdict import Condition
-from study.modelfile import read_model
+from study.equations.model_file import read_model
 from study.preliminary import model_restoring_force, natural_frequency
 from study.records.record import Record
 

@@ -16,12 +16,12 @@ import pytest
 from study import __version__, cli
 from study.commands.command import Command, number, whole
 from study.commands.terms import table
-from study.modelfile import read_model
+from study.equations.model_file import read_model
+from study.equations.simulate import simulate
+from study.equations.terms import LIBRARY
 from study.records.excitation import Excitation, force
 from study.records.record import read_csv
-from study.simulate import simulate
 from study.support.errors import StudyError
-from study.terms import LIBRARY
 
 DUFFING = str(Path(__file__).parent.parent / "models" / "duffing.yaml")
 STUDY = [sys.executable, "-m", "study"]

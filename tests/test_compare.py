@@ -14,13 +14,13 @@ from study.compare.judged import Judged
 from study.compare.levels import levels
 from study.compare.report import as_json, document, summary, tables
 from study.compare.says import says, says_of_all
-from study.model import Model, ModelTerm, free
+from study.equations.model import Model, ModelTerm, free
+from study.equations.simulate import Integrator, simulate
+from study.equations.terms import get
 from study.records.excitation import Excitation, force
 from study.records.plan import Plan, make_plan
 from study.records.record import Record
-from study.simulate import Integrator, simulate
 from study.support.errors import StudyError
-from study.terms import get
 from study.trials import make_trial
 
 Floats = NDArray[np.float64]

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from study import cli
-from study.model import Model, free
+from study.equations.model import Model, free
+from study.equations.simulate import simulate
+from study.equations.terms import get
 from study.records.excitation import Excitation, force
 from study.records.record import Record, write_csv
-from study.simulate import simulate
 from study.support.errors import StudyError
 from study.support.file_sets import check_folder, write_files
-from study.terms import get
 
 DT = 0.02
 DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parent.parent.parent / "shared" / "data"))

@@ -10,13 +10,13 @@ import pytest
 
 from study import measurements
 from study.config import load
+from study.equations.model_file import read_model
+from study.equations.simulate import simulate
 from study.estimators import ESTIMATORS, identify
 from study.estimators.base import Settings
-from study.modelfile import read_model
 from study.needs import CURVES
 from study.records.excitation import Excitation, force
 from study.records.spectra import Segments
-from study.simulate import simulate
 from study.support.errors import StudyError
 from study.support.schema import read_table, read_yaml
 

@@ -9,13 +9,13 @@ from study.diagnose import report, steadiness
 from study.diagnose.says import sentences
 from study.diagnose.separate import separating_level
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN, diagnose
-from study.model import ModelTerm
+from study.equations.model import ModelTerm
+from study.equations.simulate import Integrator, simulate
+from study.equations.terms import LIBRARY, custom
 from study.records import noise_floor
 from study.records.plan import make_plan
 from study.records.record import Record
-from study.simulate import Integrator, simulate
 from study.support import statistics
-from study.terms import LIBRARY, custom
 
 DT = 0.02
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from study import estimators
+from study.equations.simulate import Integrator, simulate
 from study.estimators.base import Settings, named_parameters, true_parameters
 from study.estimators.hand_read import read_linear
 from study.parameters import Estimate
 from study.records.spectra import Segments
-from study.simulate import Integrator, simulate
 from study.support.errors import StudyError
 
 M, C, K = 1.0, 3.77, 355.3

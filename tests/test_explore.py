@@ -8,18 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study import cli, ladder, modelfile, trials
+from study import cli, ladder, trials
 from study.compare.links import links
 from study.compare.surface import curve, surface
+from study.equations import model_file
+from study.equations.model import Model, free
+from study.equations.terms import get
 from study.explore import decimate, page, units, view, words
 from study.explore import session as sessions
 from study.explore.desk import Desk
 from study.explore.files import PAGE, files
 from study.explore.saved import saved
-from study.model import Model, free
 from study.records.plan import make_plan
 from study.support.errors import StudyError
-from study.terms import get
 
 TEXT = """# the rig in hall 3
 name: rig
@@ -230,24 +231,24 @@ def test_ties_are_shown_as_ties(asked):
 def test_saving_keeps_the_users_comments(asked, grown, tmp_path):
     given = Model("rig", tuple(free(get(n)) for n in ("inertia", "linear_damping", "linear_stiffness")))
     model = given.with_term(get("quadratic_damping")).with_values({"k": 355.0})
-    text = modelfile.revised(TEXT, "rig.yaml", model)
+    text = model_file.revised(TEXT, "rig.yaml", model)
     assert text.splitlines()[-2:] == [
         "  - {term: linear_stiffness, value: 355.0}   # from the drawing",
         "  - quadratic_damping",
     ]
     assert text.startswith("# the rig in hall 3\n")
     assert "# weighed" in text
-    own = modelfile.format_model(asked.rungs[0].model)
+    own = model_file.format_model(asked.rungs[0].model)
     made = files(grown, "rig.yaml", own)
     assert {"rig.yaml", "rig.history.json", "comparison.json", PAGE, "response.png", "ladder.png"} <= set(made)
     for name, content in made.items():
         (tmp_path / name).write_bytes(content)
-    assert modelfile.read_model(tmp_path / "rig.yaml") == grown.now.model
+    assert model_file.read_model(tmp_path / "rig.yaml") == grown.now.model
     assert len(ladder.read(tmp_path / "rig.yaml")) == 2
 
 
 def test_the_desk_does_one_thing_at_a_time_and_says_what_went_wrong(asked, tmp_path):
-    desk = Desk(asked, tmp_path / "rig.yaml", modelfile.format_model(asked.rungs[0].model), tmp_path / "out")
+    desk = Desk(asked, tmp_path / "rig.yaml", model_file.format_model(asked.rungs[0].model), tmp_path / "out")
     done = threading.Event()
     busy: list[str] = []
 

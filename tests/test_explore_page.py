@@ -15,7 +15,8 @@ import pytest
 from playwright.sync_api import Page, TimeoutError, sync_playwright
 
 from scripts.page_picture import MISSING, QUIET, browser
-from study import ladder, modelfile, trials
+from study import ladder, trials
+from study.equations import model_file
 from study.records.record import write_csv
 
 HOSTILE = "__import__('os').system('touch hacked')"
@@ -196,7 +197,7 @@ def _saved(rig: Path) -> None:
     assert {"rig.yaml", "rig.history.json", "explore.html", "response.png", "ladder.svg"} <= names
     text = (rig / "saved" / "rig.yaml").read_text()
     assert text == (rig / "rig.yaml").read_text() + "  - quadratic_damping\n"
-    assert "quadratic_damping" in modelfile.read_model(rig / "saved" / "rig.yaml")
+    assert "quadratic_damping" in model_file.read_model(rig / "saved" / "rig.yaml")
     assert [s["added"] for s in ladder.read(rig / "saved" / "rig.yaml")] == [None, "quadratic_damping"]
 
 

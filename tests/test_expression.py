@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from study import expression
-from study.expression import ExpressionError
-from study.graph import Graph
-from study.terms import custom
+from study.equations import formula
+from study.equations.formula import ExpressionError
+from study.equations.graph import Graph
+from study.equations.terms import custom
 
 U = np.linspace(-2.0, 2.0, 41)
 V = 1.3 * np.cos(3.0 * U)
@@ -22,7 +22,7 @@ NUMPY: dict[str, object] = {
 
 def build(text: str) -> Graph:
     graph = Graph()
-    expression.build(graph, text, {name: graph.input(name) for name in ("u", "v", "t")})
+    formula.build(graph, text, {name: graph.input(name) for name in ("u", "v", "t")})
     return graph
 
 
@@ -63,7 +63,7 @@ def grown(inner: st.SearchStrategy[str]) -> st.SearchStrategy[str]:
 
 
 @settings(max_examples=150, deadline=None)
-@given(st.recursive(leaves, grown, max_leaves=8).filter(lambda text: len(text) <= expression.LONGEST))
+@given(st.recursive(leaves, grown, max_leaves=8).filter(lambda text: len(text) <= formula.LONGEST))
 def test_random_valid_formulas_agree_with_numpy(value_of: Callable[..., np.ndarray], text: str) -> None:
     with np.errstate(all="ignore"):
         expected = by_numpy(text)
@@ -139,16 +139,16 @@ def test_any_text_is_a_formula_or_an_expression_error(text: str) -> None:
     except ExpressionError:
         return
     assert all(np.isfinite(value) for value in graph.values)
-    assert expression.names(text) == sorted(set(expression.names(text)))
+    assert formula.names(text) == sorted(set(formula.names(text)))
 
 
 def test_the_longest_formula_is_read_and_one_more_character_is_not() -> None:
     text = "u" + "*1" * 30
-    padded = text + " " * (expression.LONGEST - len(text))
+    padded = text + " " * (formula.LONGEST - len(text))
     build(padded)
     with pytest.raises(ExpressionError, match="301 characters"):
         build(padded + " ")
 
 
 def test_names_lists_variables_not_functions() -> None:
-    assert expression.names("u*abs(v) + max(w, u_g)*pi") == ["u", "u_g", "v", "w"]
+    assert formula.names("u*abs(v) + max(w, u_g)*pi") == ["u", "u_g", "v", "w"]

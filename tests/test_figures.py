@@ -15,12 +15,12 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.mathtext import MathTextParser
 
+from study.equations.terms import LIBRARY
 from study.figures import coherence, curves, distribution, labels, motion, page, response, styles
 from study.preliminary import Pattern, histogram
 from study.records.record import SI_UNITS, Record, write_csv
 from study.records.spectra import Segments
 from study.support.errors import StudyError
-from study.terms import LIBRARY
 
 ROOT = Path(__file__).parent.parent
 SHEET = ROOT / "config" / "study.mplstyle"

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from study.modelfile import add_term, read_model
+from study.equations.model_file import add_term, read_model
+from study.equations.terms import get
 from study.support import files
 from study.support.errors import StudyError
-from study.terms import get
 
 
 @pytest.mark.parametrize("mode", [0o600, 0o640, 0o664, 0o755])

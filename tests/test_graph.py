@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from study import kernels
-from study.graph import Graph, Op
+from study.equations import kernels
+from study.equations.graph import Graph, Op
 
 POINTS = np.random.default_rng(0).uniform(0.2, 1.8, (40, 2)) * np.random.default_rng(1).choice([-1.0, 1.0], (40, 2))
 

@@ -7,8 +7,8 @@ each of seven effects, at a seed of its own that was fixed before it was first r
 import pytest
 
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN, Diagnosis, diagnose
+from study.equations.terms import LIBRARY
 from study.records.plan import make_plan
-from study.terms import LIBRARY
 from study.trials import Trial, make_trial, runs
 from study.trials.runs import Order
 

@@ -5,11 +5,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from study.equations.model import Model
+from study.equations.terms import custom, get
 from study.inputs import Part, histories, reverse_inputs
-from study.model import Model
 from study.records.record import Record
 from study.support.errors import StudyError
-from study.terms import custom, get
 
 
 @pytest.fixture

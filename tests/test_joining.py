@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from study.chaotic import fit_in_pieces
-from study.free_run import predict
+from study.equations.free_run import predict
+from study.equations.simulate import simulate
 from study.joining import fit_pieces, joined
 from study.pieces import Pieces, even_restarts
 from study.records.excitation import displacement_noise
 from study.records.record import Record
-from study.simulate import simulate
 
 NOISE = 0.05
 

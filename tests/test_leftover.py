@@ -7,12 +7,12 @@ from study import held_out, shape_search, trials
 from study.compare.fitted import fit_model
 from study.diagnose import candidates, nature, pairs, preselect, steadiness
 from study.diagnose.ranking import rank
-from study.model import free
+from study.equations.model import free
+from study.equations.simulate import Integrator, simulate
+from study.equations.terms import get
 from study.records.excitation import Excitation, force
 from study.records.plan import make_plan
 from study.records.record import Record
-from study.simulate import Integrator, simulate
-from study.terms import get
 
 
 def left_by(model, record):

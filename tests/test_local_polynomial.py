@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from study import estimators, local_polynomial
+from study.equations.simulate import Integrator, simulate
 from study.estimators.base import Settings
 from study.inputs import Input, Part, histories, reverse_inputs
 from study.local_fit import fit
 from study.local_polynomial import Lines, LocalPolynomial, transform
 from study.records.excitation import Excitation, force
 from study.records.spectra import Segments
-from study.simulate import Integrator, simulate
 from study.support.errors import StudyError
 
 BAND = (0.3, 10.0)

@@ -7,11 +7,11 @@ from scipy.io import loadmat
 
 from study import held_out
 from study.diagnose.verdict import MISSING, diagnose
+from study.equations.model import Model, free
+from study.equations.terms import LIBRARY, get
 from study.measurements import data_folder
-from study.model import Model, free
 from study.records.plan import make_plan
 from study.records.record import Record
-from study.terms import LIBRARY, get
 
 LINEAR = Model("linear", tuple(free(get(n)) for n in ("inertia", "linear_damping", "linear_stiffness")))
 RIVALS = {"cubic_stiffness", "hysteresis", "quadratic_stiffness", "quadratic_damping", "dead_band", "constant_force"}

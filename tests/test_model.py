@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study.expression import ExpressionError
-from study.model import Model, forward_graph, forward_program, free
-from study.modelfile import read_model
+from study.equations.formula import ExpressionError
+from study.equations.model import Model, forward_graph, forward_program, free
+from study.equations.model_file import read_model
+from study.equations.terms import custom, get
 from study.support.errors import StudyError
-from study.terms import custom, get
 
 MODELS = Path(__file__).parents[1] / "models"
 

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from study.model import Model, ModelTerm
-from study.modelfile import add_term, format_model, parse_model, read_model
-from study.repeated import repeated_force
-from study.simulate import simulate
+from study.equations.model import Model, ModelTerm
+from study.equations.model_file import add_term, format_model, parse_model, read_model
+from study.equations.redundancy import repeated_force
+from study.equations.simulate import simulate
+from study.equations.terms import LIBRARY, custom, get
 from study.support.errors import StudyError
-from study.terms import LIBRARY, custom, get
 
 MODELS = Path(__file__).parent.parent / "models"
 HERE = Path("rig.yaml")

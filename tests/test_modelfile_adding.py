@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from study import modelfile
-from study.model import ModelTerm, free
-from study.modelfile import add_term, read_model
+from study.equations import model_file
+from study.equations.model import ModelTerm, free
+from study.equations.model_file import add_term, read_model
+from study.equations.terms import custom, get
 from study.support.errors import StudyError
-from study.terms import custom, get
 
 LAYOUTS = {
     "block": "# rig\nname: 'rig'  # quoted\nterms:\n  - inertia  # free\n  - {term: linear_stiffness, value: 3.5e2}\n",
@@ -80,7 +80,7 @@ def test_adding_twice_is_refused(tmp_path: Path) -> None:
 def test_a_layout_without_a_clear_place_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "rig.yaml"
     path.write_text("terms: [inertia]\n")
-    monkeypatch.setattr(modelfile.yamltext, "with_entry", lambda text, *_: f"{text}!")
+    monkeypatch.setattr(model_file.yamltext, "with_entry", lambda text, *_: f"{text}!")
     with pytest.raises(StudyError, match="add '- cubic_stiffness' to 'terms' by hand"):
         add_term(path, get("cubic_stiffness"))
     assert path.read_text() == "terms: [inertia]\n"

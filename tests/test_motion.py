@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from study.modelfile import read_model
+from study.equations.model_file import read_model
+from study.equations.simulate import Integrator, simulate
 from study.records.completion import burg, complete, consistent, derivative, suggest_cutoff
 from study.records.record import MOTIONS, Record
-from study.simulate import Integrator, simulate
 from study.support.errors import StudyError
 
 MODELS = Path(__file__).parents[1] / "models"

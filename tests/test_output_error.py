@@ -8,19 +8,19 @@ from numpy.typing import NDArray
 
 from study import parameters
 from study.chaotic import fit_in_pieces
-from study.free_run import FreeRun, predict, prepare
+from study.equations.free_run import FreeRun, predict, prepare
+from study.equations.model import Model, free
+from study.equations.simulate import Integrator, simulate
+from study.equations.terms import LIBRARY, custom
 from study.inputs import histories, reverse_inputs
 from study.miso import analyse
-from study.model import Model, free
 from study.output_error import FreeRunFit, fit_free_run
 from study.pieces import REACHES, Pieces
 from study.records.excitation import displacement_noise
 from study.records.record import MOTIONS, SI_UNITS, Record
 from study.records.spectra import Segments, cross_spectra
 from study.records.states import starting_states
-from study.simulate import Integrator, simulate
 from study.support.errors import DivergenceError, StudyError
-from study.terms import LIBRARY, custom
 
 Floats = NDArray[np.float64]
 Make = Callable[[str, Mapping[str, Mapping[str, float]]], Model]

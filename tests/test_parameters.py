@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from study.equations.model import Model
 from study.inputs import histories, reverse_inputs
 from study.miso import MisoResult, analyse
-from study.model import Model
 from study.parameters import Estimate, fit
 from study.records.record import Record
 from study.records.spectra import Segments, cross_spectra

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from study import estimators
+from study.equations.simulate import Integrator, simulate
 from study.estimators.base import Settings
 from study.identify_case import identify_case
 from study.inputs import histories, reverse_inputs
@@ -14,7 +15,6 @@ from study.periods import Periods, fit, steady
 from study.records.excitation import Excitation, force
 from study.records.record import Record
 from study.records.spectra import Segments
-from study.simulate import Integrator, simulate
 from study.support.errors import StudyError
 
 BAND, SAMPLES, DT = (0.3, 10.0), 512, 0.02

@@ -7,14 +7,14 @@ import pytest
 from scipy import stats
 
 from study import preliminary
-from study.model import Model
-from study.modelfile import read_model
+from study.equations.model import Model
+from study.equations.model_file import read_model
+from study.equations.simulate import simulate
+from study.equations.terms import get
 from study.records.excitation import Excitation, force
 from study.records.record import Record
 from study.records.spectra import Segments, autospectrum
-from study.simulate import simulate
 from study.support.errors import StudyError
-from study.terms import get
 
 MODELS = Path(__file__).parent.parent / "models"
 DT = 0.02

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from study.modelfile import parse_model
+from study.equations.model_file import parse_model
 from study.support.errors import StudyError
 
 LINEAR = "  - inertia\n  - linear_damping\n  - linear_stiffness\n"

@@ -7,12 +7,12 @@ import pytest
 
 from study import estimators, tables
 from study.chaotic import fit_record
+from study.equations.simulate import simulate
 from study.estimators.base import Settings
 from study.output_error import fit_free_run
 from study.records.excitation import displacement_noise
 from study.records.spectra import Segments
 from study.shapes import shape_keys, with_starting_shapes
-from study.simulate import simulate
 from study.support.errors import StudyError
 
 TOLD = Settings(Segments(512), (0.3, 10.0))

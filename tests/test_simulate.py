@@ -10,17 +10,17 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from study.config import load
+from study.equations.model import Model
+from study.equations.model_file import read_model
+from study.equations.simulate import Integrator, simulate
+from study.equations.terms import custom
 from study.inputs import histories, reverse_inputs
 from study.make_record import make_record
 from study.miso import analyse
-from study.model import Model
-from study.modelfile import read_model
 from study.parameters import fit
 from study.records.excitation import Excitation, force
 from study.records.spectra import Segments, cross_spectra
-from study.simulate import Integrator, simulate
 from study.support.errors import DivergenceError, StudyError
-from study.terms import custom
 
 ROOT = Path(__file__).parents[1]
 DT = 0.02

@@ -5,11 +5,11 @@ import pytest
 
 from study import estimators
 from study.chaotic import fit_record
+from study.equations.simulate import Integrator, simulate
+from study.equations.substeps import Steps, needed_steps
 from study.estimators.base import Settings
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.spectra import Segments
-from study.simulate import Integrator, simulate
-from study.stiffness import Steps, needed_steps
 
 LINEAR = {"inertia": {"m": 1.0}, "linear_damping": {"c": 3.77}, "linear_stiffness": {"k": 355.3}}
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from study import cli, trials
-from study.model import Model, free
+from study.equations.model import Model, free
+from study.equations.simulate import simulate
+from study.equations.terms import LIBRARY
 from study.records.readers import ReadOptions, read_record, suspect_swapped
 from study.records.record import MOTIONS, Record, write_csv
-from study.simulate import simulate
 from study.support.errors import StudyError
-from study.terms import LIBRARY
 
 DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parents[2] / "shared" / "data"))
 NEEDS_DATA = pytest.mark.skipif(not DATA.is_dir(), reason="the public records are not here")

@@ -10,14 +10,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from study import expression, kernels
-from study.graph import Graph
+from study.equations import formula, kernels
+from study.equations.graph import Graph
+from study.equations.model import Model, forward_graph, free, with_registers
+from study.equations.simulate import Integrator, simulate
+from study.equations.terms import LIBRARY, Component, Term, custom, get
 from study.inputs import histories, reverse_inputs
-from study.model import Model, forward_graph, free, with_registers
 from study.records.excitation import Excitation, force
-from study.simulate import Integrator, simulate
 from study.support.errors import StudyError
-from study.terms import LIBRARY, Component, Term, custom, get
 
 PERIOD = 10.24  # seconds; the frequencies below are whole multiples of 1/PERIOD, so that time-varying terms close too
 F_M, F_H = 10 / PERIOD, 21 / PERIOD
@@ -170,7 +170,7 @@ def test_derivatives_of_shapes_are_exact(name: str, value_of: Callable[..., np.n
         for wrt in columns:
             graph = Graph()
             known = {n: graph.input(n) for n in columns}
-            slope = graph.derivative(expression.build(graph, text, known), known[wrt])
+            slope = graph.derivative(formula.build(graph, text, known), known[wrt])
             program, out = graph.program([slope]), np.empty((4, 1))
             kernels.evaluate(
                 program.code, program.first, program.registers.copy(),

@@ -10,12 +10,12 @@ import pytest
 
 from study import held_out
 from study.cli import main
-from study.modelfile import parse_model, read_model
+from study.equations.model_file import parse_model, read_model
+from study.equations.simulate import Integrator, simulate
+from study.equations.terms import LIBRARY
 from study.records.plan import make_plan
 from study.records.readers import read_record
-from study.simulate import Integrator, simulate
 from study.support.errors import StudyError
-from study.terms import LIBRARY
 from study.trials import HIDDEN, SHARE, make_trial, reach, runs, sealed, share_of
 from study.trials.runs import COLUMNS, Order, Row
 

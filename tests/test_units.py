@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import pytest
 
-from study.units import VARIABLES, compose, dimensions, pretty
+from study.equations.dimensions import VARIABLES, compose, dimensions, pretty
 
 L, T = Fraction(1), Fraction(1)
 

@@ -12,8 +12,8 @@ from study.claims.reported import Reported
 from study.claims.sample import Sample
 from study.claims.verdict import Claim, Condition, at_least, conclude, together
 from study.ensemble import threaded
+from study.equations.simulate import Integrator, simulate
 from study.records.excitation import Excitation, force, theoretical_autospectrum
-from study.simulate import Integrator, simulate
 
 Floats = NDArray[np.float64]
 ALL_PARTS = {

@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 from study.claims.sample import Sample, average
 from study.ensemble import NOISE_OFFSET, threaded
+from study.equations.model import Model
+from study.equations.terms import get
 from study.estimators import miso, siso
 from study.estimators.base import Identified, Settings
 from study.estimators.hand_read import read_curve
 from study.make_record import make_record
 from study.miso import MisoResult
-from study.model import Model
 from study.records.record import Record
 from study.records.spectra import Segments
 from study.support.errors import StudyError
-from study.terms import get
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -290,6 +290,6 @@ def _analysis(found: Identified, told: Settings) -> Analysis:
 
 def models_of(folder: Path) -> dict[str, Model]:
     """Every model of a folder by its file's name."""
-    from study.modelfile import read_model
+    from study.equations.model_file import read_model
 
     return {path.stem: read_model(path) for path in sorted(folder.glob("*.yaml"))}

@@ -10,7 +10,7 @@ from study.claims.reported import Reported
 from study.claims.sample import Sample, average
 from study.claims.verdict import Claim, Condition, at_least, close, conclude, near
 from study.ensemble import threaded
-from study.model import Model
+from study.equations.model import Model
 from study.preliminary import harmonic_beside, harmonic_pattern, model_restoring_force, restoring_force
 from study.records.record import Record
 

@@ -9,8 +9,8 @@ from study.commands.records import add_reading_arguments, out_folder, plan_of, r
 
 if TYPE_CHECKING:
     from study.compare.comparison import Comparison
-    from study.model import Model
-    from study.terms import Term
+    from study.equations.model import Model
+    from study.equations.terms import Term
 
 QUIET = 2.0  # seconds of work before progress is shown
 
@@ -30,7 +30,7 @@ def _run(arguments: argparse.Namespace) -> None:
     from study import ladder
     from study.compare.comparison import compare
     from study.compare.report import as_json, document, rung, summary
-    from study.modelfile import add_term, read_model
+    from study.equations.model_file import add_term, read_model
     from study.support.file_sets import check_folder, write_files
 
     folder = out_folder(arguments)
@@ -58,7 +58,7 @@ def _run(arguments: argparse.Namespace) -> None:
 
 
 def _term(arguments: argparse.Namespace) -> "Term":
-    from study import terms
+    from study.equations import terms
 
     if arguments.force is not None:
         return terms.custom(arguments.term, arguments.force)
@@ -66,7 +66,7 @@ def _term(arguments: argparse.Namespace) -> "Term":
 
 
 def _refuse_second(path: Path, model: "Model", term: "Term") -> None:
-    from study.repeated import repeated_force
+    from study.equations.redundancy import repeated_force
     from study.support.errors import StudyError
 
     if term.name in model:

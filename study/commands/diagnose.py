@@ -8,9 +8,9 @@ from study.commands.command import Command
 from study.commands.records import add_record_arguments, out_folder, plan_of, read_records
 
 if TYPE_CHECKING:
-    from study.model import Model
+    from study.equations.model import Model
+    from study.equations.terms import Term
     from study.records.record import Record
-    from study.terms import Term
 
 QUIET = 2.0  # seconds of work before progress is shown
 
@@ -26,9 +26,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    from study import terms
     from study.diagnose.sources import own_candidates
-    from study.modelfile import read_model
+    from study.equations import terms
+    from study.equations.model_file import read_model
     from study.support.file_sets import check_folder, write_files
 
     folder = out_folder(arguments)

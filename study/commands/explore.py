@@ -23,10 +23,10 @@ def _run(arguments: argparse.Namespace) -> None:
 
     from study import ladder
     from study.compare.comparison import STEPS
+    from study.equations.model_file import WANTED, parse_model
     from study.explore import session as sessions
     from study.explore.desk import Desk
     from study.explore.server import serve
-    from study.modelfile import WANTED, parse_model
     from study.support.file_sets import check_folder
     from study.support.files import read_text
 

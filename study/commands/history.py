@@ -13,7 +13,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> None:
     from study import ladder
-    from study.modelfile import read_model
+    from study.equations.model_file import read_model
 
     read_model(arguments.model)
     steps = ladder.read(arguments.model)

@@ -25,10 +25,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    from study.modelfile import read_model
+    from study.equations.model_file import read_model
+    from study.equations.simulate import Integrator, simulate
     from study.records.excitation import Excitation, force
     from study.records.record import write_csv
-    from study.simulate import Integrator, simulate
     from study.support.files import replacing
 
     model = read_model(arguments.model)

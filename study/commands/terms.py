@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from study.commands.command import Command
 
 if TYPE_CHECKING:
-    from study.terms import Term
+    from study.equations.terms import Term
 
 PARAMETER_UNITS = {"length": "m", "time": "s", "frequency": "Hz", "1/length": "1/m"}
 WIDTH_WITHOUT_TERMINAL = 160
@@ -19,7 +19,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    from study import terms
+    from study.equations import terms
 
     print(details(terms.get(arguments.name)) if arguments.name else table(tuple(terms.LIBRARY.values())))
 

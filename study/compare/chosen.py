@@ -13,8 +13,8 @@ from scipy.linalg import block_diag
 from study import estimators, held_out
 from study.chaotic import magnifies
 from study.compare.noise import segments_of
+from study.equations.model import Model
 from study.estimators.base import Settings
-from study.model import Model
 from study.output_error import FreeRunFit, fit_free_run
 from study.parameters import Estimate
 from study.records.completion import CompletedRecord

@@ -17,7 +17,7 @@ from study.compare.noise import Noise, noise_of
 from study.compare.restoring import Restoring, restoring
 from study.compare.reverse import ForceError, force_error
 from study.compare.stretches import AlongTime, along_time
-from study.model import Model
+from study.equations.model import Model
 from study.output_error import FreeRunFit
 from study.parameters import Estimate
 from study.records.completion import complete

@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri, stdtrit
 
-from study import held_out, shape_search, units
+from study import held_out, shape_search
 from study.chaotic import fit_in_pieces
-from study.free_run import prepare
+from study.equations import dimensions
+from study.equations.free_run import prepare
+from study.equations.model import Model, ModelTerm
+from study.equations.terms import LIBRARY, QUANTITIES
 from study.inputs import history, reverse_inputs
-from study.model import Model, ModelTerm
 from study.output_error import FreeRunFit
 from study.parameters import Estimate
 from study.records.completion import complete
@@ -21,7 +23,6 @@ from study.records.record import Record
 from study.records.states import angular_rate
 from study.support.errors import DivergenceError, StudyError
 from study.support.statistics import clustered_covariance
-from study.terms import LIBRARY, QUANTITIES
 
 Floats = NDArray[np.float64]
 POOR = 0.05  # of the rms response: a fit that leaves more is tried again from pieces
@@ -233,5 +234,5 @@ def _unit(entry: ModelTerm, key: str, force: str, length: str) -> str:
         return entry.term.unit(key, force, length)
     parameter = next(p for p in entry.term.parameters if key == f"{entry.name}.{p.name}")
     powers = QUANTITIES[parameter.quantity]
-    unit = units.compose("", length, (-powers[0], -powers[1])).strip()
+    unit = dimensions.compose("", length, (-powers[0], -powers[1])).strip()
     return "Hz" if parameter.quantity == "frequency" else unit.replace("/", "1/")

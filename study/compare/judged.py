@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study.free_run import prepare
+from study.equations.free_run import prepare
 from study.output_error import FreeRunFit, fit_free_run
 from study.records import completion
 from study.records.plan import Plan

@@ -14,9 +14,9 @@ from scipy.fft import rfft
 
 from study.compare.noise import Noise
 from study.compare.reverse import ForceError, from_noise, lines_to_judge
+from study.equations.model import Model
 from study.inputs import Input, histories, reverse_inputs
 from study.local_polynomial import SPARE, Lines, LocalPolynomial, noise_variance, transform, transients
-from study.model import Model
 from study.records.completion import CompletedRecord
 from study.records.plan import Plan
 from study.support.errors import StudyError

@@ -9,13 +9,13 @@ from typing import Any, cast
 import numpy as np
 import pandas as pd
 
-from study import modelfile
 from study.compare.chosen import FREE_RUN
 from study.compare.comparison import Comparison
 from study.compare.fitted import Coefficient
 from study.compare.levels import Level
 from study.compare.says import percent, says, says_of_all
 from study.compare.surface import curve, surface
+from study.equations import model_file
 
 Row = dict[str, Any]
 
@@ -52,7 +52,7 @@ def _one(found: Comparison) -> Row:
     return {
         "record": found.record.name,
         "model": {"name": found.model.name, "equation": found.model.equation(), "terms": [
-            modelfile.format_entry(t) for t in found.model.terms]},
+            model_file.format_entry(t) for t in found.model.terms]},
         "error": {"force": found.force.total, "response": found.response_error},
         "noise_floor": {
             "force": found.force.noise_total, "response": found.noise_floor,

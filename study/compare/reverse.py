@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from study import miso
 from study.compare.noise import Noise, segments_of
+from study.equations.model import Model
 from study.inputs import Input, histories, reverse_inputs
-from study.model import Model
 from study.records.completion import CompletedRecord
 from study.records.plan import Plan
 from study.records.record import MOTIONS

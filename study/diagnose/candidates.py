@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from study import held_out, shape_search
 from study.compare.fitted import from_pieces
-from study.model import Model, free
+from study.equations.model import Model, free
+from study.equations.terms import LIBRARY, Term
 from study.output_error import FreeRunFit
 from study.records.plan import Plan
 from study.records.record import Record
 from study.reverse_start import reverse_start
 from study.shape_search import Baseline
 from study.support.errors import StudyError
-from study.terms import LIBRARY, Term
 
 Floats = NDArray[np.float64]
 THREADS = 2

@@ -16,8 +16,9 @@ from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from scipy.signal import lfilter
 
 from study import held_out
-from study.free_run import prepare
-from study.model import ModelTerm
+from study.equations.free_run import prepare
+from study.equations.model import ModelTerm
+from study.equations.terms import custom
 from study.output_error import FreeRunFit
 from study.records.plan import Plan
 from study.records.record import MOTIONS, Record
@@ -25,7 +26,6 @@ from study.shape_search import Baseline, modulation_lines, residual_lines
 from study.support import statistics
 from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares
-from study.terms import custom
 
 Floats = NDArray[np.float64]
 DEGREE = 7

@@ -15,9 +15,9 @@ from scipy.fft import rfft, rfftfreq
 from scipy.signal import get_window
 
 from study.diagnose.ranking import Ranked
+from study.equations.model import Model, ModelTerm
 from study.held_out import FAINT
 from study.inputs import history, reverse_inputs
-from study.model import Model, ModelTerm
 from study.records.completion import complete
 from study.records.plan import Plan
 from study.records.record import Record

@@ -11,12 +11,12 @@ from study import held_out
 from study.diagnose import steadiness
 from study.diagnose.candidates import Trial
 from study.diagnose.steadiness import Curve
+from study.equations.terms import Term
 from study.output_error import FreeRunFit
 from study.records.plan import Plan, shortened
 from study.records.record import Record
 from study.support import statistics
 from study.support.statistics import Gain
-from study.terms import Term
 
 Floats = NDArray[np.float64]
 TIE = 3.0  # standard errors of their difference within which two candidates are a tie: 5 %, shared by a library of 18

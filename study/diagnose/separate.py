@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from study.diagnose.ranking import Ranked
+from study.equations.free_run import prepare
 from study.figures.labels import term_names
-from study.free_run import prepare
 from study.records.plan import Plan
 from study.records.record import Record
 from study.support.errors import StudyError

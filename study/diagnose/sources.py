@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from study.equations.terms import Term, custom
 from study.support.errors import StudyError
-from study.terms import Term, custom
 
 
 def own_candidates(given: Sequence[str]) -> list[Term]:

@@ -11,7 +11,8 @@ from study.compare.fitted import fit_model
 from study.diagnose import candidates, nature, pairs
 from study.diagnose.pairs import Pair
 from study.diagnose.ranking import UNSTEADY, Ranked, changes, curves, rank, wavers
-from study.model import Model
+from study.equations.model import Model
+from study.equations.terms import Term
 from study.output_error import FreeRunFit
 from study.records import noise_floor
 from study.records.plan import Plan, shortened
@@ -19,7 +20,6 @@ from study.records.record import Record
 from study.shape_search import Baseline
 from study.support import statistics
 from study.support.errors import DivergenceError
-from study.terms import Term
 
 Floats = NDArray[np.float64]
 MISSING, NOTHING, UNKNOWN = "missing_effect", "nothing_missing", "unknown_effect"

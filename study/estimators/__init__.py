@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, cast
 from study.support.errors import StudyError
 
 if TYPE_CHECKING:  # who only asks which estimators there are waits for none of their modules
+    from study.equations.model import Model
     from study.estimators.base import Estimator, Identified, Settings
-    from study.model import Model
     from study.records.record import Record
 
 ESTIMATORS = {

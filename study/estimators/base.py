@@ -7,10 +7,10 @@ from typing import Protocol
 
 import numpy as np
 
+from study.equations.model import Model
 from study.inputs import Input
 from study.local_polynomial import LocalPolynomial
 from study.miso import MisoResult
-from study.model import Model
 from study.parameters import Estimate
 from study.records.record import Record
 from study.records.spectra import Segments

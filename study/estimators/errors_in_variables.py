@@ -1,8 +1,8 @@
 """Noise on force and response: records with several periods of the same excitation."""
 
+from study.equations.model import Model
 from study.estimators.base import Identified, Settings, named_parameters
 from study.inputs import reverse_inputs
-from study.model import Model
 from study.periods import fit, steady
 from study.records.record import Record
 

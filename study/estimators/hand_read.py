@@ -5,10 +5,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from study.equations.model import Model
 from study.estimators import miso
 from study.estimators.base import Identified, Parameter, Settings
 from study.inputs import Input
-from study.model import Model
 from study.records.record import Record
 from study.responses import Responses
 

@@ -1,11 +1,11 @@
 """Instruments from a free run: A_j(f) line by line, without the bias that noise on the response brings."""
 
 from study import instrumental, miso, parametric
+from study.equations.free_run import prepare
+from study.equations.model import Model
 from study.estimators import output_error
 from study.estimators.base import Identified, Settings, named_parameters
-from study.free_run import prepare
 from study.inputs import histories, reverse_inputs
-from study.model import Model
 from study.output_error import FreeRunFit
 from study.records import spectra
 from study.records.record import MOTIONS, Record

@@ -8,10 +8,10 @@ import numpy as np
 
 from study import held_out, parametric
 from study.chaotic import CLEAN, astray, fit_record
+from study.equations.model import Model
 from study.estimators import miso
 from study.estimators.base import Identified, Settings, named_parameters
 from study.inputs import histories, reverse_inputs
-from study.model import Model
 from study.output_error import FreeRunFit, fit_free_run
 from study.parameters import Estimate
 from study.records import spectra

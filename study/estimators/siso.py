@@ -1,9 +1,9 @@
 """Single input, single output: the best linear fit, what the report's dashed curves show."""
 
 from study import miso, parameters
+from study.equations.model import Model
 from study.estimators.base import Identified, Settings, named_parameters
 from study.inputs import histories, reverse_inputs
-from study.model import Model
 from study.records import spectra
 from study.records.record import Record
 

@@ -1,9 +1,10 @@
 """What Save writes: the model file with its comments, the ladder, the pictures, and the session as one page."""
 
-from study import ladder, modelfile
+from study import ladder
 from study.compare.pictures import pictures
 from study.compare.report import as_json, document
 from study.diagnose.files import files as diagnosis_files
+from study.equations import model_file
 from study.explore.saved import saved
 from study.explore.session import Session
 from study.figures.ladder import files as ladder_pictures
@@ -31,7 +32,7 @@ def files(session: Session, name: str, text: str) -> dict[str, bytes]:
     now, steps = session.now, session.steps
     stem = name.rpartition(".")[0] or name
     found = {
-        name: modelfile.revised(text, name, now.model).encode(),
+        name: model_file.revised(text, name, now.model).encode(),
         f"{stem}.history.json": ladder.as_bytes(steps),
         "comparison.json": as_json(document([now.comparison])),
         PAGE: saved(session),

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from study import expression, held_out, shape_search
+from study import held_out, shape_search
 from study.compare.comparison import Comparison, compare, lacking_with
 from study.compare.report import rung as ladder_step
 from study.compare.restoring import Restoring
@@ -18,11 +18,11 @@ from study.diagnose.candidates import Trial
 from study.diagnose.files import in_words
 from study.diagnose.ranking import Ranked, rank
 from study.diagnose.verdict import Diagnosis, diagnose
-from study.model import Model
+from study.equations.model import Model
+from study.equations.terms import LIBRARY, Term, custom
 from study.records.plan import Plan, shortened
 from study.records.record import Record
 from study.support.errors import StudyError
-from study.terms import LIBRARY, Term, custom
 
 Step = dict[str, Any]
 Told = Callable[[str], None]
@@ -228,7 +228,7 @@ def own_term(session: Session, text: str) -> Term:
         formula = text
     term = custom(name.strip(), formula.strip())
     known = ("u", "v", "t", *session.record.extra)
-    for used in expression.names(formula.strip()):
+    for used in formula.names(formula.strip()):
         if used not in known:
             raise StudyError(
                 f"the expression {formula.strip()!r} uses the name {used!r}; it may use {', '.join(known)}"

@@ -5,7 +5,7 @@
 
 from matplotlib.axes import Axes
 
-from study import units
+from study.equations import dimensions
 from study.figures import labels
 from study.preliminary import Histogram
 
@@ -31,8 +31,8 @@ def histogram(axes: Axes, counts: Histogram, quantity: str, unit: str) -> Axes:
     )  # fmt: skip
     axes.set_ylim(bottom=0.0)
     axes.set_xlim(counts.points[0] / factor, counts.points[-1] / factor)
-    axes.set_xlabel(f"{quantity} ({units.pretty(shown)})")
-    axes.set_ylabel(f"probability density (1/{units.pretty(shown)})")
+    axes.set_xlabel(f"{quantity} ({dimensions.pretty(shown)})")
+    axes.set_ylabel(f"probability density (1/{dimensions.pretty(shown)})")
     spread, skewness = labels.quantity(counts.deviation, unit), round(counts.skewness, 2) + 0.0  # not "-0.00"
     axes.set_title(
         f"std. deviation {spread}, skewness {skewness:.2f} (Gaussian: 0), kurtosis {counts.kurtosis:.2f} (3)"

@@ -6,9 +6,9 @@ from fractions import Fraction
 
 import pandas as pd
 
-from study import expression, terms, units
+from study.equations import dimensions, formula, terms
 
-DIMENSIONS: dict[str, units.Dimensions] = {
+DIMENSIONS: dict[str, dimensions.Dimensions] = {
     "length": (Fraction(1), Fraction(0)),
     "1/length": (Fraction(-1), Fraction(0)),
     "time": (Fraction(0), Fraction(1)),
@@ -23,7 +23,7 @@ LOOSE = (ast.Add, ast.Sub)  # operators whose operands a product must put in bra
 
 def formula(text: str) -> str:
     r"""A shape such as ``u*cos(2*pi*f_m*t)`` as Matplotlib mathtext, such as ``$u\,\cos(2\,\pi\,f_{m}\,t)$``."""
-    return f"${_math(expression.parse(text))}$"
+    return f"${_math(formula.parse(text))}$"
 
 
 def _math(tree: ast.expr) -> str:
@@ -77,10 +77,10 @@ def response_unit(shape: str, force: str = "N", length: str = "m") -> str:
     """Unit of A_j, the force over an input's shape: ``N/m^3`` for ``u**3``."""
     known = {p.name: DIMENSIONS[p.quantity] for t in terms.LIBRARY.values() for p in t.parameters}
     try:
-        powers = units.dimensions(shape, known)
-    except expression.ExpressionError:
+        powers = dimensions.dimensions(shape, known)
+    except formula.ExpressionError:
         powers = None
-    return units.compose(force, length, powers)
+    return dimensions.compose(force, length, powers)
 
 
 def power_of_ten(largest: float) -> tuple[float, str]:
@@ -105,7 +105,7 @@ def prefixed(unit: str, largest: float) -> tuple[float, str]:
 def quantity(value: float, unit: str) -> str:
     """A value with its unit, three digits: ``6.64 mm``."""
     factor, shown = prefixed(unit, abs(value))
-    return f"{value / factor:.3g} {units.pretty(shown)}"
+    return f"{value / factor:.3g} {dimensions.pretty(shown)}"
 
 
 def estimated(parameters: pd.DataFrame) -> str:
@@ -128,7 +128,7 @@ def estimated(parameters: pd.DataFrame) -> str:
         symbol = _symbol(str(row["parameter"]))
         stated = f"${symbol}$ = {value / factor:.{digits}f}"
         within = f" ± {error / factor:.{digits}f}" if digits < MOST_DIGITS else ""
-        found.append(f"{stated}{within} {units.pretty(unit)} (given {float(row['true']) / factor:g})")
+        found.append(f"{stated}{within} {dimensions.pretty(unit)} (given {float(row['true']) / factor:g})")
     return ", ".join(found)
 
 

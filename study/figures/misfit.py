@@ -12,11 +12,11 @@ from matplotlib.colors import TwoSlopeNorm
 from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
-from study import units
 from study.compare.levels import Level
 from study.compare.reverse import ForceError
 from study.compare.stretches import AlongTime
 from study.compare.surface import Curve, Surface
+from study.equations import dimensions
 from study.figures import labels
 
 Floats = NDArray[np.float64]
@@ -50,7 +50,7 @@ def response(axes: Axes, time: Floats, measured: Floats, predicted: Floats, unit
     history(axes, time, measured / factor, MEASURED, linewidth=2.6 if close else 0.6)
     dashed = {"linestyle": (0, (3.0, 1.2)), "linewidth": 1.3} if close else {"alpha": 0.75, "linewidth": 0.6}
     history(axes, time, predicted / factor, PREDICTED, **dashed)
-    return _time_axis(axes, time, f"response ({units.pretty(shown)})")
+    return _time_axis(axes, time, f"response ({dimensions.pretty(shown)})")
 
 
 def residual(axes: Axes, time: Floats, difference: Floats, noise: float, unit: str) -> Axes:
@@ -59,7 +59,7 @@ def residual(axes: Axes, time: Floats, difference: Floats, noise: float, unit: s
     history(axes, time, difference / factor, RESIDUAL)
     for k, side in enumerate((-2.0, 2.0)):
         axes.axhline(side * noise / factor, label="twice the rms of the noise" if k else None, zorder=3.0, **NOISE)
-    return _time_axis(axes, time, f"difference ({units.pretty(shown)})")
+    return _time_axis(axes, time, f"difference ({dimensions.pretty(shown)})")
 
 
 def _time_axis(axes: Axes, time: Floats, label: str) -> Axes:
@@ -118,9 +118,9 @@ def missing_force(axes: Axes, found: Surface, unit: dict[str, str]) -> Axes:
     figure = axes.get_figure()
     assert figure is not None, "the axes stand on a page"
     bar = figure.colorbar(mesh, cax=axes.inset_axes((1.025, 0.0, 0.025, 1.0)))
-    bar.set_label(f"missing force ({units.pretty(unit['force'])})")
-    axes.set_xlabel(f"displacement ({units.pretty(shown)})")
-    axes.set_ylabel(f"velocity ({units.pretty(rate_shown)})")
+    bar.set_label(f"missing force ({dimensions.pretty(unit['force'])})")
+    axes.set_xlabel(f"displacement ({dimensions.pretty(shown)})")
+    axes.set_ylabel(f"velocity ({dimensions.pretty(rate_shown)})")
     return axes
 
 
@@ -134,8 +134,8 @@ def force_curve(axes: Axes, found: Curve, against: str, unit: dict[str, str]) ->
         found.at / factor, found.mean, 1.96 * found.error, fmt="o-", color="C0", markersize=3.5, linewidth=1.2,
         elinewidth=1.0, capsize=2.0, label="mean and 95 % interval",
     )  # fmt: skip
-    axes.set_xlabel(f"{against} ({units.pretty(shown)})")
-    axes.set_ylabel(f"missing force ({units.pretty(unit['force'])})")
+    axes.set_xlabel(f"{against} ({dimensions.pretty(shown)})")
+    axes.set_ylabel(f"missing force ({dimensions.pretty(unit['force'])})")
     return axes
 
 
@@ -194,6 +194,6 @@ def coefficient_by_level(axes: Axes, level: Level, force_unit: str) -> Axes:
         level.force, level.value, 1.96 * np.array(level.error), fmt="o-", color="C1" if level.moves else "C0",
         markersize=4.0, linewidth=1.2, capsize=2.5,
     )  # fmt: skip
-    axes.set_xlabel(f"rms force ({units.pretty(force_unit)})")
-    axes.set_ylabel(f"{level.key} ({units.pretty(level.unit)})")
+    axes.set_xlabel(f"rms force ({dimensions.pretty(force_unit)})")
+    axes.set_ylabel(f"{level.key} ({dimensions.pretty(level.unit)})")
     return axes

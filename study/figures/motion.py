@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from study import units
+from study.equations import dimensions
 from study.figures import labels
 from study.preliminary import Pattern
 
@@ -37,8 +37,8 @@ def patterns(
         axes.plot(harmonic.displacement / factor, harmonic.force, **look)
         axes.set_xlim(-1.06 * largest / factor, 1.06 * largest / factor)
         axes.set_ylim(-reach, reach)
-        axes.set_xlabel(f"displacement ({units.pretty(shown)})")
-    harmonic_axes.set_ylabel(f"restoring force $F_r$ ({units.pretty(unit['force'])})")
+        axes.set_xlabel(f"displacement ({dimensions.pretty(shown)})")
+    harmonic_axes.set_ylabel(f"restoring force $F_r$ ({dimensions.pretty(unit['force'])})")
 
 
 def autospectrum(axes: Axes, frequency: Floats, density: Floats, unit: str, highest: float) -> Axes:
@@ -68,10 +68,10 @@ def history(axes: Axes, time: Floats, values: Floats, quantity: str, unit: str) 
     axes.plot(time, values, color="C0", linewidth=0.9)
     axes.set_xlim(float(time[0]), float(time[-1]))
     axes.set_xlabel("time (s)")
-    axes.set_ylabel(f"{quantity} ({units.pretty(unit)})")
+    axes.set_ylabel(f"{quantity} ({dimensions.pretty(unit)})")
     return axes
 
 
 def _squared(unit: str) -> str:
     """The square of a unit, in brackets where it is a quotient."""
-    return units.pretty(f"({unit})^2" if "/" in unit else f"{unit}^2")
+    return dimensions.pretty(f"({unit})^2" if "/" in unit else f"{unit}^2")

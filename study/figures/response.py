@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from study import units
+from study.equations import dimensions
 from study.figures import labels
 from study.figures.curves import Curve, InputResponse
 from study.figures.styles import EXACT, look
@@ -36,7 +36,7 @@ def magnitude(axes: Axes, response: InputResponse, unit: str) -> Axes:
         sizes.append(np.abs(response.exact))
     axes.set_yscale("log")
     _decades(axes, sizes)
-    axes.set_ylabel(f"$|A_{response.number}|$ ({units.pretty(unit)})")
+    axes.set_ylabel(f"$|A_{response.number}|$ ({dimensions.pretty(unit)})")
     return _frequency_axis(axes, response)
 
 
@@ -76,12 +76,12 @@ def real_and_imaginary(real: Axes, imaginary: Axes, response: InputResponse, uni
         logarithmic scale, as in Figure 26b.
     """
     factor, power = labels.power_of_ten(span)
-    label, name = units.pretty(f"{power}{unit}"), f"A_{response.number}"
+    label, name = dimensions.pretty(f"{power}{unit}"), f"A_{response.number}"
     _linear(real, response, np.real, factor, span)
     real.set_ylabel(rf"Re ${name}$ ({label})")
     if _grows(response):
         _logarithmic(imaginary, response, span)
-        imaginary.set_ylabel(rf"|Im ${name}$| ({units.pretty(unit)})")
+        imaginary.set_ylabel(rf"|Im ${name}$| ({dimensions.pretty(unit)})")
     else:
         _linear(imaginary, response, np.imag, factor, span)
         imaginary.set_ylabel(rf"Im ${name}$ ({label})")

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study.free_run import predict
-from study.model import Model, ModelTerm, free
+from study.equations.free_run import predict
+from study.equations.model import Model, ModelTerm, free
+from study.equations.simulate import Integrator, simulate
+from study.equations.terms import LIBRARY, Term, get
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.record import MOTIONS, Record
-from study.simulate import Integrator, simulate
 from study.support.errors import DivergenceError, StudyError
-from study.terms import LIBRARY, Term, get
 from study.trials.strength import SHARE, grown, share_of
 
 Floats = NDArray[np.float64]

@@ -15,11 +15,11 @@ import numpy as np
 from study import held_out
 from study.compare.fitted import fit_model
 from study.diagnose.verdict import MISSING, Diagnosis, diagnose
-from study.model import Model, free
+from study.equations.model import Model, free
+from study.equations.terms import Term
 from study.output_error import FreeRunFit
 from study.records.plan import Plan, make_plan
 from study.support.errors import DivergenceError, StudyError
-from study.terms import Term
 from study.trials.draw import HIDDEN, Trial, make_trial
 
 Row = dict[str, Any]

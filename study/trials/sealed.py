@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
-from study.modelfile import format_model
+from study.equations.model_file import format_model
 from study.records.record import write_csv
 from study.support.errors import StudyError
 from study.support.files import read_text, replace_file, replacing

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from study.equations.model import Model, ModelTerm
+from study.equations.simulate import Integrator, simulate
 from study.inputs import Input, history, reverse_inputs
-from study.model import Model, ModelTerm
 from study.records.record import Record
-from study.simulate import Integrator, simulate
 from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study import kernels
-from study.free_run import prepare
-from study.model import Model
+from study.equations import kernels
+from study.equations.free_run import prepare
+from study.equations.model import Model
 from study.records.record import Record
 from study.records.states import angular_rate, starting_states
 

@@ -8,7 +8,7 @@ import ast
 import math
 from collections.abc import Mapping
 
-from study.graph import Graph, Op
+from study.equations.graph import Graph, Op
 from study.support.errors import StudyError
 
 LONGEST = 300

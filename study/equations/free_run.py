@@ -14,9 +14,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from study import kernels
-from study.graph import Op, Program
-from study.model import Model, forward_graph, with_registers
+from study.equations import kernels
+from study.equations.graph import Op, Program
+from study.equations.model import Model, forward_graph, with_registers
 from study.records.interpolation import between_samples
 from study.records.record import MOTIONS, Record
 from study.support.errors import DivergenceError, StudyError

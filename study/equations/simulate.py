@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study import kernels
-from study.model import Model, forward_program
+from study.equations import kernels
+from study.equations.model import Model, forward_program
 from study.records.interpolation import between_samples
 from study.records.record import SI_UNITS, Record
 from study.support.errors import DivergenceError, StudyError

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from study import expression
-from study.model import Model, unit_forces
-from study.terms import LIBRARY
+from study.equations import formula
+from study.equations.model import Model, unit_forces
+from study.equations.terms import LIBRARY
 
 Floats = NDArray[np.float64]
 POINTS, FEWEST = 512, 32  # random motions at which formulas are compared, and how many of them must be finite
@@ -43,9 +43,9 @@ def repeated_force(model: Model) -> str | None:
 
 def _forces(model: Model) -> tuple[tuple[str, ...], Floats]:
     """Names of the terms, and their forces with unit coefficients at random motions, shape (points, components)."""
-    from study import kernels  # compiled code is loaded only where a formula asks for it
+    from study.equations import kernels  # compiled code is loaded only where a formula asks for it
 
-    used = {n for t in model.terms if t.name not in LIBRARY for n in expression.names(t.term.components[0].shape)}
+    used = {n for t in model.terms if t.name not in LIBRARY for n in formula.names(t.term.components[0].shape)}
     channels = tuple(sorted(used - {"u", "v", "t"}))
     names, program = unit_forces(model, channels)
     rng = np.random.default_rng(1990)

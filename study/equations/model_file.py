@@ -21,15 +21,15 @@ from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
 
-from study import expression, terms
-from study.graph import Graph
-from study.model import Model, ModelTerm, free
-from study.repeated import repeated_force
+from study.equations import formula, terms
+from study.equations.graph import Graph
+from study.equations.model import Model, ModelTerm, free
+from study.equations.redundancy import repeated_force
+from study.equations.terms import Term
 from study.support import yaml_text
 from study.support.errors import StudyError
 from study.support.files import read_text, replace_file
 from study.support.yaml_text import as_list, as_mapping, scalar, shown
-from study.terms import Term
 
 MOST_TERMS = 200
 LONGEST_NAME = 100
@@ -230,7 +230,7 @@ def _own(name: str, force: object) -> Term:
     if not isinstance(force, str):
         raise StudyError(f"force of {name!r} is {shown(force)}; a formula in quotes is right")
     term = terms.custom(name, force)
-    names = expression.names(force)
+    names = formula.names(force)
     coefficients = {symbol for known in (term, *terms.LIBRARY.values()) for symbol in known.symbols}
     for used in names:
         if used in coefficients:  # a channel of that name would be mixed up with the coefficient
@@ -238,7 +238,7 @@ def _own(name: str, force: object) -> Term:
                 f"force of {name!r} uses {used!r}, a coefficient's name; write a number or rename the channel"
             )
     graph = Graph()
-    expression.build(graph, force, {used: graph.input(used) for used in names})
+    formula.build(graph, force, {used: graph.input(used) for used in names})
     return term
 
 

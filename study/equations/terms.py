@@ -10,8 +10,8 @@ To add an effect, add one entry to ``LIBRARY`` and one row to the parametrised t
 
 from dataclasses import dataclass, field
 
-from study import expression, units
-from study.graph import Graph
+from study.equations import dimensions, formula
+from study.equations.graph import Graph
 from study.support.errors import StudyError
 
 
@@ -87,19 +87,19 @@ class Term:
         """Unit of one coefficient for a record with these units of force and length."""
         component = next(c for c in self.components if c.symbol == symbol)
         known = {p.name: QUANTITIES[p.quantity] for p in self.parameters} | {"z": STATE_DIMENSIONS}
-        powers = units.dimensions(component.shape, known)
+        powers = dimensions.dimensions(component.shape, known)
         if powers is not None:
             powers = (powers[0], powers[1] - component.order)
-        return units.compose(force, length, powers)
+        return dimensions.compose(force, length, powers)
 
 
 QUANTITIES = {
-    "length": units.VARIABLES["u"],
-    "time": units.VARIABLES["t"],
-    "frequency": (units.NONE[0], units.NONE[1] - 1),
-    "1/length": (units.NONE[0] - 1, units.NONE[1]),
+    "length": dimensions.VARIABLES["u"],
+    "time": dimensions.VARIABLES["t"],
+    "frequency": (dimensions.NONE[0], dimensions.NONE[1] - 1),
+    "1/length": (dimensions.NONE[0] - 1, dimensions.NONE[1]),
 }
-STATE_DIMENSIONS = units.VARIABLES["u"]  # the states of the library are internal displacements
+STATE_DIMENSIONS = dimensions.VARIABLES["u"]  # the states of the library are internal displacements
 
 
 def _single(
@@ -250,5 +250,5 @@ def custom(name: str, force: str) -> Term:
     if not name.isidentifier() or not name.isascii():
         raise StudyError(f"{name!r} is not a name for a term; use letters, digits and underscores")
     graph = Graph()
-    expression.build(graph, force, {n: graph.input(n) for n in expression.names(force)})  # refuses all but a formula
+    formula.build(graph, force, {n: graph.input(n) for n in formula.names(force)})  # refuses all but a formula
     return _single(name, f"q_{name}", force, meaning=f"the user's own force {force}", cause="as the user knows")
