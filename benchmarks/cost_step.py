@@ -11,12 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-from study import estimators, miso, parameters
 from study.equations.model_file import read_model
 from study.equations.simulate import Integrator, simulate
-from study.estimators.base import Settings
-from study.inputs import histories, reverse_inputs
-from study.output_error import fit_free_run
+from study.identify import estimators
+from study.identify.estimators.base import Settings
+from study.identify.frequency_domain import coefficients, conditioned
+from study.identify.frequency_domain.inputs import histories, reverse_inputs
+from study.identify.time_domain.free_run_fit import fit_free_run
 from study.records.excitation import Excitation, force
 from study.records.record import Record
 from study.records.spectra import Segments, cross_spectra_in_pieces
@@ -57,7 +58,7 @@ def channels(path: Path, samples: int) -> Iterator[list[np.ndarray]]:
 def miso_in_pieces(path: Path, samples: int) -> None:
     """Read, cross-spectra, MI/SO, coefficients."""
     matrix = cross_spectra_in_pieces(channels(path, samples), DT, SETTINGS.segments)
-    parameters.fit(miso.analyse(matrix), INPUTS, SETTINGS.band, SETTINGS.segments.line_inflation())
+    coefficients.fit(conditioned.analyse(matrix), INPUTS, SETTINGS.band, SETTINGS.segments.line_inflation())
 
 
 def miso_whole(path: Path, samples: int) -> None:

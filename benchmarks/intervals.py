@@ -13,13 +13,13 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from study import estimators
 from study.config import load
 from study.ensemble import threaded
 from study.equations.model_file import read_model
 from study.equations.simulate import Integrator, simulate
-from study.estimators import output_error
-from study.estimators.base import Settings
+from study.identify import estimators
+from study.identify.estimators import output_error
+from study.identify.estimators.base import Settings
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.record import Record
 from study.records.spectra import Segments

@@ -15,10 +15,10 @@ from sysidentpy.basis_function import Polynomial
 from sysidentpy.model_structure_selection import FROLS
 from sysidentpy.parameter_estimation import LeastSquares
 
-from study import estimators
 from study.equations.model import Model
-from study.estimators.base import Settings
-from study.output_error import fit_free_run
+from study.identify import estimators
+from study.identify.estimators.base import Settings
+from study.identify.time_domain.free_run_fit import fit_free_run
 from study.records.record import Record
 from study.records.spectra import Segments
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from scipy.signal import csd
 
-from study import miso, parameters
 from study.equations.model import Model, forward_program
 from study.equations.model_file import read_model
 from study.equations.simulate import METHODS, Integrator, simulate
-from study.inputs import histories, reverse_inputs
-from study.local_fit import fit
-from study.local_polynomial import LocalPolynomial, responses, transform
+from study.identify.frequency_domain import coefficients, conditioned
+from study.identify.frequency_domain.inputs import histories, reverse_inputs
+from study.identify.frequency_domain.local_polynomial_fit import fit
+from study.identify.frequency_domain.local_polynomial_method import LocalPolynomial, responses, transform
 from study.records.excitation import Excitation, force
 from study.records.interpolation import between_samples
 from study.records.spectra import Segments, cross_spectra
@@ -121,4 +121,4 @@ def in_reverse(samples: int):
     """MI/SO with everything that follows from the inputs' time histories."""
     inputs, data = reverse_channels(samples)
     inflation = Segments().line_inflation()
-    return lambda: parameters.fit(miso.analyse(cross_spectra(data, DT)), inputs, (0.3, 10.0), inflation)
+    return lambda: coefficients.fit(conditioned.analyse(cross_spectra(data, DT)), inputs, (0.3, 10.0), inflation)

@@ -1,11 +1,11 @@
 # What several rules share: the modules that each stage rests on, settings and files by case.
 from study.config import PRELIMINARY
-from study.estimators import ESTIMATORS
+from study.identify.estimators import ESTIMATORS
 from study.support.code_dependencies import rests_on
 
-# Touching study/miso.py re-runs identification and what follows, not simulation, though the two share
+# Touching study/identify/frequency_domain/conditioned.py re-runs identification and what follows, not simulation, though the two share
 # study/reproduction/make_record.py: what only identification uses is not followed from there.
-IDENTIFICATION_ONLY = ["study.estimators", "study.estimators.base", "study.records.spectra", "study.local_polynomial"]
+IDENTIFICATION_ONLY = ["study.identify.estimators", "study.identify.estimators.base", "study.records.spectra", "study.identify.frequency_domain.local_polynomial_method"]
 CODE = {
     "record": rests_on(Path("scripts/make_record.py"), without=IDENTIFICATION_ONLY),
     "identify": rests_on(Path("scripts/identify.py"), also=ESTIMATORS.values()),

@@ -11,7 +11,7 @@ from study import case_names, needs
 from study.equations import terms
 from study.equations.model import Model, forward_graph, free
 from study.equations.model_file import read_model
-from study.estimators.base import true_parameters
+from study.identify.estimators.base import true_parameters
 from study.records.excitation import SETTINGS, Excitation, theoretical_autospectrum
 from study.support.errors import StudyError
 from study.support.schema import check, numbered_rows, read_yaml
@@ -211,7 +211,7 @@ def _complete_model(path: Path) -> Model:
 
 def _check_assumed(model: Model, extra: str, settings: Table) -> None:
     """Whether the record can tell the inputs of the assumed model apart."""
-    from study.local_polynomial import LocalPolynomial
+    from study.identify.frequency_domain.local_polynomial_method import LocalPolynomial
     from study.records.spectra import Segments
 
     if extra:

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from study import estimators
 from study.equations.model import Model
 from study.equations.terms import get
-from study.estimators.base import Identified, Settings
-from study.local_polynomial import LocalPolynomial
+from study.identify import estimators
+from study.identify.estimators.base import Identified, Settings
+from study.identify.frequency_domain.local_polynomial_method import LocalPolynomial
 from study.records.record import Record
 from study.records.spectra import Segments
 from study.support.errors import DivergenceError

@@ -14,8 +14,8 @@ import pandas as pd
 
 from study.ensemble import threaded
 from study.equations.model import Model
-from study.estimators import miso
-from study.estimators.base import Settings, true_parameters
+from study.identify.estimators import miso
+from study.identify.estimators.base import Settings, true_parameters
 from study.identify_case import estimator_settings
 from study.make_record import make_record
 from study.support.errors import DivergenceError

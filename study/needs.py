@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from study.estimators import ESTIMATORS
+from study.identify.estimators import ESTIMATORS
 from study.records.excitation import READINGS, SETTINGS, Excitation, theoretical_autospectrum
 from study.support.errors import StudyError
 

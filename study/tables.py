@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 
 from study.equations.model import Model
-from study.estimators.base import Identified, true_parameters
-from study.inputs import Input
-from study.miso import MisoResult
+from study.identify.estimators.base import Identified, true_parameters
+from study.identify.frequency_domain.conditioned import MisoResult
+from study.identify.frequency_domain.inputs import Input
 from study.support.files import replacing
 
 Table = Mapping[str, Any]

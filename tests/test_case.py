@@ -8,7 +8,7 @@ import pytest
 
 from study import tables
 from study.config import load
-from study.estimators import ESTIMATORS
+from study.identify.estimators import ESTIMATORS
 from study.identify_case import assumed_model, estimator_settings, identify_case
 from study.make_record import make_record
 from study.support.errors import DivergenceError, StudyError

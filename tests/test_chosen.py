@@ -6,16 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study import cli, estimators
+from study import cli
 from study.compare.chosen import CHAOTIC
 from study.compare.comparison import Comparison, compare
-from study.compare.fitted import Coefficient
 from study.compare.local_reverse import local_force_error
 from study.compare.report import document, summary
 from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
-from study.estimators.base import Settings
+from study.identify import estimators
+from study.identify.estimators.base import Settings
+from study.identify.time_domain.fit_model import Coefficient
 from study.records.completion import CompletedRecord
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.plan import Plan

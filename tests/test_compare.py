@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from study.compare import amplitude, frequency, noise, stretches, surface
 from study.compare.comparison import Comparison, across, compare
-from study.compare.fitted import Coefficient
 from study.compare.judged import Judged
 from study.compare.levels import levels
 from study.compare.report import as_json, document, summary, tables
@@ -17,6 +16,7 @@ from study.compare.says import says, says_of_all
 from study.equations.model import Model, ModelTerm, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
+from study.identify.time_domain.fit_model import Coefficient
 from study.records.excitation import Excitation, force
 from study.records.plan import Plan, make_plan
 from study.records.record import Record

@@ -12,8 +12,8 @@ from study import measurements
 from study.config import load
 from study.equations.model_file import read_model
 from study.equations.simulate import simulate
-from study.estimators import ESTIMATORS, identify
-from study.estimators.base import Settings
+from study.identify.estimators import ESTIMATORS, identify
+from study.identify.estimators.base import Settings
 from study.needs import CURVES
 from study.records.excitation import Excitation, force
 from study.records.spectra import Segments

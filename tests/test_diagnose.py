@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study import held_out, trials
+from study import trials
 from study.diagnose import report, steadiness
 from study.diagnose.says import sentences
 from study.diagnose.separate import separating_level
@@ -12,6 +12,7 @@ from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN, diagnose
 from study.equations.model import ModelTerm
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY, custom
+from study.identify.time_domain import held_out
 from study.records import noise_floor
 from study.records.plan import make_plan
 from study.records.record import Record

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study import estimators
 from study.equations.simulate import Integrator, simulate
-from study.estimators.base import Settings, named_parameters, true_parameters
-from study.estimators.hand_read import read_linear
-from study.parameters import Estimate
+from study.identify import estimators
+from study.identify.estimators.base import Settings, named_parameters, true_parameters
+from study.identify.estimators.hand_read import read_linear
+from study.identify.frequency_domain.coefficients import Estimate
 from study.records.spectra import Segments
 from study.support.errors import StudyError
 

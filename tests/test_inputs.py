@@ -7,7 +7,7 @@ import pytest
 
 from study.equations.model import Model
 from study.equations.terms import custom, get
-from study.inputs import Part, histories, reverse_inputs
+from study.identify.frequency_domain.inputs import Part, histories, reverse_inputs
 from study.records.record import Record
 from study.support.errors import StudyError
 

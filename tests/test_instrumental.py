@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study import estimators, instrumental
-from study.estimators.base import Settings
-from study.inputs import Input, Part, history, reverse_inputs
+from study.identify import estimators
+from study.identify.estimators.base import Settings
+from study.identify.frequency_domain import instruments
+from study.identify.frequency_domain.inputs import Input, Part, history, reverse_inputs
 from study.records.excitation import displacement_noise
 from study.records.record import Record
 from study.records.spectra import Segments
@@ -41,7 +42,7 @@ def test_mean_of_a_power_is_what_its_moments_say(u):
         ("u*cos(2*pi*f_m*t)", u),
     ):
         item = one_input(shape, *([("f_m", 0.0)] if "f_m" in shape else []))
-        np.testing.assert_allclose(instrumental.expected(item, still(u), spread), exact, atol=1e-12)
+        np.testing.assert_allclose(instruments.expected(item, still(u), spread), exact, atol=1e-12)
 
 
 @pytest.mark.parametrize("shape", ["u*abs(u)", "max(min(u, u_g), -u_g)", "u**2*v", "v*abs(v)", "abs(u)*v"])
@@ -54,7 +55,7 @@ def test_mean_of_any_shape_is_that_of_many_draws(shape):
     noise = root @ draws
     moved = Record(0.02, {"force": noise[0], "displacement": 0.2 + noise[0], "velocity": 0.5 + noise[1]})
     values = history(item, moved)
-    found = instrumental.expected(item, still(0.2, 0.5), spread)[0]
+    found = instruments.expected(item, still(0.2, 0.5), spread)[0]
     assert abs(found - values.mean()) < 4.0 * values.std() / np.sqrt(values.size) + 1e-3 * abs(values.mean())
 
 
@@ -65,7 +66,7 @@ def test_corrected_inputs_have_the_mean_of_the_true_ones(systems, records):
     raw, mended = [], []
     for seed in range(6):
         measured = noisy(clean, 0.2, seed)
-        mended.append(instrumental.corrected([cube], measured, clean)[0])
+        mended.append(instruments.corrected([cube], measured, clean)[0])
         raw.append(history(cube, measured))
     slope = [float(np.mean([x @ true for x in found]) / (true @ true)) for found in (raw, mended)]
     u = clean["displacement"]
@@ -78,7 +79,7 @@ def test_corrected_inputs_have_the_mean_of_the_true_ones(systems, records):
 def test_noise_of_the_measured_channels_is_that_which_was_added(records):
     clean = records["duffing"]
     measured = noisy(clean, 0.1, 2)
-    spread = instrumental.noise_spread(measured, clean)
+    spread = instruments.noise_spread(measured, clean)
     added = 0.1 * np.mean(clean["displacement"] ** 2)
     assert np.linalg.norm(spread["displacement"]) ** 2 == pytest.approx(added, rel=0.05)
     assert not np.any(spread["velocity"])
@@ -118,7 +119,7 @@ def test_a_formula_of_a_missing_channel_is_refused(records):
     record = records["duffing"]
     lacking = replace(record, channels={name: record[name] for name in ("force", "displacement")})
     with pytest.raises(StudyError, match="velocity"):
-        instrumental.corrected([one_input("v**3")], lacking, lacking)
+        instruments.corrected([one_input("v**3")], lacking, lacking)
 
 
 def test_coherence_along_the_free_run_is_that_without_noise(systems, records):

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study.chaotic import fit_in_pieces
 from study.equations.free_run import predict
 from study.equations.simulate import simulate
-from study.joining import fit_pieces, joined
-from study.pieces import Pieces, even_restarts
+from study.identify.time_domain.continuation import fit_pieces, joined
+from study.identify.time_domain.multiple_shooting import fit_in_pieces
+from study.identify.time_domain.shooting import Pieces, even_restarts
 from study.records.excitation import displacement_noise
 from study.records.record import Record
 

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from study import held_out, shape_search, trials
-from study.compare.fitted import fit_model
+from study import trials
 from study.diagnose import candidates, nature, pairs, preselect, steadiness
 from study.diagnose.ranking import rank
 from study.equations.model import free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
+from study.identify.time_domain import held_out, shape_search
+from study.identify.time_domain.fit_model import fit_model
 from study.records.excitation import Excitation, force
 from study.records.plan import make_plan
 from study.records.record import Record

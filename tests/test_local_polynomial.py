@@ -6,12 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study import estimators, local_polynomial
 from study.equations.simulate import Integrator, simulate
-from study.estimators.base import Settings
-from study.inputs import Input, Part, histories, reverse_inputs
-from study.local_fit import fit
-from study.local_polynomial import Lines, LocalPolynomial, transform
+from study.identify import estimators
+from study.identify.estimators.base import Settings
+from study.identify.frequency_domain import local_polynomial_method
+from study.identify.frequency_domain.inputs import Input, Part, histories, reverse_inputs
+from study.identify.frequency_domain.local_polynomial_fit import fit
+from study.identify.frequency_domain.local_polynomial_method import Lines, LocalPolynomial, transform
 from study.records.excitation import Excitation, force
 from study.records.spectra import Segments
 from study.support.errors import StudyError
@@ -42,7 +43,7 @@ def made_lines(count=400, noise=0.0, seed=3):
 
 def test_polynomials_are_found_exactly_whatever_leaks():
     lines, exact = made_lines()
-    found = local_polynomial.responses(lines, LocalPolynomial(2, 12))
+    found = local_polynomial_method.responses(lines, LocalPolynomial(2, 12))
     index = np.searchsorted(lines.frequency, found.frequency - 1e-9)
     np.testing.assert_allclose(found.response, exact[:, index], rtol=1e-9)
     assert np.all(found.noise < 1e-18 * np.mean(np.abs(lines.output) ** 2))
@@ -53,7 +54,7 @@ def test_polynomials_are_found_exactly_whatever_leaks():
 def test_a_band_is_solved_as_a_dense_solver_does():
     lines, _ = made_lines(noise=50.0)
     how = LocalPolynomial(1, 10)
-    found = local_polynomial.responses(lines, how)
+    found = local_polynomial_method.responses(lines, how)
     b, first = 3, 3 * 5
     x = np.arange(-10, 11) / 10.0
     part = slice(first, first + 21)
@@ -69,15 +70,15 @@ def test_a_band_is_solved_as_a_dense_solver_does():
 
 def test_bands_solved_in_chunks_are_the_same(monkeypatch):
     lines, _ = made_lines(noise=1.0)
-    whole = local_polynomial.responses(lines, LocalPolynomial(2, 12))
-    monkeypatch.setattr(local_polynomial, "CHUNK", 7)
-    parts = local_polynomial.responses(lines, LocalPolynomial(2, 12))
+    whole = local_polynomial_method.responses(lines, LocalPolynomial(2, 12))
+    monkeypatch.setattr(local_polynomial_method, "CHUNK", 7)
+    parts = local_polynomial_method.responses(lines, LocalPolynomial(2, 12))
     np.testing.assert_array_equal(whole.response, parts.response)
     np.testing.assert_array_equal(whole.covariance, parts.covariance)
 
 
 def test_covariance_and_noise_are_those_of_many_seeds():
-    found = [local_polynomial.responses(made_lines(120, 50.0, s)[0], LocalPolynomial(2, 15)) for s in range(60)]
+    found = [local_polynomial_method.responses(made_lines(120, 50.0, s)[0], LocalPolynomial(2, 15)) for s in range(60)]
     exact = made_lines(120)[1][:, np.searchsorted(made_lines(120)[0].frequency, found[0].frequency - 1e-9)]
     off = np.array([f.response - exact for f in found])
     claimed = np.array([np.einsum("fjj->jf", f.covariance.real) for f in found])
@@ -190,7 +191,7 @@ def test_memory_does_not_grow_with_bands_times_inputs():
     import tracemalloc
 
     tracemalloc.start()
-    local_polynomial.responses(lines, LocalPolynomial())
+    local_polynomial_method.responses(lines, LocalPolynomial())
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     bands = len(lines.frequency) // 20
@@ -207,7 +208,7 @@ def test_records_that_are_too_short(systems, records):
     with pytest.raises(StudyError, match=re.escape(says)):
         fit(lines, inputs, BAND, LocalPolynomial())
     with pytest.raises(StudyError, match="the record of 256 samples has 127 lines, fewer than the 161 of a band"):
-        local_polynomial.responses(lines, LocalPolynomial(2, 80))
+        local_polynomial_method.responses(lines, LocalPolynomial(2, 80))
 
 
 def test_bands_that_are_too_narrow():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from study.equations.model import Model
-from study.inputs import histories, reverse_inputs
-from study.miso import MisoResult, analyse
+from study.identify.frequency_domain.conditioned import MisoResult, analyse
+from study.identify.frequency_domain.inputs import histories, reverse_inputs
 from study.records.record import Record
 from study.records.spectra import Segments, SpectralMatrix, cross_spectra
 from study.support.errors import StudyError

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from study import parameters
-from study.chaotic import fit_in_pieces
 from study.equations.free_run import FreeRun, predict, prepare
 from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY, custom
-from study.inputs import histories, reverse_inputs
-from study.miso import analyse
-from study.output_error import FreeRunFit, fit_free_run
-from study.pieces import REACHES, Pieces
+from study.identify.frequency_domain import coefficients
+from study.identify.frequency_domain.conditioned import analyse
+from study.identify.frequency_domain.inputs import histories, reverse_inputs
+from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
+from study.identify.time_domain.multiple_shooting import fit_in_pieces
+from study.identify.time_domain.shooting import REACHES, Pieces
 from study.records.excitation import displacement_noise
 from study.records.record import MOTIONS, SI_UNITS, Record
 from study.records.spectra import Segments, cross_spectra
@@ -70,7 +70,7 @@ def started(model: Model, record: Record) -> dict[str, float]:
     """What MI/SO makes of the record."""
     inputs, cut = reverse_inputs(model), Segments()
     responses = analyse(cross_spectra([*histories(inputs, record), record["force"]], record.dt, cut))
-    estimate = parameters.fit(responses, inputs, (0.3, 10.0), cut.line_inflation())
+    estimate = coefficients.fit(responses, inputs, (0.3, 10.0), cut.line_inflation())
     return dict(zip(estimate.symbols, (float(v) for v in estimate.values), strict=True))
 
 

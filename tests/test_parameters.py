@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from study.equations.model import Model
-from study.inputs import histories, reverse_inputs
-from study.miso import MisoResult, analyse
-from study.parameters import Estimate, fit
+from study.identify.frequency_domain.coefficients import Estimate, fit
+from study.identify.frequency_domain.conditioned import MisoResult, analyse
+from study.identify.frequency_domain.inputs import histories, reverse_inputs
 from study.records.record import Record
 from study.records.spectra import Segments, cross_spectra
 

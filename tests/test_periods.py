@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study import estimators
 from study.equations.simulate import Integrator, simulate
-from study.estimators.base import Settings
+from study.identify import estimators
+from study.identify.estimators.base import Settings
+from study.identify.frequency_domain.inputs import histories, reverse_inputs
+from study.identify.frequency_domain.periodic import Periods, fit, steady
 from study.identify_case import identify_case
-from study.inputs import histories, reverse_inputs
-from study.periods import Periods, fit, steady
 from study.records.excitation import Excitation, force
 from study.records.record import Record
 from study.records.spectra import Segments

@@ -5,14 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from study import estimators, tables
-from study.chaotic import fit_record
+from study import tables
 from study.equations.simulate import simulate
-from study.estimators.base import Settings
-from study.output_error import fit_free_run
+from study.identify import estimators
+from study.identify.estimators.base import Settings
+from study.identify.time_domain.free_run_fit import fit_free_run
+from study.identify.time_domain.multiple_shooting import fit_record
+from study.identify.time_domain.open_shapes import shape_keys, with_starting_shapes
 from study.records.excitation import displacement_noise
 from study.records.spectra import Segments
-from study.shapes import shape_keys, with_starting_shapes
 from study.support.errors import StudyError
 
 TOLD = Settings(Segments(512), (0.3, 10.0))
@@ -134,7 +135,7 @@ def test_a_search_that_does_not_arrive_says_so(systems, records, monkeypatch):
     def hasty(model, record, **told):
         return fit_free_run(model, record, **told, max_iterations=1)
 
-    monkeypatch.setattr("study.estimators.output_error.fit_record", hasty)
+    monkeypatch.setattr("study.identify.estimators.output_error.fit_record", hasty)
     record = noisy(records["duffing"], 0.05, 1)
     found = estimators.identify("output_error", systems["duffing"], record, TOLD)
     assert found.note == "still falling after 1 free runs, the most allowed"

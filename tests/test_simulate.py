@@ -14,10 +14,10 @@ from study.equations.model import Model
 from study.equations.model_file import read_model
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import custom
-from study.inputs import histories, reverse_inputs
+from study.identify.frequency_domain.coefficients import fit
+from study.identify.frequency_domain.conditioned import analyse
+from study.identify.frequency_domain.inputs import histories, reverse_inputs
 from study.make_record import make_record
-from study.miso import analyse
-from study.parameters import fit
 from study.records.excitation import Excitation, force
 from study.records.spectra import Segments, cross_spectra
 from study.support.errors import DivergenceError, StudyError

@@ -98,7 +98,12 @@ def test_a_module_that_is_no_python_is_named(package):
 
 def test_simulation_does_not_rest_on_identification():
     script = Path("scripts/make_record.py")
-    cut = ["study.estimators", "study.estimators.base", "study.records.spectra", "study.local_polynomial"]
+    cut = [
+        "study.identify.estimators",
+        "study.identify.estimators.base",
+        "study.records.spectra",
+        "study.identify.frequency_domain.local_polynomial_method",
+    ]
     found = rests_on(ROOT / script, without=cut)
     names = {Path(p).name for p in found}
     assert {"simulate.py", "kernels.py", "excitation.py", "terms.py", "record.py"} <= names

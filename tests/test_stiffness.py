@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from study import estimators
-from study.chaotic import fit_record
 from study.equations.simulate import Integrator, simulate
 from study.equations.substeps import Steps, needed_steps
-from study.estimators.base import Settings
+from study.identify import estimators
+from study.identify.estimators.base import Settings
+from study.identify.time_domain.multiple_shooting import fit_record
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.spectra import Segments
 

@@ -9,9 +9,9 @@ import pytest
 
 from study import tables
 from study.config import load
-from study.estimators.base import Identified, Parameter
+from study.identify.estimators.base import Identified, Parameter
+from study.identify.frequency_domain.responses import Responses
 from study.identify_case import identify_case
-from study.responses import Responses
 from study.support.errors import StudyError
 
 CONFIG = load(Path(__file__).parent.parent / "config")

@@ -15,7 +15,7 @@ from study.equations.graph import Graph
 from study.equations.model import Model, forward_graph, free, with_registers
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY, Component, Term, custom, get
-from study.inputs import histories, reverse_inputs
+from study.identify.frequency_domain.inputs import histories, reverse_inputs
 from study.records.excitation import Excitation, force
 from study.support.errors import StudyError
 

@@ -8,11 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study import held_out
 from study.cli import main
 from study.equations.model_file import parse_model, read_model
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY
+from study.identify.time_domain import held_out
 from study.records.plan import make_plan
 from study.records.readers import read_record
 from study.support.errors import StudyError

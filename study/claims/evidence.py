@@ -13,11 +13,11 @@ from study.claims.sample import Sample, average
 from study.ensemble import NOISE_OFFSET, threaded
 from study.equations.model import Model
 from study.equations.terms import get
-from study.estimators import miso, siso
-from study.estimators.base import Identified, Settings
-from study.estimators.hand_read import read_curve
+from study.identify.estimators import miso, siso
+from study.identify.estimators.base import Identified, Settings
+from study.identify.estimators.hand_read import read_curve
+from study.identify.frequency_domain.conditioned import MisoResult
 from study.make_record import make_record
-from study.miso import MisoResult
 from study.records.record import Record
 from study.records.spectra import Segments
 from study.support.errors import StudyError

@@ -7,8 +7,8 @@ from study.claims.reported import Reported
 from study.claims.sample import Sample
 from study.claims.verdict import Claim, Condition, conclude, together
 from study.ensemble import threaded
-from study.estimators import instrumental
-from study.estimators.base import Settings
+from study.identify.estimators import instrumental
+from study.identify.estimators.base import Settings
 from study.records.record import Record
 from study.records.spectra import Segments
 

@@ -10,8 +10,8 @@ from study.claims.evidence import Assumed, Drive, Evidence
 from study.claims.reported import Reported
 from study.claims.sample import Sample, average
 from study.claims.verdict import Claim, Condition, at_most, close, conclude, significant
-from study.estimators.base import Identified
-from study.miso import MisoResult
+from study.identify.estimators.base import Identified
+from study.identify.frequency_domain.conditioned import MisoResult
 from study.records.spectra import Segments
 
 Floats = NDArray[np.float64]
@@ -96,8 +96,8 @@ def overlap(evidence: Evidence, reported: Reported) -> Claim:
 
 def coherence_forms(evidence: Evidence, reported: Reported) -> Claim:
     """(4.38) and (4.39) on the Duffing system's own record."""
-    from study.estimators import miso
-    from study.estimators.base import Settings
+    from study.identify.estimators import miso
+    from study.identify.estimators.base import Settings
 
     drive = Drive("duffing")
     low, high = evidence.settings["fit_band"]

@@ -13,7 +13,7 @@ from study.claims.reported import Reported
 from study.claims.sample import Sample, average, departure, gaussian_score, is_gaussian, kurtosis, share
 from study.claims.verdict import Claim, Condition, at_least, conclude
 from study.equations.simulate import Integrator, simulate
-from study.estimators.base import true_parameters
+from study.identify.estimators.base import true_parameters
 from study.preliminary import model_restoring_force
 from study.records.excitation import displacement_noise
 from study.records.spectra import Segments, autospectrum

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from study.commands.command import Command
 from study.commands.records import add_record_arguments, out_folder, plan_of, read_records
-from study.estimators import ESTIMATORS
+from study.identify.estimators import ESTIMATORS
 
 WITHOUT = ("siso", "miso_hand_read")  # estimators that do not find all coefficients of a model, or not together
 QUIET = 2.0  # seconds of work before progress is shown

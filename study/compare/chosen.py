@@ -10,13 +10,14 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from study import estimators, held_out
-from study.chaotic import magnifies
 from study.compare.noise import segments_of
 from study.equations.model import Model
-from study.estimators.base import Settings
-from study.output_error import FreeRunFit, fit_free_run
-from study.parameters import Estimate
+from study.identify import estimators
+from study.identify.estimators.base import Settings
+from study.identify.frequency_domain.coefficients import Estimate
+from study.identify.time_domain import held_out
+from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
+from study.identify.time_domain.multiple_shooting import magnifies
 from study.records.completion import CompletedRecord
 from study.records.plan import Plan, with_steps
 from study.records.record import Record

@@ -8,7 +8,6 @@ import numpy as np
 
 from study.compare.amplitude import Growths, growths
 from study.compare.chosen import CHAOTIC, FREE_RUN, fit_by, has_lost
-from study.compare.fitted import Coefficient, coefficients, fit_model
 from study.compare.frequency import Band, bands
 from study.compare.judged import Judged, judge
 from study.compare.levels import Level, levels
@@ -18,8 +17,9 @@ from study.compare.restoring import Restoring, restoring
 from study.compare.reverse import ForceError, force_error
 from study.compare.stretches import AlongTime, along_time
 from study.equations.model import Model
-from study.output_error import FreeRunFit
-from study.parameters import Estimate
+from study.identify.frequency_domain.coefficients import Estimate
+from study.identify.time_domain.fit_model import Coefficient, coefficients, fit_model
+from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.completion import complete
 from study.records.plan import Plan, make_plan
 from study.records.record import Record
@@ -127,7 +127,7 @@ def compare(
     start : mapping of float, optional
         Values to begin the fit from, one for each that is fitted; searched for if left out.
     estimator : str
-        What finds the coefficients: the fit in free run, or one of ``study.estimators``. With ``local_polynomial``
+        What finds the coefficients: the fit in free run, or one of ``study.identify.estimators``. With ``local_polynomial``
         the error of the force is free of leakage too.
     progress : callable, optional
         Called with what is being done, ``STEPS`` times.

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.equations.free_run import prepare
-from study.output_error import FreeRunFit, fit_free_run
+from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
 from study.records import completion
 from study.records.plan import Plan
 from study.records.record import MOTIONS, Record
@@ -88,7 +88,7 @@ def judge(found: FreeRunFit, record: Record, how: Plan, low: float = 0.0) -> Jud
     """Run a fitted model along the judging part.
 
     Where that follows the fitting part the run goes on through both; elsewhere its initial state, and
-    nothing else, is estimated from the judging part (as in ``study.held_out.held_out_residual``).
+    nothing else, is estimated from the judging part (as in ``study.identify.time_domain.held_out.held_out_residual``).
 
     Parameters
     ----------

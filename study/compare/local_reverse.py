@@ -15,8 +15,15 @@ from scipy.fft import rfft
 from study.compare.noise import Noise
 from study.compare.reverse import ForceError, from_noise, lines_to_judge
 from study.equations.model import Model
-from study.inputs import Input, histories, reverse_inputs
-from study.local_polynomial import SPARE, Lines, LocalPolynomial, noise_variance, transform, transients
+from study.identify.frequency_domain.inputs import Input, histories, reverse_inputs
+from study.identify.frequency_domain.local_polynomial_method import (
+    SPARE,
+    Lines,
+    LocalPolynomial,
+    noise_variance,
+    transform,
+    transients,
+)
 from study.records.completion import CompletedRecord
 from study.records.plan import Plan
 from study.support.errors import StudyError

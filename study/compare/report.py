@@ -11,11 +11,11 @@ import pandas as pd
 
 from study.compare.chosen import FREE_RUN
 from study.compare.comparison import Comparison
-from study.compare.fitted import Coefficient
 from study.compare.levels import Level
 from study.compare.says import percent, says, says_of_all
 from study.compare.surface import curve, surface
 from study.equations import model_file
+from study.identify.time_domain.fit_model import Coefficient
 
 Row = dict[str, Any]
 

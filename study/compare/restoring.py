@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
-from study import held_out
 from study.compare.judged import Judged
 from study.compare.noise import Noise
 from study.equations import kernels
 from study.equations.model import Model, forward_graph, free, with_registers
 from study.equations.terms import get
-from study.inputs import history, reverse_inputs
+from study.identify.frequency_domain.inputs import history, reverse_inputs
+from study.identify.time_domain import held_out
 from study.records.completion import SETTLED, derivative
 from study.records.plan import Plan
 from study.records.record import MOTIONS, Record

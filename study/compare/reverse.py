@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study import miso
 from study.compare.noise import Noise, segments_of
 from study.equations.model import Model
-from study.inputs import Input, histories, reverse_inputs
+from study.identify.frequency_domain import conditioned
+from study.identify.frequency_domain.inputs import Input, histories, reverse_inputs
 from study.records.completion import CompletedRecord
 from study.records.plan import Plan
 from study.records.record import MOTIONS
@@ -112,7 +112,7 @@ def force_error(model: Model, completed: CompletedRecord, how: Plan, noise: Nois
     cut = _segments(last - first, len(inputs))
     matrix = cross_spectra([*channels, record[how.response][first:last], record["force"][first:last]], record.dt, cut)
     reverse, response = _without(matrix, len(inputs)), matrix.density[:, -2, -2].real
-    result = miso.analyse(reverse)
+    result = conditioned.analyse(reverse)
     freedom = result.averages / (result.averages - len(inputs))
     force = np.maximum(result.output, np.finfo(float).tiny)
     density = np.interp(matrix.frequency, noise.frequency, noise.density)

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study import held_out, shape_search
-from study.compare.fitted import from_pieces
 from study.equations.model import Model, free
 from study.equations.terms import LIBRARY, Term
-from study.output_error import FreeRunFit
+from study.identify.frequency_domain.starting_values import reverse_start
+from study.identify.time_domain import held_out, shape_search
+from study.identify.time_domain.fit_model import from_pieces
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.shape_search import Baseline
 from study.records.plan import Plan
 from study.records.record import Record
-from study.reverse_start import reverse_start
-from study.shape_search import Baseline
 from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from scipy.signal import lfilter
 
-from study import held_out
 from study.equations.free_run import prepare
 from study.equations.model import ModelTerm
 from study.equations.terms import custom
-from study.output_error import FreeRunFit
+from study.identify.time_domain import held_out
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.shape_search import Baseline, modulation_lines, residual_lines
 from study.records.plan import Plan
 from study.records.record import MOTIONS, Record
-from study.shape_search import Baseline, modulation_lines, residual_lines
 from study.support import statistics
 from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study import held_out
 from study.diagnose import preselect
 from study.diagnose.candidates import SHORT, THREADS
 from study.diagnose.preselect import PairStart
 from study.diagnose.ranking import Ranked
-from study.output_error import FreeRunFit
+from study.identify.time_domain import held_out
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.shape_search import Baseline
 from study.records.plan import Plan
 from study.records.record import Record
-from study.shape_search import Baseline
 from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]

@@ -16,12 +16,12 @@ from scipy.signal import get_window
 
 from study.diagnose.ranking import Ranked
 from study.equations.model import Model, ModelTerm
-from study.held_out import FAINT
-from study.inputs import history, reverse_inputs
+from study.identify.frequency_domain.inputs import history, reverse_inputs
+from study.identify.time_domain.held_out import FAINT
+from study.identify.time_domain.shape_search import Baseline, sensitivity
 from study.records.completion import complete
 from study.records.plan import Plan
 from study.records.record import Record
-from study.shape_search import Baseline, sensitivity
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study import held_out
 from study.diagnose import steadiness
 from study.diagnose.candidates import Trial
 from study.diagnose.steadiness import Curve
 from study.equations.terms import Term
-from study.output_error import FreeRunFit
+from study.identify.time_domain import held_out
+from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.plan import Plan, shortened
 from study.records.record import Record
 from study.support import statistics

@@ -6,18 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study import held_out, shape_search
-from study.compare.fitted import fit_model
 from study.diagnose import candidates, nature, pairs
 from study.diagnose.pairs import Pair
 from study.diagnose.ranking import UNSTEADY, Ranked, changes, curves, rank, wavers
 from study.equations.model import Model
 from study.equations.terms import Term
-from study.output_error import FreeRunFit
+from study.identify.time_domain import held_out, shape_search
+from study.identify.time_domain.fit_model import fit_model
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.shape_search import Baseline
 from study.records import noise_floor
 from study.records.plan import Plan, shortened
 from study.records.record import Record
-from study.shape_search import Baseline
 from study.support import statistics
 from study.support.errors import DivergenceError
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from study import held_out, shape_search
 from study.compare.comparison import Comparison, compare, lacking_with
 from study.compare.report import rung as ladder_step
 from study.compare.restoring import Restoring
@@ -20,6 +19,7 @@ from study.diagnose.ranking import Ranked, rank
 from study.diagnose.verdict import Diagnosis, diagnose
 from study.equations.model import Model
 from study.equations.terms import LIBRARY, Term, custom
+from study.identify.time_domain import held_out, shape_search
 from study.records.plan import Plan, shortened
 from study.records.record import Record
 from study.support.errors import StudyError

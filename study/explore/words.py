@@ -5,13 +5,13 @@ from html import escape
 from typing import Any
 
 from study.compare.comparison import Comparison
-from study.compare.fitted import Coefficient
 from study.compare.says import percent, says
 from study.diagnose.ranking import Ranked
 from study.diagnose.verdict import MISSING, NOTHING
 from study.explore.session import Rung
 from study.explore.units import in_text, length, number, rate
 from study.figures.labels import power_of_ten, term_names
+from study.identify.time_domain.fit_model import Coefficient
 
 VERDICTS = {MISSING: "An effect is missing", NOTHING: "Nothing is missing"}
 UNKNOWN = "Something is missing that no candidate explains"

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from study import held_out
-from study.compare.fitted import fit_model
 from study.diagnose.verdict import MISSING, Diagnosis, diagnose
 from study.equations.model import Model, free
 from study.equations.terms import Term
-from study.output_error import FreeRunFit
+from study.identify.time_domain import held_out
+from study.identify.time_domain.fit_model import fit_model
+from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.plan import Plan, make_plan
 from study.support.errors import DivergenceError, StudyError
 from study.trials.draw import HIDDEN, Trial, make_trial

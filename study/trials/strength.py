@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from study.equations.model import Model, ModelTerm
 from study.equations.simulate import Integrator, simulate
-from study.inputs import Input, history, reverse_inputs
+from study.identify.frequency_domain.inputs import Input, history, reverse_inputs
 from study.records.record import Record
 from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares

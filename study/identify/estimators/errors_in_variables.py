@@ -1,9 +1,9 @@
 """Noise on force and response: records with several periods of the same excitation."""
 
 from study.equations.model import Model
-from study.estimators.base import Identified, Settings, named_parameters
-from study.inputs import reverse_inputs
-from study.periods import fit, steady
+from study.identify.estimators.base import Identified, Settings, named_parameters
+from study.identify.frequency_domain.inputs import reverse_inputs
+from study.identify.frequency_domain.periodic import fit, steady
 from study.records.record import Record
 
 

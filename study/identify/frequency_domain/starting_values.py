@@ -6,10 +6,10 @@ valleys, in which a fit ends that begins from a linear model where the system is
 
 import numpy as np
 
-from study import miso, parameters
 from study.equations.model import Model
-from study.held_out import FAINT
-from study.inputs import histories, reverse_inputs
+from study.identify.frequency_domain import coefficients, conditioned
+from study.identify.frequency_domain.inputs import histories, reverse_inputs
+from study.identify.time_domain.held_out import FAINT
 from study.records.completion import complete
 from study.records.plan import Plan
 from study.records.record import Record
@@ -46,7 +46,7 @@ def reverse_start(model: Model, record: Record, how: Plan) -> dict[str, float]:
     if driven.size < len(inputs):
         raise StudyError(f"the force of {record.name!r} drives too few frequencies for {len(inputs)} inputs")
     band = (max(float(driven[0]), completed.band[0]), min(float(driven[-1]), completed.band[1]))
-    found = parameters.fit(miso.analyse(matrix), inputs, band, cut.line_inflation())
+    found = coefficients.fit(conditioned.analyse(matrix), inputs, band, cut.line_inflation())
     if not np.all(np.isfinite(found.values)):
         raise StudyError(f"the reverse system of {model.name!r} and {record.name!r} has no solution")
     return dict(zip(found.symbols, found.values.tolist(), strict=True))

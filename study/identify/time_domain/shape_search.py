@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, rfft, rfftfreq
 
-from study import held_out
 from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model, ModelTerm, free
 from study.equations.terms import Term, get
-from study.output_error import FreeRunFit
+from study.identify.time_domain import held_out
+from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.plan import Plan
 from study.records.record import MOTIONS, Record
 from study.support.errors import StudyError

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import rfft
 
-from study.responses import Responses
+from study.identify.frequency_domain.responses import Responses
 from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]

@@ -18,14 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.equations import formula
-from study.inputs import Input, history
-from study.miso import COLLINEAR
-from study.parameters import Estimate
-from study.parametric import left_over
+from study.identify.frequency_domain.coefficients import Estimate
+from study.identify.frequency_domain.conditioned import COLLINEAR
+from study.identify.frequency_domain.from_coefficients import left_over
+from study.identify.frequency_domain.inputs import Input, history
+from study.identify.frequency_domain.responses import Responses
 from study.records import spectra
 from study.records.record import Record
 from study.records.spectra import Segments, SpectralMatrix
-from study.responses import Responses
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

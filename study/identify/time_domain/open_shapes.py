@@ -1,6 +1,6 @@
 """Shape parameters that a model leaves open: where a fit of them begins.
 
-Each point of a search over them (``study.shape_search``: the width of a dead band, a gap, a relaxation time or the
+Each point of a search over them (``study.identify.time_domain.shape_search``: the width of a dead band, a gap, a relaxation time or the
 frequency of a stiffness) is fitted to a part of the record. One free run tells points apart best, unless the
 system is chaotic: then it ends in a side valley at every point, while the misfit in pieces of a period falls
 smoothly towards the truth.
@@ -12,16 +12,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study import held_out, shape_search
-from study.chaotic import astray, magnifies
 from study.equations.model import Model, ModelTerm
 from study.equations.substeps import needed_steps
-from study.joining import fit_pieces
-from study.output_error import FreeRunFit
-from study.pieces import Pieces, even_restarts
+from study.identify.time_domain import held_out, shape_search
+from study.identify.time_domain.continuation import fit_pieces
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.multiple_shooting import astray, magnifies
+from study.identify.time_domain.shape_search import Baseline
+from study.identify.time_domain.shooting import Pieces, even_restarts
 from study.records.plan import Plan, make_plan, shortened, with_steps
 from study.records.record import Record
-from study.shape_search import Baseline
 from study.support.errors import DivergenceError, StudyError
 
 Floats = NDArray[np.float64]

@@ -1,8 +1,8 @@
 """The report's estimator where nobody says what u_g or f_m is: shape parameters from the record, then MI/SO."""
 
 from study.equations.model import Model
-from study.estimators import miso, output_error
-from study.estimators.base import Identified, Settings, named_parameters
+from study.identify.estimators import miso, output_error
+from study.identify.estimators.base import Identified, Settings, named_parameters
 from study.records.record import Record
 
 

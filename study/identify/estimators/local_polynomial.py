@@ -1,10 +1,10 @@
 """Local polynomials: one transform of the whole record, no window, and no leakage of the record's ends."""
 
 from study.equations.model import Model
-from study.estimators.base import Identified, Settings, named_parameters
-from study.inputs import histories, reverse_inputs
-from study.local_fit import fit
-from study.local_polynomial import responses, transform
+from study.identify.estimators.base import Identified, Settings, named_parameters
+from study.identify.frequency_domain.inputs import histories, reverse_inputs
+from study.identify.frequency_domain.local_polynomial_fit import fit
+from study.identify.frequency_domain.local_polynomial_method import responses, transform
 from study.records.record import Record
 
 

@@ -8,13 +8,13 @@ from typing import Protocol
 import numpy as np
 
 from study.equations.model import Model
-from study.inputs import Input
-from study.local_polynomial import LocalPolynomial
-from study.miso import MisoResult
-from study.parameters import Estimate
+from study.identify.frequency_domain.coefficients import Estimate
+from study.identify.frequency_domain.conditioned import MisoResult
+from study.identify.frequency_domain.inputs import Input
+from study.identify.frequency_domain.local_polynomial_method import LocalPolynomial
+from study.identify.frequency_domain.responses import Responses
 from study.records.record import Record
 from study.records.spectra import Segments
-from study.responses import Responses
 
 
 @dataclass(frozen=True)

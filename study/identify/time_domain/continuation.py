@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from study.equations.model import Model
-from study.output_error import FreeRunFit, fit_free_run
-from study.pieces import Pieces
+from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
+from study.identify.time_domain.shooting import Pieces
 from study.support.errors import DivergenceError
 from study.support.levenberg_marquardt import OFFSET
 
@@ -25,7 +25,7 @@ def fit_pieces(
     model: Model, pieces: Pieces, states: Floats, held: Collection[str], max_iterations: int, tie: float = 0.0,
     offset: float = OFFSET,
 ) -> FreeRunFit:  # fmt: skip
-    """:func:`study.output_error.fit_free_run` from these states of the pieces."""
+    """:func:`study.identify.time_domain.free_run_fit.fit_free_run` from these states of the pieces."""
     return fit_free_run(
         model, pieces.record, held=held, response=pieces.response, steps_per_sample=pieces.steps_per_sample,
         span=pieces.span, restarts=pieces.restarts, max_iterations=max_iterations, initial=states, tie=tie,

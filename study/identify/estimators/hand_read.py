@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.equations.model import Model
-from study.estimators import miso
-from study.estimators.base import Identified, Parameter, Settings
-from study.inputs import Input
+from study.identify.estimators import miso
+from study.identify.estimators.base import Identified, Parameter, Settings
+from study.identify.frequency_domain.inputs import Input
+from study.identify.frequency_domain.responses import Responses
 from study.records.record import Record
-from study.responses import Responses
 
 LOWEST_LINES = 3  # "the asymptotic behavior of A_1 for f -> 0": the first lines above zero, where no mean is lost
 

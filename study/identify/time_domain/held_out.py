@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model
-from study.output_error import FreeRunFit, fit_free_run
+from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
 from study.records.plan import Plan
 from study.records.record import MOTIONS, Record
 from study.records.spectra import Segments, cross_spectra

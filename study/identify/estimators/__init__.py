@@ -7,18 +7,18 @@ from study.support.errors import StudyError
 
 if TYPE_CHECKING:  # who only asks which estimators there are waits for none of their modules
     from study.equations.model import Model
-    from study.estimators.base import Estimator, Identified, Settings
+    from study.identify.estimators.base import Estimator, Identified, Settings
     from study.records.record import Record
 
 ESTIMATORS = {
-    "siso": "study.estimators.siso",
-    "miso": "study.estimators.miso",
-    "miso_hand_read": "study.estimators.hand_read",
-    "local_polynomial": "study.estimators.local_polynomial",
-    "output_error": "study.estimators.output_error",
-    "instrumental": "study.estimators.instrumental",
-    "miso_free_shape": "study.estimators.free_shape",
-    "errors_in_variables": "study.estimators.errors_in_variables",
+    "siso": "study.identify.estimators.siso",
+    "miso": "study.identify.estimators.miso",
+    "miso_hand_read": "study.identify.estimators.hand_read",
+    "local_polynomial": "study.identify.estimators.local_polynomial",
+    "output_error": "study.identify.estimators.output_error",
+    "instrumental": "study.identify.estimators.instrumental",
+    "miso_free_shape": "study.identify.estimators.free_shape",
+    "errors_in_variables": "study.identify.estimators.errors_in_variables",
 }
 
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from study.identify.frequency_domain.responses import Responses
 from study.records.spectra import SpectralMatrix
-from study.responses import Responses
 from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]

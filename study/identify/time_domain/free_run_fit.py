@@ -3,7 +3,7 @@
 The force is taken as known and the noise as additive on the response, so no noisy regressor enters and
 the estimate is not biased by noise (the reverse MI/SO estimate is, Section 5.4). The sum of squares is
 minimised by the method of Levenberg and Marquardt (``study.support.levenberg_marquardt``) with exact derivatives
-(``study.equations.free_run``). A chaotic system is run piece by piece (``study.pieces``, ``study.chaotic``).
+(``study.equations.free_run``). A chaotic system is run piece by piece (``study.identify.time_domain.shooting``, ``study.identify.time_domain.multiple_shooting``).
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model
-from study.parameters import Estimate
+from study.identify.frequency_domain.coefficients import Estimate
 from study.records.record import Record
 from study.records.states import starting_states
 from study.support.block_normal import Ties
@@ -115,7 +115,7 @@ def fit_free_run(
         First sample, and the one after the last; the whole record if left out.
     restarts : sequence of int
         Samples of the record at which the motion begins anew from a state that is estimated too;
-        see ``study.chaotic`` for systems that need it.
+        see ``study.identify.time_domain.multiple_shooting`` for systems that need it.
     max_iterations : int
         Free runs after which to give up.
     initial : str or array, shape (pieces, states)

@@ -1,12 +1,12 @@
 """Instruments from a free run: A_j(f) line by line, without the bias that noise on the response brings."""
 
-from study import instrumental, miso, parametric
 from study.equations.free_run import prepare
 from study.equations.model import Model
-from study.estimators import output_error
-from study.estimators.base import Identified, Settings, named_parameters
-from study.inputs import histories, reverse_inputs
-from study.output_error import FreeRunFit
+from study.identify.estimators import output_error
+from study.identify.estimators.base import Identified, Settings, named_parameters
+from study.identify.frequency_domain import conditioned, from_coefficients, instruments
+from study.identify.frequency_domain.inputs import histories, reverse_inputs
+from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records import spectra
 from study.records.record import MOTIONS, Record
 
@@ -19,17 +19,17 @@ def identify(model: Model, record: Record, settings: Settings) -> Identified:
     found = output_error.fit(model, record, settings)
     inputs = reverse_inputs(found.model)
     clean = clean_motion(found, record)
-    values = instrumental.channels(inputs, record, clean)
+    values = instruments.channels(inputs, record, clean)
     matrix = spectra.cross_spectra(values, record.dt, settings.segments)
-    estimate = instrumental.fit(
-        matrix, inputs, settings.band, parametric.response(inputs, found.estimate, matrix.frequency),
-        instrumental.stretches(values, record.dt, settings.segments),
+    estimate = instruments.fit(
+        matrix, inputs, settings.band, from_coefficients.response(inputs, found.estimate, matrix.frequency),
+        instruments.stretches(values, record.dt, settings.segments),
     )  # fmt: skip
     note = "" if found.converged else found.message
     own = spectra.cross_spectra([*histories(inputs, clean), record["force"]], record.dt, settings.segments)
     shapes = output_error.shapes_of(found, [key for key in model.values if "." in key])
     named = (*named_parameters(estimate), *named_parameters(shapes))
-    return Identified(inputs, instrumental.responses(matrix), named, estimate, note, shapes, miso.analyse(own))
+    return Identified(inputs, instruments.responses(matrix), named, estimate, note, shapes, conditioned.analyse(own))
 
 
 def clean_motion(found: FreeRunFit, record: Record) -> Record:

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from study.inputs import Input
-from study.parameters import Estimate
+from study.identify.frequency_domain.coefficients import Estimate
+from study.identify.frequency_domain.inputs import Input
+from study.identify.frequency_domain.responses import Responses
 from study.records.spectra import SpectralMatrix
-from study.responses import Responses
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

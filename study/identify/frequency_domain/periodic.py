@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from scipy.fft import rfft
 
 from study.equations import formula
-from study.inputs import Input, histories
-from study.parameters import Estimate
+from study.identify.frequency_domain.coefficients import Estimate
+from study.identify.frequency_domain.inputs import Input, histories
 from study.records.record import Record
 from study.support.errors import StudyError
 

@@ -6,18 +6,19 @@ from functools import lru_cache
 
 import numpy as np
 
-from study import held_out, parametric
-from study.chaotic import CLEAN, astray, fit_record
 from study.equations.model import Model
-from study.estimators import miso
-from study.estimators.base import Identified, Settings, named_parameters
-from study.inputs import histories, reverse_inputs
-from study.output_error import FreeRunFit, fit_free_run
-from study.parameters import Estimate
+from study.identify.estimators import miso
+from study.identify.estimators.base import Identified, Settings, named_parameters
+from study.identify.frequency_domain import from_coefficients
+from study.identify.frequency_domain.coefficients import Estimate
+from study.identify.frequency_domain.inputs import histories, reverse_inputs
+from study.identify.time_domain import held_out
+from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
+from study.identify.time_domain.multiple_shooting import CLEAN, astray, fit_record
+from study.identify.time_domain.open_shapes import shape_keys, with_starting_shapes
 from study.records import spectra
 from study.records.plan import Plan
 from study.records.record import Record
-from study.shapes import shape_keys, with_starting_shapes
 from study.support.errors import DivergenceError
 
 KEPT = 4  # fits: those of the records that the threads are at
@@ -29,7 +30,7 @@ def identify(model: Model, record: Record, settings: Settings) -> Identified:
     found = fit(model, record, settings)
     inputs, estimate = reverse_inputs(found.model), found.estimate
     matrix = spectra.cross_spectra([*histories(inputs, record), record["force"]], record.dt, settings.segments)
-    result = parametric.responses(inputs, estimate, matrix)
+    result = from_coefficients.responses(inputs, estimate, matrix)
     note = "" if found.converged else found.message
     return Identified(inputs, result, named_parameters(estimate), estimate, note)
 

@@ -19,9 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft
 
-from study.inputs import Input
-from study.local_polynomial import EXACT, Lines, LocalPolynomial, noise_variance, transients
-from study.parameters import Estimate
+from study.identify.frequency_domain.coefficients import Estimate
+from study.identify.frequency_domain.inputs import Input
+from study.identify.frequency_domain.local_polynomial_method import (
+    EXACT,
+    Lines,
+    LocalPolynomial,
+    noise_variance,
+    transients,
+)
 from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]

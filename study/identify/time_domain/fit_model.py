@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri, stdtrit
 
-from study import held_out, shape_search
-from study.chaotic import fit_in_pieces
 from study.equations import dimensions
 from study.equations.free_run import prepare
 from study.equations.model import Model, ModelTerm
 from study.equations.terms import LIBRARY, QUANTITIES
-from study.inputs import history, reverse_inputs
-from study.output_error import FreeRunFit
-from study.parameters import Estimate
+from study.identify.frequency_domain.coefficients import Estimate
+from study.identify.frequency_domain.inputs import history, reverse_inputs
+from study.identify.time_domain import held_out, shape_search
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.multiple_shooting import fit_in_pieces
 from study.records.completion import complete
 from study.records.plan import Plan
 from study.records.record import Record

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.inputs import Input
-from study.responses import Responses
+from study.identify.frequency_domain.inputs import Input
+from study.identify.frequency_domain.responses import Responses
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
