@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from study.equations import formula, kernels
+from study.equations import formulas, kernels
 from study.equations.graph import Graph
 from study.equations.model import Model, free, with_registers
 from study.equations.simulate import Integrator, simulate
@@ -93,7 +93,7 @@ def value_of() -> Callable[..., Floats]:
     def value(text: str, **columns: Floats | float) -> Floats:
         graph = Graph()
         known = {name: graph.input(name) for name in columns}
-        program = with_registers(graph.program([formula.build(graph, text, known)]), {})
+        program = with_registers(graph.program([formulas.build(graph, text, known)]), {})
         data = np.column_stack([np.atleast_1d(np.asarray(c, dtype=float)) for c in columns.values()])
         out = np.empty((len(data), 1))
         positions = np.array([program.inputs[name] for name in columns], dtype=np.int64)

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from study.equations import formula
-from study.equations.formula import ExpressionError
+from study.equations import formulas
+from study.equations.formulas import ExpressionError
 from study.equations.graph import Graph
 from study.equations.terms import custom
 
@@ -22,7 +22,7 @@ NUMPY: dict[str, object] = {
 
 def build(text: str) -> Graph:
     graph = Graph()
-    formula.build(graph, text, {name: graph.input(name) for name in ("u", "v", "t")})
+    formulas.build(graph, text, {name: graph.input(name) for name in ("u", "v", "t")})
     return graph
 
 
@@ -63,7 +63,7 @@ def grown(inner: st.SearchStrategy[str]) -> st.SearchStrategy[str]:
 
 
 @settings(max_examples=150, deadline=None)
-@given(st.recursive(leaves, grown, max_leaves=8).filter(lambda text: len(text) <= formula.LONGEST))
+@given(st.recursive(leaves, grown, max_leaves=8).filter(lambda text: len(text) <= formulas.LONGEST))
 def test_random_valid_formulas_agree_with_numpy(value_of: Callable[..., np.ndarray], text: str) -> None:
     with np.errstate(all="ignore"):
         expected = by_numpy(text)
@@ -139,16 +139,16 @@ def test_any_text_is_a_formula_or_an_expression_error(text: str) -> None:
     except ExpressionError:
         return
     assert all(np.isfinite(value) for value in graph.values)
-    assert formula.names(text) == sorted(set(formula.names(text)))
+    assert formulas.names(text) == sorted(set(formulas.names(text)))
 
 
 def test_the_longest_formula_is_read_and_one_more_character_is_not() -> None:
     text = "u" + "*1" * 30
-    padded = text + " " * (formula.LONGEST - len(text))
+    padded = text + " " * (formulas.LONGEST - len(text))
     build(padded)
     with pytest.raises(ExpressionError, match="301 characters"):
         build(padded + " ")
 
 
 def test_names_lists_variables_not_functions() -> None:
-    assert formula.names("u*abs(v) + max(w, u_g)*pi") == ["u", "u_g", "v", "w"]
+    assert formulas.names("u*abs(v) + max(w, u_g)*pi") == ["u", "u_g", "v", "w"]

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study.equations.formula import ExpressionError
+from study.equations.formulas import ExpressionError
 from study.equations.model import Model, forward_graph, forward_program, free
 from study.equations.model_file import read_model
 from study.equations.terms import custom, get

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from study.equations import formula, kernels
+from study.equations import formulas, kernels
 from study.equations.graph import Graph
 from study.equations.model import Model, forward_graph, free, with_registers
 from study.equations.simulate import Integrator, simulate
@@ -170,7 +170,7 @@ def test_derivatives_of_shapes_are_exact(name: str, value_of: Callable[..., np.n
         for wrt in columns:
             graph = Graph()
             known = {n: graph.input(n) for n in columns}
-            slope = graph.derivative(formula.build(graph, text, known), known[wrt])
+            slope = graph.derivative(formulas.build(graph, text, known), known[wrt])
             program, out = graph.program([slope]), np.empty((4, 1))
             kernels.evaluate(
                 program.code, program.first, program.registers.copy(),

@@ -120,14 +120,14 @@ def compare(
     record : Record
         Force and at least one motion.
     how : Plan, optional
-        What is fitted and what is judged; :func:`study.records.plan.make_plan` if left out.
+        What is fitted and what is judged; :func:`plan.make_plan` if left out.
     cutoff : float, optional
         Frequency in hertz above which a measured velocity or acceleration is integrated; what lies below is
         not judged. Found from the record if left out.
     start : mapping of float, optional
         Values to begin the fit from, one for each that is fitted; searched for if left out.
     estimator : str
-        What finds the coefficients: the fit in free run, or one of ``study.identify.estimators``. With ``local_polynomial``
+        What finds the coefficients: the fit in free run, or one of ``estimators``. With ``local_polynomial``
         the error of the force is free of leakage too.
     progress : callable, optional
         Called with what is being done, ``STEPS`` times.

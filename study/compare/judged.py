@@ -88,7 +88,7 @@ def judge(found: FreeRunFit, record: Record, how: Plan, low: float = 0.0) -> Jud
     """Run a fitted model along the judging part.
 
     Where that follows the fitting part the run goes on through both; elsewhere its initial state, and
-    nothing else, is estimated from the judging part (as in ``study.identify.time_domain.held_out.held_out_residual``).
+    nothing else, is estimated from the judging part (as in ``held_out.held_out_residual``).
 
     Parameters
     ----------

@@ -2,7 +2,7 @@
 
 Where the excitation is periodic, what differs between periods is noise, whatever its spectrum
 (Pintelon and Schoukens, System Identification, 2012, Section 2.5). Elsewhere noise is taken as white, at
-the level of the quietest bands of the residual (``study.records.noise_floor``).
+the level of the quietest bands of the residual (``noise_floor``).
 """
 
 from dataclasses import dataclass, replace

@@ -4,7 +4,7 @@ import ast
 import re
 from fractions import Fraction
 
-from study.equations import formula
+from study.equations import formulas
 
 Dimensions = tuple[Fraction, Fraction]  # powers of length and of time
 NONE: Dimensions = (Fraction(0), Fraction(0))
@@ -18,7 +18,7 @@ VARIABLES: dict[str, Dimensions] = {
 
 def dimensions(text: str, known: dict[str, Dimensions]) -> Dimensions | None:
     """Powers of length and time of a formula; None where its parts do not share them."""
-    return _dimensions(formula.parse(text), VARIABLES | known)
+    return _dimensions(formulas.parse(text), VARIABLES | known)
 
 
 def _dimensions(tree: ast.expr, known: dict[str, Dimensions]) -> Dimensions | None:

@@ -198,7 +198,7 @@ def prepare(
     span : pair of int, optional
         First sample, and the one after the last; the whole record if left out.
     restarts : sequence of int
-        Samples of the record, within the span, at which the motion begins anew (``study.identify.time_domain.shooting``).
+        Samples of the record, within the span, at which the motion begins anew (``shooting``).
 
     Raises
     ------

@@ -4,7 +4,7 @@ All kernels stand in this one file, because Numba's disk cache notices a change 
 a function but not of one it calls. A state is ``(u, v, z...)``; the program computes its derivatives
 ``(v, a, dz...)`` from the registers ``u, v, t, force, z..., channels...``, which stand first.
 
-Layout of the registers (see ``study.equations.model.forward_program``): 0 u, 1 v, 2 t, 3 force,
+Layout of the registers (see ``model.forward_program``): 0 u, 1 v, 2 t, 3 force,
 then the extra channels, then the states z, then coefficients and shape parameters.
 """
 

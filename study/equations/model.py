@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study.equations import formula
+from study.equations import formulas
 from study.equations.graph import Graph, Program
 from study.equations.terms import Component, Term
 from study.support.errors import StudyError
@@ -186,7 +186,7 @@ def forward_graph(model: Model, channels: tuple[str, ...] = ()) -> ForwardGraph:
         rate = None
         if entry.term.state is not None:
             names["z"] = states[entry.name]
-            rate = formula.build(graph, entry.term.state, names)
+            rate = formulas.build(graph, entry.term.state, names)
             rates.append(rate)
         for component in entry.term.components:
             if component.order < 2:
@@ -211,7 +211,7 @@ def unit_forces(model: Model, channels: tuple[str, ...] = ()) -> tuple[tuple[str
 
 def _unit_force(graph: Graph, component: Component, names: Mapping[str, int], rate: int | None) -> int:
     """Force of a component with a unit coefficient: its shape, or the shape's derivative by the chain rule."""
-    shape = formula.build(graph, component.shape, names)
+    shape = formulas.build(graph, component.shape, names)
     if component.order == 1:
         total = graph.mul(graph.derivative(shape, names["u"]), names["v"])
         total = graph.add(total, graph.derivative(shape, names["t"]))

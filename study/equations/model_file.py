@@ -21,7 +21,7 @@ from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
 
-from study.equations import formula, terms
+from study.equations import formulas, terms
 from study.equations.graph import Graph
 from study.equations.model import Model, ModelTerm, free
 from study.equations.redundancy import repeated_force
@@ -230,7 +230,7 @@ def _own(name: str, force: object) -> Term:
     if not isinstance(force, str):
         raise StudyError(f"force of {name!r} is {shown(force)}; a formula in quotes is right")
     term = terms.custom(name, force)
-    names = formula.names(force)
+    names = formulas.names(force)
     coefficients = {symbol for known in (term, *terms.LIBRARY.values()) for symbol in known.symbols}
     for used in names:
         if used in coefficients:  # a channel of that name would be mixed up with the coefficient
@@ -238,7 +238,7 @@ def _own(name: str, force: object) -> Term:
                 f"force of {name!r} uses {used!r}, a coefficient's name; write a number or rename the channel"
             )
     graph = Graph()
-    formula.build(graph, force, {used: graph.input(used) for used in names})
+    formulas.build(graph, force, {used: graph.input(used) for used in names})
     return term
 
 

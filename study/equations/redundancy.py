@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from study.equations import formula
+from study.equations import formulas
 from study.equations.model import Model, unit_forces
 from study.equations.terms import LIBRARY
 
@@ -43,9 +43,9 @@ def repeated_force(model: Model) -> str | None:
 
 def _forces(model: Model) -> tuple[tuple[str, ...], Floats]:
     """Names of the terms, and their forces with unit coefficients at random motions, shape (points, components)."""
-    from study.equations import kernels  # compiled code is loaded only where a formula asks for it
+    from study.equations import kernels  # compiled code is loaded only where a formulas asks for it
 
-    used = {n for t in model.terms if t.name not in LIBRARY for n in formula.names(t.term.components[0].shape)}
+    used = {n for t in model.terms if t.name not in LIBRARY for n in formulas.names(t.term.components[0].shape)}
     channels = tuple(sorted(used - {"u", "v", "t"}))
     names, program = unit_forces(model, channels)
     rng = np.random.default_rng(1990)

@@ -10,7 +10,7 @@ To add an effect, add one entry to ``LIBRARY`` and one row to the parametrised t
 
 from dataclasses import dataclass, field
 
-from study.equations import dimensions, formula
+from study.equations import dimensions, formulas
 from study.equations.graph import Graph
 from study.support.errors import StudyError
 
@@ -250,5 +250,5 @@ def custom(name: str, force: str) -> Term:
     if not name.isidentifier() or not name.isascii():
         raise StudyError(f"{name!r} is not a name for a term; use letters, digits and underscores")
     graph = Graph()
-    formula.build(graph, force, {n: graph.input(n) for n in formula.names(force)})  # refuses all but a formula
+    formulas.build(graph, force, {n: graph.input(n) for n in formulas.names(force)})  # refuses all but a formula
     return _single(name, f"q_{name}", force, meaning=f"the user's own force {force}", cause="as the user knows")

@@ -17,6 +17,7 @@ from study.diagnose.candidates import Trial
 from study.diagnose.files import in_words
 from study.diagnose.ranking import Ranked, rank
 from study.diagnose.verdict import Diagnosis, diagnose
+from study.equations import formulas
 from study.equations.model import Model
 from study.equations.terms import LIBRARY, Term, custom
 from study.identify.time_domain import held_out, shape_search
@@ -228,7 +229,7 @@ def own_term(session: Session, text: str) -> Term:
         formula = text
     term = custom(name.strip(), formula.strip())
     known = ("u", "v", "t", *session.record.extra)
-    for used in formula.names(formula.strip()):
+    for used in formulas.names(formula.strip()):
         if used not in known:
             raise StudyError(
                 f"the expression {formula.strip()!r} uses the name {used!r}; it may use {', '.join(known)}"

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import pandas as pd
 
-from study.equations import dimensions, formula, terms
+from study.equations import dimensions, formulas, terms
 
 DIMENSIONS: dict[str, dimensions.Dimensions] = {
     "length": (Fraction(1), Fraction(0)),
@@ -23,7 +23,7 @@ LOOSE = (ast.Add, ast.Sub)  # operators whose operands a product must put in bra
 
 def formula(text: str) -> str:
     r"""A shape such as ``u*cos(2*pi*f_m*t)`` as Matplotlib mathtext, such as ``$u\,\cos(2\,\pi\,f_{m}\,t)$``."""
-    return f"${_math(formula.parse(text))}$"
+    return f"${_math(formulas.parse(text))}$"
 
 
 def _math(tree: ast.expr) -> str:
@@ -78,7 +78,7 @@ def response_unit(shape: str, force: str = "N", length: str = "m") -> str:
     known = {p.name: DIMENSIONS[p.quantity] for t in terms.LIBRARY.values() for p in t.parameters}
     try:
         powers = dimensions.dimensions(shape, known)
-    except formula.ExpressionError:
+    except formulas.ExpressionError:
         powers = None
     return dimensions.compose(force, length, powers)
 

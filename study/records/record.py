@@ -86,7 +86,7 @@ def heading(channel: str, unit: str) -> str:
 
 
 def read_csv(path: Path) -> Record:
-    """Read what :func:`write_csv` wrote of a record in SI units. ``study.records.readers`` reads all others."""
+    """Read what :func:`write_csv` wrote of a record in SI units. ``readers`` reads all others."""
     import pandas as pd
 
     table = pd.read_csv(path)  # from pandas 3.1 on, the default parser returns the very doubles that were written

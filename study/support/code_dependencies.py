@@ -16,7 +16,7 @@ def rests_on(script: Path, *, also: Iterable[str] = (), without: Collection[str]
     script : Path
         A Python file; the package stands in the folder above its own.
     also : iterable of str
-        Modules that are imported by name while the script runs, such as ``study.identify.estimators.miso``.
+        Modules that are imported by name while the script runs, such as ``estimators.miso``.
     without : collection of str
         Modules that are not followed: what the script imports along with what it needs, and does not use.
 

@@ -61,7 +61,7 @@ class Point:
 def point_at(
     x: Floats, residual: Floats, jacobian: Floats, shared: int, begins: Sequence[int], ties: Ties | None = None
 ) -> Point | None:
-    """The point with this residual and Jacobian (``study.support.block_normal``); None if they are not finite.
+    """The point with this residual and Jacobian (``block_normal``); None if they are not finite.
 
     The gaps of ties count among the residual.
     """

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study.equations import kernels
+from study.equations import formulas, kernels
 from study.equations.graph import Graph
 from study.equations.model import Model, ModelTerm, with_registers
 from study.equations.terms import Component
@@ -120,11 +120,11 @@ def history(item: Input, record: Record) -> Floats:
         As :func:`histories`.
     """
     formula = item.shape if item.state is None else item.state
-    wanted = [n for n in formula.names(formula) if n not in dict(item.parameters) and n != "z"]
+    wanted = [n for n in formulas.names(formula) if n not in dict(item.parameters) and n != "z"]
     data = _columns(wanted, formula, record)
     graph = Graph()
     known = {name: graph.input(name) for name in (*wanted, *dict(item.parameters), "z")}
-    program = with_registers(graph.program([formula.build(graph, formula, known)]), dict(item.parameters))
+    program = with_registers(graph.program([formulas.build(graph, formula, known)]), dict(item.parameters))
     positions = np.array([program.inputs[n] for n in wanted], dtype=np.int64)
     registers, output = program.registers.copy(), program.outputs
     if item.state is not None:

@@ -17,7 +17,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from study.equations import formula
+from study.equations import formulas
 from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.frequency_domain.conditioned import COLLINEAR
 from study.identify.frequency_domain.from_coefficients import left_over
@@ -188,7 +188,7 @@ def noise_spread(record: Record, clean: Record) -> dict[str, Floats]:
 
 def expected(item: Input, clean: Record, spread: dict[str, Floats]) -> Floats:
     """Mean of an input's history over Gaussian noise about a clean motion, shape (n,)."""
-    used = [NOISY[name] for name in formula.names(item.shape) if NOISY.get(name) in spread]
+    used = [NOISY[name] for name in formulas.names(item.shape) if NOISY.get(name) in spread]
     sources = [s for s in range(len(spread)) if any(spread[name][s] != 0.0 for name in used)]
     nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
     weights = weights / np.sum(weights)

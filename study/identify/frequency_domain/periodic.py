@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import rfft
 
-from study.equations import formula
+from study.equations import formulas
 from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.frequency_domain.inputs import Input, histories
 from study.records.record import Record
@@ -187,7 +187,7 @@ def _grouped(record: Record) -> dict[str, Floats]:
 
 def _check(inputs: Sequence[Input], count: int, name: str) -> None:
     for item in inputs:
-        if item.state is not None or "t" in formula.names(item.shape):
+        if item.state is not None or "t" in formulas.names(item.shape):
             raise StudyError(
                 f"the input {item.shape!r} of {', '.join(item.terms)} is not the same in every period; "
                 "errors_in_variables needs shapes of the motion alone"

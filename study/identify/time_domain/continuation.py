@@ -25,7 +25,7 @@ def fit_pieces(
     model: Model, pieces: Pieces, states: Floats, held: Collection[str], max_iterations: int, tie: float = 0.0,
     offset: float = OFFSET,
 ) -> FreeRunFit:  # fmt: skip
-    """:func:`study.identify.time_domain.free_run_fit.fit_free_run` from these states of the pieces."""
+    """:func:`free_run_fit.fit_free_run` from these states of the pieces."""
     return fit_free_run(
         model, pieces.record, held=held, response=pieces.response, steps_per_sample=pieces.steps_per_sample,
         span=pieces.span, restarts=pieces.restarts, max_iterations=max_iterations, initial=states, tie=tie,

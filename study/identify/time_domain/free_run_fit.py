@@ -2,8 +2,8 @@
 
 The force is taken as known and the noise as additive on the response, so no noisy regressor enters and
 the estimate is not biased by noise (the reverse MI/SO estimate is, Section 5.4). The sum of squares is
-minimised by the method of Levenberg and Marquardt (``study.support.levenberg_marquardt``) with exact derivatives
-(``study.equations.free_run``). A chaotic system is run piece by piece (``study.identify.time_domain.shooting``, ``study.identify.time_domain.multiple_shooting``).
+minimised by the method of Levenberg and Marquardt (``levenberg_marquardt``) with exact derivatives
+(``free_run``). A chaotic system is run piece by piece (``shooting``, ``multiple_shooting``).
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -115,7 +115,7 @@ def fit_free_run(
         First sample, and the one after the last; the whole record if left out.
     restarts : sequence of int
         Samples of the record at which the motion begins anew from a state that is estimated too;
-        see ``study.identify.time_domain.multiple_shooting`` for systems that need it.
+        see ``multiple_shooting`` for systems that need it.
     max_iterations : int
         Free runs after which to give up.
     initial : str or array, shape (pieces, states)

@@ -43,11 +43,11 @@ def fit_in_pieces(
     The record is cut into pieces of about a period, each from an initial state of its own: no error grows
     far within them, and the search finds its way from poor starting values. If the fitted system needs no
     cuts, as most do, the whole record is fitted from there in one free run. Otherwise neighbours are joined
-    (``study.identify.time_domain.continuation``), and the motion that this yields is tied together at all its pieces until it is one
+    (``continuation``), and the motion that this yields is tied together at all its pieces until it is one
     that stays beside the measured one (multiple shooting; H. G. Bock, 1983): joining finds the right valley
     for the states, ties its floor. Where that fails, pieces begin anew, with the coefficients of the longest that held.
 
-    Parameters, result and errors are those of :func:`study.identify.time_domain.free_run_fit.fit_free_run`; ``initial`` of the
+    Parameters, result and errors are those of :func:`free_run_fit.fit_free_run`; ``initial`` of the
     result has one row a piece.
     """
     whole = span or (0, len(record))
@@ -84,19 +84,19 @@ def fit_record(
 ) -> FreeRunFit:
     """Fit a model to a whole record: in one free run where that holds, in pieces where it does not.
 
-    Steps are those that the starting model needs (``study.equations.substeps``) unless they are given; the first runs take
+    Steps are those that the starting model needs (``substeps``) unless they are given; the first runs take
     fewer, which cost less and lead as near. One free run is believed if the fit converges, leaves no part of the
     motion (a residual that is large and smooth), and the fitted system does not magnify a disturbance tenfold anywhere
-    on its way (``study.identify.time_domain.shooting.needed_restarts``, from the exact sensitivities). A system that does loses the record
+    on its way (``shooting.needed_restarts``, from the exact sensitivities). A system that does loses the record
     however true the model, and its sum of squares is full of side valleys; half the steps are many enough for pieces
-    of it. Parameters and result are those of :func:`study.identify.time_domain.free_run_fit.fit_free_run`.
+    of it. Parameters and result are those of :func:`free_run_fit.fit_free_run`.
 
     Raises
     ------
     DivergenceError
         If the model diverges within a period of its start.
     StudyError
-        As :func:`study.identify.time_domain.free_run_fit.fit_free_run`.
+        As :func:`free_run_fit.fit_free_run`.
     """
     steps = needed_steps(model.with_values(dict(start or {})), record, response, steps_per_sample)
     coarse = max(steps.fine // 2, 1)

@@ -1,6 +1,6 @@
 """Shape parameters that a model leaves open: where a fit of them begins.
 
-Each point of a search over them (``study.identify.time_domain.shape_search``: the width of a dead band, a gap, a relaxation time or the
+Each point of a search over them (``shape_search``: the width of a dead band, a gap, a relaxation time or the
 frequency of a stiffness) is fitted to a part of the record. One free run tells points apart best, unless the
 system is chaotic: then it ends in a side valley at every point, while the misfit in pieces of a period falls
 smoothly towards the truth.

@@ -43,7 +43,7 @@ def read_record(path: Path, mapping: ReadOptions | None = None) -> Record:
     Returns
     -------
     Record
-        Force and at least one motion, as measured; ``study.records.completion.complete`` gives the others.
+        Force and at least one motion, as measured; ``completion.complete`` gives the others.
 
     Raises
     ------
