@@ -8,8 +8,9 @@ from matplotlib import style as styles
 from matplotlib.figure import Figure
 
 from study import preliminary
-from study.figures import coherence, curves, distribution, labels, page, response
+from study.figures import coherence, curves, frequency_response, labels, page
 from study.records.record import read_csv
+from study.reproduction.pictures import distribution
 from study.support.errors import StudyError
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
@@ -26,8 +27,8 @@ def linear(response_csv: Path, title: str, highest: float = HIGHEST, drawn: Sequ
         title, "Linear frequency response function $A_1(f)$", rows=2,
         legend_rows=page.rows_for(len(first.curves) + 2),
     )  # fmt: skip
-    response.magnitude(axes[0], first, labels.response_unit(first.shape))
-    response.phase(axes[1], first)
+    frequency_response.magnitude(axes[0], first, labels.response_unit(first.shape))
+    frequency_response.phase(axes[1], first)
     page.letter(axes, ("magnitude", "phase"))
     page.legend(figure, axes, bands=True)
     return figure
@@ -49,7 +50,7 @@ def nonlinear(response_csv: Path, title: str, highest: float = HIGHEST, drawn: S
     for item, real, imaginary in zip(shown, axes[:count], axes[count:], strict=True):
         unit = labels.response_unit(item.shape)
         alike = [other for other in shown if labels.response_unit(other.shape) == unit]
-        response.real_and_imaginary(real, imaginary, item, unit, response.common_span(alike))
+        frequency_response.real_and_imaginary(real, imaginary, item, unit, frequency_response.common_span(alike))
     by_input = [panel for pair in zip(axes[:count], axes[count:], strict=True) for panel in pair]
     page.letter(by_input, [f"{p} of $A_{r.number}$, input {labels.formula(r.shape)}" for r in shown for p in PARTS])
     page.legend(figure, axes, bands=True)

@@ -6,14 +6,15 @@ from pathlib import Path
 import pandas as pd
 from matplotlib import style as styles
 
-from study.figures import estimator_errors, page
+from study.figures import page
+from study.reproduction.pictures import error_dots
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
 
 
 def main(table: Path, style: Path, cases: Sequence[str], outputs: Sequence[Path]) -> None:
     with styles.context(style):
-        figure = estimator_errors.errors(pd.read_csv(table), cases)
+        figure = error_dots.errors(pd.read_csv(table), cases)
         for path in outputs:
             replace_file(path, page.rendered(figure, path.suffix[1:]))
 

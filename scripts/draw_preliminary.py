@@ -10,9 +10,10 @@ from matplotlib.figure import Figure
 
 from study import preliminary
 from study.equations.model_file import read_model
-from study.figures import distribution, labels, motion, page
+from study.figures import labels, page
 from study.records import spectra
 from study.records.record import read_csv
+from study.reproduction.pictures import distribution, force_patterns
 from study.support.errors import StudyError
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
@@ -38,7 +39,7 @@ def pattern(source: Source) -> Figure:
     harmonic = preliminary.harmonic_pattern(model, amplitude, frequency, cycles)
     figure, axes = page.page(source.title, "Restoring force against displacement", columns=2, width=7.6, panel=3.1)
     left, right = axes
-    motion.patterns(left, right, harmonic, random, record.units)
+    force_patterns.patterns(left, right, harmonic, random, record.units)
     size = labels.quantity(amplitude, record.units["displacement"])
     page.letter(axes, (f"harmonic motion, {size} at {frequency:.3g} Hz", "random excitation"))
     page.legend(figure, axes)
@@ -52,8 +53,8 @@ def periodic_lines(source: Source, segments: spectra.Segments) -> Figure:
     lines = preliminary.mathieu_lines(natural, values["periodic_stiffness.f_m"])
     figure, axes = page.page(source.title, "Autospectrum of the displacement", panel=2.9, legend_rows=1)
     frequency, density = spectra.autospectrum(record["displacement"], record.dt, segments)
-    motion.autospectrum(axes[0], frequency, density, record.units["displacement"], HIGHEST)
-    motion.marked(axes[0], lines)
+    force_patterns.autospectrum(axes[0], frequency, density, record.units["displacement"], HIGHEST)
+    force_patterns.marked(axes[0], lines)
     return figure
 
 
@@ -64,9 +65,9 @@ def force_history(source: Source, segments: spectra.Segments) -> Figure:
         "Excitation", "Force history (segment) and autospectrum", rows=2, legend_rows=0, share=False
     )
     shown = record.part(0, segments.length)
-    motion.history(axes[0], shown.time, shown["force"], "force", record.units["force"])
+    force_patterns.history(axes[0], shown.time, shown["force"], "force", record.units["force"])
     frequency, density = spectra.autospectrum(record["force"], record.dt, segments)
-    motion.autospectrum(axes[1], frequency, density, record.units["force"], float(frequency[-1]))
+    force_patterns.autospectrum(axes[1], frequency, density, record.units["force"], float(frequency[-1]))
     page.letter(axes, ("history", "autospectrum"))
     return figure
 

@@ -5,8 +5,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from study import cli, ladder
+from study import cli
 from study.commands.records import plan_of, read_records
+from study.compare import history
+from study.compare.history_picture import files as ladder_pictures
 from study.diagnose import report
 from study.diagnose.files import files as diagnosis_files
 from study.diagnose.verdict import MISSING, Diagnosis
@@ -14,7 +16,6 @@ from study.equations.model_file import WANTED, parse_model
 from study.explore import session as sessions
 from study.explore.files import PAGE, files
 from study.explore.session import Session
-from study.figures.ladder import files as ladder_pictures
 from study.support.file_sets import write_files
 from study.support.files import read_text
 
@@ -34,7 +35,7 @@ def run(*words: str) -> None:
         sys.exit(code)
 
 
-def climb(record: Path, model: Path, options: Sequence[str], steps: int, folder: Path) -> list[ladder.Step]:
+def climb(record: Path, model: Path, options: Sequence[str], steps: int, folder: Path) -> list[history.Step]:
     """Begin with a model and add the first candidate of each diagnosis to it, as a user of ``study explore`` would.
 
     Parameters
@@ -71,10 +72,10 @@ def climb(record: Path, model: Path, options: Sequence[str], steps: int, folder:
             break
         session = sessions.with_added(session, found.candidates[0].name)
     made = files(session, model.name, text)
-    write_files(folder, {SAVED: made.pop(PAGE), "history.json": ladder.as_bytes(session.steps)})
+    write_files(folder, {SAVED: made.pop(PAGE), "history.json": history.as_bytes(session.steps)})
     write_files(folder, ladder_pictures(session.steps, model.stem))
     write_files(work, made)
-    print(ladder.table(session.steps))
+    print(history.table(session.steps))
     return session.steps
 
 

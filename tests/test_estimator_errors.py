@@ -11,9 +11,9 @@ from matplotlib import style
 
 from study import ensemble, error_pages, estimator_errors
 from study.config import load
-from study.figures import estimator_errors as drawn
 from study.figures import page
 from study.identify.estimators import ESTIMATORS
+from study.reproduction.pictures import error_dots as drawn
 from study.support import document
 from study.support.errors import StudyError
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study import cli, ladder, trials
+from study import cli, trials
+from study.compare import history
 from study.compare.links import links
 from study.compare.surface import curve, surface
 from study.equations import model_file
@@ -244,7 +245,7 @@ def test_saving_keeps_the_users_comments(asked, grown, tmp_path):
     for name, content in made.items():
         (tmp_path / name).write_bytes(content)
     assert model_file.read_model(tmp_path / "rig.yaml") == grown.now.model
-    assert len(ladder.read(tmp_path / "rig.yaml")) == 2
+    assert len(history.read(tmp_path / "rig.yaml")) == 2
 
 
 def test_the_desk_does_one_thing_at_a_time_and_says_what_went_wrong(asked, tmp_path):

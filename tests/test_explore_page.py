@@ -15,7 +15,8 @@ import pytest
 from playwright.sync_api import Page, TimeoutError, sync_playwright
 
 from scripts.page_picture import MISSING, QUIET, browser
-from study import ladder, trials
+from study import trials
+from study.compare import history
 from study.equations import model_file
 from study.records.record import write_csv
 
@@ -198,7 +199,7 @@ def _saved(rig: Path) -> None:
     text = (rig / "saved" / "rig.yaml").read_text()
     assert text == (rig / "rig.yaml").read_text() + "  - quadratic_damping\n"
     assert "quadratic_damping" in model_file.read_model(rig / "saved" / "rig.yaml")
-    assert [s["added"] for s in ladder.read(rig / "saved" / "rig.yaml")] == [None, "quadratic_damping"]
+    assert [s["added"] for s in history.read(rig / "saved" / "rig.yaml")] == [None, "quadratic_damping"]
 
 
 def _opened_without_a_network(page: Page, rig: Path, given: float, reached: float) -> None:

@@ -16,10 +16,11 @@ from matplotlib.figure import Figure
 from matplotlib.mathtext import MathTextParser
 
 from study.equations.terms import LIBRARY
-from study.figures import coherence, curves, distribution, labels, motion, page, response, styles
+from study.figures import coherence, curves, frequency_response, labels, page, styles
 from study.preliminary import Pattern, histogram
 from study.records.record import SI_UNITS, Record, write_csv
 from study.records.spectra import Segments
+from study.reproduction.pictures import distribution, force_patterns
 from study.support.errors import StudyError
 
 ROOT = Path(__file__).parent.parent
@@ -165,7 +166,9 @@ def test_no_two_estimators_look_alike_in_grey():
 
 
 def test_figures_need_no_pyplot():
-    code = "import sys, study.figures.response, study.figures.page; sys.exit('matplotlib.pyplot' in sys.modules)"
+    code = (
+        "import sys, study.figures.frequency_response, study.figures.page; sys.exit('matplotlib.pyplot' in sys.modules)"
+    )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
@@ -207,7 +210,7 @@ def drawn(panel):
 
 def test_magnitude_draws_each_estimate_in_its_look():
     item = one()
-    lines = drawn(response.magnitude(axes(), item, "N/m"))
+    lines = drawn(frequency_response.magnitude(axes(), item, "N/m"))
     assert list(lines) == ["MI/SO", "SI/SO", "exact"]
     np.testing.assert_allclose(lines["MI/SO"].get_ydata(), np.abs(item.curves[0].values))
     np.testing.assert_allclose(lines["exact"].get_ydata(), np.abs(LINEAR[1:101]))
@@ -217,12 +220,12 @@ def test_magnitude_draws_each_estimate_in_its_look():
 
 
 def test_magnitude_without_an_exact_function_is_that_of_a_measured_record():
-    assert list(drawn(response.magnitude(axes(), one(exact=False), "N/m"))) == ["MI/SO", "SI/SO"]
+    assert list(drawn(frequency_response.magnitude(axes(), one(exact=False), "N/m"))) == ["MI/SO", "SI/SO"]
 
 
 def test_magnitude_band_is_about_the_curve():
     panel, item = axes(), one(spread=0.1)
-    response.magnitude(panel, item, "N/m")
+    frequency_response.magnitude(panel, item, "N/m")
     edges = panel.collections[0].get_paths()[0].vertices
     at = np.isclose(edges[:, 0], item.frequency[50])
     size, half = abs(item.curves[0].values[50]), item.curves[0].half_width[50]
@@ -235,19 +238,21 @@ def test_phase_does_not_wrap_at_180_degrees(angle, shown):
     frequency = np.array([1.0, 2.0])
     curve = curves.Curve("miso", frequency, np.full(2, np.exp(1j * np.radians(angle))), np.zeros(2))
     item = curves.InputResponse(1, "u", (curve,), frequency, None)
-    np.testing.assert_allclose(drawn(response.phase(axes(), item))["MI/SO"].get_ydata(), shown)
+    np.testing.assert_allclose(drawn(frequency_response.phase(axes(), item))["MI/SO"].get_ydata(), shown)
 
 
 def test_phase_leaves_a_gap_where_it_wraps():
     frequency = np.arange(1.0, 4.0)
     curve = curves.Curve("miso", frequency, np.exp(1j * np.radians([-80.0, -100.0, -100.0])), np.zeros(3))
     item = curves.InputResponse(1, "u", (curve,), frequency, None)
-    np.testing.assert_allclose(drawn(response.phase(axes(), item))["MI/SO"].get_ydata(), [-80.0, np.nan, 260.0])
+    np.testing.assert_allclose(
+        drawn(frequency_response.phase(axes(), item))["MI/SO"].get_ydata(), [-80.0, np.nan, 260.0]
+    )
 
 
 def test_real_and_imaginary_part_share_a_scale_and_carry_their_power_of_ten():
     real, imaginary, item = axes(), axes(), one(number=2)
-    response.real_and_imaginary(real, imaginary, item, "N/m^3", response.common_span([item]))
+    frequency_response.real_and_imaginary(real, imaginary, item, "N/m^3", frequency_response.common_span([item]))
     np.testing.assert_allclose(drawn(real)["exact"].get_ydata(), 20.0)
     np.testing.assert_allclose(drawn(imaginary)["MI/SO"].get_ydata(), item.curves[0].values.imag / 1e6)
     assert real.get_ylabel() == "Re $A_2$ (10$^{6}$ N/m$^{3}$)"
@@ -261,7 +266,7 @@ def test_imaginary_part_of_a_damping_term_is_logarithmic_and_marks_wrong_signs()
     table.loc[line, "imag"] *= -1.0
     item = curves.responses(table, 10.0)[1]
     real, imaginary = axes(), axes()
-    response.real_and_imaginary(real, imaginary, item, "N/m^3", response.common_span([item]))
+    frequency_response.real_and_imaginary(real, imaginary, item, "N/m^3", frequency_response.common_span([item]))
     assert (real.get_yscale(), imaginary.get_yscale()) == ("linear", "log")
     crosses = drawn(imaginary)["opposite sign"]
     wrong = np.sign(item.curves[0].values.imag) < 0.0
@@ -276,7 +281,7 @@ def test_a_curve_has_a_gap_where_its_band_is_taller_than_the_panel():
     curve = curves.Curve("miso", frequency, np.full(10, 2.0 + 1.0j), error)
     item = curves.InputResponse(2, "u**3", (curve,), frequency, np.full(10, 2.0 + 1.0j))
     real, imaginary = Figure().subplots(2)
-    response.real_and_imaginary(real, imaginary, item, "N/m^3", response.common_span([item]))
+    frequency_response.real_and_imaginary(real, imaginary, item, "N/m^3", frequency_response.common_span([item]))
     for axes in (real, imaginary):
         drawn = axes.get_lines()[0].get_ydata()
         assert list(np.flatnonzero(np.isnan(drawn))) == [6]
@@ -286,12 +291,12 @@ def test_real_part_that_is_zero_is_seen_to_be_small_beside_the_function():
     table = response_table("duffing_van_der_pol")
     table[["real", "exact_real"]] -= 2e7 * (table["input"] == 2).to_numpy()[:, None]
     item = curves.responses(table, 10.0)[1]
-    assert response.common_span([item]) >= 1.5 * np.median(np.abs(item.exact))
+    assert frequency_response.common_span([item]) >= 1.5 * np.median(np.abs(item.exact))
 
 
 def test_one_scale_for_inputs_of_one_unit():
     second, third = curves.responses(response_table("mathieu"), 10.0)[1:]
-    assert response.common_span([second, third]) > 2.0 * response.common_span([third])
+    assert frequency_response.common_span([second, third]) > 2.0 * frequency_response.common_span([third])
 
 
 def test_cumulative_coherence_names_what_each_curve_adds():
@@ -321,7 +326,7 @@ def test_histogram_is_in_the_unit_of_its_axis():
 def test_patterns_share_their_scales():
     left, right = axes(), axes()
     grid = np.linspace(-1.0, 1.0, 9)
-    motion.patterns(left, right, Pattern(0.01 * grid, grid), Pattern(0.02 * grid, 3.0 * grid), SI_UNITS)
+    force_patterns.patterns(left, right, Pattern(0.01 * grid, grid), Pattern(0.02 * grid, 3.0 * grid), SI_UNITS)
     assert left.get_xlim() == right.get_xlim()
     assert left.get_ylim() == right.get_ylim()
     assert left.get_ylim()[1] > 3.0
@@ -334,7 +339,7 @@ def test_patterns_share_their_scales():
 def test_same_bytes_each_time_and_a_look_that_the_sheet_decides():
     def made():
         figure, panels = page.page("Title", "what is shown")
-        response.magnitude(panels[0], one(), "N/m")
+        frequency_response.magnitude(panels[0], one(), "N/m")
         page.legend(figure, panels, bands=True)
         return figure
 

@@ -2,7 +2,8 @@ import json
 
 import pytest
 
-from study import cli, ladder, trials
+from study import cli, trials
+from study.compare import history
 from study.records.record import write_csv
 
 
@@ -31,7 +32,7 @@ def test_diagnose_add_history(rig, capsys):
     text = (rig / "rig.yaml").read_text()
     assert text.endswith("  - quadratic_damping\n")
     assert text.count("# mine") == len(trials.make_trial(911, hidden=["quadratic_damping"]).believed.terms)
-    before, after = ladder.read(rig / "rig.yaml")
+    before, after = history.read(rig / "rig.yaml")
     assert after["added"] == "quadratic_damping"
     assert after["error"]["response"] < before["error"]["response"]
     assert after["error"]["response"] == pytest.approx(after["noise_floor"]["response"], rel=0.15)
@@ -62,11 +63,11 @@ def test_bad_input_is_one_sentence_and_changes_nothing(rig, capsys, words, said)
     assert said in err
     assert err.count("\n") == 1
     assert (rig / "rig.yaml").read_bytes() == before
-    assert not ladder.path_of(rig / "rig.yaml").exists()
+    assert not history.path_of(rig / "rig.yaml").exists()
 
 
 def test_a_broken_ladder_is_refused_before_the_model_is_touched(rig, capsys):
-    ladder.path_of(rig / "rig.yaml").write_text("{not json")
+    history.path_of(rig / "rig.yaml").write_text("{not json")
     before = (rig / "rig.yaml").read_bytes()
     assert cli.main(["add", "rig.yaml", "quadratic_damping", "--data", "rig.csv"]) == 2
     assert "is not JSON" in capsys.readouterr().err

@@ -27,7 +27,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> None:
     from tqdm import tqdm
 
-    from study import ladder
+    from study.compare import history
     from study.compare.comparison import compare
     from study.compare.report import as_json, document, rung, summary
     from study.equations.model_file import add_term, read_model
@@ -38,7 +38,7 @@ def _run(arguments: argparse.Namespace) -> None:
     term = _term(arguments)
     model = read_model(arguments.model)
     _refuse_second(arguments.model, model, term)
-    steps = ladder.read(arguments.model)
+    steps = history.read(arguments.model)
     records = read_records(arguments)
     pairs: list[tuple[Comparison, Comparison]] = []
     with tqdm(total=2 * len(records), delay=QUIET, leave=False, unit=" fits") as bar:
@@ -49,12 +49,12 @@ def _run(arguments: argparse.Namespace) -> None:
             pairs.append((before, compare(model.with_term(term), record, how, cutoff=arguments.cutoff)))
             bar.update()
     for before, after in pairs:
-        steps = ladder.climbed(steps, rung(before), rung(after, term.name))
-    ladder.write(arguments.model, steps)
+        steps = history.climbed(steps, rung(before), rung(after, term.name))
+    history.write(arguments.model, steps)
     add_term(arguments.model, term)
     write_files(folder, {"comparison.json": as_json(document([after for _, after in pairs]))})
     print(summary([after for _, after in pairs]))
-    print("\n" + ladder.table(steps))
+    print("\n" + history.table(steps))
 
 
 def _term(arguments: argparse.Namespace) -> "Term":

@@ -21,7 +21,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> None:
     from tqdm import tqdm
 
-    from study import ladder
+    from study.compare import history
     from study.compare.comparison import STEPS
     from study.equations.model_file import WANTED, parse_model
     from study.explore import session as sessions
@@ -34,7 +34,7 @@ def _run(arguments: argparse.Namespace) -> None:
     check_folder(folder)
     text = read_text(arguments.model, WANTED)
     model = parse_model(text, arguments.model)
-    steps = ladder.read(arguments.model)
+    steps = history.read(arguments.model)
     (record,) = read_records(arguments)
     how = plan_of(arguments, record)
     with tqdm(total=STEPS, delay=QUIET, leave=False, unit="step") as bar:

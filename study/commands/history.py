@@ -12,21 +12,21 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    from study import ladder
+    from study.compare import history
     from study.equations.model_file import read_model
 
     read_model(arguments.model)
-    steps = ladder.read(arguments.model)
+    steps = history.read(arguments.model)
     if not steps:
         print(f"{arguments.model}: nothing was added yet; 'study add' begins the ladder")
         return
-    print(ladder.table(steps))
+    print(history.table(steps))
     if arguments.out is not None:
-        from study.figures.ladder import files
+        from study.compare.history_picture import files
         from study.support.file_sets import check_folder, write_files
 
         check_folder(arguments.out)
-        write_files(arguments.out, files(steps, arguments.model.stem) | {"history.json": ladder.as_bytes(steps)})
+        write_files(arguments.out, files(steps, arguments.model.stem) | {"history.json": history.as_bytes(steps)})
 
 
 COMMAND = Command(

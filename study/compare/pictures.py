@@ -12,11 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from study.compare import panels
 from study.compare.comparison import Comparison
 from study.compare.levels import Level
 from study.compare.says import percent
 from study.compare.surface import curve, surface
-from study.figures import coherence, misfit, page
+from study.figures import coherence, page
 from study.figures.curves import InputCoherence
 
 Floats = NDArray[np.float64]
@@ -55,10 +56,10 @@ def response(found: Comparison) -> Figure:
         f"{found.record.name}: {found.how.response}", f"model {found.model.name}; {about}", rows=3, width=WIDE,
         panel=1.8, legend_rows=2, share=False,
     )  # fmt: skip
-    misfit.response(axes[0], judged.time, judged.measured, judged.predicted, unit)
-    misfit.residual(axes[1], judged.time, judged.residual, found.noise.rms, unit)
+    panels.response(axes[0], judged.time, judged.measured, judged.predicted, unit)
+    panels.residual(axes[1], judged.time, judged.residual, found.noise.rms, unit)
     near = judged.closeup
-    misfit.response(axes[2], judged.time[near], judged.measured[near], judged.predicted[near], unit)
+    panels.response(axes[2], judged.time[near], judged.measured[near], judged.predicted[near], unit)
     page.letter(axes, ("all that is judged", "the difference", "close-up of (a) where the difference is largest"))
     page.legend(figure, axes, columns=2)
     return figure
@@ -74,7 +75,7 @@ def force_error(found: Comparison) -> Figure:
         f"{found.record.name}: error of the force", f"model {found.model.name}; unexplained is {about}", rows=2,
         width=WIDE, panel=2.3, legend_rows=2, share=False,
     )  # fmt: skip
-    misfit.force_error(axes[0], force, highest)
+    panels.force_error(axes[0], force, highest)
     keep = (force.frequency > 0.0) & (force.frequency <= highest)
     shares = [
         InputCoherence(i.shape, " + ".join(i.terms), force.frequency[keep], c[keep])
@@ -98,9 +99,9 @@ def missing_force(found: Comparison) -> Figure:
         width=WIDE, panel=2.3, share=False,
     )  # fmt: skip
     u, v, force = (x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force))
-    misfit.missing_force(axes[0], surface(u, v, force), unit)
-    misfit.force_curve(axes[1], curve(u, force), "displacement", unit)
-    misfit.force_curve(axes[2], curve(v, force), "velocity", unit)
+    panels.missing_force(axes[0], surface(u, v, force), unit)
+    panels.force_curve(axes[1], curve(u, force), "displacement", unit)
+    panels.force_curve(axes[2], curve(v, force), "velocity", unit)
     page.letter(axes, ("mean over the plane of motion", "against displacement", "against velocity"))
     page.legend(figure, axes)
     return figure
@@ -113,8 +114,8 @@ def error_in_time(found: Comparison) -> Figure:
         f"model {found.model.name}; differences between stretches of equal level: p = {found.time.p_value:.2g}",
         rows=2, width=WIDE, panel=2.0, share=False,
     )  # fmt: skip
-    misfit.error_in_time(axes[0], found.time, found.noise_floor)
-    misfit.error_beyond_level(axes[1], found.time)
+    panels.error_in_time(axes[0], found.time, found.noise_floor)
+    panels.error_beyond_level(axes[1], found.time)
     page.letter(axes, ("error and response", "beyond what the level accounts for"))
     page.legend(figure, axes[:1])
     return figure
@@ -129,7 +130,7 @@ def by_level(moving: Sequence[Level], force_unit: str) -> Figure:
     )  # fmt: skip
     figure.subplots_adjust(wspace=0.38)
     for panel, level in zip(axes, moving, strict=False):
-        misfit.coefficient_by_level(panel, level, force_unit)
+        panels.coefficient_by_level(panel, level, force_unit)
         verdict = "moves" if level.moves else "does not move"
         panel.set_title(f"{level.key}: {verdict} (p = {level.p_value:.2g})")
     _hide(axes[len(moving) :])

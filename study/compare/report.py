@@ -119,7 +119,7 @@ def level_row(found: Level) -> Row:
 
 
 def rung(found: Comparison, added: str | None = None) -> Row:
-    """A comparison as a rung of the ladder (``study.ladder``); ``added`` names the term that is new in it."""
+    """A comparison as a rung of the ladder (``study.compare.history``); ``added`` names the term that is new in it."""
     return {
         "terms": [t.name for t in found.model.terms],
         "added": added,

@@ -1,13 +1,13 @@
 """What Save writes: the model file with its comments, the ladder, the pictures, and the session as one page."""
 
-from study import ladder
+from study.compare import history
+from study.compare.history_picture import files as ladder_pictures
 from study.compare.pictures import pictures
 from study.compare.report import as_json, document
 from study.diagnose.files import files as diagnosis_files
 from study.equations import model_file
 from study.explore.saved import saved
 from study.explore.session import Session
-from study.figures.ladder import files as ladder_pictures
 
 PAGE = "explore.html"
 
@@ -33,7 +33,7 @@ def files(session: Session, name: str, text: str) -> dict[str, bytes]:
     stem = name.rpartition(".")[0] or name
     found = {
         name: model_file.revised(text, name, now.model).encode(),
-        f"{stem}.history.json": ladder.as_bytes(steps),
+        f"{stem}.history.json": history.as_bytes(steps),
         "comparison.json": as_json(document([now.comparison])),
         PAGE: saved(session),
     }
