@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from study import cli
-from study.compare.chosen import CHAOTIC
+from study.compare.by_estimator import CHAOTIC
 from study.compare.comparison import Comparison, compare
-from study.compare.local_reverse import local_force_error
-from study.compare.report import document, summary
+from study.compare.comparison_report import document, summary
+from study.compare.local_force_error import local_force_error
 from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get

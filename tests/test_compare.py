@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from study.compare import amplitude, frequency, noise, stretches, surface
+from study.compare import along_time, bands, force_map, growth, noise
+from study.compare.across_levels import levels
 from study.compare.comparison import Comparison, across, compare
-from study.compare.judged import Judged
-from study.compare.levels import levels
-from study.compare.report import as_json, document, summary, tables
-from study.compare.says import says, says_of_all
+from study.compare.comparison_report import as_json, document, summary, tables
+from study.compare.comparison_sentences import says, says_of_all
+from study.compare.prediction import Judged
 from study.equations.model import Model, ModelTerm, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
@@ -267,11 +267,11 @@ def test_the_narrowest_band_that_holds_most() -> None:
     power = np.zeros(101)
     power[20:24] = [1.0, 3.0, 4.0, 1.0]
     power[60] = 1.0
-    band = frequency.narrowest("response", np.arange(101) * 0.5, power)
+    band = bands.narrowest("response", np.arange(101) * 0.5, power)
     assert band is not None
     assert (band.low, band.high) == (10.25, 11.25)
     assert band.share == pytest.approx(0.7)
-    assert frequency.narrowest("response", np.arange(101) * 0.5, np.zeros(101)) is None
+    assert bands.narrowest("response", np.arange(101) * 0.5, np.zeros(101)) is None
 
 
 def judged(residual: Floats, response: Floats) -> Judged:
@@ -285,22 +285,22 @@ def test_chance_changes_along_the_record_are_not_reported() -> None:
     for _ in range(100):
         white = rng.standard_normal((2, 4096 + 8))
         residual, response = (np.convolve(x, np.ones(9), "valid") for x in white)
-        low += stretches.along_time(judged(0.1 * residual, response)).p_value < 0.05
+        low += along_time.along_time(judged(0.1 * residual, response)).p_value < 0.05
     assert low <= 11  # 5 are expected; more than 11 come by chance once in two hundred times
 
 
 def test_a_change_along_the_record_is_seen_beside_one_of_the_level() -> None:
     rng = np.random.default_rng(13)
     residual, response = rng.standard_normal((2, 6000))
-    steady = stretches.along_time(judged(0.1 * residual, response))
+    steady = along_time.along_time(judged(0.1 * residual, response))
     assert steady.p_value > 0.01
     worse = residual * np.where(np.arange(6000) >= 5000, 2.0, 1.0)
-    changed = stretches.along_time(judged(0.1 * worse, response))
+    changed = along_time.along_time(judged(0.1 * worse, response))
     assert changed.p_value < 1e-6
     assert max(changed.stretches, key=lambda s: s.ratio) is changed.stretches[-1]
     bursts = np.repeat(np.tile([0.8, 1.25], 24), 125)  # the error follows the level, and that is no change in time
     bursts[5000:] *= 2.0
-    follows = stretches.along_time(judged(0.1 * residual * bursts, response * bursts))
+    follows = along_time.along_time(judged(0.1 * residual * bursts, response * bursts))
     assert follows.p_value > 0.01
     assert not follows.confounded
     assert follows.growth == pytest.approx(1.0, abs=0.1)
@@ -310,14 +310,14 @@ def test_where_level_and_time_change_together_they_are_not_told_apart() -> None:
     rng = np.random.default_rng(14)
     ramp = np.linspace(0.05, 1.0, 6000)
     residual, response = rng.standard_normal((2, 6000))
-    assert stretches.along_time(judged(residual * ramp**2, response * ramp)).confounded
+    assert along_time.along_time(judged(residual * ramp**2, response * ramp)).confounded
 
 
 def test_curves_count_a_stay_once() -> None:
     at = np.repeat(np.tile(np.linspace(-1.0, 1.0, 50), 40), 10)
     rng = np.random.default_rng(15)
     value = np.repeat(rng.standard_normal(2000), 10)
-    found = surface.curve(at, value)
+    found = force_map.curve(at, value)
     middle = np.abs(found.at) < 0.5
     true = 1.0 / np.sqrt(2000 / 24)
     assert np.median(found.error[middle]) == pytest.approx(true, rel=0.5)
@@ -328,7 +328,7 @@ def test_the_map_shows_the_force_where_the_motion_was() -> None:
     turn = np.linspace(0.0, 400.0 * np.pi, 100_000)
     size = 0.2 + 0.8 * np.linspace(0.0, 1.0, len(turn))
     u, v = size * np.cos(turn), -size * np.sin(turn)
-    found = surface.surface(u, v, v * np.abs(v))
+    found = force_map.surface(u, v, v * np.abs(v))
     seen = np.isfinite(found.mean)
     middle = 0.5 * (found.velocity[1:] + found.velocity[:-1])
     expected = np.broadcast_to(middle * np.abs(middle), found.mean.shape)
@@ -351,7 +351,7 @@ def test_the_missing_force_is_the_hidden_one() -> None:
 
 def test_powers_are_interpolated_between_those_tried() -> None:
     powers = np.array([1.0, 1.5, 2.0])
-    power, gain = amplitude._top(powers, 4.0 - (powers - 1.6) ** 2)
+    power, gain = growth._top(powers, 4.0 - (powers - 1.6) ** 2)
     assert (power, gain) == (pytest.approx(1.6), pytest.approx(4.0))
 
 
@@ -385,7 +385,7 @@ def test_the_document_has_the_fields_of_the_issue_and_is_plain_json() -> None:
     assert set(content["where"]) == {"frequency", "amplitude", "time", "level"}
     assert content["where"]["frequency"][0]["of"] == "response"
     assert content["where"]["amplitude"][0]["of"] == "velocity"
-    assert len(content["where"]["time"]) == stretches.STRETCHES
+    assert len(content["where"]["time"]) == along_time.STRETCHES
     for row in content["coefficients"]:
         assert row["interval"][0] < row["value"] < row["interval"][1]
 

@@ -10,8 +10,8 @@ import pytest
 
 from study import cli, trials
 from study.compare import history
+from study.compare.force_map import curve, surface
 from study.compare.links import links
-from study.compare.surface import curve, surface
 from study.equations import model_file
 from study.equations.model import Model, free
 from study.equations.terms import get

@@ -29,7 +29,7 @@ def _run(arguments: argparse.Namespace) -> None:
 
     from study.compare import history
     from study.compare.comparison import compare
-    from study.compare.report import as_json, document, rung, summary
+    from study.compare.comparison_report import as_json, document, rung, summary
     from study.equations.model_file import add_term, read_model
     from study.support.file_sets import check_folder, write_files
 

@@ -26,8 +26,8 @@ def _run(arguments: argparse.Namespace) -> None:
     from tqdm import tqdm
 
     from study.compare.comparison import STEPS, across, compare
-    from study.compare.pictures import level_pictures, pictures
-    from study.compare.report import as_json, document, summary, tables
+    from study.compare.comparison_pictures import level_pictures, pictures
+    from study.compare.comparison_report import as_json, document, summary, tables
     from study.equations.model_file import read_model
     from study.explore.files import PAGE
     from study.explore.saved import of_comparison

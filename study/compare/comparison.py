@@ -6,16 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from study.compare.amplitude import Growths, growths
-from study.compare.chosen import CHAOTIC, FREE_RUN, fit_by, has_lost
-from study.compare.frequency import Band, bands
-from study.compare.judged import Judged, judge
-from study.compare.levels import Level, levels
-from study.compare.local_reverse import local_force_error
+from study.compare.across_levels import Level, levels
+from study.compare.along_time import AlongTime, along_time
+from study.compare.bands import Band, bands
+from study.compare.by_estimator import CHAOTIC, FREE_RUN, fit_by, has_lost
+from study.compare.force_error import ForceError, force_error
+from study.compare.growth import Growths, growths
+from study.compare.local_force_error import local_force_error
+from study.compare.missing_force import Restoring, restoring
 from study.compare.noise import Noise, noise_of
-from study.compare.restoring import Restoring, restoring
-from study.compare.reverse import ForceError, force_error
-from study.compare.stretches import AlongTime, along_time
+from study.compare.prediction import Judged, judge
 from study.equations.model import Model
 from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.time_domain.fit_model import Coefficient, coefficients, fit_model

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.fft import rfft, rfftfreq
 
 from study.compare.comparison import Comparison
-from study.compare.surface import CELLS, CLASSES, edges
+from study.compare.force_map import CELLS, CLASSES, edges
 from study.records.spectra import Segments
 
 Floats = NDArray[np.float64]

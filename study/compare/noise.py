@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study.compare.judged import Judged
+from study.compare.prediction import Judged
 from study.records import noise_floor
 from study.records.record import MOTIONS, Record
 from study.records.spectra import Segments, autospectrum

@@ -12,10 +12,10 @@ from matplotlib.colors import TwoSlopeNorm
 from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
-from study.compare.levels import Level
-from study.compare.reverse import ForceError
-from study.compare.stretches import AlongTime
-from study.compare.surface import Curve, Surface
+from study.compare.across_levels import Level
+from study.compare.along_time import AlongTime
+from study.compare.force_error import ForceError
+from study.compare.force_map import Curve, Surface
 from study.equations import dimensions
 from study.figures import labels
 

@@ -1,7 +1,7 @@
 """A diagnosis in words, and as the files that a command writes."""
 
 from study.compare.comparison import Comparison
-from study.compare.report import as_json, where
+from study.compare.comparison_report import as_json, where
 from study.diagnose import pages, report
 from study.diagnose.says import sentences
 from study.diagnose.separate import advice

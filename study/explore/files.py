@@ -1,9 +1,9 @@
 """What Save writes: the model file with its comments, the ladder, the pictures, and the session as one page."""
 
 from study.compare import history
+from study.compare.comparison_pictures import pictures
+from study.compare.comparison_report import as_json, document
 from study.compare.history_picture import files as ladder_pictures
-from study.compare.pictures import pictures
-from study.compare.report import as_json, document
 from study.diagnose.files import files as diagnosis_files
 from study.equations import model_file
 from study.explore.saved import saved

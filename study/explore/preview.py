@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.compare.comparison import Comparison
+from study.compare.force_map import CLASSES, curve, surface
+from study.compare.missing_force import Restoring
 from study.compare.noise import segments_of
-from study.compare.restoring import Restoring
-from study.compare.surface import CLASSES, curve, surface
 from study.diagnose.ranking import Ranked
 from study.explore import decimate
 from study.explore.session import Rung

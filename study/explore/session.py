@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from study.compare.comparison import Comparison, compare, lacking_with
-from study.compare.report import rung as ladder_step
-from study.compare.restoring import Restoring
+from study.compare.comparison_report import rung as ladder_step
+from study.compare.missing_force import Restoring
 from study.diagnose import candidates
 from study.diagnose.candidates import Trial
 from study.diagnose.files import in_words

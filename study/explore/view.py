@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.compare.comparison import Comparison
+from study.compare.force_map import CELLS, curve, surface
 from study.compare.links import links
-from study.compare.surface import CELLS, curve, surface
 from study.diagnose.ranking import Ranked
 from study.diagnose.steadiness import Curve as Steadiness
 from study.explore import decimate, preview, words

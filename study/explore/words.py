@@ -5,7 +5,7 @@ from html import escape
 from typing import Any
 
 from study.compare.comparison import Comparison
-from study.compare.says import percent, says
+from study.compare.comparison_sentences import percent, says
 from study.diagnose.ranking import Ranked
 from study.diagnose.verdict import MISSING, NOTHING
 from study.explore.session import Rung

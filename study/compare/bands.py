@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from study.compare.force_error import ForceError
 from study.compare.noise import Noise
-from study.compare.reverse import ForceError
 
 Floats = NDArray[np.float64]
 MOST = 2.0 / 3.0  # of the unexplained power, at least, lies in the band that is named

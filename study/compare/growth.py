@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.compare.restoring import Restoring
+from study.compare.missing_force import Restoring
 
 Floats = NDArray[np.float64]
 POWERS = np.arange(0.0, 6.01, 0.25)

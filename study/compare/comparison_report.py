@@ -9,11 +9,11 @@ from typing import Any, cast
 import numpy as np
 import pandas as pd
 
-from study.compare.chosen import FREE_RUN
+from study.compare.across_levels import Level
+from study.compare.by_estimator import FREE_RUN
 from study.compare.comparison import Comparison
-from study.compare.levels import Level
-from study.compare.says import percent, says, says_of_all
-from study.compare.surface import curve, surface
+from study.compare.comparison_sentences import percent, says, says_of_all
+from study.compare.force_map import curve, surface
 from study.equations import model_file
 from study.identify.time_domain.fit_model import Coefficient
 

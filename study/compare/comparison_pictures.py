@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from study.compare import panels
+from study.compare.across_levels import Level
 from study.compare.comparison import Comparison
-from study.compare.levels import Level
-from study.compare.says import percent
-from study.compare.surface import curve, surface
+from study.compare.comparison_sentences import percent
+from study.compare.force_map import curve, surface
 from study.figures import coherence, page
 from study.figures.curves import InputCoherence
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import rfft
 
+from study.compare.force_error import ForceError, from_noise, lines_to_judge
 from study.compare.noise import Noise
-from study.compare.reverse import ForceError, from_noise, lines_to_judge
 from study.equations.model import Model
 from study.identify.frequency_domain.inputs import Input, histories, reverse_inputs
 from study.identify.frequency_domain.local_polynomial_method import (
@@ -34,7 +34,7 @@ DEGREE = 2
 
 
 def local_force_error(model: Model, completed: CompletedRecord, how: Plan, noise: Noise) -> ForceError:
-    """Judge a fitted model in reverse on the judging part, as ``study.compare.reverse.force_error`` does.
+    """Judge a fitted model in reverse on the judging part, as ``study.compare.force_error.force_error`` does.
 
     The first entry of every array stands for the lines below the first band, of which nothing is said.
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from study.compare.judged import Judged
+from study.compare.prediction import Judged
 
 Floats = NDArray[np.float64]
 STRETCHES = 6

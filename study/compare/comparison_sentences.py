@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from study.compare.amplitude import Growth, Growths
+from study.compare.across_levels import Level
+from study.compare.along_time import AlongTime
 from study.compare.comparison import Comparison
-from study.compare.levels import Level
+from study.compare.growth import Growth, Growths
 from study.compare.noise import SCATTER
-from study.compare.stretches import AlongTime
 
 NEGLIGIBLE = 2e-3  # of the rms response: structure below this is no evidence that something is missing
 CHANCE = 0.01  # p value below which a change along the record is no chance

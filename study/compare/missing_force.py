@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
-from study.compare.judged import Judged
 from study.compare.noise import Noise
+from study.compare.prediction import Judged
 from study.equations import kernels
 from study.equations.model import Model, forward_graph, free, with_registers
 from study.equations.terms import get
