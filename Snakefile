@@ -2,7 +2,7 @@
 import sys
 from pathlib import Path
 
-from study.config import load
+from study.reproduction.config import load
 from study.support.workflow_step import alone, one_sentence, sweep
 
 with one_sentence():

@@ -13,8 +13,6 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from study.config import load
-from study.ensemble import threaded
 from study.equations.model_file import read_model
 from study.equations.simulate import Integrator, simulate
 from study.identify import estimators
@@ -23,6 +21,8 @@ from study.identify.estimators.base import Settings
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.record import Record
 from study.records.spectra import Segments
+from study.reproduction.config import load
+from study.reproduction.ensemble import threaded
 from study.support import document
 
 Floats = NDArray[np.float64]

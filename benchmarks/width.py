@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from study.config import load
 from study.equations.model_file import read_model
 from study.equations.simulate import Integrator, simulate
 from study.identify import estimators
 from study.identify.estimators.base import Settings
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.spectra import Segments
+from study.reproduction.config import load
 
 ROOT = Path(__file__).parent.parent
 FIRST = 6000

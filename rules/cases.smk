@@ -1,6 +1,6 @@
 # Figures of each case, and its name as a target. Their files are named by the report's numbers, which no
 # wildcard can say: one rule a case.
-from study.config import IDENTIFIED
+from study.reproduction.config import IDENTIFIED
 
 DESCRIBED = {
     "linear": "A_1: magnitude and phase",

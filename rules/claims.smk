@@ -1,8 +1,8 @@
 # The report's claims, and the two studies that they rest on: the reading of "unit variance" and the
 # integrator's steps. All work on ensembles of their own seeds, not on results/<case>: they wait for no case, and what
 # takes longest begins first. What they do beside the simulations keeps one core busy, not two.
-from study.claims.reported import check_complete, check_systems
-from study.claims.reported import load as load_reported
+from study.reproduction.claims.reported import check_complete, check_systems
+from study.reproduction.claims.reported import load as load_reported
 
 STATEMENTS = {"statements": "config/reported.tsv", "schema": "config/schemas/reported.schema.yaml"}
 
@@ -15,9 +15,9 @@ with one_sentence():
 MODELS = sorted({f"models/{name.split('.')[1]}.yaml" for name in _reported.statements if name.count(".") == 2})
 
 ENSEMBLE_CODE = sorted(
-    {*CODE["record"], *CODE["identify"], "study/ensemble.py", "study/claims/evidence.py", "study/claims/sample.py"}
+    {*CODE["record"], *CODE["identify"], "study/reproduction/ensemble.py", "study/reproduction/claims/evidence.py", "study/reproduction/claims/sample.py"}
 )
-CLAIM_CODE = sorted({*ENSEMBLE_CODE, "study/preliminary.py", *(str(p) for p in Path("study/claims").glob("*.py"))})
+CLAIM_CODE = sorted({*ENSEMBLE_CODE, "study/reproduction/preliminary.py", *(str(p) for p in Path("study/reproduction/claims").glob("*.py"))})
 CLAIM_SETTINGS = {
     key: STUDY.settings[key]
     for key in "sampling noise_seed integrator segments fit_band tolerances ensembles".split()
@@ -34,7 +34,7 @@ rule excitation_reading:
     input:
         **STATEMENTS,
         models=MODELS,
-        code=[*ENSEMBLE_CODE, "study/excitation_reading.py", "study/claims/reported.py"],
+        code=[*ENSEMBLE_CODE, "study/reproduction/claims/excitation_reading.py", "study/reproduction/claims/reported.py"],
     output:
         table=report(
             "results/excitation_reading.csv",
@@ -55,7 +55,7 @@ rule excitation_reading:
 rule integrator_steps:
     input:
         models=MODELS,
-        code=[*ENSEMBLE_CODE, "study/integrator_study.py"],
+        code=[*ENSEMBLE_CODE, "study/reproduction/integrator_study.py"],
     output:
         csv=report(
             "results/integrator_steps.csv",
@@ -79,7 +79,7 @@ rule claims:
         **STATEMENTS,
         steps="results/integrator_steps.csv",
         models=MODELS,
-        code=[*CLAIM_CODE, "study/excitation_reading.py"],
+        code=[*CLAIM_CODE, "study/reproduction/claims/excitation_reading.py"],
     output:
         csv=report(
             "results/claims.csv",

@@ -1,5 +1,5 @@
 # What several rules share: the modules that each stage rests on, settings and files by case.
-from study.config import PRELIMINARY
+from study.reproduction.config import PRELIMINARY
 from study.identify.estimators import ESTIMATORS
 from study.support.code_dependencies import rests_on
 

@@ -6,9 +6,9 @@ from typing import Any, cast
 
 import pandas as pd
 
-from study import tables
-from study.claims import evidence, reported, table
-from study.claims.verdict import Claim
+from study.reproduction import tables
+from study.reproduction.claims import claims_table, evidence, reported
+from study.reproduction.claims.judgement import Claim
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
 
@@ -19,11 +19,11 @@ def main(models: str, statements: str, schema: str, steps: str, settings: dict[s
     stated = reported.load(Path(statements), Path(schema))
 
     def progress(number: int, claim: Claim) -> None:
-        print(f"{number} of {len(table.CLAIMS)}: {claim.id}: {claim.verdict}", file=sys.stderr, flush=True)
+        print(f"{number} of {len(claims_table.CLAIMS)}: {claim.id}: {claim.verdict}", file=sys.stderr, flush=True)
 
-    judged = table.judge(found, stated, progress)
+    judged = claims_table.judge(found, stated, progress)
     tables.write_csv(judged, Path(csv))
-    replace_file(Path(page), table.page(judged).encode())
+    replace_file(Path(page), claims_table.page(judged).encode())
 
 
 if "snakemake" in globals():

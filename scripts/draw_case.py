@@ -7,9 +7,9 @@ import pandas as pd
 from matplotlib import style as styles
 from matplotlib.figure import Figure
 
-from study import preliminary
 from study.figures import coherence, curves, frequency_response, labels, page
 from study.records.record import read_csv
+from study.reproduction import preliminary
 from study.reproduction.pictures import distribution
 from study.support.errors import StudyError
 from study.support.files import replace_file

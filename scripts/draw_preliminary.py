@@ -8,11 +8,11 @@ from typing import Any
 from matplotlib import style as styles
 from matplotlib.figure import Figure
 
-from study import preliminary
 from study.equations.model_file import read_model
 from study.figures import labels, page
 from study.records import spectra
 from study.records.record import read_csv
+from study.reproduction import preliminary
 from study.reproduction.pictures import distribution, force_patterns
 from study.support.errors import StudyError
 from study.support.files import replace_file

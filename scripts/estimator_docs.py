@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from study import error_pages
-from study.config import load
+from study.reproduction import error_pages
+from study.reproduction.config import load
 from study.support import document
 from study.support.errors import StudyError
 from study.support.files import replace_file

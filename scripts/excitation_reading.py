@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from study import excitation_reading, tables
-from study.claims import evidence, reported
+from study.reproduction import tables
+from study.reproduction.claims import evidence, excitation_reading, reported
 from study.support.workflow_step import one_sentence
 
 

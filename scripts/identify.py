@@ -4,10 +4,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from study import tables
 from study.equations.model_file import read_model
-from study.identify_case import identify_case
 from study.records.record import read_csv
+from study.reproduction import tables
+from study.reproduction.identify_case import identify_case
 from study.support.workflow_step import one_sentence
 
 

@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from study.equations.model_file import read_model
-from study.make_record import make_record
 from study.records.record import write_csv
+from study.reproduction.make_record import make_record
 from study.support.files import replacing
 from study.support.workflow_step import one_sentence
 

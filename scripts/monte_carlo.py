@@ -7,8 +7,8 @@ from typing import Any
 
 import pandas as pd
 
-from study import ensemble, estimator_errors, tables
 from study.equations.model_file import read_model
+from study.reproduction import ensemble, estimator_errors, tables
 from study.support.workflow_step import one_sentence
 
 EVERY = 100  # seeds between two signs of life

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from study import ensemble
+from study.reproduction import ensemble
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from study import summary
+from study.reproduction import summary
 from study.support import document
 from study.support.errors import StudyError
 from study.support.workflow_step import one_sentence

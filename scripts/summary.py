@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from study import summary
+from study.reproduction import summary
 from study.support import document
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence

@@ -8,8 +8,8 @@ import pandas as pd
 from matplotlib import style as styles
 from matplotlib.figure import Figure
 
-from study import tables
 from study.figures import page
+from study.reproduction import tables
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
 from study.trials import pictures, reach

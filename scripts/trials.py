@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from study import tables
+from study.reproduction import tables
 from study.support.workflow_step import one_sentence
 from study.trials import runs
 

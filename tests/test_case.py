@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study import tables
-from study.config import load
 from study.identify.estimators import ESTIMATORS
-from study.identify_case import assumed_model, estimator_settings, identify_case
-from study.make_record import make_record
+from study.reproduction import tables
+from study.reproduction.config import load
+from study.reproduction.identify_case import assumed_model, estimator_settings, identify_case
+from study.reproduction.make_record import make_record
 from study.support.errors import DivergenceError, StudyError
 
 CONFIG = load(Path(__file__).parent.parent / "config")

@@ -11,28 +11,29 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
+from study.reproduction.claims.reported import Reported, Statement
+from study.reproduction.claims.sample import Sample, departure
 
-from study import config, excitation_reading, integrator_study
-from study.claims import (
+from study.equations.model_file import read_model
+from study.records.record import Record
+from study.reproduction import config, integrator_study
+from study.reproduction.claims import (
+    claims_table,
     damping,
     duffing,
     evidence,
+    excitation_reading,
     instruments,
+    judgement,
     levels,
-    preliminary,
+    preliminary_claims,
     response,
     sample,
     simulation,
-    table,
-    verdict,
 )
-from study.claims import reported as stated
-from study.claims.reported import Reported, Statement
-from study.claims.sample import Sample, departure
-from study.claims.verdict import Condition
-from study.equations.model_file import read_model
-from study.preliminary import model_restoring_force, natural_frequency
-from study.records.record import Record
+from study.reproduction.claims import reported as stated
+from study.reproduction.claims.judgement import Condition
+from study.reproduction.preliminary import model_restoring_force, natural_frequency
 
 ROOT = Path(__file__).parents[1]
 SEEDS = 6
@@ -64,7 +65,7 @@ def found(settings: dict[str, Any], steps: pd.DataFrame) -> evidence.Evidence:
 
 @pytest.fixture(scope="module")
 def judged(found: evidence.Evidence, report: Reported) -> pd.DataFrame:
-    return table.judge(found, report)
+    return claims_table.judge(found, report)
 
 
 @pytest.mark.parametrize(
@@ -78,7 +79,7 @@ def judged(found: evidence.Evidence, report: Reported) -> pd.DataFrame:
     ],
 )
 def test_verdict_counts_conditions(met: list[bool], said: str) -> None:
-    assert verdict.verdict(met) == said
+    assert judgement.verdict(met) == said
 
 
 def one_statement() -> Reported:
@@ -86,29 +87,29 @@ def one_statement() -> Reported:
 
 
 def test_a_claim_that_holds_needs_no_reason() -> None:
-    claim = verdict.conclude(one_statement(), "a", MET, because="never said")
+    claim = judgement.conclude(one_statement(), "a", MET, because="never said")
     assert (claim.verdict, claim.why, claim.reported) == ("reproduced", "", "3 Hz")
 
 
 def test_a_claim_that_fails_says_what_and_why() -> None:
-    claim = verdict.conclude(one_statement(), "a", MET, MISSED, because="of this")
+    claim = judgement.conclude(one_statement(), "a", MET, MISSED, because="of this")
     assert claim.verdict == "partly"
     assert claim.why == "x 1, where the criterion is x above 2: of this"
-    others = [verdict.Condition("c", f"m {i}", False, f"r {i}") for i in (1, 1, 2, 3)]
-    assert verdict.conclude(one_statement(), "a", *others, because="of this").why == "r 1 (2 more like it): of this"
-    assert verdict.conclude(one_statement(), "a", *others).why == "r 1; r 2; r 3"
+    others = [judgement.Condition("c", f"m {i}", False, f"r {i}") for i in (1, 1, 2, 3)]
+    assert judgement.conclude(one_statement(), "a", *others, because="of this").why == "r 1 (2 more like it): of this"
+    assert judgement.conclude(one_statement(), "a", *others).why == "r 1; r 2; r 3"
 
 
 def test_together_is_met_only_as_a_whole() -> None:
-    assert verdict.together("both", [MET, MET]).met
-    whole = verdict.together("both", [MET, MISSED])
+    assert judgement.together("both", [MET, MET]).met
+    whole = judgement.together("both", [MET, MISSED])
     assert not whole.met
     assert whole.why.startswith("both: x 1")
 
 
 @pytest.mark.parametrize(("value", "met"), [(104.9, True), (105.1, False), (95.1, True), (94.9, False)])
 def test_close_stands_at_its_edge(value: float, met: bool) -> None:
-    assert verdict.close("x", Sample((value, value)), 100.0, 0.05).met is met
+    assert judgement.close("x", Sample((value, value)), 100.0, 0.05).met is met
 
 
 def test_a_sample_shows_mean_error_and_own_record() -> None:
@@ -178,9 +179,9 @@ def test_what_the_study_finds(judged: pd.DataFrame, name: str, said: str) -> Non
 
 
 def test_the_page_holds_every_row(judged: pd.DataFrame) -> None:
-    page = table.page(judged)
+    page = claims_table.page(judged)
     assert page.count("\n| ") == len(judged) + 2
-    beside = judged["where"].str.startswith(verdict.BESIDE)
+    beside = judged["where"].str.startswith(judgement.BESIDE)
     assert list(judged["id"][beside]) == ["noise_instruments"]
     assert f"{len(judged) - 1} statements: " in page, "what the report does not state is not counted"
     width = page.splitlines()[4].replace("\\|", "").count("|")
@@ -201,11 +202,11 @@ def changed(folder: Path, settings: Mapping[str, Any], system: str, old: str, ne
     [
         (
             "duffing", "2.0e7", "3.0e7",
-            [duffing.duffing_cubic, duffing.siso_stiffness, preliminary.duffing_pattern, simulation.table_1],
+            [duffing.duffing_cubic, duffing.siso_stiffness, preliminary_claims.duffing_pattern, simulation.table_1],
         ),
         ("duffing_van_der_pol", "2.0e6", "1.0e6", [damping.combined_cubic, levels.invariant]),
-        ("linear", "3.77", "3.9", [preliminary.oval_width]),
-        ("dead_band", "0.0025", "0.0035", [simulation.stiffness_gap, preliminary.dead_band_pattern]),
+        ("linear", "3.77", "3.9", [preliminary_claims.oval_width]),
+        ("dead_band", "0.0025", "0.0035", [simulation.stiffness_gap, preliminary_claims.dead_band_pattern]),
     ],
 )  # fmt: skip
 def test_a_changed_coefficient_changes_the_verdicts(
@@ -231,7 +232,7 @@ def test_the_same_evidence_twice(settings: dict[str, Any], found: evidence.Evide
 
 def test_the_dead_band_is_read_from_its_pattern(found: evidence.Evidence) -> None:
     record = found.records(evidence.Drive("dead_band"))[0]
-    assert preliminary.read_dead_band(record, 1.0) == pytest.approx(0.0025, rel=0.05)
+    assert preliminary_claims.read_dead_band(record, 1.0) == pytest.approx(0.0025, rel=0.05)
 
 
 @pytest.mark.parametrize("pace", [0.8, 1.25])
@@ -244,7 +245,7 @@ def test_the_envelope_is_that_of_the_figures_harmonic_motion(pace: float) -> Non
     record = Record(
         0.001, {"force": force, "displacement": u, "velocity": v, "acceleration": -(omega**2) * u}, name="harmonic"
     )
-    inside, width = preliminary.envelope(model, record, 1.0)
+    inside, width = preliminary_claims.envelope(model, record, 1.0)
     assert width == pytest.approx(pace, rel=1e-3)
     assert (inside > 0.99) == (pace < 1.0)
 

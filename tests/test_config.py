@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from study import measurements
-from study.config import load
 from study.equations.model_file import read_model
 from study.equations.simulate import simulate
 from study.identify.estimators import ESTIMATORS, identify
 from study.identify.estimators.base import Settings
-from study.needs import CURVES
 from study.records.excitation import Excitation, force
 from study.records.spectra import Segments
+from study.reproduction.config import load
+from study.reproduction.preconditions import CURVES
 from study.support.errors import StudyError
 from study.support.schema import read_table, read_yaml
 

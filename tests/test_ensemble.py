@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study import ensemble
-from study.config import load
+from study.reproduction import ensemble
+from study.reproduction.config import load
 
 CONFIG = load(Path(__file__).parent.parent / "config")
 

@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 from matplotlib import style
 
-from study import ensemble, error_pages, estimator_errors
-from study.config import load
 from study.figures import page
 from study.identify.estimators import ESTIMATORS
+from study.reproduction import ensemble, error_pages, estimator_errors
+from study.reproduction.config import load
 from study.reproduction.pictures import error_dots as drawn
 from study.support import document
 from study.support.errors import StudyError

@@ -17,10 +17,10 @@ from matplotlib.mathtext import MathTextParser
 
 from study.equations.terms import LIBRARY
 from study.figures import coherence, curves, frequency_response, labels, page, styles
-from study.preliminary import Pattern, histogram
 from study.records.record import SI_UNITS, Record, write_csv
 from study.records.spectra import Segments
 from study.reproduction.pictures import distribution, force_patterns
+from study.reproduction.preliminary import Pattern, histogram
 from study.support.errors import StudyError
 
 ROOT = Path(__file__).parent.parent

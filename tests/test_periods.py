@@ -11,10 +11,10 @@ from study.identify import estimators
 from study.identify.estimators.base import Settings
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
 from study.identify.frequency_domain.periodic import Periods, fit, steady
-from study.identify_case import identify_case
 from study.records.excitation import Excitation, force
 from study.records.record import Record
 from study.records.spectra import Segments
+from study.reproduction.identify_case import identify_case
 from study.support.errors import StudyError
 
 BAND, SAMPLES, DT = (0.3, 10.0), 512, 0.02

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from study import preliminary
 from study.equations.model import Model
 from study.equations.model_file import read_model
 from study.equations.simulate import simulate
@@ -14,6 +13,7 @@ from study.equations.terms import get
 from study.records.excitation import Excitation, force
 from study.records.record import Record
 from study.records.spectra import Segments, autospectrum
+from study.reproduction import preliminary
 from study.support.errors import StudyError
 
 MODELS = Path(__file__).parent.parent / "models"

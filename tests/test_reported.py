@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from study.claims import reported
-from study.excitation_reading import quantities
+from study.reproduction.claims import reported
+from study.reproduction.claims.excitation_reading import quantities
 from study.support.errors import StudyError
 from tests.conftest import LINEAR, TABLE_1
 

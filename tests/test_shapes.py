@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from study import tables
 from study.equations.simulate import simulate
 from study.identify import estimators
 from study.identify.estimators.base import Settings
@@ -14,6 +13,7 @@ from study.identify.time_domain.multiple_shooting import fit_record
 from study.identify.time_domain.open_shapes import shape_keys, with_starting_shapes
 from study.records.excitation import displacement_noise
 from study.records.spectra import Segments
+from study.reproduction import tables
 from study.support.errors import StudyError
 
 TOLD = Settings(Segments(512), (0.3, 10.0))

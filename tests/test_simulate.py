@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from study.config import load
 from study.equations.model import Model
 from study.equations.model_file import read_model
 from study.equations.simulate import Integrator, simulate
@@ -17,9 +16,10 @@ from study.equations.terms import custom
 from study.identify.frequency_domain.coefficients import fit
 from study.identify.frequency_domain.conditioned import analyse
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
-from study.make_record import make_record
 from study.records.excitation import Excitation, force
 from study.records.spectra import Segments, cross_spectra
+from study.reproduction.config import load
+from study.reproduction.make_record import make_record
 from study.support.errors import DivergenceError, StudyError
 
 ROOT = Path(__file__).parents[1]

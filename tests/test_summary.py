@@ -5,7 +5,7 @@ from html.parser import HTMLParser
 import pandas as pd
 import pytest
 
-from study import summary
+from study.reproduction import summary
 from study.support import document
 
 PARAMETERS = pd.DataFrame(

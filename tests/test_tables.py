@@ -7,11 +7,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study import tables
-from study.config import load
 from study.identify.estimators.base import Identified, Parameter
 from study.identify.frequency_domain.responses import Responses
-from study.identify_case import identify_case
+from study.reproduction import tables
+from study.reproduction.config import load
+from study.reproduction.identify_case import identify_case
 from study.support.errors import StudyError
 
 CONFIG = load(Path(__file__).parent.parent / "config")

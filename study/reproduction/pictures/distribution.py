@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from study.equations import dimensions
 from study.figures import labels
-from study.preliminary import Histogram
+from study.reproduction.preliminary import Histogram
 
 
 def histogram(axes: Axes, counts: Histogram, quantity: str, unit: str) -> Axes:

@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
-from study import estimator_errors
 from study.figures.styles import look
+from study.reproduction import estimator_errors
 
 PANELS = (("m",), ("c",), ("k",), ("f_n",), ("zeta",), ("k3",), ("c3",), ("k_m", "k_dead_band"))
 COLUMNS = 4
@@ -29,7 +29,7 @@ LEFT, TOP, ROW = 1.5, 1.15, 0.19  # inches
 
 
 def errors(table: pd.DataFrame, cases: Sequence[str]) -> Figure:
-    """The picture of a table of :func:`study.estimator_errors.errors`.
+    """The picture of a table of :func:`study.reproduction.estimator_errors.errors`.
 
     Parameters that are zero have no relative error and are not drawn. ``cases`` are the rows, from above.
     """

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from study.equations import dimensions
 from study.figures import labels
-from study.preliminary import Pattern
+from study.reproduction.preliminary import Pattern
 
 Floats = NDArray[np.float64]
 HARMONIC: dict[str, Any] = {"color": "C0", "linewidth": 1.8, "label": "harmonic motion"}

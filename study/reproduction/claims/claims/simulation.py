@@ -6,17 +6,17 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from study.reproduction.claims.common import TESTS_WRONG
+from study.reproduction.claims.evidence import Drive, Evidence
+from study.reproduction.claims.reported import Reported
+from study.reproduction.claims.sample import Sample, average, departure, gaussian_score, is_gaussian, kurtosis, share
 
-from study.claims.common import TESTS_WRONG
-from study.claims.evidence import Drive, Evidence
-from study.claims.reported import Reported
-from study.claims.sample import Sample, average, departure, gaussian_score, is_gaussian, kurtosis, share
-from study.claims.verdict import Claim, Condition, at_least, conclude
 from study.equations.simulate import Integrator, simulate
 from study.identify.estimators.base import true_parameters
-from study.preliminary import model_restoring_force
 from study.records.excitation import displacement_noise
 from study.records.spectra import Segments, autospectrum
+from study.reproduction.claims.judgement import Claim, Condition, at_least, conclude
+from study.reproduction.preliminary import model_restoring_force
 
 Floats = NDArray[np.float64]
 SYSTEMS = ("linear", "duffing", "van_der_pol", "duffing_van_der_pol", "mathieu", "dead_band", "extreme")

@@ -6,8 +6,8 @@ from typing import Any
 
 import pandas as pd
 
-from study import estimator_errors
 from study.figures.styles import look
+from study.reproduction import estimator_errors
 from study.support.document import Block, Bullets, Image, Text, table
 
 WHO = (

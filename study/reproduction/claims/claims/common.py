@@ -5,12 +5,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from study.reproduction.claims.evidence import Drive, Ensemble, Evidence
+from study.reproduction.claims.reported import Reported
+from study.reproduction.claims.sample import Sample, average, gaussian_score, is_gaussian, kurtosis, share
 
-from study.claims.evidence import Drive, Ensemble, Evidence
-from study.claims.reported import Reported
-from study.claims.sample import Sample, average, gaussian_score, is_gaussian, kurtosis, share
-from study.claims.verdict import Condition, at_least, at_most
-from study.ensemble import threaded
+from study.reproduction.claims.judgement import Condition, at_least, at_most
+from study.reproduction.ensemble import threaded
 
 Floats = NDArray[np.float64]
 NEAR_UNITY_MEAN, NEAR_UNITY_LOWEST = 0.99, 0.95

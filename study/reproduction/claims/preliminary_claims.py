@@ -4,15 +4,15 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from study.reproduction.claims.evidence import Drive, Evidence
+from study.reproduction.claims.reported import Reported
+from study.reproduction.claims.sample import Sample, average
 
-from study.claims.evidence import Drive, Evidence
-from study.claims.reported import Reported
-from study.claims.sample import Sample, average
-from study.claims.verdict import Claim, Condition, at_least, close, conclude, near
-from study.ensemble import threaded
 from study.equations.model import Model
-from study.preliminary import harmonic_beside, harmonic_pattern, model_restoring_force, restoring_force
 from study.records.record import Record
+from study.reproduction.claims.judgement import Claim, Condition, at_least, close, conclude, near
+from study.reproduction.ensemble import threaded
+from study.reproduction.preliminary import harmonic_beside, harmonic_pattern, model_restoring_force, restoring_force
 
 Floats = NDArray[np.float64]
 PATTERNS = ("linear", "duffing", "van_der_pol", "duffing_van_der_pol", "mathieu", "dead_band")

@@ -8,18 +8,18 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from study.reproduction.claims.sample import Sample, average
 
-from study.claims.sample import Sample, average
-from study.ensemble import NOISE_OFFSET, threaded
 from study.equations.model import Model
 from study.equations.terms import get
 from study.identify.estimators import miso, siso
 from study.identify.estimators.base import Identified, Settings
 from study.identify.estimators.hand_read import read_curve
 from study.identify.frequency_domain.conditioned import MisoResult
-from study.make_record import make_record
 from study.records.record import Record
 from study.records.spectra import Segments
+from study.reproduction.ensemble import NOISE_OFFSET, threaded
+from study.reproduction.make_record import make_record
 from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
@@ -241,7 +241,7 @@ def driven_model(models: Mapping[str, Model], drive: Drive) -> Model:
 
 
 def record_settings(settings: Table, drive: Drive) -> dict[str, Any]:
-    """What ``study.make_record.make_record`` wants, for a drive.
+    """What ``study.reproduction.make_record.make_record`` wants, for a drive.
 
     Raises
     ------

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from study.ensemble import threaded
 from study.equations.model import Model
 from study.identify.estimators import miso
 from study.identify.estimators.base import Settings, true_parameters
-from study.identify_case import estimator_settings
-from study.make_record import make_record
+from study.reproduction.ensemble import threaded
+from study.reproduction.identify_case import estimator_settings
+from study.reproduction.make_record import make_record
 from study.support.errors import DivergenceError
 
 Table = Mapping[str, Any]

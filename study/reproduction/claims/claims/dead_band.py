@@ -3,16 +3,26 @@
 import math
 
 import numpy as np
+from study.reproduction.claims.common import NEAR_UNITY_LOWEST, differs_from_gaussian, in_band, near_unity, recovered
+from study.reproduction.claims.duffing import LINEAR_PARTS, levels
+from study.reproduction.claims.evidence import Assumed, Drive, Evidence
+from study.reproduction.claims.reported import Reported
+from study.reproduction.claims.sample import Sample, share
 
-from study.claims.common import NEAR_UNITY_LOWEST, differs_from_gaussian, in_band, near_unity, recovered
-from study.claims.duffing import LINEAR_PARTS, levels
-from study.claims.evidence import Assumed, Drive, Evidence
-from study.claims.linear import deficit
-from study.claims.reported import Reported
-from study.claims.sample import Sample, share
-from study.claims.verdict import Claim, Condition, at_least, at_most, close, conclude, near, one_record, significant
-from study.excitation_reading import largest_error
 from study.records.excitation import READINGS
+from study.reproduction.claims.excitation_reading import largest_error
+from study.reproduction.claims.judgement import (
+    Claim,
+    Condition,
+    at_least,
+    at_most,
+    close,
+    conclude,
+    near,
+    one_record,
+    significant,
+)
+from study.reproduction.claims.linear_system import deficit
 
 SYSTEM = "dead_band"
 AS_DUFFING = Assumed(plus=("cubic_stiffness",), minus=("dead_band",))

@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from study.reproduction.claims.common import TESTS_WRONG, has_line, local_maxima, looks_gaussian, nearest
+from study.reproduction.claims.evidence import Drive, Evidence
+from study.reproduction.claims.reported import Reported
+from study.reproduction.claims.sample import Sample, kurtosis
 
-from study.claims.common import TESTS_WRONG, has_line, local_maxima, looks_gaussian, nearest
-from study.claims.evidence import Drive, Evidence
-from study.claims.reported import Reported
-from study.claims.sample import Sample, kurtosis
-from study.claims.verdict import Claim, Condition, at_least, conclude, significant
-from study.preliminary import mathieu_lines
 from study.records.spectra import Segments, autospectrum
+from study.reproduction.claims.judgement import Claim, Condition, at_least, conclude, significant
+from study.reproduction.preliminary import mathieu_lines
 
 Floats = NDArray[np.float64]
 NONLINEAR = ("duffing", "van_der_pol", "duffing_van_der_pol", "mathieu", "dead_band", "extreme")

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from study import case_names, needs
 from study.equations import terms
 from study.equations.model import Model, forward_graph, free
 from study.equations.model_file import read_model
 from study.identify.estimators.base import true_parameters
 from study.records.excitation import SETTINGS, Excitation, theoretical_autospectrum
+from study.reproduction import case_names, preconditions
 from study.support.errors import StudyError
 from study.support.schema import check, numbered_rows, read_yaml
 
@@ -145,7 +145,7 @@ def load(folder: Path) -> StudyConfig:
         if name not in cases and not (folder.parent / "models" / f"{name}.yaml").is_file():
             raise StudyError(f"{source}: tolerances.of_case names {name!r}, which is neither a case nor a system")
     _check_tolerances(settings["tolerances"], parameter_names(folder.parent / "models"), str(source))
-    needs.check_claims(settings, str(source))
+    preconditions.check_claims(settings, str(source))
     return StudyConfig(settings, cases)
 
 
@@ -160,8 +160,8 @@ def _case(row: Table, where: str, settings: Table, models: Path, taken: dict[str
     try:
         model = _complete_model(path)
         _check_assumed(model, row["also_assumed"], settings)
-        needs.check_periods(settings["excitations"][row["excitation"]], settings)
-        needs.check_reached(settings["excitations"][row["excitation"]], settings)
+        preconditions.check_periods(settings["excitations"][row["excitation"]], settings)
+        preconditions.check_reached(settings["excitations"][row["excitation"]], settings)
     except StudyError as error:
         raise StudyError(f"{where}: {error}") from None
     figures = _figures(row, where, taken)
@@ -253,7 +253,7 @@ def _check_settings(settings: Table, where: str) -> None:
             f"{where}: local_polynomial.half_width makes bands of {width} lines; fit_band [{low}, {high}] of "
             f"{sampling['samples']} samples holds fewer"
         )
-    needs.check_estimators(settings, where)
+    preconditions.check_estimators(settings, where)
     for name, described in settings["excitations"].items():
         own = ("kind", "seed", "periods", *SETTINGS[described["kind"]])
         for key in described:

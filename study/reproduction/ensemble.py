@@ -8,10 +8,10 @@ from typing import Any, TypeVar
 
 import pandas as pd
 
-from study import tables
 from study.equations.model import Model
-from study.identify_case import identify_case
-from study.make_record import make_record
+from study.reproduction import tables
+from study.reproduction.identify_case import identify_case
+from study.reproduction.make_record import make_record
 from study.support.errors import DivergenceError
 
 Table = Mapping[str, Any]

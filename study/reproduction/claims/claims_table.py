@@ -4,29 +4,29 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict
 
 import pandas as pd
+from study.reproduction.claims.evidence import Evidence
+from study.reproduction.claims.reported import Reported
 
-from study.claims import (
+from study.reproduction.claims import (
     conclusions,
     damping,
     dead_band,
     duffing,
     instruments,
     levels,
-    linear,
+    linear_system,
     mathieu,
-    preliminary,
+    preliminary_claims,
     response,
     simulation,
 )
-from study.claims.evidence import Evidence
-from study.claims.reported import Reported
-from study.claims.verdict import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED, Claim
+from study.reproduction.claims.judgement import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED, Claim
 
 CLAIMS: tuple[Callable[[Evidence, Reported], Claim], ...] = (
     *simulation.CLAIMS,
     *response.CLAIMS,
-    *preliminary.CLAIMS,
-    *linear.CLAIMS,
+    *preliminary_claims.CLAIMS,
+    *linear_system.CLAIMS,
     *duffing.CLAIMS,
     *damping.CLAIMS,
     *mathieu.CLAIMS,

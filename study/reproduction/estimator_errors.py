@@ -25,7 +25,7 @@ def errors(estimates: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     estimates : DataFrame
-        As :func:`study.ensemble.estimates` gives it, of one case or several.
+        As :func:`study.reproduction.ensemble.estimates` gives it, of one case or several.
 
     Returns
     -------

@@ -7,8 +7,8 @@ The criterion of a claim is a list of conditions that follow from the report's w
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from study.claims.reported import Reported
-from study.claims.sample import Sample
+from study.reproduction.claims.reported import Reported
+from study.reproduction.claims.sample import Sample
 
 REPRODUCED, PARTLY, NOT_REPRODUCED = "reproduced", "partly", "not reproduced"
 SEPARATOR = "; "  # between the parts of what was measured, one a condition

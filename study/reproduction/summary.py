@@ -6,8 +6,8 @@ from typing import Any
 
 import pandas as pd
 
-from study import error_pages
-from study.claims.verdict import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED, SEPARATOR
+from study.reproduction import error_pages
+from study.reproduction.claims.judgement import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED, SEPARATOR
 from study.support.document import Block, Bullets, Heading, Text, table
 
 INTRODUCTION = (
