@@ -9,8 +9,8 @@ from study import cli
 from study.commands.records import plan_of, read_records
 from study.compare import history
 from study.compare.history_picture import files as ladder_pictures
-from study.diagnose import report
-from study.diagnose.files import files as diagnosis_files
+from study.diagnose import diagnosis_report
+from study.diagnose.diagnosis_files import files as diagnosis_files
 from study.diagnose.verdict import MISSING, Diagnosis
 from study.equations.model_file import WANTED, parse_model
 from study.explore import session as sessions
@@ -84,7 +84,7 @@ def _diagnosed(session: Session, folder: Path) -> tuple[Session, Diagnosis]:
     now, found = sessions.examined(session)
     units = now.comparison.record.units
     print(f"{now.label}: {found.verdict.replace('_', ' ')}")
-    print(report.table(found, units.get("force", "N"), units.get("displacement", "m")))
+    print(diagnosis_report.table(found, units.get("force", "N"), units.get("displacement", "m")))
     print(f"\n{now.said}\n", flush=True)
     write_files(folder, diagnosis_files(found, now.comparison, now.said))
     return sessions.with_rung(session, now), found

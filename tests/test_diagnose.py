@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from study import trials
-from study.diagnose import report, steadiness
-from study.diagnose.says import sentences
-from study.diagnose.separate import separating_level
+from study.diagnose import constancy, diagnosis_report
+from study.diagnose.diagnosis_sentences import sentences
+from study.diagnose.separating_test import separating_level
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN, diagnose
 from study.equations.model import ModelTerm
 from study.equations.simulate import Integrator, simulate
@@ -109,11 +109,11 @@ def test_a_small_effect_is_not_given_the_name_of_what_takes_a_little_of_it(syste
 
 def test_the_fields_are_those_of_the_file(drag_found):
     found, _ = drag_found
-    fields = report.fields(found)
+    fields = diagnosis_report.fields(found)
     assert set(fields) >= {"verdict", "error", "noise_floor", "candidates"}
     wanted = {"term", "parameters", "coefficient", "interval", "response_error", "explained", "p_value", "tied_with"}
     assert all(set(row) >= wanted for row in fields["candidates"])
-    assert "quadratic_damping" in report.table(found, "N", "m")
+    assert "quadratic_damping" in diagnosis_report.table(found, "N", "m")
 
 
 def test_the_ends_of_a_narrow_interval_are_told_apart(drag_found):
@@ -143,12 +143,12 @@ def test_a_true_coefficient_is_flat_and_an_imitators_is_not():
     rng = np.random.default_rng(1)
     sensitivity = rng.standard_normal(8192) * (1.0 + 0.8 * np.sin(np.arange(8192) / 300.0))
     noise = 0.05 * rng.standard_normal(8192)
-    flat = steadiness.along_amplitude(sensitivity, noise, 1.0)
-    bent = steadiness.along_amplitude(sensitivity, noise + 0.3 * sensitivity**3, 1.0)
+    flat = constancy.along_amplitude(sensitivity, noise, 1.0)
+    bent = constancy.along_amplitude(sensitivity, noise + 0.3 * sensitivity**3, 1.0)
     assert flat.spread() < 0.02 < 0.1 < bent.spread()
     filtered = np.convolve(sensitivity, [0.5, 0.3, 0.2], "same")
-    assert steadiness.along_frequency(sensitivity, noise, 1.0, 0.02).spread() < 0.02
-    assert steadiness.along_frequency(sensitivity, filtered, 1.0, 0.02).spread() > 0.1
+    assert constancy.along_frequency(sensitivity, noise, 1.0, 0.02).spread() < 0.02
+    assert constancy.along_frequency(sensitivity, filtered, 1.0, 0.02).spread() > 0.1
 
 
 def test_gain_counts_the_blocks():
@@ -237,7 +237,7 @@ def test_an_imitator_that_leaves_only_noise_is_found_out_by_its_coefficient() ->
 def test_a_constant_is_a_constant_and_a_moving_coefficient_is_not() -> None:
     rng = np.random.default_rng(3)
     error = np.full(8, 0.1)
-    flat = [steadiness.Curve(np.arange(8.0), 5.0 + 0.1 * rng.standard_normal(8) + 0j, error) for _ in range(400)]
+    flat = [constancy.Curve(np.arange(8.0), 5.0 + 0.1 * rng.standard_normal(8) + 0j, error) for _ in range(400)]
     p_values = np.array([curve.p_value() for curve in flat])
     assert np.mean(p_values < 0.1) == pytest.approx(0.1, abs=0.05)
-    assert steadiness.Curve(np.arange(8.0), 5.0 + 0.2 * np.arange(8.0) + 0j, error).p_value() < 1e-6
+    assert constancy.Curve(np.arange(8.0), 5.0 + 0.2 * np.arange(8.0) + 0j, error).p_value() < 1e-6

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from study import trials
-from study.diagnose import candidates, nature, pairs, preselect, steadiness
+from study.diagnose import candidates, constancy, dependence, pair_screening, pairs
 from study.diagnose.ranking import rank
 from study.equations.model import free
 from study.equations.simulate import Integrator, simulate
@@ -19,7 +19,7 @@ from study.records.record import Record
 def left_by(model, record):
     how = make_plan(record)
     found, _ = fit_model(model, record, how)
-    return nature.leftover(found, shape_search.baseline(found, record, how), record, how)
+    return dependence.leftover(found, shape_search.baseline(found, record, how), record, how)
 
 
 def test_an_imitator_under_noise_leaves_a_shape_and_the_truth_leaves_none():
@@ -27,9 +27,9 @@ def test_an_imitator_under_noise_leaves_a_shape_and_the_truth_leaves_none():
     made = trials.make_trial(94181, ("van_der_pol_damping",), 0.05, "displacement")
     imitator = left_by(made.believed.with_term(free(get("displacement_damping"))), made.record)
     truth = left_by(made.believed.with_term(free(get("van_der_pol_damping"))), made.record)
-    assert 0.003 < nature.significant(imitator, 1e-3) < 0.03
-    assert nature.significant(truth, 1e-2) == 0.0
-    assert max(nature.explained_by(truth).values()) < 0.01
+    assert 0.003 < dependence.significant(imitator, 1e-3) < 0.03
+    assert dependence.significant(truth, 1e-2) == 0.0
+    assert max(dependence.explained_by(truth).values()) < 0.01
 
 
 def test_a_shape_is_seen_in_noise_as_rarely_as_its_level_says(systems):
@@ -38,17 +38,17 @@ def test_a_shape_is_seen_in_noise_as_rarely_as_its_level_says(systems):
     noise = 0.2 * np.std(clean["displacement"]) * rng.standard_normal((12, 2048))
     model = systems["linear"].with_values(dict.fromkeys(systems["linear"].values))
     records = [Record(clean.dt, {"force": clean["force"], "displacement": clean["displacement"] + n}) for n in noise]
-    alarms = [nature.significant(left_by(model, record), 0.1) > 0.0 for record in records]
+    alarms = [dependence.significant(left_by(model, record), 0.1) > 0.0 for record in records]
     assert np.mean(alarms) <= 0.25  # a tenth is meant: more than three of twelve has a chance of 3 %
 
 
 def test_few_strong_blocks_do_not_make_a_coefficient_move():
     """Three blocks hold half of the sensitivity's power: their own scatter says little of their errors."""
     rng = np.random.default_rng(7)
-    swell = np.ones(64 * steadiness.BLOCK)
-    swell[: 3 * steadiness.BLOCK] = 5.0
+    swell = np.ones(64 * constancy.BLOCK)
+    swell[: 3 * constancy.BLOCK] = 5.0
     curves = [
-        steadiness.along_amplitude(swell * rng.standard_normal(len(swell)), rng.standard_normal(len(swell)), 1.0)
+        constancy.along_amplitude(swell * rng.standard_normal(len(swell)), rng.standard_normal(len(swell)), 1.0)
         for _ in range(300)
     ]
     assert np.mean([curve.p_value() < 0.01 for curve in curves]) < 0.03
@@ -74,7 +74,7 @@ def test_both_of_two_effects_are_the_best_pair(two_effects):
 
 def test_each_way_of_preselecting_names_the_pair(two_effects):
     made, how, base, rows = two_effects
-    starts = preselect.promising(rows, base, made.record, how, ())
+    starts = pair_screening.promising(rows, base, made.record, how, ())
     assert sum(set(start.names) == set(made.hidden) for start in starts) == 2
     assert all(value is not None for start in starts for value in start.model.values.values())
 

@@ -26,7 +26,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    from study.diagnose.sources import own_candidates
+    from study.diagnose.user_candidates import own_candidates
     from study.equations import terms
     from study.equations.model_file import read_model
     from study.support.file_sets import check_folder, write_files
@@ -51,8 +51,8 @@ def _one(model: "Model", record: "Record", arguments: argparse.Namespace, own: "
     from tqdm import tqdm
 
     from study.compare.comparison import compare
-    from study.diagnose import report
-    from study.diagnose.files import files, in_words
+    from study.diagnose import diagnosis_report
+    from study.diagnose.diagnosis_files import files, in_words
     from study.diagnose.verdict import diagnose
 
     how = plan_of(arguments, record)
@@ -66,7 +66,7 @@ def _one(model: "Model", record: "Record", arguments: argparse.Namespace, own: "
         said = in_words(found, record, how)
     force, length = record.units.get("force", "N"), compared.record.units.get("displacement", "m")
     print(f"{record.name}: {found.verdict.replace('_', ' ')}")
-    print(report.table(found, force, length))
+    print(diagnosis_report.table(found, force, length))
     print("\n" + said)
     return files(found, compared, said)
 

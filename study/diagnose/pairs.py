@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.diagnose import preselect
+from study.diagnose import pair_screening
 from study.diagnose.candidates import SHORT, THREADS
-from study.diagnose.preselect import PairStart
+from study.diagnose.pair_screening import PairStart
 from study.diagnose.ranking import Ranked
 from study.identify.time_domain import held_out
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -70,7 +70,7 @@ def best_pair(
             return None
 
     with ThreadPoolExecutor(THREADS) as pool:
-        starts = preselect.promising(rows, base, record, how, held)
+        starts = pair_screening.promising(rows, base, record, how, held)
         fits = [pair for pair in pool.map(one, starts) if pair is not None]
     power = float(np.mean(base.found.residual**2))
     return min(fits, key=lambda pair: _misfit(pair, power), default=None)

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study.diagnose import steadiness
+from study.diagnose import constancy
 from study.diagnose.candidates import Trial
-from study.diagnose.steadiness import Curve
+from study.diagnose.constancy import Curve
 from study.equations.terms import Term
 from study.identify.time_domain import held_out
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -278,8 +278,8 @@ def curves(found: FreeRunFit, term: Term, record: Record, how: Plan) -> tuple[Cu
     alone = own - basis @ (basis.T @ own)
     if np.linalg.norm(alone) <= INDISTINCT * np.linalg.norm(own):
         return None, None
-    along = steadiness.along_frequency(alone, found.residual, size, record.dt)
-    classes = steadiness.along_amplitude(alone, found.residual, size)
+    along = constancy.along_frequency(alone, found.residual, size, record.dt)
+    classes = constancy.along_amplitude(alone, found.residual, size)
     return _unless_empty(along), _unless_empty(classes)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.diagnose import candidates, nature, pairs
+from study.diagnose import candidates, dependence, pairs
 from study.diagnose.pairs import Pair
 from study.diagnose.ranking import UNSTEADY, Ranked, changes, curves, rank, wavers
 from study.equations.model import Model
@@ -128,7 +128,9 @@ def diagnose(
     size = float(np.std(record[how.response][how.judge[0] : how.judge[1]]))
     noise = _floor([residual, *(r.residual for r in rows[:3])], record.dt)
     verdict, rows, left, pair = _decide(rows, base, residual, size, record, how, held)
-    families = nature.explained_by(nature.leftover(base.found, base, record, short)) if verdict == UNKNOWN else {}
+    families = (
+        dependence.explained_by(dependence.leftover(base.found, base, record, short)) if verdict == UNKNOWN else {}
+    )
     return Diagnosis(
         verdict, found, residual, float(np.sqrt(np.mean(residual**2))) / size,
         noise / size, tuple(rows), left, pair, families, diverged,
@@ -241,7 +243,7 @@ def _lack(found: FreeRunFit, error: float, record: Record, how: Plan) -> float:
     Structure that is as broad as noise is not seen in a spectrum; it still depends on the motion.
     """
     short = shortened(how, len(found.residual))
-    left = nature.leftover(found, shape_search.baseline(found, record, short), record, short)
-    shares = nature.explained_by(left)
+    left = dependence.leftover(found, shape_search.baseline(found, record, short), record, short)
+    shares = dependence.explained_by(left)
     share = max(share for name, share in shares.items() if name != "time")
-    return error * float(np.sqrt(max(share if share > LACK else 0.0, nature.significant(left, CHANCE))))
+    return error * float(np.sqrt(max(share if share > LACK else 0.0, dependence.significant(left, CHANCE))))

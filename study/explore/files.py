@@ -4,7 +4,7 @@ from study.compare import history
 from study.compare.comparison_pictures import pictures
 from study.compare.comparison_report import as_json, document
 from study.compare.history_picture import files as ladder_pictures
-from study.diagnose.files import files as diagnosis_files
+from study.diagnose.diagnosis_files import files as diagnosis_files
 from study.equations import model_file
 from study.explore.saved import saved
 from study.explore.session import Session

@@ -14,7 +14,7 @@ from study.compare.comparison_report import rung as ladder_step
 from study.compare.missing_force import Restoring
 from study.diagnose import candidates
 from study.diagnose.candidates import Trial
-from study.diagnose.files import in_words
+from study.diagnose.diagnosis_files import in_words
 from study.diagnose.ranking import Ranked, rank
 from study.diagnose.verdict import Diagnosis, diagnose
 from study.equations import formulas

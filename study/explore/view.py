@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from study.compare.comparison import Comparison
 from study.compare.force_map import CELLS, curve, surface
 from study.compare.links import links
+from study.diagnose.constancy import Curve as Steadiness
 from study.diagnose.ranking import Ranked
-from study.diagnose.steadiness import Curve as Steadiness
 from study.explore import decimate, preview, words
 from study.explore.session import Rung
 from study.explore.units import Scale, in_text, length, power, rate

@@ -2,7 +2,7 @@
 
 from matplotlib.figure import Figure
 
-from study.diagnose import pictures
+from study.diagnose import diagnosis_pictures
 from study.diagnose.verdict import Diagnosis
 from study.figures import page
 from study.figures.sheet import in_style
@@ -18,13 +18,13 @@ def pages(found: Diagnosis, record: str) -> dict[str, Figure]:
         panel=3.4, legend_rows=1, headed=False,
     )  # fmt: skip
     ranking.subplots_adjust(left=0.34)
-    pictures.ranking(axes, found)
+    diagnosis_pictures.ranking(axes, found)
     page.legend(ranking, [axes])
     constancy, panels = page.page(
         f"Is the coefficient a constant? {record}", "that of a true term is, along frequency and along amplitude",
         columns=2, width=page.width(2), panel=2.8, share=False,
     )  # fmt: skip
-    pictures.constancy(panels[0], panels[1], found.candidates[:FOLLOWED])
+    diagnosis_pictures.constancy(panels[0], panels[1], found.candidates[:FOLLOWED])
     page.legend(constancy, panels)
     return {"candidates": ranking, "constancy": constancy}
 

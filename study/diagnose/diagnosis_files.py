@@ -2,9 +2,9 @@
 
 from study.compare.comparison import Comparison
 from study.compare.comparison_report import as_json, where
-from study.diagnose import pages, report
-from study.diagnose.says import sentences
-from study.diagnose.separate import advice
+from study.diagnose import diagnosis_pages, diagnosis_report
+from study.diagnose.diagnosis_sentences import sentences
+from study.diagnose.separating_test import advice
 from study.diagnose.verdict import MISSING, Diagnosis
 from study.records.plan import Plan
 from study.records.record import Record
@@ -30,7 +30,7 @@ def files(found: Diagnosis, compared: Comparison, said: str) -> dict[str, bytes]
     said : str
         The diagnosis in words.
     """
-    content = report.fields(found)
+    content = diagnosis_report.fields(found)
     content["error"]["force"] = compared.force.total
     content |= {"record": compared.record.name, "where": where(compared), "says": said}
-    return {"diagnosis.json": as_json(content)} | pages.files(found, compared.record.name)
+    return {"diagnosis.json": as_json(content)} | diagnosis_pages.files(found, compared.record.name)
