@@ -12,7 +12,7 @@ from study.figures import page
 from study.reproduction import tables
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
-from study.trials import pictures, reach
+from study.trials import reach, trial_pictures
 
 KINDS = {"single": "one effect hidden", "pair": "two effects hidden"}
 
@@ -38,7 +38,7 @@ def _confusion(counts: pd.DataFrame) -> Figure:
     figure = Figure(figsize=(10.2, 8.6), layout="constrained")
     axes = figure.subplots()
     axes.set_title("Trials: which effect was hidden, and what diagnose said (% of each row)", fontweight="bold")
-    pictures.confusion(axes, counts)
+    trial_pictures.confusion(axes, counts)
     return figure
 
 
@@ -48,7 +48,7 @@ def _ladder(rows: pd.DataFrame) -> Figure:
         width=page.width(2), panel=2.9, legend_rows=1,
     )  # fmt: skip
     for panel, kind in zip(axes, KINDS, strict=True):
-        pictures.ladder(panel, rows[rows["kind"] == kind])
+        trial_pictures.ladder(panel, rows[rows["kind"] == kind])
     page.letter(axes, list(KINDS.values()))
     page.legend(figure, axes[1:])
     return figure
