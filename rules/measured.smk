@@ -5,7 +5,7 @@
 #   snakemake -j2 gallery                              all of that, with pictures, for every record
 from dataclasses import asdict
 
-from study import measurements
+from study.commands import measurements
 
 with one_sentence():
     MEASUREMENTS = measurements.load(Path("config"), STUDY.cases)

@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from study.climb import climb, run
-from study.measurements import Measurement, check_present
+from study.commands.climb import climb, run
+from study.commands.measurements import Measurement, check_present
 from study.support.errors import StudyError
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study import measurements
+from study.commands import measurements
 from study.equations.model_file import read_model
 from study.equations.simulate import simulate
 from study.identify.estimators import ESTIMATORS, identify

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
+from study.commands.measurements import data_folder
 from study.diagnose.verdict import MISSING, diagnose
 from study.equations.model import Model, free
 from study.equations.terms import LIBRARY, get
 from study.identify.time_domain import held_out
-from study.measurements import data_folder
 from study.records.plan import make_plan
 from study.records.record import Record
 

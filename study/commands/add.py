@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from study.commands.command import Command
-from study.commands.records import add_reading_arguments, out_folder, plan_of, read_records
+from study.commands.record_arguments import add_reading_arguments, out_folder, plan_of, read_records
 
 if TYPE_CHECKING:
     from study.compare.comparison import Comparison

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from study.commands.command import Command
-from study.commands.records import add_record_arguments, out_folder, plan_of, read_records
+from study.commands.record_arguments import add_record_arguments, out_folder, plan_of, read_records
 from study.identify.estimators import ESTIMATORS
 
 WITHOUT = ("siso", "miso_hand_read")  # estimators that do not find all coefficients of a model, or not together

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from study.commands.command import Command, whole
-from study.commands.records import add_reading_arguments, out_folder, plan_of, read_records
+from study.commands.record_arguments import add_reading_arguments, out_folder, plan_of, read_records
 
 QUIET = 2.0  # seconds of work before progress is shown
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from study import cli
-from study.commands.records import plan_of, read_records
+from study.commands.record_arguments import plan_of, read_records
 from study.compare import history
 from study.compare.history_picture import files as ladder_pictures
 from study.diagnose import diagnosis_report
