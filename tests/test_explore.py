@@ -15,11 +15,11 @@ from study.compare.links import links
 from study.equations import model_file
 from study.equations.model import Model, free
 from study.equations.terms import get
-from study.explore import decimate, page, units, view, words
+from study.explore import decimate, html_page, page_units, view, words
 from study.explore import session as sessions
 from study.explore.desk import Desk
-from study.explore.files import PAGE, files
 from study.explore.saved import saved
+from study.explore.saved_files import PAGE, files
 from study.records.plan import make_plan
 from study.support.errors import StudyError
 
@@ -160,7 +160,7 @@ def test_the_ladder_goes_on_where_the_file_left_it(begun):
     step = begun.steps[0]
     earlier = ({**step, "terms": ["inertia"]}, {**step, "added": "linear_damping"})
     assert len(replace(begun, earlier=earlier).steps) == 2
-    names = page.ladder_columns(replace(begun, earlier=earlier[:1]))["name"]
+    names = html_page.ladder_columns(replace(begun, earlier=earlier[:1]))["name"]
     assert names == ["0 as given", "1 as given"]
 
 
@@ -194,14 +194,14 @@ def test_what_a_user_named_cannot_leave_its_place(asked):
 
 
 def test_units_are_written_as_people_write_them():
-    assert units.in_text("N s^2/m^2") == "N s²/m²"
-    assert units.in_text("u**3*v") == "u³·v"
-    assert units.number(4.897e5) == "4.897·10⁵"
-    assert units.number(-0.012) == "-0.012"
-    assert units.rate("m/s^2", 0.02) == units.Scale(1e-3, "mm/s^2")
-    assert units.length("V", 0.02) == units.Scale(1.0, "V")
-    assert units.power("V", 0.012) == units.Scale(1e-3, "10^-3 V")
-    assert units.power("N", 30.0) == units.power("N", 0.0) == units.Scale(1.0, "N")
+    assert page_units.in_text("N s^2/m^2") == "N s²/m²"
+    assert page_units.in_text("u**3*v") == "u³·v"
+    assert page_units.number(4.897e5) == "4.897·10⁵"
+    assert page_units.number(-0.012) == "-0.012"
+    assert page_units.rate("m/s^2", 0.02) == page_units.Scale(1e-3, "mm/s^2")
+    assert page_units.length("V", 0.02) == page_units.Scale(1.0, "V")
+    assert page_units.power("V", 0.012) == page_units.Scale(1e-3, "10^-3 V")
+    assert page_units.power("N", 30.0) == page_units.power("N", 0.0) == page_units.Scale(1.0, "N")
 
 
 def test_the_missing_force_has_one_unit_everywhere(asked):

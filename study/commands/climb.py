@@ -14,7 +14,7 @@ from study.diagnose.diagnosis_files import files as diagnosis_files
 from study.diagnose.verdict import MISSING, Diagnosis
 from study.equations.model_file import WANTED, parse_model
 from study.explore import session as sessions
-from study.explore.files import PAGE, files
+from study.explore.saved_files import PAGE, files
 from study.explore.session import Session
 from study.support.file_sets import write_files
 from study.support.files import read_text

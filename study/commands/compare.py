@@ -29,8 +29,8 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.compare.comparison_pictures import level_pictures, pictures
     from study.compare.comparison_report import as_json, document, summary, tables
     from study.equations.model_file import read_model
-    from study.explore.files import PAGE
     from study.explore.saved import of_comparison
+    from study.explore.saved_files import PAGE
     from study.support.file_sets import check_folder, write_files
 
     folder = out_folder(arguments)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from study.explore import session as sessions
-from study.explore.files import PAGE, files
+from study.explore.saved_files import PAGE, files
 from study.explore.session import Session
 from study.support.errors import StudyError
 from study.support.file_sets import write_files

@@ -7,7 +7,7 @@ from bokeh.document import Document
 from bokeh.events import RangesUpdate
 from bokeh.models import ColumnDataSource, CustomJS
 
-from study.explore import decimate, page, preview
+from study.explore import decimate, html_page, preview
 from study.explore.desk import Desk
 from study.explore.view import View, over_time, scales_of, view, within
 
@@ -22,18 +22,18 @@ class Watcher:
         self.shown = desk.session
         self.asked = ColumnDataSource({"act": [], "name": [], "count": []}, name="asked")
         self.state = ColumnDataSource(self._state(), name="state")
-        self.page = page.build(self._view(), page.ladder_columns(self.shown), [self.asked, self.state])
+        self.page = html_page.build(self._view(), html_page.ladder_columns(self.shown), [self.asked, self.state])
         self.span: tuple[float, float] | None = None
         self._lay()
         desk.watch(self, self._told)
         document.on_session_destroyed(lambda _: desk.leave(self))
 
     def _lay(self) -> None:
-        for panel in page.placed(self.page, diagnosed=True):
+        for panel in html_page.placed(self.page, diagnosed=True):
             self.document.add_root(panel)
-        self.document.title = page.title(self.shown)
-        self.document.template = page.template()
-        self.document.template_variables.update(page.variables(self.shown, live=True))
+        self.document.title = html_page.title(self.shown)
+        self.document.template = html_page.template()
+        self.document.template_variables.update(html_page.variables(self.shown, live=True))
         self.document.js_on_event("document_ready", CustomJS(code="window.study.begin()"))
         self.page.sources["words"].js_on_change("data", CustomJS(code="window.study.words()"))
         self.state.js_on_change("data", CustomJS(code="window.study.state()"))
@@ -60,7 +60,7 @@ class Watcher:
         self.document.hold("combine")
         if session is not self.shown:
             self.shown = session
-            self.page.show(self._view(), page.ladder_columns(session))
+            self.page.show(self._view(), html_page.ladder_columns(session))
             if self.span is not None:
                 self._refine(self.span)
         self.state.data = self._state()

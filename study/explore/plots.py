@@ -6,100 +6,100 @@ from typing import Any
 from bokeh.models import ColorBar, ColumnDataSource, FactorRange, HoverTool, LinearColorMapper, Quad, Span, VStrip
 from bokeh.palettes import RdBu11
 
-from study.explore import style
+from study.explore import theme
 
 Sources = Mapping[str, ColumnDataSource]
 
 
 def response(s: Sources, time: Any) -> Any:
     """Measured and predicted response."""
-    drawn = style.panel("response", 150, "", "response", select="width", ranges=(time, None))
+    drawn = theme.panel("response", 150, "", "response", select="width", ranges=(time, None))
     drawn.xaxis.visible = False
     _blocks(drawn, s)
-    measured = drawn.line("t", "measured", source=s["time"], **style.MEASURED)
-    predicted = drawn.line("t", "predicted", source=s["time"], **style.PREDICTED)
-    style.chosen(drawn, "box_response")
-    style.follows(drawn, [measured, predicted])
-    style.legend(drawn, [("measured", [measured]), ("free run of the model", [predicted])])
+    measured = drawn.line("t", "measured", source=s["time"], **theme.MEASURED)
+    predicted = drawn.line("t", "predicted", source=s["time"], **theme.PREDICTED)
+    theme.chosen(drawn, "box_response")
+    theme.follows(drawn, [measured, predicted])
+    theme.legend(drawn, [("measured", [measured]), ("free run of the model", [predicted])])
     return drawn
 
 
 def difference(s: Sources, time: Any) -> Any:
     """What the model misses, the noise, and what a candidate would leave."""
-    drawn = style.panel("difference", 158, "time / s", "difference", select="width", ranges=(time, None))
+    drawn = theme.panel("difference", 158, "time / s", "difference", select="width", ranges=(time, None))
     _blocks(drawn, s)
-    line = drawn.line("t", "difference", source=s["time"], **style.DIFFERENCE)
-    would = drawn.line("t", "y", source=s["ghost_time"], **style.WOULD)
-    noise = drawn.multi_line("t", "level", source=s["noise"], **style.NOISE)
-    style.chosen(drawn, "box_difference")
-    style.follows(drawn, [line, noise])
-    style.legend(drawn, [("measured less predicted", [line]), ("± twice the noise", [noise]), ("candidate", [would])])
+    line = drawn.line("t", "difference", source=s["time"], **theme.DIFFERENCE)
+    would = drawn.line("t", "y", source=s["ghost_time"], **theme.WOULD)
+    noise = drawn.multi_line("t", "level", source=s["noise"], **theme.NOISE)
+    theme.chosen(drawn, "box_difference")
+    theme.follows(drawn, [line, noise])
+    theme.legend(drawn, [("measured less predicted", [line]), ("± twice the noise", [noise]), ("candidate", [would])])
     return drawn
 
 
 def close(s: Sources) -> Any:
     """The same where the model misses most, or where a stretch was selected."""
-    drawn = style.panel("close", 308, "time / s", "response", narrow=True)
-    measured = drawn.line("t", "measured", source=s["close"], **style.MEASURED | {"line_width": 3.4})
-    predicted = drawn.line("t", "predicted", source=s["close"], **style.PREDICTED | {"line_width": 1.5})
-    style.legend(drawn, [("measured", [measured]), ("free run", [predicted])])
+    drawn = theme.panel("close", 308, "time / s", "response", narrow=True)
+    measured = drawn.line("t", "measured", source=s["close"], **theme.MEASURED | {"line_width": 3.4})
+    predicted = drawn.line("t", "predicted", source=s["close"], **theme.PREDICTED | {"line_width": 1.5})
+    theme.legend(drawn, [("measured", [measured]), ("free run", [predicted])])
     return drawn
 
 
 def _blocks(drawn: Any, s: Sources) -> None:
     """The stretches of time in which a selected band or amplitude is at home."""
-    strips = VStrip(x0="left", x1="right", fill_color=style.BAND, fill_alpha="weight", line_color=None)
+    strips = VStrip(x0="left", x1="right", fill_color=theme.BAND, fill_alpha="weight", line_color=None)
     drawn.add_glyph(s["blocks"], strips, level="underlay", nonselection_glyph=None)
 
 
 def force(s: Sources, frequency: Any, share: Any) -> Any:
     """Unexplained share of the force with the noise floor."""
-    drawn = style.panel(
+    drawn = theme.panel(
         "force", 222, "frequency / Hz", "unexplained share of the force / %", select="width", ranges=(frequency, share),
         narrow=True, y_axis_type="log",
     )  # fmt: skip
     left = drawn.line("f", "parametric", source=s["force"], line_color="#0b5394", line_width=1.6)
     least = drawn.line("f", "unexplained", source=s["force"], line_color="#d1600a", line_width=1.4, line_dash=[6, 3])
-    noise = drawn.line("f", "noise", source=s["force"], **style.NOISE)
-    style.chosen(drawn, "box_force")
-    style.legend(drawn, [("fitted", [left]), ("1 − coherence", [least]), ("noise", [noise])])
+    noise = drawn.line("f", "noise", source=s["force"], **theme.NOISE)
+    theme.chosen(drawn, "box_force")
+    theme.legend(drawn, [("fitted", [left]), ("1 − coherence", [least]), ("noise", [noise])])
     return drawn
 
 
 def coherence(s: Sources, frequency: Any) -> Any:
     """Cumulative coherence: what the inputs explain, one after the other."""
-    drawn = style.panel(
+    drawn = theme.panel(
         "coherence", 222, "frequency / Hz", "cumulative coherence / 1", select="width",
         narrow=True,
-        ranges=(frequency, style.fixed("range_coherence", 0.0, 1.03)),
+        ranges=(frequency, theme.fixed("range_coherence", 0.0, 1.03)),
     )  # fmt: skip
     lines = drawn.multi_line(
         "f", "share", source=s["coherence"], line_color="colour", line_dash="dash", line_width=1.5
     )  # fmt: skip
-    style.legend(drawn, [({"field": "name"}, [lines])], "bottom_right")
-    style.chosen(drawn, "box_coherence")
+    theme.legend(drawn, [({"field": "name"}, [lines])], "bottom_right")
+    theme.chosen(drawn, "box_coherence")
     return drawn
 
 
 def spectrum(s: Sources, frequency: Any) -> Any:
     """The difference of the response by frequency, the noise, what is selected and what a candidate would leave."""
-    drawn = style.panel(
+    drawn = theme.panel(
         "spectrum", 222, "frequency / Hz", "difference", select="width", ranges=(frequency, None),
         narrow=True, y_axis_type="log",
     )  # fmt: skip
     line = drawn.line("f", "difference", source=s["spectrum"], line_color="#d1600a", line_width=1.5)
-    noise = drawn.line("f", "noise", source=s["spectrum"], **style.NOISE)
-    would = drawn.line("f", "y", source=s["ghost_spectrum"], **style.WOULD)
-    picked = drawn.line("f", "y", source=s["picked_spectrum"], **style.PICKED)
-    style.chosen(drawn, "box_spectrum")
-    style.follows(drawn, [line, noise])
-    style.legend(drawn, [("difference", [line]), ("noise", [noise]), ("candidate", [would]), ("selected", [picked])])
+    noise = drawn.line("f", "noise", source=s["spectrum"], **theme.NOISE)
+    would = drawn.line("f", "y", source=s["ghost_spectrum"], **theme.WOULD)
+    picked = drawn.line("f", "y", source=s["picked_spectrum"], **theme.PICKED)
+    theme.chosen(drawn, "box_spectrum")
+    theme.follows(drawn, [line, noise])
+    theme.legend(drawn, [("difference", [line]), ("noise", [noise]), ("candidate", [would]), ("selected", [picked])])
     return drawn
 
 
 def plane(s: Sources) -> Any:
     """The missing force over displacement and velocity; negative cells bear a dash, dots may be noise."""
-    drawn = style.panel("plane", 250, "displacement", "velocity", narrow=True)
+    drawn = theme.panel("plane", 250, "displacement", "velocity", narrow=True)
     mapper = LinearColorMapper(palette=RdBu11, low=-1.0, high=1.0, name="mapper", nan_color="rgba(0,0,0,0)")
     cells = drawn.quad(
         "left", "right", "top", "bottom", source=s["plane"], fill_color={"field": "mean", "transform": mapper},
@@ -116,7 +116,7 @@ def plane(s: Sources) -> Any:
     drawn.add_glyph(s["plane"], outline, nonselection_glyph=None)
     bar = ColorBar(
         color_mapper=mapper, name="plane_bar", width=9, padding=4, background_fill_color=None,
-        major_label_text_font=style.FONT, major_label_text_font_size="11px", major_label_text_color=style.QUIET,
+        major_label_text_font=theme.FONT, major_label_text_font_size="11px", major_label_text_color=theme.QUIET,
         label_standoff=4, bar_line_color=None,
     )  # fmt: skip
     drawn.add_layout(bar, "right")
@@ -129,36 +129,36 @@ def plane(s: Sources) -> Any:
 def against(s: Sources, of: str) -> Any:
     """Mean missing force against displacement (u) or velocity (v) with 95 % intervals."""
     name = f"against_{of}"
-    drawn = style.panel(name, 250, of, "missing force", select="width", narrow=True)
+    drawn = theme.panel(name, 250, of, "missing force", select="width", narrow=True)
     drawn.add_layout(Span(location=0.0, dimension="width", line_color="#9aa5b1", line_width=1.0))
     mean = drawn.line("at", "mean", source=s[name], line_color="#0b5394", line_width=1.4)
     dots = drawn.scatter("at", "mean", source=s[name], fill_color="#0b5394", line_color=None, size=4.5)
     bars = drawn.segment("at", "low", "at", "high", source=s[name], line_color="#0b5394", line_width=1.0)
-    would = drawn.line("at", "y", source=s[f"ghost_{of}"], **style.WOULD)
-    picked = drawn.line("at", "y", source=s[f"picked_{of}"], **style.PICKED)
-    style.chosen(drawn, f"box_{name}")
+    would = drawn.line("at", "y", source=s[f"ghost_{of}"], **theme.WOULD)
+    picked = drawn.line("at", "y", source=s[f"picked_{of}"], **theme.PICKED)
+    theme.chosen(drawn, f"box_{name}")
     reach = drawn.line("at", "reach", source=s[name], line_alpha=0.0)  # how near the axis may come
-    style.follows(drawn, [mean, bars, reach])
-    style.legend(drawn, [("mean, 95 %", [mean, dots, bars]), ("candidate", [would]), ("selected", [picked])])
+    theme.follows(drawn, [mean, bars, reach])
+    theme.legend(drawn, [("mean, 95 %", [mean, dots, bars]), ("candidate", [would]), ("selected", [picked])])
     return drawn
 
 
 def constancy(s: Sources) -> Any:
     """A_j(f): the coefficient of one candidate along frequency; that of a true term is a constant."""
-    drawn = style.panel("constancy", 150, "frequency / Hz", "coefficient", ranges=(None, None))
+    drawn = theme.panel("constancy", 150, "frequency / Hz", "coefficient", ranges=(None, None))
     drawn.x_range.range_padding = 0.05
     line = drawn.line("f", "value", source=s["shown"], line_color="#0b5394", line_width=1.3)
     drawn.scatter("f", "value", source=s["shown"], fill_color="#0b5394", line_color=None, size=5)
     drawn.segment("f", "low", "f", "high", source=s["shown"], line_color="#0b5394", line_width=1.0)
     zero = drawn.line("f", "zero", source=s["shown"], line_color="#9aa5b1", line_width=1.0)
-    style.follows(drawn, [line, zero])
+    theme.follows(drawn, [line, zero])
     drawn.y_range.range_padding = 0.25
     return drawn
 
 
 def ladder(s: Sources, names: list[str], height: int) -> Any:
     """Error by model, one below the other, with the noise floor."""
-    drawn = style.panel(
+    drawn = theme.panel(
         "ladder", height, "held-out error / %", "", x_axis_type="log",
         ranges=(None, FactorRange(factors=names[::-1], name="range_ladder", range_padding=0.15)),
     )  # fmt: skip
@@ -167,14 +167,14 @@ def ladder(s: Sources, names: list[str], height: int) -> Any:
         "floor", "name", source=s["ladder"], marker="dash", angle=1.5708, size=22, line_color="#000000", line_width=1.3,
         line_dash="dotted",
     )  # fmt: skip
-    drawn.line("response", "name", source=s["ladder"], line_color=style.INK, line_width=1.3)
-    response = drawn.scatter("response", "name", source=s["ladder"], size="size", fill_color=style.INK, line_color=None)
+    drawn.line("response", "name", source=s["ladder"], line_color=theme.INK, line_width=1.3)
+    response = drawn.scatter("response", "name", source=s["ladder"], size="size", fill_color=theme.INK, line_color=None)
     drawn.line("force", "name", source=s["ladder"], line_color="#8a949e", line_dash="dashed", line_width=1.2)
     force = drawn.scatter(
         "force", "name", source=s["ladder"], marker="square", size=6, fill_color="white", line_color="#5c6873",
         line_width=1.3,
     )  # fmt: skip
-    drawn.yaxis.major_label_text_color = style.INK
+    drawn.yaxis.major_label_text_color = theme.INK
     drawn.yaxis.major_label_text_font_size = "12px"
-    style.legend(drawn, [("response", [response]), ("force", [force]), ("noise floor", [floor])])
+    theme.legend(drawn, [("response", [response]), ("force", [force]), ("noise floor", [floor])])
     return drawn

@@ -10,7 +10,7 @@ from bokeh.models import ColumnDataSource, CustomJS
 from bokeh.resources import Resources
 
 from study.compare.comparison import Comparison
-from study.explore import page
+from study.explore import html_page
 from study.explore.session import Rung, Session
 from study.explore.view import Columns, view
 
@@ -20,17 +20,17 @@ EMBED = "Bokeh.safely(() => Bokeh.embed.embed_items({docs}, {items}))"
 def saved(session: Session) -> bytes:
     """The whole session as a file that a browser opens; it shows the last rung first."""
     views = [view(rung, number, live=False) for number, rung in enumerate(session.rungs)]
-    ladder = page.ladder_columns(session)
+    ladder = html_page.ladder_columns(session)
     stores: list[ColumnDataSource] = []
     if len(views) > 1:
         for number, seen in enumerate(views):
             columns: dict[str, Columns] = {
-                **seen.columns, "frame": page.frame(seen), "ladder": _marked(ladder, number - len(views))
+                **seen.columns, "frame": html_page.frame(seen), "ladder": _marked(ladder, number - len(views))
             }  # fmt: skip
             stores += [ColumnDataSource(c, name=f"{name}@{number}") for name, c in columns.items()]
-    made = page.build(views[-1], ladder, stores)
-    values = page.variables(session, live=False)
-    shown = page.placed(made, values["diagnosed"])
+    made = html_page.build(views[-1], ladder, stores)
+    values = html_page.variables(session, live=False)
+    shown = html_page.placed(made, values["diagnosed"])
     document = Document()
     for panel in shown:
         document.add_root(panel)
@@ -40,8 +40,8 @@ def saved(session: Session) -> bytes:
     items = [{"docid": "study", "roots": {r.id: r.elementid for r in roots.values()},
               "root_ids": [r.id for r in roots.values()]}]  # fmt: skip
     script = EMBED.format(docs=_in_script({"study": content}), items=_in_script(items))
-    text = page.template().render(
-        **values, title=page.title(session), roots=roots, plot_script=f"<script>{script}</script>",
+    text = html_page.template().render(
+        **values, title=html_page.title(session), roots=roots, plot_script=f"<script>{script}</script>",
         bokeh_js=Resources(mode="inline", components=["bokeh"], minified=True, log_level="error").render_js(),
     )  # fmt: skip
     return text.encode()

@@ -13,8 +13,8 @@ from study.compare.links import links
 from study.diagnose.constancy import Curve as Steadiness
 from study.diagnose.ranking import Ranked
 from study.explore import decimate, preview, words
+from study.explore.page_units import Scale, in_text, length, power, rate
 from study.explore.session import Rung
-from study.explore.units import Scale, in_text, length, power, rate
 from study.figures.labels import power_of_ten
 
 Floats = NDArray[np.float64]

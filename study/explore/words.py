@@ -8,8 +8,8 @@ from study.compare.comparison import Comparison
 from study.compare.comparison_sentences import percent, says
 from study.diagnose.ranking import Ranked
 from study.diagnose.verdict import MISSING, NOTHING
+from study.explore.page_units import in_text, length, number, rate
 from study.explore.session import Rung
-from study.explore.units import in_text, length, number, rate
 from study.figures.labels import power_of_ten, term_names
 from study.identify.time_domain.fit_model import Coefficient
 

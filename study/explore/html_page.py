@@ -10,9 +10,9 @@ import numpy as np
 from bokeh.models import ColumnDataSource, CustomJS
 from jinja2 import Environment, Template
 
-from study.explore import plots, style, words
+from study.explore import plots, theme, words
+from study.explore.page_units import in_text
 from study.explore.session import Session, Step
-from study.explore.units import in_text
 from study.explore.view import Columns, View
 
 GHOSTS: dict[str, Columns] = {
@@ -68,12 +68,12 @@ def build(seen: View, ladder: Columns, stores: Sequence[ColumnDataSource] = ()) 
     given = {**seen.columns, **GHOSTS, "ladder": ladder, "frame": frame(seen)}
     sources = {name: ColumnDataSource(columns, name=name) for name, columns in given.items()}
     t, highest = seen.columns["time"]["t"], seen.highest
-    time = style.fixed("range_time", float(t[0]), float(t[-1]))
-    frequency = style.fixed("range_frequency", 0.0, highest)
+    time = theme.fixed("range_time", float(t[0]), float(t[-1]))
+    frequency = theme.fixed("range_frequency", 0.0, highest)
     panels: dict[str, Any] = {
         "response": plots.response(sources, time), "difference": plots.difference(sources, time),
         "close": plots.close(sources),
-        "force": plots.force(sources, frequency, style.fixed("range_force", *seen.limits)),
+        "force": plots.force(sources, frequency, theme.fixed("range_force", *seen.limits)),
         "coherence": plots.coherence(sources, frequency),
         "spectrum": plots.spectrum(sources, frequency), "plane": plots.plane(sources),
         "against_u": plots.against(sources, "u"), "against_v": plots.against(sources, "v"),
