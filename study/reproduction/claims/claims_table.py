@@ -4,8 +4,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict
 
 import pandas as pd
-from study.reproduction.claims.evidence import Evidence
-from study.reproduction.claims.reported import Reported
 
 from study.reproduction.claims import (
     conclusions,
@@ -20,7 +18,9 @@ from study.reproduction.claims import (
     response,
     simulation,
 )
+from study.reproduction.claims.evidence import Evidence
 from study.reproduction.claims.judgement import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED, Claim
+from study.reproduction.claims.reported import Reported
 
 CLAIMS: tuple[Callable[[Evidence, Reported], Claim], ...] = (
     *simulation.CLAIMS,

@@ -6,11 +6,11 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 import pandas as pd
+
+from study.records.excitation import READINGS
 from study.reproduction.claims.evidence import Assumed, Drive, Ensemble, Evidence
 from study.reproduction.claims.reported import Reported
 from study.reproduction.claims.sample import Sample
-
-from study.records.excitation import READINGS
 
 SURE = 2.0  # standard errors by which one reading must come nearer than the other ...
 TIE = "tie"  # ... or this is said

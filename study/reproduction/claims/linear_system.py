@@ -4,15 +4,15 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from study.reproduction.claims.common import TESTS_WRONG, looks_gaussian, near_unity
-from study.reproduction.claims.evidence import Assumed, Drive, Evidence
-from study.reproduction.claims.reported import Reported
-from study.reproduction.claims.sample import Sample, average
 
 from study.identify.estimators.base import Identified
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.records.spectra import Segments
+from study.reproduction.claims.common import TESTS_WRONG, looks_gaussian, near_unity
+from study.reproduction.claims.evidence import Assumed, Drive, Evidence
 from study.reproduction.claims.judgement import Claim, Condition, at_most, close, conclude, significant
+from study.reproduction.claims.reported import Reported
+from study.reproduction.claims.sample import Sample, average
 
 Floats = NDArray[np.float64]
 READ_OFF = 0.05  # what a hand reads off a curve

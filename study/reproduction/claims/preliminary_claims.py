@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from study.reproduction.claims.evidence import Drive, Evidence
-from study.reproduction.claims.reported import Reported
-from study.reproduction.claims.sample import Sample, average
 
 from study.equations.model import Model
 from study.records.record import Record
+from study.reproduction.claims.evidence import Drive, Evidence
 from study.reproduction.claims.judgement import Claim, Condition, at_least, close, conclude, near
+from study.reproduction.claims.reported import Reported
+from study.reproduction.claims.sample import Sample, average
 from study.reproduction.ensemble import threaded
 from study.reproduction.preliminary import harmonic_beside, harmonic_pattern, model_restoring_force, restoring_force
 

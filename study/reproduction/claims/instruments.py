@@ -1,16 +1,15 @@
 """Section 5.4 with another estimator: what its statements would be with instruments from a free run."""
 
-from study.reproduction.claims.damping import COMBINED
-from study.reproduction.claims.evidence import Drive, Evidence
-from study.reproduction.claims.levels import PARTS, SIGNIFICANT_BIAS, noises
-from study.reproduction.claims.reported import Reported
-from study.reproduction.claims.sample import Sample
-
 from study.identify.estimators import instrumental
 from study.identify.estimators.base import Settings
 from study.records.record import Record
 from study.records.spectra import Segments
+from study.reproduction.claims.damping import COMBINED
+from study.reproduction.claims.evidence import Drive, Evidence
 from study.reproduction.claims.judgement import Claim, Condition, conclude, together
+from study.reproduction.claims.levels import PARTS, SIGNIFICANT_BIAS, noises
+from study.reproduction.claims.reported import Reported
+from study.reproduction.claims.sample import Sample
 from study.reproduction.ensemble import threaded
 
 NAMES = (*PARTS, "f_n")

@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from study.reproduction.claims.common import TESTS_WRONG, has_line, local_maxima, looks_gaussian, nearest
-from study.reproduction.claims.evidence import Drive, Evidence
-from study.reproduction.claims.reported import Reported
-from study.reproduction.claims.sample import Sample, kurtosis
 
 from study.records.spectra import Segments, autospectrum
+from study.reproduction.claims.common import TESTS_WRONG, has_line, local_maxima, looks_gaussian, nearest
+from study.reproduction.claims.evidence import Drive, Evidence
 from study.reproduction.claims.judgement import Claim, Condition, at_least, conclude, significant
+from study.reproduction.claims.reported import Reported
+from study.reproduction.claims.sample import Sample, kurtosis
 from study.reproduction.preliminary import mathieu_lines
 
 Floats = NDArray[np.float64]

@@ -2,13 +2,13 @@
 
 import numpy as np
 from numpy.typing import NDArray
+
 from study.reproduction.claims.common import has_line, in_band, linear_share, local_maxima, near_unity, recovered
 from study.reproduction.claims.duffing import LINEAR_PARTS
 from study.reproduction.claims.evidence import Analysis, Drive, Evidence
+from study.reproduction.claims.judgement import Claim, Condition, at_most, close, conclude, near
 from study.reproduction.claims.reported import Reported
 from study.reproduction.claims.sample import GAUSSIAN_CENTRAL_SHARE, average, central_share, kurtosis
-
-from study.reproduction.claims.judgement import Claim, Condition, at_most, close, conclude, near
 
 LINE = 0.2  # hertz: two lines of the report's spectra
 LOW_COHERENCE = 0.5  # "quite low", "rather low": less than half passes

@@ -6,16 +6,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from study.reproduction.claims.common import TESTS_WRONG
-from study.reproduction.claims.evidence import Drive, Evidence
-from study.reproduction.claims.reported import Reported
-from study.reproduction.claims.sample import Sample, average, departure, gaussian_score, is_gaussian, kurtosis, share
 
 from study.equations.simulate import Integrator, simulate
 from study.identify.estimators.base import true_parameters
 from study.records.excitation import displacement_noise
 from study.records.spectra import Segments, autospectrum
+from study.reproduction.claims.common import TESTS_WRONG
+from study.reproduction.claims.evidence import Drive, Evidence
 from study.reproduction.claims.judgement import Claim, Condition, at_least, conclude
+from study.reproduction.claims.reported import Reported
+from study.reproduction.claims.sample import Sample, average, departure, gaussian_score, is_gaussian, kurtosis, share
 from study.reproduction.preliminary import model_restoring_force
 
 Floats = NDArray[np.float64]

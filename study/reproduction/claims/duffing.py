@@ -4,12 +4,12 @@ import math
 from itertools import pairwise
 
 import numpy as np
+
 from study.reproduction.claims.common import less_distorted, looks_gaussian, near_unity, recovered
 from study.reproduction.claims.evidence import Assumed, Drive, Ensemble, Evidence
+from study.reproduction.claims.judgement import Claim, Condition, at_most, close, conclude, near, one_record
 from study.reproduction.claims.reported import Reported
 from study.reproduction.claims.sample import Sample, average
-
-from study.reproduction.claims.judgement import Claim, Condition, at_most, close, conclude, near, one_record
 
 LEVELS = ("lowest", "second", "third", "highest")
 READ_OFF = 0.05  # what a hand reads off a curve

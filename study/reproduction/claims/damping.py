@@ -1,6 +1,7 @@
 """Sections 5.2.3 and 5.2.4: the Van der Pol and the combined system."""
 
 import numpy as np
+
 from study.reproduction.claims.common import (
     differs_from_gaussian,
     less_distorted,
@@ -11,10 +12,9 @@ from study.reproduction.claims.common import (
 )
 from study.reproduction.claims.duffing import LINEAR_PARTS, levels, rising
 from study.reproduction.claims.evidence import Assumed, Drive, Evidence
+from study.reproduction.claims.judgement import Claim, Condition, at_least, close, conclude, near, significant
 from study.reproduction.claims.reported import Reported
 from study.reproduction.claims.sample import GAUSSIAN_OUTER_SHARE, outer_share
-
-from study.reproduction.claims.judgement import Claim, Condition, at_least, close, conclude, near, significant
 
 COMBINED = "duffing_van_der_pol"
 

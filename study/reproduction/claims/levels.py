@@ -5,15 +5,15 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+
+from study.records.excitation import displacement_noise
 from study.reproduction.claims.common import near_unity, recovered
 from study.reproduction.claims.damping import COMBINED
 from study.reproduction.claims.duffing import levels, rising
 from study.reproduction.claims.evidence import Assumed, Drive, Ensemble, Evidence
+from study.reproduction.claims.judgement import Claim, Condition, at_least, close, conclude, together
 from study.reproduction.claims.reported import Reported
 from study.reproduction.claims.sample import Sample, average
-
-from study.records.excitation import displacement_noise
-from study.reproduction.claims.judgement import Claim, Condition, at_least, close, conclude, together
 from study.reproduction.ensemble import NOISE_OFFSET, threaded
 
 Floats = NDArray[np.float64]

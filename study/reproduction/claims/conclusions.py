@@ -2,17 +2,17 @@
 
 import numpy as np
 from numpy.typing import NDArray
+
+from study.equations.simulate import Integrator, simulate
+from study.records.excitation import Excitation, force, theoretical_autospectrum
 from study.reproduction.claims.common import recovered
 from study.reproduction.claims.damping import COMBINED
 from study.reproduction.claims.duffing import LINEAR_PARTS, levels
 from study.reproduction.claims.evidence import Assumed, Drive, Ensemble, Evidence, Outcome
+from study.reproduction.claims.judgement import Claim, Condition, at_least, conclude, together
 from study.reproduction.claims.levels import PARTS, noises
 from study.reproduction.claims.reported import Reported
 from study.reproduction.claims.sample import Sample
-
-from study.equations.simulate import Integrator, simulate
-from study.records.excitation import Excitation, force, theoretical_autospectrum
-from study.reproduction.claims.judgement import Claim, Condition, at_least, conclude, together
 from study.reproduction.ensemble import threaded
 
 Floats = NDArray[np.float64]

@@ -3,13 +3,11 @@
 import math
 
 import numpy as np
+
+from study.records.excitation import READINGS
 from study.reproduction.claims.common import NEAR_UNITY_LOWEST, differs_from_gaussian, in_band, near_unity, recovered
 from study.reproduction.claims.duffing import LINEAR_PARTS, levels
 from study.reproduction.claims.evidence import Assumed, Drive, Evidence
-from study.reproduction.claims.reported import Reported
-from study.reproduction.claims.sample import Sample, share
-
-from study.records.excitation import READINGS
 from study.reproduction.claims.excitation_reading import largest_error
 from study.reproduction.claims.judgement import (
     Claim,
@@ -23,6 +21,8 @@ from study.reproduction.claims.judgement import (
     significant,
 )
 from study.reproduction.claims.linear_system import deficit
+from study.reproduction.claims.reported import Reported
+from study.reproduction.claims.sample import Sample, share
 
 SYSTEM = "dead_band"
 AS_DUFFING = Assumed(plus=("cubic_stiffness",), minus=("dead_band",))

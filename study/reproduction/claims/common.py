@@ -5,11 +5,11 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+
 from study.reproduction.claims.evidence import Drive, Ensemble, Evidence
+from study.reproduction.claims.judgement import Condition, at_least, at_most
 from study.reproduction.claims.reported import Reported
 from study.reproduction.claims.sample import Sample, average, gaussian_score, is_gaussian, kurtosis, share
-
-from study.reproduction.claims.judgement import Condition, at_least, at_most
 from study.reproduction.ensemble import threaded
 
 Floats = NDArray[np.float64]

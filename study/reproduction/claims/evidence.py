@@ -8,7 +8,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from study.reproduction.claims.sample import Sample, average
 
 from study.equations.model import Model
 from study.equations.terms import get
@@ -18,6 +17,7 @@ from study.identify.estimators.hand_read import read_curve
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.records.record import Record
 from study.records.spectra import Segments
+from study.reproduction.claims.sample import Sample, average
 from study.reproduction.ensemble import NOISE_OFFSET, threaded
 from study.reproduction.make_record import make_record
 from study.support.errors import StudyError
