@@ -19,7 +19,7 @@ CODE = {
     "summary": rests_on(Path("scripts/summary.py")),
 }
 NOISE = {name: case.noise for name, case in STUDY.cases.items()}
-STYLE = "config/study.mplstyle"
+STYLE = "study/figures/study.mplstyle"
 ENDINGS = ("png", "svg")
 IDENTIFIED_FILES = ("frequency_response.csv", "coherence.csv", "noise.csv", "parameters.csv")
 

@@ -3,11 +3,10 @@
 from pathlib import Path
 from typing import Any
 
-from study.reproduction.claims.evidence import Drive, models_of, record_settings
-from study.reproduction.claims.simulation import SYSTEMS
-
 from study.records.excitation import READINGS
 from study.reproduction import integrator_study, tables
+from study.reproduction.claims.evidence import Drive, models_of, record_settings
+from study.reproduction.claims.simulation import SYSTEMS
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
 

@@ -1,9 +1,11 @@
 """Snakemake step: a measured record and a model -> comparison, diagnosis, or a climb from model to model."""
 
+import sys
 from pathlib import Path
 from typing import Any
 
-from study.commands.climb import climb, run
+from study import cli
+from study.commands.climb import climb
 from study.commands.measurements import Measurement, check_present
 from study.support.errors import StudyError
 from study.support.files import replace_file
@@ -14,7 +16,9 @@ def main(what: str, row: Measurement, output: Any) -> None:
     record, model = Path(row.path), Path(row.model)
     check_present(record)
     if what != "climb":
-        run(what, str(record), "--model", str(model), *row.options, "--out", str(Path(output[0]).parent))
+        words = (what, str(record), "--model", str(model), *row.options, "--out", str(Path(output[0]).parent))
+        if code := cli.main(words):  # which has said why
+            sys.exit(code)
         return
     target = Path(output.history)
     steps = climb(record, model, row.options, row.steps, target.parent)

@@ -1,53 +1,15 @@
-"""The command line: find the command, run it, and turn whatever goes wrong into one sentence.
+"""The command line: run a command, and turn whatever goes wrong into one sentence."""
 
-A new command is one module in ``study/commands`` and one entry in :data:`COMMANDS`.
-"""
-
-import argparse
 import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import NoReturn
 
-from study import __doc__ as summary
-from study import __version__
-from study.commands import add, compare, diagnose, explore, history, simulate, terms, trial
-from study.commands.command import Command
+from study.commands.parser import parser
 from study.support.errors import StudyError
 
-COMMANDS: tuple[Command, ...] = (
-    compare.COMMAND, diagnose.COMMAND, add.COMMAND, history.COMMAND, explore.COMMAND, terms.COMMAND,
-    simulate.COMMAND, trial.COMMAND,
-)  # fmt: skip
-
 BAD_INPUT, FAULT, INTERRUPTED, PIPE_CLOSED = 2, 1, 130, 141  # the last two as shells report SIGINT and SIGPIPE
-
-
-class _Parser(argparse.ArgumentParser):
-    """A parser whose complaints are one sentence, like all others."""
-
-    def error(self, message: str) -> NoReturn:
-        raise StudyError(f"{message}; see '{self.prog} --help'")
-
-
-def parser() -> argparse.ArgumentParser:
-    """The parser of the command line with every command of the table."""
-    root = _Parser(
-        "study", description=summary, epilog="example: study simulate --help",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
-    root.add_argument("--version", action="version", version=f"study {__version__}")
-    commands = root.add_subparsers(title="commands", metavar="COMMAND", required=True, dest="command")
-    for command in COMMANDS:
-        child = commands.add_parser(
-            command.name, help=command.summary, description=command.summary,
-            epilog=f"example:\n  {command.example}", formatter_class=argparse.RawDescriptionHelpFormatter,
-        )  # fmt: skip
-        command.arguments(child)
-        child.set_defaults(run=command.run)
-    return root
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -1,11 +1,10 @@
 """A climb: diagnose, add what is missing, and again, until nothing is missing that has a name."""
 
 import shutil
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from study import cli
+from study.commands.parser import parser
 from study.commands.record_arguments import plan_of, read_records
 from study.compare import history
 from study.compare.history_picture import files as ladder_pictures
@@ -20,19 +19,6 @@ from study.support.file_sets import write_files
 from study.support.files import read_text
 
 SAVED = "climb.html"  # the whole climb as one page
-
-
-def run(*words: str) -> None:
-    """A command of the command line, within a step of the workflow.
-
-    Raises
-    ------
-    SystemExit
-        With its exit code, if it failed; it has said why.
-    """
-    code = cli.main(words)
-    if code:
-        sys.exit(code)
 
 
 def climb(record: Path, model: Path, options: Sequence[str], steps: int, folder: Path) -> list[history.Step]:
@@ -60,7 +46,7 @@ def climb(record: Path, model: Path, options: Sequence[str], steps: int, folder:
     StudyError
         If a file cannot be read or written.
     """
-    arguments = cli.parser().parse_args(["explore", str(record), "--model", str(model), *options])
+    arguments = parser().parse_args(["explore", str(record), "--model", str(model), *options])
     text = read_text(model, WANTED)
     (data,) = read_records(arguments)
     work = folder / "climb"

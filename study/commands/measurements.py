@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from study.commands.parser import parser
 from study.support.errors import StudyError
 from study.support.schema import numbered_rows
 
@@ -78,8 +79,6 @@ def load(folder: Path, cases: Collection[str] = ()) -> Mapping[str, Measurement]
 
 def _options(text: str, where: str) -> tuple[str, ...]:
     """The words of the options, read once by the command's own parser so that no job has to refuse them."""
-    from study.cli import parser
-
     try:
         words = tuple(shlex.split(text))
     except ValueError as error:

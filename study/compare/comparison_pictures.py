@@ -4,10 +4,8 @@
 # pyright: reportUnknownMemberType=false
 
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
-from matplotlib import style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -19,9 +17,9 @@ from study.compare.comparison_sentences import percent
 from study.compare.force_map import curve, surface
 from study.figures import coherence, page
 from study.figures.curves import InputCoherence
+from study.figures.sheet import in_style
 
 Floats = NDArray[np.float64]
-SHEET = Path(__file__).parent.parent.parent / "config" / "study.mplstyle"
 KINDS = ("png", "svg")
 WIDE = 7.2  # inches
 
@@ -32,7 +30,7 @@ def pictures(found: Comparison) -> dict[str, bytes]:
         "response": response, "force_error": force_error, "missing_force": missing_force,
         "error_in_time": error_in_time,
     }  # fmt: skip
-    with style.context(SHEET if SHEET.is_file() else "default"):
+    with in_style():
         return _bytes({name: draw(found) for name, draw in drawn.items()})
 
 
@@ -40,7 +38,7 @@ def level_pictures(moving: Sequence[Level], force_unit: str) -> dict[str, bytes]
     """The picture of coefficients by level; none for one record."""
     if not moving:
         return {}
-    with style.context(SHEET if SHEET.is_file() else "default"):
+    with in_style():
         return _bytes({"coefficients_by_level": by_level(moving, force_unit)})
 
 

@@ -10,10 +10,10 @@ from study.reproduction.claims import (
     damping,
     dead_band,
     duffing,
-    instruments,
     levels,
     linear_system,
     mathieu,
+    noise_with_instruments,
     preliminary_claims,
     response,
     simulation,
@@ -32,7 +32,7 @@ CLAIMS: tuple[Callable[[Evidence, Reported], Claim], ...] = (
     *mathieu.CLAIMS,
     *dead_band.CLAIMS,
     *levels.CLAIMS,
-    *instruments.CLAIMS,
+    *noise_with_instruments.CLAIMS,
     *conclusions.CLAIMS,
 )
 COLUMNS = ["id", "where", "claim", "reported", "measured", "criterion", "verdict", "why"]

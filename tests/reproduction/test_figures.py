@@ -23,8 +23,8 @@ from study.reproduction.pictures import distribution, force_patterns
 from study.reproduction.preliminary import Pattern, histogram
 from study.support.errors import StudyError
 
-ROOT = Path(__file__).parent.parent
-SHEET = ROOT / "config" / "study.mplstyle"
+ROOT = Path(__file__).parents[2]
+SHEET = ROOT / "study" / "figures" / "study.mplstyle"
 FREQUENCY = np.arange(0.0, 12.5, 0.1)
 OMEGA = 2j * np.pi * FREQUENCY
 LINEAR = OMEGA**2 + 3.77 * OMEGA + 355.3

@@ -17,7 +17,7 @@ from study.reproduction.pictures import error_dots as drawn
 from study.support import document
 from study.support.errors import StudyError
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 CONFIG = load(ROOT / "config")
 NOISE = {"quiet": 0.0, "noisy": 0.1}
 
@@ -168,7 +168,7 @@ def test_factors_are_short():
 
 
 def test_the_picture_shows_each_estimator_at_its_error(table):
-    with style.context(ROOT / "config" / "study.mplstyle"):
+    with style.context(ROOT / "study" / "figures" / "study.mplstyle"):
         figure = drawn.errors(table, list(NOISE))
     panel = next(axes for axes in figure.axes if axes.get_title(loc="left") == "stiffness k")
     (line,) = (line for line in panel.lines if line.get_label() == "output error")
@@ -180,7 +180,7 @@ def test_the_picture_shows_each_estimator_at_its_error(table):
 
 def test_an_estimator_that_finds_nothing_stands_at_the_edge(table):
     lost = table.assign(median_error=math.inf, standard_error=math.inf)
-    with style.context(ROOT / "config" / "study.mplstyle"):
+    with style.context(ROOT / "study" / "figures" / "study.mplstyle"):
         figure = drawn.errors(lost, list(NOISE))
         assert page.rendered(figure, "png").startswith(b"\x89PNG")
     assert {

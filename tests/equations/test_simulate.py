@@ -22,7 +22,7 @@ from study.reproduction.config import load
 from study.reproduction.make_record import make_record
 from study.support.errors import DivergenceError, StudyError
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 DT = 0.02
 NAMES = ("linear", "duffing", "van_der_pol", "duffing_van_der_pol", "mathieu", "dead_band", "extreme")
 

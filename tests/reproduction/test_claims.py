@@ -11,8 +11,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
-from study.reproduction.claims.reported import Reported, Statement
-from study.reproduction.claims.sample import Sample, departure
 
 from study.equations.model_file import read_model
 from study.records.record import Record
@@ -23,9 +21,9 @@ from study.reproduction.claims import (
     duffing,
     evidence,
     excitation_reading,
-    instruments,
     judgement,
     levels,
+    noise_with_instruments,
     preliminary_claims,
     response,
     sample,
@@ -33,9 +31,11 @@ from study.reproduction.claims import (
 )
 from study.reproduction.claims import reported as stated
 from study.reproduction.claims.judgement import Condition
+from study.reproduction.claims.reported import Reported, Statement
+from study.reproduction.claims.sample import Sample, departure
 from study.reproduction.preliminary import model_restoring_force, natural_frequency
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SEEDS = 6
 MET, MISSED = Condition("c", "m", True), Condition("x above 2", "x 1", False)
 
@@ -301,13 +301,13 @@ def test_instruments_are_judged_at_every_noise_by_their_own_bias(
         asked.append(noise)
         return {"m": Sample((-0.098, 0.0) if noise == 0.1 else (-0.01, 0.02)), "c": Sample((-0.2, 0.21))}
 
-    monkeypatch.setattr(instruments, "biases", off)
-    claim = instruments.unbiased(found, report)
+    monkeypatch.setattr(noise_with_instruments, "biases", off)
+    claim = noise_with_instruments.unbiased(found, report)
     assert asked == [0.05, 0.1, 0.2]
     assert claim.verdict == "reproduced", "a bias below the limit, and scatter that explains it"
     assert "10 % noise: m -4.9 +- 4.9 %, c +0.5 +- 20 %" in claim.measured
-    assert not instruments.small("m", Sample((-0.06, -0.06))).met
-    assert instruments.small("m", Sample((-0.0101, -0.0099))).met
+    assert not noise_with_instruments.small("m", Sample((-0.06, -0.06))).met
+    assert noise_with_instruments.small("m", Sample((-0.0101, -0.0099))).met
 
 
 def test_raw_is_the_nearer_reading(found: evidence.Evidence, report: Reported) -> None:

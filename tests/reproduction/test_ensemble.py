@@ -11,7 +11,7 @@ import pytest
 from study.reproduction import ensemble
 from study.reproduction.config import load
 
-CONFIG = load(Path(__file__).parent.parent / "config")
+CONFIG = load(Path(__file__).parents[2] / "config")
 
 
 def told(case, **record):

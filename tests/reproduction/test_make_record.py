@@ -13,7 +13,7 @@ from study.reproduction.identify_case import assumed_model, estimator_settings, 
 from study.reproduction.make_record import make_record
 from study.support.errors import DivergenceError, StudyError
 
-CONFIG = load(Path(__file__).parent.parent / "config")
+CONFIG = load(Path(__file__).parents[2] / "config")
 
 
 def settings(case, **changed):

@@ -13,7 +13,7 @@ from study.records.completion import burg, complete, consistent, derivative, sug
 from study.records.record import MOTIONS, Record
 from study.support.errors import StudyError
 
-MODELS = Path(__file__).parents[1] / "models"
+MODELS = Path(__file__).parents[2] / "models"
 DT = 0.02
 CASES = tuple(sorted(p.stem for p in MODELS.glob("*.yaml")))
 # Responses of these two have no content above 12.5 Hz, so sampling at 50 Hz loses nothing. The corners, cubes and

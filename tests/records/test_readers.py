@@ -19,7 +19,7 @@ from study.records.readers import ReadOptions, assignments, read_options, read_r
 from study.records.record import MOTIONS, Record, write_csv
 from study.support.errors import StudyError
 
-DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parents[2] / "shared" / "data"))
+DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parents[3] / "shared" / "data"))
 NEEDS_DATA = pytest.mark.skipif(not DATA.is_dir(), reason="the public records are not here")
 RNG = np.random.default_rng(11)
 TIME = 0.02 * np.arange(40)

@@ -18,7 +18,7 @@ from study.equations.simulate import simulate
 from study.equations.terms import LIBRARY, custom, get
 from study.support.errors import StudyError
 
-MODELS = Path(__file__).parent.parent / "models"
+MODELS = Path(__file__).parents[2] / "models"
 HERE = Path("rig.yaml")
 
 TABLE_1 = {
@@ -335,7 +335,7 @@ def models(draw: st.DrawFn) -> Model:
         entries.append(ModelTerm(term, coefficients, parameters))
     name = draw(st.text(min_size=1, max_size=20).filter(lambda s: s.isprintable() and s.strip()))
     model = Model(name, tuple(entries))
-    assume(repeated_force(model) is None)  # no file may hold such a one: tests/test_repeated.py
+    assume(repeated_force(model) is None)  # no file may hold such a one: tests/equations/test_redundancy.py
     return model
 
 

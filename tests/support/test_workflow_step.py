@@ -12,7 +12,7 @@ from study.support.errors import StudyError
 from study.support.files import replacing
 from study.support.workflow_step import alone, one_sentence, sweep
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 
 
 def test_a_fault_is_one_sentence_and_an_exit_code(capsys):

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 SNAKEMAKE = str(Path(sys.executable).parent / "snakemake")
 PARTS = ("Snakefile", "rules", "config", "models", "scripts", "study", "profiles")
 SMALL = [
@@ -138,7 +138,7 @@ def test_touched_identification_runs_again_without_simulation(built):
 
 
 def test_touched_style_draws_again_and_nothing_else(built):
-    with edited(built / "config" / "study.mplstyle", "font.size: 10", "font.size: 11"):
+    with edited(built / "study" / "figures" / "study.mplstyle", "font.size: 10", "font.size: 11"):
         jobs = planned(built)
     assert set(jobs) == {
         "draw.duffing", "draw.noisy", "draw_preliminary.duffing", "draw_estimators", "summary", "all"

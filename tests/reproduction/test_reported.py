@@ -9,7 +9,7 @@ from study.reproduction.claims.excitation_reading import quantities
 from study.support.errors import StudyError
 from tests.conftest import LINEAR, TABLE_1
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SCHEMA = ROOT / "config" / "schemas" / "reported.schema.yaml"
 HEADING = "id\twhere\twhat\tvalue\tunit\n"
 

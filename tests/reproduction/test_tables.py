@@ -14,7 +14,7 @@ from study.reproduction.config import load
 from study.reproduction.identify_case import identify_case
 from study.support.errors import StudyError
 
-CONFIG = load(Path(__file__).parent.parent / "config")
+CONFIG = load(Path(__file__).parents[2] / "config")
 JUDGED = {"relative": {"k": 0.01}, "absolute": {"k": 2.0}}
 
 

@@ -19,7 +19,7 @@ from study.support.errors import StudyError
 from study.support.file_sets import check_folder, write_files
 
 DT = 0.02
-DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parent.parent.parent / "shared" / "data"))
+DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parents[3] / "shared" / "data"))
 LINEAR = "name: rig\nterms: [inertia, linear_damping, linear_stiffness]\n"
 WRITTEN = {
     "explore.html", "comparison.json", "comparison.csv", "coefficients.csv", "force_error.csv",

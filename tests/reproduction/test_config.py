@@ -20,7 +20,7 @@ from study.reproduction.preconditions import CURVES
 from study.support.errors import StudyError
 from study.support.schema import read_table, read_yaml
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 ROW = "duffing\tduffing\treport\t1.0\t0\t\t21\t22\t23\t24\t3\t\t\t\tDuffing system"
 
 

@@ -16,7 +16,7 @@ from study.records.spectra import Segments, autospectrum
 from study.reproduction import preliminary
 from study.support.errors import StudyError
 
-MODELS = Path(__file__).parent.parent / "models"
+MODELS = Path(__file__).parents[2] / "models"
 DT = 0.02
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from study import __version__, cli
+from study.commands import parser
 from study.commands.command import Command, number, whole
 from study.commands.terms import table
 from study.equations.model_file import read_model
@@ -23,7 +24,7 @@ from study.records.excitation import Excitation, force
 from study.records.record import read_csv
 from study.support.errors import StudyError
 
-DUFFING = str(Path(__file__).parent.parent / "models" / "duffing.yaml")
+DUFFING = str(Path(__file__).parents[2] / "models" / "duffing.yaml")
 STUDY = [sys.executable, "-m", "study"]
 HEAVY = {"numpy", "scipy", "pandas", "numba", "matplotlib", "ruamel", "tabulate", "h5py", "bokeh", "snakemake"}
 
@@ -63,7 +64,7 @@ def test_help_imports_nothing_heavy() -> None:
     assert not HEAVY & set(done.stdout.splitlines()[-1].split())
 
 
-@pytest.mark.parametrize("command", cli.COMMANDS, ids=lambda c: c.name)
+@pytest.mark.parametrize("command", parser.COMMANDS, ids=lambda c: c.name)
 def test_each_help_shows_an_example_that_is_understood(command: Command, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main([command.name, "--help"]) == 0
     shown = capsys.readouterr().out
@@ -72,7 +73,7 @@ def test_each_help_shows_an_example_that_is_understood(command: Command, capsys:
         words = shlex.split(line)
         assert line.strip() in shown
         assert words[0] == "study"
-        assert cli.parser().parse_args(words[1:]).run is command.run
+        assert parser.parser().parse_args(words[1:]).run is command.run
 
 
 def test_version_and_both_ways_to_start() -> None:
@@ -274,6 +275,7 @@ def test_a_full_disk_behind_stdout_is_one_sentence(words: list[str]) -> None:
 ENDLESS = """
 import signal, sys, time
 from study import cli
+from study.commands import parser
 from study.commands.command import Command
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # shells start what runs behind them without it
@@ -282,7 +284,7 @@ def run(_):
     print("working", flush=True)
     time.sleep(60)
 
-cli.COMMANDS = (Command("work", "works", "study work", lambda _: None, run),)
+parser.COMMANDS = (Command("work", "works", "study work", lambda _: None, run),)
 sys.exit(cli.main(["work"]))
 """
 

@@ -12,7 +12,7 @@ from study.equations.model_file import read_model
 from study.equations.terms import custom, get
 from study.support.errors import StudyError
 
-MODELS = Path(__file__).parents[1] / "models"
+MODELS = Path(__file__).parents[2] / "models"
 
 
 def test_the_same_term_twice_is_refused() -> None:

@@ -1,0 +1,56 @@
+"""The house: imports run one way through the packages, and no file name stands for two things."""
+
+import ast
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+STUDY = Path(__file__).parents[1] / "study"
+FLOORS = (
+    "cli", "commands", "explore", "trials", "diagnose", "reproduction", "compare", "figures", "identify", "equations",
+    "records", "support",
+)  # fmt: skip
+FILES = sorted(STUDY.rglob("*.py"))
+LOOSE = {"__init__", "__main__", "cli"}
+
+
+def imported(path: Path) -> set[str]:
+    """First part below ``study`` of every module that a file imports."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        match node:
+            case ast.Import(names=found):
+                names |= {name.name for name in found}
+            case ast.ImportFrom(module="study", names=found):
+                names |= {f"study.{name.name}" for name in found if not name.name.startswith("__")}
+            case ast.ImportFrom(module=str(module)):
+                names.add(module)
+    return {name.split(".")[1] for name in names if name.startswith("study.")}
+
+
+@pytest.mark.parametrize("package", FLOORS[1:])
+def test_imports_run_downward(package):
+    below = FLOORS[FLOORS.index(package) :]
+    upward = {
+        f"{path.relative_to(STUDY)} imports study.{name}"
+        for path in (STUDY / package).rglob("*.py")
+        for name in imported(path)
+        if name not in below
+    }
+    assert not upward
+
+
+def test_every_module_lives_in_a_package_that_says_what_it_is():
+    assert {path.stem for path in STUDY.glob("*.py")} == LOOSE
+    packages = {path.parent for path in FILES} - {STUDY}
+    assert {p.relative_to(STUDY).parts[0] for p in packages} == set(FLOORS[1:])
+    for package in packages:
+        words = ast.get_docstring(ast.parse((package / "__init__.py").read_text(encoding="utf-8")))
+        assert words, f"{package} does not say what it is"
+
+
+def test_no_file_name_stands_for_two_things():
+    # A command's file is called as the command is, and calls what it is named after.
+    names = Counter(path.stem for path in FILES if path.stem != "__init__" and path.parent.name != "commands")
+    assert [name for name, count in names.items() if count > 1] == []
