@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from study.commands.command import number, whole
-from study.records.plan import Plan, make_plan
 from study.support.errors import StudyError
 
 if TYPE_CHECKING:
+    from study.records.plan import Plan
     from study.records.readers import ReadOptions
     from study.records.record import Record
 
@@ -105,6 +105,8 @@ def plan_of(arguments: argparse.Namespace, record: "Record") -> "Plan":
     StudyError
         If the ranges overlap or leave the record, or it lacks the response asked for.
     """
+    from study.records.plan import make_plan
+
     fit, judge = _within(arguments.fit, record), _within(arguments.judge, record)
     if arguments.response is not None and arguments.response not in record:
         have = ", ".join(m for m in MOTIONS if m in record)

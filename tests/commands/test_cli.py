@@ -222,7 +222,7 @@ def _table_of(error: BaseException) -> tuple[Command, ...]:
 def test_whatever_goes_wrong_is_one_line(
     error: BaseException, code: int, names: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(cli, "COMMANDS", _table_of(error))
+    monkeypatch.setattr(parser, "COMMANDS", _table_of(error))
     assert cli.main(["fail"]) == code
     out, err = capsys.readouterr()
     assert out == ""

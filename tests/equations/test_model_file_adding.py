@@ -80,7 +80,7 @@ def test_adding_twice_is_refused(tmp_path: Path) -> None:
 def test_a_layout_without_a_clear_place_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "rig.yaml"
     path.write_text("terms: [inertia]\n")
-    monkeypatch.setattr(model_file.yamltext, "with_entry", lambda text, *_: f"{text}!")
+    monkeypatch.setattr(model_file.yaml_text, "with_entry", lambda text, *_: f"{text}!")
     with pytest.raises(StudyError, match="add '- cubic_stiffness' to 'terms' by hand"):
         add_term(path, get("cubic_stiffness"))
     assert path.read_text() == "terms: [inertia]\n"

@@ -127,7 +127,7 @@ def test_report_is_one_file_with_every_figure_and_table(built):
 
 
 def test_touched_identification_runs_again_without_simulation(built):
-    module = built / "study" / "miso.py"
+    module = built / "study" / "identify" / "frequency_domain" / "conditioned.py"
     times = module.stat()
     module.touch()
     jobs = planned(built)
