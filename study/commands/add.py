@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from study.commands.command import Command
-from study.commands.record_arguments import add_reading_arguments, out_folder, plan_of, read_records
+from study.commands.record_arguments import add_reading_arguments, out_folder, prepared_of, read_records
 
 if TYPE_CHECKING:
     from study.compare.comparison import Comparison
@@ -30,6 +30,7 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.compare import history
     from study.compare.comparison import compare
     from study.compare.comparison_report import as_json, document, rung, summary
+    from study.diagnose.adding import added
     from study.equations.model_file import add_term, read_model
     from study.support.file_sets import check_folder, write_files
 
@@ -43,10 +44,9 @@ def _run(arguments: argparse.Namespace) -> None:
     pairs: list[tuple[Comparison, Comparison]] = []
     with tqdm(total=2 * len(records), delay=QUIET, leave=False, unit=" fits") as bar:
         for record in records:
-            how = plan_of(arguments, record)
-            before = compare(model, record, how, cutoff=arguments.cutoff)
+            before = compare(model, prepared_of(arguments, record))
             bar.update()
-            pairs.append((before, compare(model.with_term(term), record, how, cutoff=arguments.cutoff)))
+            pairs.append((before, added(before, term)))
             bar.update()
     for before, after in pairs:
         steps = history.climbed(steps, rung(before), rung(after, term.name))

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from study.commands.parser import parser
-from study.commands.record_arguments import plan_of, read_records
+from study.commands.record_arguments import prepared_of, read_records
 from study.compare import history
 from study.compare.history_picture import files as ladder_pictures
 from study.diagnose import diagnosis_report
@@ -51,7 +51,7 @@ def climb(record: Path, model: Path, options: Sequence[str], steps: int, folder:
     (data,) = read_records(arguments)
     work = folder / "climb"
     shutil.rmtree(work, ignore_errors=True)
-    session = sessions.begin(parse_model(text, model), data, plan_of(arguments, data), cutoff=arguments.cutoff)
+    session = sessions.begin(parse_model(text, model), prepared_of(arguments, data))
     for number in range(steps + 1):
         session, found = _diagnosed(session, work / f"step_{number}")
         if found.verdict != MISSING or number == steps:
@@ -68,9 +68,8 @@ def climb(record: Path, model: Path, options: Sequence[str], steps: int, folder:
 def _diagnosed(session: Session, folder: Path) -> tuple[Session, Diagnosis]:
     """The session with its present model diagnosed, printed and written into a folder; and the diagnosis."""
     now, found = sessions.examined(session)
-    units = now.comparison.record.units
     print(f"{now.label}: {found.verdict.replace('_', ' ')}")
-    print(diagnosis_report.table(found, units.get("force", "N"), units.get("displacement", "m")))
+    print(diagnosis_report.table(found))
     print(f"\n{now.said}\n", flush=True)
-    write_files(folder, diagnosis_files(found, now.comparison, now.said))
+    write_files(folder, diagnosis_files(found, now.said))
     return sessions.with_rung(session, now), found

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from study.commands.command import Command
-from study.commands.record_arguments import add_record_arguments, out_folder, plan_of, read_records
+from study.commands.record_arguments import add_record_arguments, out_folder, prepared_of, read_records
 from study.identify.estimators import ESTIMATORS
 
 WITHOUT = ("siso", "miso_hand_read")  # estimators that do not find all coefficients of a model, or not together
@@ -37,7 +37,7 @@ def _run(arguments: argparse.Namespace) -> None:
     check_folder(folder)
     model = read_model(arguments.model)
     records = read_records(arguments)
-    plans = [plan_of(arguments, record) for record in records]
+    prepared = [prepared_of(arguments, record) for record in records]
     many = len(records) > 1
     files: dict[str, bytes] = {}
     with tqdm(total=(STEPS + 1) * len(records), delay=QUIET, leave=False, unit="step") as bar:
@@ -46,10 +46,7 @@ def _run(arguments: argparse.Namespace) -> None:
             bar.set_description(what, refresh=False)
             bar.update()
 
-        found = [
-            compare(model, record, how, cutoff=arguments.cutoff, estimator=arguments.estimator, progress=told)
-            for record, how in zip(records, plans, strict=True)
-        ]
+        found = [compare(model, one, estimator=arguments.estimator, progress=told) for one in prepared]
         for one in found:
             told("pictures")
             prefix = f"{one.record.name}_" if many else ""

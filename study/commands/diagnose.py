@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from study.commands.command import Command
-from study.commands.record_arguments import add_record_arguments, out_folder, plan_of, read_records
+from study.commands.record_arguments import add_record_arguments, out_folder, prepared_of, read_records
 
 if TYPE_CHECKING:
     from study.equations.model import Model
@@ -55,20 +55,19 @@ def _one(model: "Model", record: "Record", arguments: argparse.Namespace, own: "
     from study.diagnose.diagnosis_files import files, in_words
     from study.diagnose.verdict import diagnose
 
-    how = plan_of(arguments, record)
+    prepared = prepared_of(arguments, record)
     with tqdm(delay=QUIET, leave=False, unit=" candidates", desc=record.name) as bar:
 
         def one_more(_: int) -> None:
             bar.update()
 
-        compared = compare(model, record, how, cutoff=arguments.cutoff)
-        found = diagnose(model, record, how, extra=own, without=tuple(arguments.without), progress=one_more)
-        said = in_words(found, record, how)
-    force, length = record.units.get("force", "N"), compared.record.units.get("displacement", "m")
-    print(f"{record.name}: {found.verdict.replace('_', ' ')}")
-    print(diagnosis_report.table(found, force, length))
-    print("\n" + said)
-    return files(found, compared, said)
+        comparison = compare(model, prepared)
+        diagnosis = diagnose(comparison, extra=own, without=tuple(arguments.without), progress=one_more)
+        words = in_words(diagnosis)
+    print(f"{record.name}: {diagnosis.verdict.replace('_', ' ')}")
+    print(diagnosis_report.table(diagnosis))
+    print("\n" + words)
+    return files(diagnosis, words)
 
 
 COMMAND = Command(

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from study.commands.command import Command, whole
-from study.commands.record_arguments import add_reading_arguments, out_folder, plan_of, read_records
+from study.commands.record_arguments import add_reading_arguments, out_folder, prepared_of, read_records
 
 QUIET = 2.0  # seconds of work before progress is shown
 
@@ -36,14 +36,14 @@ def _run(arguments: argparse.Namespace) -> None:
     model = parse_model(text, arguments.model)
     steps = history.read(arguments.model)
     (record,) = read_records(arguments)
-    how = plan_of(arguments, record)
+    prepared = prepared_of(arguments, record)
     with tqdm(total=STEPS, delay=QUIET, leave=False, unit="step") as bar:
 
         def told(what: str) -> None:
             bar.set_description(what, refresh=False)
             bar.update()
 
-        session = sessions.begin(model, record, how, cutoff=arguments.cutoff, earlier=steps, progress=told)
+        session = sessions.begin(model, prepared, earlier=steps, progress=told)
     desk = Desk(session, arguments.model, text, folder)
     try:
         serve(desk, arguments.port, lambda address: _ready(address, not arguments.no_browser))

@@ -10,6 +10,7 @@ from study.support.errors import StudyError
 
 if TYPE_CHECKING:
     from study.records.plan import Plan
+    from study.records.prepared import Prepared
     from study.records.readers import ReadOptions
     from study.records.record import Record
 
@@ -97,7 +98,20 @@ def read_records(arguments: argparse.Namespace) -> list["Record"]:
     return list(distinct([read_record(path, options) for path in arguments.records]))
 
 
-def plan_of(arguments: argparse.Namespace, record: "Record") -> "Plan":
+def prepared_of(arguments: argparse.Namespace, record: "Record") -> "Prepared":
+    """A record made ready: its motions completed, and what to fit and to judge of it settled.
+
+    Raises
+    ------
+    StudyError
+        If the ranges overlap or leave the record, it lacks the response asked for, or cannot be completed.
+    """
+    from study.records.prepared import prepare_record
+
+    return prepare_record(record, _plan(arguments, record), arguments.cutoff)
+
+
+def _plan(arguments: argparse.Namespace, record: "Record") -> "Plan":
     """What to fit and what to judge of a record.
 
     Raises

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from study.identify.time_domain.fit_model import Coefficient
+from study.compare.fitted_coefficients import Coefficient
 
 MOVES = 0.01  # of the p value, the number of coefficients accounted for
 RESOLUTION = 1e-3  # of the coefficient: smaller differences are those of the numerical integration

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from study.compare.prediction import Judged
+from study.compare.prediction import Prediction
 
 Floats = NDArray[np.float64]
 STRETCHES = 6
@@ -65,13 +65,13 @@ class AlongTime:
     confounded: bool
 
 
-def along_time(judged: Judged) -> AlongTime:
+def along_time(prediction: Prediction) -> AlongTime:
     """Compare stretches of the judging part.
 
     The logarithm of the residual's power in blocks is explained by that of the response (and its square)
     and then by the stretch as well; an F test says whether the second step brings more than chance would.
     """
-    residual, response = judged.residual, judged.measured - float(np.mean(judged.measured))
+    residual, response = prediction.residual, prediction.measured - float(np.mean(prediction.measured))
     count = _blocks(residual)
     e, y = _log_powers(residual, count), _log_powers(response, count)
     group = np.arange(count) * STRETCHES // count
@@ -87,7 +87,7 @@ def along_time(judged: Judged) -> AlongTime:
         ratio = (sum_plain - sum_full) / (STRETCHES - 1) / (sum_full / freedom)
         p_value = float(np.asarray(fdtrc(STRETCHES - 1, freedom, ratio), dtype=np.float64))
     growth, growth_error = _slope(level, e)
-    rows = tuple(_stretch(judged, residual, response, k, np.exp(e - usual), group) for k in range(STRETCHES))
+    rows = tuple(_stretch(prediction, residual, response, k, np.exp(e - usual), group) for k in range(STRETCHES))
     together = 1.0 - _regress(np.concatenate([plain[:, :1], stretch], axis=1), level)[1] / max(
         float(level @ level), 1e-300
     )
@@ -124,14 +124,14 @@ def _slope(x: Floats, y: Floats) -> tuple[float, float]:
 
 
 def _stretch(
-    judged: Judged, residual: Floats, response: Floats, k: int, ratios: Floats, group: NDArray[np.int64]
+    prediction: Prediction, residual: Floats, response: Floats, k: int, ratios: Floats, group: NDArray[np.int64]
 ) -> Stretch:
     bounds = np.linspace(0, len(residual), STRETCHES + 1).round().astype(int)
     first, last = int(bounds[k]), int(bounds[k + 1])
-    begin = float(judged.time[first])
+    begin = float(prediction.time[first])
     return Stretch(
-        begin, begin + (last - first) * judged.dt,
-        float(np.sqrt(np.mean(residual[first:last] ** 2))) / judged.size,
-        float(np.sqrt(np.mean(response[first:last] ** 2))) / judged.size,
+        begin, begin + (last - first) * prediction.dt,
+        float(np.sqrt(np.mean(residual[first:last] ** 2))) / prediction.size,
+        float(np.sqrt(np.mean(response[first:last] ** 2))) / prediction.size,
         float(np.exp(np.mean(np.log(ratios[group == k])))),
     )  # fmt: skip

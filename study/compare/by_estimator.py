@@ -15,11 +15,10 @@ from study.equations.model import Model
 from study.identify import estimators
 from study.identify.estimators.base import Settings
 from study.identify.frequency_domain.coefficients import Estimate
-from study.identify.time_domain import held_out
-from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
-from study.identify.time_domain.multiple_shooting import magnifies
-from study.records.completion import CompletedRecord
-from study.records.plan import Plan, with_steps
+from study.identify.frequency_domain.starting_values import FAINT
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.part_fit import fit_part
+from study.records.prepared import Prepared
 from study.records.record import Record
 from study.records.spectra import Segments, cross_spectra
 from study.support.errors import StudyError
@@ -27,23 +26,9 @@ from study.support.errors import StudyError
 FREE_RUN = "output_error"
 STEPS = 8  # per sample: no coefficient is fitted in free run, so that many cost little
 FOLLOWED, SMOOTHED = 0.5, 5  # coherence, over so many lines, up to the last of which the displacement is no noise
-LOST = 0.05  # of the standard deviation of the response: a free run that misses by less has not lost the motion
-LOOKED = 4096  # samples: a chaotic motion magnifies disturbances long before
-CHAOTIC = (
-    "the fitted system magnifies disturbances, as a chaotic one does: its free run loses the measured motion however "
-    "true the model, so that the coefficients come from pieces of the record, the response error says little, and "
-    "the error of the force says how good the model is"
-)
 
 
-def has_lost(found: FreeRunFit, completed: CompletedRecord, how: Plan) -> bool:
-    """Whether a fit in one free run has lost the motion because its system magnifies disturbances."""
-    size = float(np.std(completed.record[how.response][slice(*how.fit)]))
-    stretch = how.fit[0], min(how.fit[1], how.fit[0] + LOOKED)
-    return found.rms > LOST * size and magnifies(found, completed.record, how.response, how.steps_per_sample, stretch)
-
-
-def fit_by(name: str, model: Model, completed: CompletedRecord, how: Plan) -> tuple[FreeRunFit, Plan, Estimate]:
+def fit_by(name: str, model: Model, prepared: Prepared) -> tuple[FreeRunFit, Estimate]:
     """What an estimator finds on the fitting part, as a fit whose initial state alone was found in free run.
 
     Parameters
@@ -52,16 +37,13 @@ def fit_by(name: str, model: Model, completed: CompletedRecord, how: Plan) -> tu
         Of the estimator.
     model : Model
         Coefficients open; shape parameters too, for estimators that find them.
-    completed : CompletedRecord
-        Record with all three motions.
-    how : Plan
-        What is fitted.
+    prepared : Prepared
+        The record and what is fitted of it.
 
     Returns
     -------
-    FreeRunFit, Plan, Estimate
-        The fit, which has converged if the estimator's own search has; the plan with its steps per sample; and
-        what the estimator found.
+    FreeRunFit, Estimate
+        The fit, which has converged if the estimator's own search has, and what the estimator found.
 
     Raises
     ------
@@ -74,10 +56,9 @@ def fit_by(name: str, model: Model, completed: CompletedRecord, how: Plan) -> tu
             f"model {model.name!r} holds {', '.join(held)}; the estimator {name} finds every coefficient: leave them "
             f"open, or take {FREE_RUN}"
         )
-    first, last = max(how.fit[0], completed.edge), min(how.fit[1], len(completed.record) - completed.edge)
-    part = completed.record.part(first, last)
+    part = prepared.record.part(*prepared.inner(prepared.plan.fit))
     cut = segments_of(len(part))
-    band = _lines(part, completed.band, cut)
+    band = _lines(part, prepared.band, cut)
     identified = estimators.identify(name, model, part, Settings(cut, band))
     estimate = _together(identified.estimate, identified.shapes)
     missing = [key for key, value in model.values.items() if value is None and key not in estimate]
@@ -93,13 +74,8 @@ def fit_by(name: str, model: Model, completed: CompletedRecord, how: Plan) -> tu
             f"open, or take {FREE_RUN}"
         )
     known = model.with_values({key: estimate[key] for key in estimate.symbols})
-    how = with_steps(how, STEPS)
-    run = fit_free_run(
-        known, completed.record, held=tuple(known.values), response=how.response,
-        steps_per_sample=STEPS, span=how.fit,
-    )  # fmt: skip
-    run = replace(run, converged=not identified.note, message=identified.note or run.message)
-    return run, how, estimate
+    run = fit_part(known, prepared, tuple(known.values), steps=STEPS)
+    return replace(run, converged=not identified.note, message=identified.note or run.message), estimate
 
 
 def _lines(part: Record, within: tuple[float, float], cut: Segments) -> tuple[float, float]:
@@ -107,7 +83,7 @@ def _lines(part: Record, within: tuple[float, float], cut: Segments) -> tuple[fl
     matrix = cross_spectra([part["force"], part["displacement"]], part.dt, cut)
     g, frequency = matrix.density, matrix.frequency
     force, motion = g[:, 0, 0].real, g[:, 1, 1].real
-    loud = (force > held_out.FAINT * np.max(force)) & (frequency <= within[1])
+    loud = (force > FAINT * np.max(force)) & (frequency <= within[1])
     together = np.convolve(np.abs(g[:, 0, 1]) ** 2, np.ones(SMOOTHED), "same")
     coherence = together / np.maximum(np.convolve(force * motion, np.ones(SMOOTHED), "same"), np.finfo(float).tiny)
     followed = loud & (coherence > FOLLOWED)

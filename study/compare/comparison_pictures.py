@@ -48,17 +48,17 @@ def _bytes(figures: Mapping[str, Figure]) -> dict[str, bytes]:
 
 def response(found: Comparison) -> Figure:
     """Measured and predicted response, their difference, and a close-up where that is largest."""
-    judged, unit = found.judged, found.record.units.get(found.how.response, "")
-    about = f"error {percent(found.response_error)} of the rms response, noise floor {percent(found.noise_floor)}"
+    prediction, unit = found.prediction, found.record.units.get(found.plan.response, "")
+    about = f"error {percent(prediction.error)} of the rms response, noise floor {percent(prediction.floor)}"
     figure, axes = page.page(
-        f"{found.record.name}: {found.how.response}", f"model {found.model.name}; {about}", rows=3, width=WIDE,
+        f"{found.record.name}: {found.plan.response}", f"model {found.model.name}; {about}", rows=3, width=WIDE,
         panel=1.8, legend_rows=2, share=False,
     )  # fmt: skip
-    panels.response(axes[0], judged.time, judged.measured, judged.predicted, unit)
-    panels.residual(axes[1], judged.time, judged.residual, found.noise.rms, unit)
-    near = judged.closeup
-    panels.response(axes[2], judged.time[near], judged.measured[near], judged.predicted[near], unit)
-    page.letter(axes, ("all that is judged", "the difference", "close-up of (a) where the difference is largest"))
+    panels.response(axes[0], prediction.time, prediction.measured, prediction.predicted, unit)
+    panels.residual(axes[1], prediction.time, prediction.residual, found.prediction.noise.rms, unit)
+    near = prediction.closeup
+    panels.response(axes[2], prediction.time[near], prediction.measured[near], prediction.predicted[near], unit)
+    page.letter(axes, ("all that is prediction", "the difference", "close-up of (a) where the difference is largest"))
     page.legend(figure, axes, columns=2)
     return figure
 
@@ -89,7 +89,7 @@ def force_error(found: Comparison) -> Figure:
 
 def missing_force(found: Comparison) -> Figure:
     """The force that the model lacks over the (u, v) plane and against each of them."""
-    lacking, unit = found.restoring, dict(found.record.units)
+    lacking, unit = found.missing_force, dict(found.record.units)
     band = lacking.frequency[lacking.gate]
     about = "the difference is noise" if not len(band) else f"seen in bands from {band[0]:.3g} to {band[-1]:.3g} Hz"
     figure, axes = page.page(
@@ -112,7 +112,7 @@ def error_in_time(found: Comparison) -> Figure:
         f"model {found.model.name}; differences between stretches of equal level: p = {found.time.p_value:.2g}",
         rows=2, width=WIDE, panel=2.0, share=False,
     )  # fmt: skip
-    panels.error_in_time(axes[0], found.time, found.noise_floor)
+    panels.error_in_time(axes[0], found.time, found.prediction.floor)
     panels.error_beyond_level(axes[1], found.time)
     page.letter(axes, ("error and response", "beyond what the level accounts for"))
     page.legend(figure, axes[:1])

@@ -13,9 +13,9 @@ from study.compare.across_levels import Level
 from study.compare.by_estimator import FREE_RUN
 from study.compare.comparison import Comparison
 from study.compare.comparison_sentences import percent, says, says_of_all
+from study.compare.fitted_coefficients import Coefficient
 from study.compare.force_map import curve, surface
 from study.equations import model_file
-from study.identify.time_domain.fit_model import Coefficient
 
 Row = dict[str, Any]
 
@@ -49,25 +49,26 @@ def _mean(values: Sequence[float], key: str) -> float:
 
 
 def _one(found: Comparison) -> Row:
+    prediction = found.prediction
     return {
         "record": found.record.name,
         "model": {"name": found.model.name, "equation": found.model.equation(), "terms": [
             model_file.format_entry(t) for t in found.model.terms]},
-        "error": {"force": found.force.total, "response": found.response_error},
+        "error": {"force": found.force.total, "response": found.prediction.error},
         "noise_floor": {
-            "force": found.force.noise_total, "response": found.noise_floor,
-            "response_error": found.noise.error / found.judged.size, "from": found.noise.source,
+            "force": found.force.noise_total, "response": prediction.floor,
+            "response_error": prediction.noise.error / prediction.size, "from": prediction.noise.source,
         },
         "rms": {
-            "response_error": found.response_error * found.judged.size, "response": found.judged.size,
-            "unit": found.record.units.get(found.how.response, ""),
+            "response_error": found.prediction.error * found.prediction.size, "response": found.prediction.size,
+            "unit": found.record.units.get(found.plan.response, ""),
         },
         "error_of_fitted_coefficients": {"force": found.force.parametric_total},
-        "above_noise": {"response": found.structure, "standard_errors": found.noise.significance},
+        "above_noise": {"response": found.prediction.structure, "standard_errors": found.prediction.noise.significance},
         "coefficients": [coefficient_row(c) for c in found.coefficients],
         "fit": {
-            "samples": list(found.how.fit), "judged": list(found.how.judge), "response": found.how.response,
-            "estimator": found.estimator, "converged": found.found.converged, "message": found.found.message,
+            "samples": list(found.plan.fit), "judged": list(found.plan.judge), "response": found.plan.response,
+            "estimator": found.estimator, "converged": found.fit.converged, "message": found.fit.message,
         },
         "where": where(found),
         "test": {
@@ -124,11 +125,11 @@ def rung(found: Comparison, added: str | None = None) -> Row:
         "terms": [t.name for t in found.model.terms],
         "added": added,
         "record": found.record.name,
-        "error": {"force": found.force.total, "response": found.response_error},
-        "rms": float(found.response_error * found.judged.size),
-        "unit": found.record.units.get(found.how.response, ""),
-        "noise_floor": {"response": found.noise_floor},
-        "converged": found.found.converged,
+        "error": {"force": found.force.total, "response": found.prediction.error},
+        "rms": float(found.prediction.error * found.prediction.size),
+        "unit": found.record.units.get(found.plan.response, ""),
+        "noise_floor": {"response": found.prediction.floor},
+        "converged": found.fit.converged,
         "coefficients": [coefficient_row(c) for c in found.coefficients],
     }
 
@@ -177,12 +178,13 @@ def _csv(table: pd.DataFrame) -> bytes:
 
 
 def _summary(found: Comparison) -> pd.DataFrame:
+    prediction = found.prediction
     row = {
-        "model": found.model.name, "response_error": found.response_error, "response_noise_floor": found.noise_floor,
-        "response_above_noise": found.structure, "force_error": found.force.total,
+        "model": found.model.name, "response_error": prediction.error, "response_noise_floor": prediction.floor,
+        "response_above_noise": prediction.structure, "force_error": found.force.total,
         "force_error_of_fitted_coefficients": found.force.parametric_total,
         "force_noise_floor": found.force.noise_total, "rms_force": found.level, "time_p_value": found.time.p_value,
-        "converged": found.found.converged,
+        "converged": found.fit.converged,
     }  # fmt: skip
     return pd.DataFrame([row])
 
@@ -207,12 +209,12 @@ def _force_error(found: Comparison) -> pd.DataFrame:
 
 
 def _response_spectrum(found: Comparison) -> pd.DataFrame:
-    noise = found.noise
+    noise = found.prediction.noise
     return pd.DataFrame({"frequency": noise.frequency, "difference": noise.residual, "noise": noise.density})
 
 
 def _curves(found: Comparison) -> pd.DataFrame:
-    lacking = found.restoring
+    lacking = found.missing_force
     inner = lacking.inner
     against = {"displacement": lacking.displacement[inner], "velocity": lacking.velocity[inner]}
     frames: list[pd.DataFrame] = []
@@ -223,7 +225,7 @@ def _curves(found: Comparison) -> pd.DataFrame:
 
 
 def _map(found: Comparison) -> pd.DataFrame:
-    lacking = found.restoring
+    lacking = found.missing_force
     plane = surface(*(x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force)))
     i, j = np.nonzero(np.isfinite(plane.mean))
     u, v = (0.5 * (x[1:] + x[:-1]) for x in (plane.displacement, plane.velocity))
@@ -246,7 +248,7 @@ def summary(found: Sequence[Comparison], moving: Sequence[Level] = ()) -> str:
     first = found[0]
     heads = ["", "response error", "in units", "noise floor", "force error", "noise alone"]
     rows = [
-        [c.record.name, percent(c.response_error), _in_units(c), percent(c.noise_floor),
+        [c.record.name, percent(c.prediction.error), _in_units(c), percent(c.prediction.floor),
          percent(c.force.total), percent(c.force.noise_total)] for c in found
     ]  # fmt: skip
     errors = tabulate(rows, heads, tablefmt="simple", disable_numparse=True, stralign="right", colglobalalign="right")
@@ -257,16 +259,17 @@ def summary(found: Sequence[Comparison], moving: Sequence[Level] = ()) -> str:
 
 
 def _in_units(found: Comparison) -> str:
-    return f"{found.response_error * found.judged.size:.3g} {found.record.units.get(found.how.response, '')}".strip()
+    unit = found.record.units.get(found.plan.response, "")
+    return f"{found.prediction.error * found.prediction.size:.3g} {unit}".strip()
 
 
 def _headline(found: Comparison) -> str:
     low, high = found.force.frequency[found.force.band][[0, -1]]
     by = "" if found.estimator == FREE_RUN else f" by {found.estimator}"
     return (
-        f"model {found.model.name}: fitted to samples {found.how.fit[0]} to {found.how.fit[1]}{by}, "
-        f"judged on {found.how.judge[0]} to {found.how.judge[1]}\n"
-        f"response: free run, rms difference over rms {found.how.response}; "
+        f"model {found.model.name}: fitted to samples {found.plan.fit[0]} to {found.plan.fit[1]}{by}, "
+        f"judged on {found.plan.judge[0]} to {found.plan.judge[1]}\n"
+        f"response: free run, rms difference over rms {found.plan.response}; "
         f"force: share of power unexplained, {low:.3g} to {high:.3g} Hz"
     )
 

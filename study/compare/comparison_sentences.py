@@ -26,12 +26,12 @@ PARITY = {"odd": "odd in it", "even": "even in it"}
 def says(found: Comparison) -> str:
     """What a user should know of one record, in two or three sentences."""
     sentences = [_how_good(found)]
-    if found.response_error >= HOPELESS:
+    if found.prediction.error >= HOPELESS:
         sentences.append("Mass, damping and stiffness are the least that a model needs")
-    elif found.structure > NEGLIGIBLE:
+    elif found.prediction.structure > NEGLIGIBLE:
         sentences.append(_where(found))
-    if not found.found.converged:
-        sentences.append(f"The fit did not arrive at a minimum ({found.found.message}), so this may be the fit's fault")
+    if not found.fit.converged:
+        sentences.append(f"The fit did not arrive at a minimum ({found.fit.message}), so this may be the fit's fault")
     return ". ".join(s[0].upper() + s[1:] for s in sentences) + "."
 
 
@@ -47,21 +47,21 @@ def _plain(number: float) -> str:
 
 
 def _how_good(found: Comparison) -> str:
-    error, floor = percent(found.response_error), percent(found.noise_floor)
+    error, floor = percent(found.prediction.error), percent(found.prediction.floor)
     start = f"the model misses the response by {error} of its rms"
-    if found.response_error >= HOPELESS:
+    if found.prediction.error >= HOPELESS:
         return (
             f"{start}, as one without any motion would: it cannot follow this record, and its fitted coefficients "
             "mean nothing"
         )
-    if found.noise.alone:
-        how = " (from the scatter between periods)" if found.noise.source == SCATTER else ""
+    if found.prediction.noise.alone:
+        how = " (from the scatter between periods)" if found.prediction.noise.source == SCATTER else ""
         doubt = "" if how else "; 'study diagnose' looks closer"
         return f"{start}, and that is noise{how}: nothing stands above the noise floor of {floor}{doubt}"
-    if found.structure <= NEGLIGIBLE:
+    if found.prediction.structure <= NEGLIGIBLE:
         return (
-            f"{start}; what stands above the noise floor of {floor} is {percent(found.structure)} of the response, "
-            "too little to call anything missing"
+            f"{start}; what stands above the noise floor of {floor} is {percent(found.prediction.structure)} of the "
+            "response, too little to call anything missing"
         )
     return f"{start}, where noise alone would leave {floor}"
 
@@ -149,7 +149,7 @@ def says_of_all(found: Sequence[Comparison], moving: Sequence[Level]) -> str:
     """The same of several records: the worst of them, and whether the coefficients move between levels."""
     if len(found) == 1:
         return says(found[0])
-    worst = max(found, key=lambda c: c.structure)
+    worst = max(found, key=lambda c: c.prediction.structure)
     moved = [level for level in moving if level.moves]
     names = ", ".join(f"{level.key} by {percent(level.change)}" for level in moved)
     levels = f"coefficients move with the level: {names}" if moved else "no coefficient moves with the level"

@@ -11,12 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study.compare.noise import Noise, segments_of
+from study.compare.noise import segments_of
+from study.compare.prediction import Prediction
 from study.equations.model import Model
 from study.identify.frequency_domain import conditioned
 from study.identify.frequency_domain.inputs import Input, histories, reverse_inputs
-from study.records.completion import CompletedRecord
-from study.records.plan import Plan
 from study.records.record import MOTIONS
 from study.records.spectra import Segments, SpectralMatrix, cross_spectra
 
@@ -85,32 +84,29 @@ class ForceError:
         return min(self._over_band(self.noise), 1.0)
 
 
-def force_error(model: Model, completed: CompletedRecord, how: Plan, noise: Noise) -> ForceError:
+def force_error(model: Model, prediction: Prediction) -> ForceError:
     """Judge a fitted model in reverse on the judging part.
 
     Parameters
     ----------
     model : Model
         Every value known.
-    completed : CompletedRecord
-        Record with all three motions.
-    how : Plan
-        What is judged.
-    noise : Noise
-        Noise of the response.
+    prediction : Prediction
+        What the model predicts of the judging part, and its noise.
 
     Raises
     ------
     StudyError
         If the judging part is too short for so many inputs.
     """
-    first, last = how.judge
-    first, last = max(first, completed.edge), min(last, len(completed.record) - completed.edge)
-    record = completed.record
+    prepared, noise = prediction.prepared, prediction.noise
+    record, (first, last) = prepared.record, prepared.inner(prepared.plan.judge)
     inputs = reverse_inputs(model)
     channels = [h[first:last] for h in histories(inputs, record)]
     cut = _segments(last - first, len(inputs))
-    matrix = cross_spectra([*channels, record[how.response][first:last], record["force"][first:last]], record.dt, cut)
+    matrix = cross_spectra(
+        [*channels, record[prepared.response][first:last], record["force"][first:last]], record.dt, cut
+    )
     reverse, response = _without(matrix, len(inputs)), matrix.density[:, -2, -2].real
     result = conditioned.analyse(reverse)
     freedom = result.averages / (result.averages - len(inputs))
@@ -121,10 +117,10 @@ def force_error(model: Model, completed: CompletedRecord, how: Plan, noise: Nois
         force=result.output,
         unexplained=np.clip((1.0 - result.multiple) * freedom, 0.0, 1.0),
         parametric=_left(reverse, inputs, model) / force,
-        noise=from_noise(matrix.frequency, inputs, model, how, density) / force,
+        noise=from_noise(matrix.frequency, inputs, model, prepared.response, density) / force,
         cumulative=result.cumulative,
         inputs=inputs,
-        band=lines_to_judge(matrix.frequency, response, density, result.output, completed.band[0]),
+        band=lines_to_judge(matrix.frequency, response, density, result.output, prepared.band[0]),
     )
 
 
@@ -149,12 +145,12 @@ def _left(matrix: SpectralMatrix, inputs: Sequence[Input], model: Model) -> Floa
     return np.einsum("fi,fij,fj->f", weights.conj(), matrix.density, weights).real.clip(0.0)
 
 
-def from_noise(frequency: Floats, inputs: Sequence[Input], model: Model, how: Plan, density: Floats) -> Floats:
+def from_noise(frequency: Floats, inputs: Sequence[Input], model: Model, response: str, density: Floats) -> Floats:
     """Density of force that noise on the response makes through the linear terms."""
     linear = next(i for i in inputs if i.shape == "u")
     stiffness = np.abs(linear.response(frequency, model.numbers())) ** 2
     omega = 2.0 * np.pi * np.maximum(frequency, 0.5 * frequency[1])
-    return stiffness * density / omega ** (2 * MOTIONS.index(how.response))
+    return stiffness * density / omega ** (2 * MOTIONS.index(response))
 
 
 def lines_to_judge(frequency: Floats, response: Floats, noise: Floats, force: Floats, low: float) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.compare.missing_force import Restoring
+from study.compare.missing_force import MissingForce
 
 Floats = NDArray[np.float64]
 POWERS = np.arange(0.0, 6.01, 0.25)
@@ -67,12 +67,12 @@ class Growths:
     margins: tuple[float, ...]
 
 
-def growths(found: Restoring) -> Growths | None:
+def growths(found: MissingForce) -> Growths | None:
     """Hold the missing force against powers of displacement and velocity; None if there is nothing to explain.
 
     Parameters
     ----------
-    found : Restoring
+    found : MissingForce
         The missing force.
     """
     keep = found.inner
@@ -102,7 +102,7 @@ def _basis(columns: list[Floats], samples: int) -> Floats:
 
 
 def _way(
-    name: tuple[str, str], found: Restoring, u: Floats, v: Floats, keep: slice, basis: Floats, wanted: Floats,
+    name: tuple[str, str], found: MissingForce, u: Floats, v: Floats, keep: slice, basis: Floats, wanted: Floats,
     explicable: float,
 ) -> tuple[Growth, Floats] | None:  # fmt: skip
     """One way with its best power, and its shares with each block left out."""

@@ -66,15 +66,15 @@ class Links:
 
 def links(found: Comparison) -> Links:
     """Tie the stretches, bands and amplitudes of a comparison to each other."""
-    n = len(found.judged.residual)
+    n = len(found.prediction.residual)
     count = int(np.clip(n // SHORTEST, 1, BLOCKS))
     bounds = np.linspace(0, n, count + 1).round().astype(np.int64)
-    lacking = found.restoring
+    lacking = found.missing_force
     block = np.searchsorted(bounds, np.arange(n), side="right") - 1
     place = block[lacking.inner]
     u, v, force = (x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force))
-    frequency, power = _spectra(found.judged.residual, found.judged.dt, bounds)
-    times = np.asarray(float(found.judged.time[0]) + bounds * found.judged.dt, dtype=np.float64)
+    frequency, power = _spectra(found.prediction.residual, found.prediction.dt, bounds)
+    times = np.asarray(float(found.prediction.time[0]) + bounds * found.prediction.dt, dtype=np.float64)
     return Links(
         times, frequency, power, _classes(u, force, place, count),
         _classes(v, force, place, count), _cells(u, v, place, count),

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.fft import rfft
 
 from study.compare.force_error import ForceError, from_noise, lines_to_judge
-from study.compare.noise import Noise
+from study.compare.prediction import Prediction
 from study.equations.model import Model
 from study.identify.frequency_domain.inputs import Input, histories, reverse_inputs
 from study.identify.frequency_domain.local_polynomial_method import (
@@ -24,8 +24,6 @@ from study.identify.frequency_domain.local_polynomial_method import (
     transform,
     transients,
 )
-from study.records.completion import CompletedRecord
-from study.records.plan import Plan
 from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
@@ -33,7 +31,7 @@ Complexes = NDArray[np.complex128]
 DEGREE = 2
 
 
-def local_force_error(model: Model, completed: CompletedRecord, how: Plan, noise: Noise) -> ForceError:
+def local_force_error(model: Model, prediction: Prediction) -> ForceError:
     """Judge a fitted model in reverse on the judging part, as ``study.compare.force_error.force_error`` does.
 
     The first entry of every array stands for the lines below the first band, of which nothing is said.
@@ -43,8 +41,8 @@ def local_force_error(model: Model, completed: CompletedRecord, how: Plan, noise
     StudyError
         If the judging part is too short for two bands.
     """
-    first, last = max(how.judge[0], completed.edge), min(how.judge[1], len(completed.record) - completed.edge)
-    record, inputs = completed.record.part(first, last), reverse_inputs(model)
+    prepared, noise = prediction.prepared, prediction.noise
+    record, inputs = prepared.record.part(*prepared.inner(prepared.plan.judge)), reverse_inputs(model)
     lines = transform([*histories(inputs, record), record["force"]], record.dt)
     local = LocalPolynomial(DEGREE, ((DEGREE + 1) * (len(inputs) + 1) + SPARE) // 2)
     index = _bands(lines, local, record.name)
@@ -53,18 +51,18 @@ def local_force_error(model: Model, completed: CompletedRecord, how: Plan, noise
     left = [noise_variance(replace(lines, inputs=lines.inputs[: r + 1]), index, local) for r in range(len(inputs))]
     shares = np.array([np.minimum(_over(_with_zero(part * lines.density), force), 1.0) for part in left])
     rest = _rest(model, inputs, lines, index, local)
-    motion = np.asarray(rfft(record[how.response]), dtype=np.complex128)[1 : len(lines.frequency) + 1]
+    motion = np.asarray(rfft(record[prepared.response]), dtype=np.complex128)[1 : len(lines.frequency) + 1]
     density = np.interp(frequency, noise.frequency, noise.density)
     return ForceError(
         frequency=frequency,
         force=force,
         unexplained=shares[-1],
         parametric=_over(_with_zero(rest * lines.density), force),
-        noise=_over(from_noise(frequency, inputs, model, how, density), force),
+        noise=_over(from_noise(frequency, inputs, model, prepared.response, density), force),
         cumulative=np.maximum.accumulate(1.0 - shares, axis=0),
         inputs=inputs,
         band=lines_to_judge(
-            frequency, _with_zero(_power(motion[index]) * lines.density), density, force, completed.band[0]
+            frequency, _with_zero(_power(motion[index]) * lines.density), density, force, prepared.band[0]
         ),
     )
 

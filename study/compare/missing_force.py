@@ -16,14 +16,13 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from study.compare.noise import Noise
-from study.compare.prediction import Judged
+from study.compare.prediction import Prediction
 from study.equations import kernels
-from study.equations.model import Model, forward_graph, free, with_registers
-from study.equations.terms import get
+from study.equations.model import Model, forward_graph, with_registers
 from study.identify.frequency_domain.inputs import history, reverse_inputs
-from study.identify.time_domain import held_out
+from study.identify.frequency_domain.starting_values import oscillator
 from study.records.completion import SETTLED, derivative
-from study.records.plan import Plan
+from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record
 
 Floats = NDArray[np.float64]
@@ -33,7 +32,7 @@ LEAST_DAMPING = 0.02  # of critical, in the weight that a line has
 
 
 @dataclass(frozen=True)
-class Restoring:
+class MissingForce:
     """The missing force on the judging part; n samples.
 
     Attributes
@@ -79,7 +78,7 @@ class Restoring:
         return _filtered(force, self.dt, self.frequency, self.weight * self.gate)
 
 
-def restoring(model: Model, keys: Sequence[str], judged: Judged, noise: Noise, record: Record, how: Plan) -> Restoring:
+def missing_force(model: Model, keys: Sequence[str], prediction: Prediction) -> MissingForce:
     """The missing force on the judging part.
 
     Parameters
@@ -88,40 +87,35 @@ def restoring(model: Model, keys: Sequence[str], judged: Judged, noise: Noise, r
         Every value known.
     keys : sequence of str
         What was fitted.
-    judged : Judged
+    prediction : Prediction
         Free run and measured response.
-    noise : Noise
-        Noise of the response.
-    record : Record
-        With all three motions in consistent units.
-    how : Plan
-        What was fitted and judged.
     """
-    gate = above_noise(noise, judged.low)
-    motion = _motion(judged, gate, noise.frequency)
-    part = record.part(*how.judge)
+    noise, prepared = prediction.noise, prediction.prepared
+    gate = above_noise(noise, prediction.low)
+    motion = _motion(prediction, gate, noise.frequency)
+    part = prepared.record.part(*prepared.plan.judge)
     named = part.with_channels(dict(zip(MOTIONS, motion, strict=True)))
-    forces = missing_force(model, keys, named)
+    forces = unbalanced_force(model, keys, named)
     width = float(noise.frequency[1])
-    return Restoring(
+    return MissingForce(
         displacement=motion[0],
         velocity=motion[1],
         force=forces[:, 0],
         free=forces[:, 1:],
         gate=gate,
-        weight=_weight(record, how, noise.frequency),
+        weight=_weight(prepared, noise.frequency),
         frequency=noise.frequency,
         noise=float(np.sum(noise.density[gate]) * width),
-        dt=judged.dt,
-        edge=_edge(judged, width),
+        dt=prediction.dt,
+        edge=_edge(prediction, width),
     )
 
 
-def _edge(judged: Judged, width: float) -> int:
+def _edge(prediction: Prediction, width: float) -> int:
     """Half the memory of the gate, and what an integration needs to settle; at most an eighth of all."""
-    memory = 0.5 / (width * judged.dt)
-    settling = SETTLED / (judged.low * judged.dt) if judged.low > 0.0 else 0.0
-    return min(round(max(memory, settling)), len(judged.measured) // 8)
+    memory = 0.5 / (width * prediction.dt)
+    settling = SETTLED / (prediction.low * prediction.dt) if prediction.low > 0.0 else 0.0
+    return min(round(max(memory, settling)), len(prediction.measured) // 8)
 
 
 def above_noise(noise: Noise, low: float) -> NDArray[np.bool_]:
@@ -132,21 +126,21 @@ def above_noise(noise: Noise, low: float) -> NDArray[np.bool_]:
     return (level > noise.density * (1.0 + spread)) & (noise.frequency >= low)
 
 
-def _motion(judged: Judged, gate: NDArray[np.bool_], frequency: Floats) -> Floats:
+def _motion(prediction: Prediction, gate: NDArray[np.bool_], frequency: Floats) -> Floats:
     """Displacement, velocity and acceleration: free run plus what is sure of the difference, shape (3, n).
 
     The difference is integrated before it is gated: a gate blurs the ends, which an integration would blow up.
     """
     parts: list[Floats] = []
     for row in range(3):
-        order = row - judged.row
-        low = judged.low if order < 0 else 0.0
-        moved = derivative(judged.difference, judged.dt, order, low) if order else judged.difference
-        parts.append(_filtered(moved, judged.dt, frequency, gate.astype(np.float64)))
-    return judged.motion + np.stack(parts)
+        order = row - prediction.row
+        low = prediction.low if order < 0 else 0.0
+        moved = derivative(prediction.difference, prediction.dt, order, low) if order else prediction.difference
+        parts.append(_filtered(moved, prediction.dt, frequency, gate.astype(np.float64)))
+    return prediction.motion + np.stack(parts)
 
 
-def missing_force(model: Model, keys: Sequence[str], record: Record) -> Floats:
+def unbalanced_force(model: Model, keys: Sequence[str], record: Record) -> Floats:
     """``F - (forces of all terms)`` along a record, and its derivatives by some keys, shape (n, 1 + keys).
 
     Raises
@@ -178,14 +172,13 @@ def _states(model: Model, record: Record) -> dict[str, Floats]:
     return {f"z:{i.terms[0]}": history(i, record) for i in reverse_inputs(model) if i.state is not None}
 
 
-def _weight(record: Record, how: Plan, frequency: Floats) -> Floats:
+def _weight(prepared: Prepared, frequency: Floats) -> Floats:
     """|H(f)| of the best linear oscillator from force to the measured response."""
-    names = ("inertia", "linear_damping", "linear_stiffness")
-    own = held_out.linear_start(Model("linear", tuple(free(get(n)) for n in names)), record, how)
+    own = oscillator(prepared)
     omega = 2.0 * np.pi * np.maximum(frequency, 0.5 * frequency[1])
     damping = max(abs(own["c"]), 2.0 * LEAST_DAMPING * float(np.sqrt(abs(own["k"]) * own["m"])))
     stiffness = np.abs(own["k"] - own["m"] * omega**2 + 1j * omega * damping)
-    return omega ** MOTIONS.index(how.response) / stiffness
+    return omega ** MOTIONS.index(prepared.response) / stiffness
 
 
 def _filtered(values: Floats, dt: float, frequency: Floats, gain: Floats) -> Floats:

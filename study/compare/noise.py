@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study.compare.prediction import Judged
 from study.records import noise_floor
-from study.records.record import MOTIONS, Record
+from study.records.prepared import Prepared
 from study.records.spectra import Segments, autospectrum
 
 Floats = NDArray[np.float64]
@@ -70,50 +69,52 @@ def segments_of(samples: int) -> Segments:
     return Segments(length=max(32, min(LONGEST, 2 ** int(np.log2(max(samples // AVERAGES, 32))))))
 
 
-def noise_of(judged: Judged, record: Record, last: int) -> Noise:
+def noise_of(difference: Floats, residual: Floats, prepared: Prepared, numerical: float) -> Noise:
     """Noise of the response on the judging part.
 
     Parameters
     ----------
-    judged : Judged
-        Measured and predicted response.
-    record : Record
+    difference, residual : array, shape (samples to judge,)
+        Measured minus predicted response, and the same without what lies below the frequencies that are judged.
+    prepared : Prepared
         The whole record; its ``period``, if it has one, is made use of.
-    last : int
-        The sample after the last of the judging part: periods are counted back from it.
+    numerical : float
+        Rms error of the integration, below which no noise can be seen.
     """
-    cut = segments_of(len(judged.residual))
-    frequency, residual = autospectrum(judged.difference, judged.dt, cut)
-    floor = noise_floor.floor(judged.difference, judged.dt, judged.low)
-    scatter = _between_periods(record, judged.row, last)
-    nyquist, averages = 0.5 / judged.dt, cut.effective_averages(len(judged.residual))
-    white = floor.noise**2 / (nyquist - judged.low)
+    low, dt = prepared.band[0], prepared.dt
+    cut = segments_of(len(difference))
+    frequency, density = autospectrum(difference, dt, cut)
+    floor = noise_floor.floor(difference, dt, low)
+    averages = cut.effective_averages(len(difference))
+    white = floor.noise**2 / (0.5 / dt - low)
     quiet = averages * len(frequency) / cut.line_inflation() * noise_floor.QUIET / noise_floor.BANDS
-    white_error = 0.5 * floor.noise / np.sqrt(quiet)
-    found = Noise(
-        frequency, np.full_like(frequency, white), residual, floor.noise, white_error,
+    noise = Noise(
+        frequency, np.full_like(frequency, white), density, floor.noise, 0.5 * floor.noise / np.sqrt(quiet),
         floor.excess, floor.significance, averages, WHITE,
     )  # fmt: skip
+    scatter = _between_periods(prepared)
     if scatter is not None:
-        found = _with_density(found, autospectrum(scatter, judged.dt, cut)[1], judged, len(scatter))
-    if found.rms < judged.numerical:
-        found = replace(found, rms=judged.numerical, source=EXACT)
-    return found
+        noise = _with_density(noise, autospectrum(scatter, dt, cut)[1], low, len(difference), len(scatter))
+    if noise.rms < numerical:
+        noise = replace(noise, rms=numerical, source=EXACT)
+    # Noise is a part of what is left: an estimate of it that scatters above all of that is cut back to it.
+    return replace(noise, rms=min(noise.rms, float(np.sqrt(np.mean(residual**2)))))
 
 
-def _between_periods(record: Record, row: int, last: int) -> Floats | None:
+def _between_periods(prepared: Prepared) -> Floats | None:
     """Differences of the response between neighbouring periods with the variance of the noise, strung together.
 
     Periods are counted back from the end of the judging part, where the motion has settled; the whole
     record serves, because scatter says nothing of a model. None if there are not two alike.
     """
+    record, last = prepared.record, prepared.plan.judge[1]
     period = record.period
     if period is None or last // period < 2:
         return None
     count = min(last // period, 6)
     first = last - count * period
     force = record["force"][first:last].reshape(count, period)
-    motion = record[MOTIONS[row]][first:last].reshape(count, period)
+    motion = record[prepared.response][first:last].reshape(count, period)
     alike = np.sqrt(np.mean(np.diff(force, axis=0) ** 2, axis=1)) < SAME * float(np.std(force))
     settled = np.diff(motion, axis=0)[alike] / np.sqrt(2.0)
     if not len(settled):
@@ -121,18 +122,18 @@ def _between_periods(record: Record, row: int, last: int) -> Floats | None:
     return settled[1:].ravel() if len(settled) > 2 else settled[-1]  # the first may still hold the beginning
 
 
-def _with_density(found: Noise, density: Floats, judged: Judged, samples: int) -> Noise:
+def _with_density(noise: Noise, density: Floats, low: float, judged: int, samples: int) -> Noise:
     """The same with a noise density that was measured."""
-    keep = found.frequency >= judged.low
-    width = float(found.frequency[1])
+    keep = noise.frequency >= low
+    width = float(noise.frequency[1])
     rms = float(np.sqrt(np.sum(density[keep]) * width))
-    cut = segments_of(len(judged.residual))
+    cut = segments_of(judged)
     lines = np.count_nonzero(keep) / cut.line_inflation()
     own = cut.effective_averages(samples)
-    spread = density * np.sqrt(1.0 / found.averages + 1.0 / own)
+    spread = density * np.sqrt(1.0 / noise.averages + 1.0 / own)
     error = float(np.sqrt(np.sum((spread * width)[keep] ** 2) * cut.line_inflation()))
-    above = float(np.sum((found.residual - density)[keep]) * width)
+    above = float(np.sum((noise.residual - density)[keep]) * width)
     return replace(
-        found, density=density, rms=rms, error=0.5 * rms / np.sqrt(own * lines),
+        noise, density=density, rms=rms, error=0.5 * rms / np.sqrt(own * lines),
         excess=max(above, 0.0), significance=above / error if error > 0.0 else np.inf, source=SCATTER,
     )  # fmt: skip

@@ -1,74 +1,115 @@
-"""The free run of a fitted model along the part of the record that was not fitted."""
+"""The free run of a fitted model along the part of the record that was not fitted, its error and its noise floor."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from study.equations.free_run import prepare
-from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
-from study.records import completion
-from study.records.plan import Plan
-from study.records.record import MOTIONS, Record
+from study.compare.noise import Noise, noise_of
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.part_fit import JudgingRun, judging_run
+from study.records.completion import derivative
+from study.records.prepared import Prepared
+from study.records.record import MOTIONS
+from study.support.errors import DivergenceError
 
 Floats = NDArray[np.float64]
 CYCLES = 12  # of the response, in a close-up
 
 
-@dataclass(frozen=True)
-class Judged:
+@dataclass(frozen=True, eq=False)
+class Prediction:
     """Measured and predicted response on the judging part; n samples.
 
     Attributes
     ----------
-    time : array, shape (n,)
-        In seconds.
-    motion : array, shape (3, n)
-        Displacement, velocity and acceleration of the free run.
-    row : int
-        Place of the measured response in ``MOTIONS``.
-    measured : array, shape (n,)
-        The response as measured.
-    low : float
-        Frequency in hertz below which nothing is judged (the cut-off of an integration), or 0.
-    dt : float
-        Sampling interval in seconds.
+    prepared : Prepared
+        The record and its parts.
+    run : JudgingRun or None
+        The free run; None where it does not stay finite: then nothing is predicted, and the error counts as 100 %.
+    predicted : array, shape (n,)
+        Response of the free run.
     numerical : float
         Rms error of the integration itself: the difference to a run with twice the steps.
     """
 
-    time: Floats
-    motion: Floats
-    row: int
-    measured: Floats
-    low: float
-    dt: float
+    prepared: Prepared
+    run: JudgingRun | None
+    predicted: Floats
     numerical: float
 
     @property
-    def predicted(self) -> Floats:
-        """Response of the free run, shape (n,)."""
-        return self.motion[self.row]
+    def diverged(self) -> bool:
+        """Whether the free run does not stay finite."""
+        return self.run is None
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval in seconds."""
+        return self.prepared.dt
+
+    @property
+    def low(self) -> float:
+        """Frequency in hertz below which nothing is judged (the cut-off of an integration), or 0."""
+        return self.prepared.band[0]
+
+    @property
+    def row(self) -> int:
+        """Place of the measured response in ``MOTIONS``."""
+        return MOTIONS.index(self.prepared.response)
+
+    @property
+    def time(self) -> Floats:
+        """In seconds, shape (n,)."""
+        return self.prepared.record.time[slice(*self.prepared.plan.judge)]
+
+    @property
+    def measured(self) -> Floats:
+        """The response as measured, shape (n,)."""
+        return self.prepared.judged
 
     @property
     def difference(self) -> Floats:
         """Measured minus predicted response at all frequencies, shape (n,)."""
         return self.measured - self.predicted
 
-    @property
+    @cached_property
+    def motion(self) -> Floats:
+        """Displacement, velocity and acceleration of the free run, shape (3, n)."""
+        if self.run is None:
+            return np.zeros((len(MOTIONS), len(self.predicted)))
+        return np.stack([self.run.motion(name) for name in MOTIONS])
+
+    @cached_property
     def residual(self) -> Floats:
         """The difference without what lies below ``low``, shape (n,)."""
-        return self.above(self.difference)
+        return self._above(self.difference)
 
-    @property
+    @cached_property
     def size(self) -> float:
         """Rms of the measured response about its mean, without what lies below ``low``."""
-        return float(np.std(self.above(self.measured)))
+        return float(np.std(self._above(self.measured)))
 
     @property
     def error(self) -> float:
         """Rms of the residual over that of the response."""
         return float(np.sqrt(np.mean(self.residual**2))) / self.size
+
+    @cached_property
+    def noise(self) -> Noise:
+        """Noise on the response, and what stands above it in the residual."""
+        return noise_of(self.difference, self.residual, self.prepared, self.numerical)
+
+    @property
+    def floor(self) -> float:
+        """The part of the error that no model could explain, as far as this residual shows."""
+        return self.noise.rms / self.size
+
+    @property
+    def structure(self) -> float:
+        """Rms of what stands above the noise over the rms of the response; zero if noise alone would leave as much."""
+        return 0.0 if self.noise.alone else float(np.sqrt(self.noise.excess)) / self.size
 
     @property
     def closeup(self) -> slice:
@@ -79,50 +120,15 @@ class Judged:
         first = int(np.argmax(np.convolve(self.residual**2, np.ones(length), "valid")))
         return slice(first, first + length)
 
-    def above(self, values: Floats) -> Floats:
-        """Values without what lies below ``low``, shape (n,)."""
-        return completion.derivative(values, self.dt, 0, self.low) if self.low > 0.0 else values
+    def _above(self, values: Floats) -> Floats:
+        return derivative(values, self.dt, 0, self.low) if self.low > 0.0 else values
 
 
-def judge(found: FreeRunFit, record: Record, how: Plan, low: float = 0.0) -> Judged:
-    """Run a fitted model along the judging part.
-
-    Where that follows the fitting part the run goes on through both; elsewhere its initial state, and
-    nothing else, is estimated from the judging part (as in ``held_out.held_out_residual``).
-
-    Parameters
-    ----------
-    found : FreeRunFit
-        What was fitted on the fitting part.
-    record : Record
-        Force and response in consistent units.
-    how : Plan
-        What is judged.
-    low : float
-        Frequency in hertz below which nothing is judged.
-
-    Raises
-    ------
-    DivergenceError
-        If the free run leaves the range of finite numbers.
-    """
-    first, last = how.judge
-    span, initial = (how.fit[0], last), found.initial
-    if first != how.fit[1]:
-        again = fit_free_run(
-            found.model, record, held=tuple(found.model.values), response=how.response,
-            steps_per_sample=how.steps_per_sample, span=how.judge,
-        )  # fmt: skip
-        span, initial = how.judge, again.initial
-    run = prepare(found.model, record, steps_per_sample=how.steps_per_sample, span=span)
-    whole = [replace(run, row=row).respond({}, initial)[0] for row in range(3)]
-    motions = np.asarray(whole, dtype=np.float64)[:, first - span[0] :]
-    row = MOTIONS.index(how.response)
-    twice = prepare(
-        found.model, record, response=how.response, steps_per_sample=2 * how.steps_per_sample, span=span
-    )  # fmt: skip
-    finer, _ = twice.respond({}, initial)
-    gap: Floats = np.subtract(finer[first - span[0] :], motions[row])
-    numerical = float(np.sqrt(np.mean(gap**2)))
-    part = record.part(first, last)
-    return Judged(part.time, motions, row, part[how.response], low, record.dt, numerical)
+def predict(fit: FreeRunFit, prepared: Prepared) -> Prediction:
+    """Run a fitted model along the judging part (:class:`study.identify.time_domain.part_fit.JudgingRun`)."""
+    try:
+        run = judging_run(fit, prepared)
+        predicted, finer = (run.motion(prepared.response, times) for times in (1, 2))
+    except DivergenceError:
+        return Prediction(prepared, None, np.full_like(prepared.judged, np.mean(prepared.judged)), 0.0)
+    return Prediction(prepared, run, predicted, float(np.sqrt(np.mean(np.subtract(finer, predicted) ** 2))))

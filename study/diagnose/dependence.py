@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from scipy.signal import lfilter
 
-from study.equations.free_run import prepare
 from study.equations.model import ModelTerm
 from study.equations.terms import custom
-from study.identify.time_domain import held_out
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.part_fit import judging_run, linearise, run_of
 from study.identify.time_domain.shape_search import Baseline, modulation_lines, residual_lines
-from study.records.plan import Plan
-from study.records.record import MOTIONS, Record
+from study.records.prepared import Prepared
+from study.records.record import MOTIONS
 from study.support import statistics
 from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares
@@ -62,34 +61,36 @@ class Leftover:
     base: Baseline
 
 
-def leftover(found: FreeRunFit, base: Baseline, record: Record, how: Plan) -> Leftover:
+def leftover(base: Baseline, prepared: Prepared) -> Leftover:
     """What a fitted model leaves; where its free run does not stay finite to the end, on the fitting part alone.
 
     Parameters
     ----------
-    found : FreeRunFit
-        The fit.
     base : Baseline
-        Of the same model.
-    record, how
+        Of the fitted model.
+    prepared : Prepared
         The record, and the parts that the fit was made on and is judged on.
     """
-    how = replace(how, judge=(how.judge[0], min(how.judge[1], how.judge[0] + LONGEST)))
-    motions = [_motion(found, record, how, name) for name in MOTIONS[:2]]
+    fit, (first, last) = base.fit, prepared.plan.judge
+    prepared = replace(prepared, plan=replace(prepared.plan, judge=(first, min(last, first + LONGEST))))
+    motions = [run_of(fit, prepared, motion=name).respond({}, fit.initial)[0] for name in MOTIONS[:2]]
     families = _formulas(*(float(np.std(x)) for x in motions))
-    shaped = _with_shapes(found, [text for texts in families.values() for text in texts])
-    rows = [*motions, found.residual, held_out.linearise(shaped, record, how)]
+    shaped = _with_shapes(fit, [text for texts in families.values() for text in texts])
+    states = 0 if fit.restarts else 2  # of segments, each initial state matters to its own samples alone
+    rows = [*motions, fit.residual, linearise(shaped, prepared)[:, : len(shaped.keys) + states]]
     try:
-        start = held_out.judging_start(found, record, how)
-        later = [held_out.held_out_motion(found, record, how, name, start) for name in MOTIONS[:2]]
-        later.append(held_out.held_out_residual(found, record, how, start))
-        later.append(held_out.held_out_derivatives(shaped, record, how, start))
+        run = judging_run(fit, prepared)
+        later = [run.motion(name) for name in MOTIONS[:2]]
+        later += [
+            prepared.judged - run.motion(prepared.response),
+            run.derivatives(shaped)[:, : len(shaped.keys) + states],
+        ]
     except DivergenceError:
-        split = len(found.residual) // 2
+        split = len(fit.residual) // 2
     else:
-        rows, split = [np.concatenate(both) for both in zip(rows, later, strict=True)], len(found.residual)
+        rows, split = [np.concatenate(both) for both in zip(rows, later, strict=True)], len(fit.residual)
     u, v, residual, slopes = rows
-    first, last = len(found.keys), len(shaped.keys)
+    first, last = len(fit.keys), len(shaped.keys)
     edges = first + np.cumsum([0, *(len(texts) for texts in families.values())])
     return Leftover(
         displacement=u / np.std(u), velocity=v / np.std(v), residual=residual,
@@ -99,18 +100,13 @@ def leftover(found: FreeRunFit, base: Baseline, record: Record, how: Plan) -> Le
     )  # fmt: skip
 
 
-def _with_shapes(found: FreeRunFit, texts: Sequence[str]) -> FreeRunFit:
+def _with_shapes(fit: FreeRunFit, texts: Sequence[str]) -> FreeRunFit:
     """The same fit of a model that has forces of these shapes as well, all of them zero."""
-    model, keys = found.model, found.keys
+    model, keys = fit.model, fit.keys
     for i, text in enumerate(texts):
         term = custom(f"general_shape_{i}", text)
         model, keys = model.with_term(ModelTerm(term, (0.0,), ())), (*keys, *term.symbols)
-    return replace(found, model=model, keys=keys, values=np.append(found.values, np.zeros(len(texts))))
-
-
-def _motion(found: FreeRunFit, record: Record, how: Plan, name: str) -> Floats:
-    run = prepare(found.model, record, response=name, steps_per_sample=how.steps_per_sample, span=how.fit)
-    return run.respond({}, found.initial)[0]
+    return replace(fit, model=model, keys=keys, values=np.append(fit.values, np.zeros(len(texts))))
 
 
 def explained_by(left: Leftover) -> dict[str, float]:
@@ -175,7 +171,7 @@ def _hysteresis(steps: Floats, beta: float) -> Floats:
 
 
 def _times(left: Leftover) -> list[Floats]:
-    turn = 2.0 * np.pi * np.arange(len(left.residual)) / len(left.base.found.residual)
+    turn = 2.0 * np.pi * np.arange(len(left.residual)) / len(left.base.fit.residual)
     found: list[Floats] = []
     for line in modulation_lines(left.base)[:3]:
         found += [left.displacement * np.cos(line * turn), left.displacement * np.sin(line * turn)]

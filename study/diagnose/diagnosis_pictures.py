@@ -15,17 +15,18 @@ SHOWN = 10
 FURTHEST = (-4.0, 6.0)  # of a coefficient, relative to its value: what lies beyond is no constant
 
 
-def ranking(axes: Axes, found: Diagnosis) -> Axes:
+def ranking(axes: Axes, diagnosis: Diagnosis) -> Axes:
     """Held-out error of the response after adding each candidate, beside the error before and the noise floor."""
-    rows = found.candidates[:SHOWN]
+    rows, before = diagnosis.candidates[:SHOWN], diagnosis.comparison.prediction.error
     place = np.arange(len(rows))
-    values = [100.0 * min(r.response_error, 10.0 * found.response_error) for r in rows]
+    values = [100.0 * min(r.response_error, 10.0 * before) for r in rows]
     axes.barh(place, values, height=0.62, color=["0.25" if i == 0 else "0.7" for i in place])
     axes.set_yticks(place, [_label(r, rows[0]) for r in rows])
     axes.invert_yaxis()
-    axes.set_xlim(0.0, 118.0 * found.response_error)
-    axes.axvline(100.0 * found.response_error, color="0.1", linewidth=1.4, linestyle="-", label="without it")
-    axes.axvline(100.0 * found.noise, color="0.1", linewidth=1.4, linestyle=":", label="noise floor")
+    axes.set_xlim(0.0, 118.0 * before)
+    axes.axvline(100.0 * before, color="0.1", linewidth=1.4, linestyle="-", label="without it")
+    floor = rows[0].prediction.floor if rows else diagnosis.comparison.prediction.floor
+    axes.axvline(100.0 * floor, color="0.1", linewidth=1.4, linestyle=":", label="noise floor")
     axes.set_xlabel("held-out error of the response after adding it / %")
     return axes
 

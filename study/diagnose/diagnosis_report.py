@@ -12,14 +12,16 @@ TIES = 2  # ties named in the table; the file names all
 SHOWN = 8  # candidates in the table on the screen
 
 
-def table(found: Diagnosis, force: str, length: str) -> str:
+def table(diagnosis: Diagnosis) -> str:
     """The first candidates as a person reads them in ten seconds."""
     from tabulate import tabulate
 
     head = ["", "effect", "explains", "error with it", "coefficient", "p", "changes by", "tied with"]
-    rows = [_shown(i, row, force, length) for i, row in enumerate(found.candidates[:SHOWN], start=1)]
+    units = diagnosis.comparison.record.units
+    force, length = units.get("force", "N"), units.get("displacement", "m")
+    rows = [_shown(i, row, force, length) for i, row in enumerate(diagnosis.candidates[:SHOWN], start=1)]
     shown = tabulate(rows, head, tablefmt="simple", disable_numparse=True)
-    more = len(found.candidates) - SHOWN
+    more = len(diagnosis.candidates) - SHOWN
     return f"{shown}\n... and {more} more, in diagnosis.json" if more > 0 else shown
 
 
@@ -43,17 +45,18 @@ def _few(names: tuple[str, ...]) -> str:
     return f"{shown} and {len(names) - TIES} more" if len(names) > TIES else shown
 
 
-def fields(found: Diagnosis) -> dict[str, Any]:
+def fields(diagnosis: Diagnosis) -> dict[str, Any]:
     """What ``diagnosis.json`` holds of the diagnosis itself; candidates best first."""
+    prediction = diagnosis.comparison.prediction
     return {
-        "verdict": found.verdict,
-        "error": {"response": found.response_error},
-        "noise_floor": {"response": found.noise},
-        "candidates": [_candidate(row) for row in found.candidates],
-        "pair": list(found.pair),
-        "left": found.left,
-        "depends_on": found.families,
-        "converged": found.found.converged,
+        "verdict": diagnosis.verdict,
+        "error": {"response": prediction.error, "force": diagnosis.comparison.force.total},
+        "noise_floor": {"response": prediction.floor},
+        "candidates": [_candidate(row) for row in diagnosis.candidates],
+        "pair": list(diagnosis.pair),
+        "left": diagnosis.left,
+        "depends_on": diagnosis.families,
+        "converged": diagnosis.comparison.fit.converged,
     }
 
 
@@ -66,6 +69,7 @@ def _candidate(row: Ranked) -> dict[str, Any]:
         "coefficient": row.coefficient,
         "interval": [_finite(low), _finite(high)],
         "response_error": row.response_error,
+        "noise_floor": row.prediction.floor,
         "explained": row.gain.explained,
         "explained_error": row.gain.error,
         "p_value": row.p_value,
@@ -74,7 +78,7 @@ def _candidate(row: Ranked) -> dict[str, Any]:
             "amplitude": _finite(row.steadiness.spread()) if row.steadiness else None,
         },
         "tied_with": list(row.tied_with),
-        "converged": row.found.converged,
+        "converged": row.fit.converged,
     }
 
 

@@ -10,61 +10,57 @@ DEPENDENCE = 0.1  # held-out share from which the unexplained force is said to d
 CLOSE = 0.05  # families this close to the best one are named with it
 
 
-def sentences(found: Diagnosis, force: str, length: str) -> list[str]:
-    """What to tell the engineer.
-
-    Parameters
-    ----------
-    found : Diagnosis
-        The diagnosis.
-    force, length : str
-        Units of force and displacement.
-    """
-    if found.verdict == NOTHING:
-        return [_nothing(found)]
-    said = _missing(found, force, length) if found.verdict == MISSING else _unknown(found)
-    if found.diverged:
+def sentences(diagnosis: Diagnosis) -> list[str]:
+    """What to tell the engineer."""
+    if diagnosis.verdict == NOTHING:
+        return [_nothing(diagnosis)]
+    said = _missing(diagnosis) if diagnosis.verdict == MISSING else _unknown(diagnosis)
+    if diagnosis.comparison.prediction.diverged:
         said.insert(0, "The free run of the model does not stay finite: its error counts as 100 %.")
     return said
 
 
-def _nothing(found: Diagnosis) -> str:
+def _nothing(diagnosis: Diagnosis) -> str:
+    prediction = diagnosis.comparison.prediction
     return (
-        f"Nothing is missing that this record could show: the error of the response is {_percent(found.response_error)}"
-        f" and its noise floor {_percent(found.noise)}; none of {len(found.candidates)} candidates explains any of it."
+        f"Nothing is missing that this record could show: the error of the response is {_percent(prediction.error)}"
+        f" and its noise floor {_percent(prediction.floor)}; none of {len(diagnosis.candidates)} candidates "
+        "explains any of it."
     )
 
 
-def _missing(found: Diagnosis, force: str, length: str) -> list[str]:
-    first = found.candidates[0]
+def _missing(diagnosis: Diagnosis) -> list[str]:
+    first, units = diagnosis.candidates[0], diagnosis.comparison.record.units
+    force, length = units.get("force", "N"), units.get("displacement", "m")
     said = [
         f"{_words(first.name)} is missing ({first.term.meaning}).",
-        f"With it the held-out error of the response falls from {_percent(found.response_error)} to "
-        f"{_percent(first.response_error)}; the noise floor is {_percent(found.noise)}.",
+        f"With it the held-out error of the response falls from {_percent(diagnosis.comparison.prediction.error)} to "
+        f"{_percent(first.response_error)}; the noise floor is {_percent(first.prediction.floor)}.",
         f"Its coefficient is {_amount(first, force, length)}{_shape(first, length)}.",
     ]
-    if found.pair:
-        second = next(name for name in found.pair if name != first.name)
+    if diagnosis.pair:
+        second = next(name for name in diagnosis.pair if name != first.name)
         said.append(f"It does not explain all: of all candidates, {term_names(second)} beside it explains most.")
-    elif found.left > 0.0:
-        said.append(f"Structure of {_percent(found.left)} of the response is left beside it.")
+    elif diagnosis.left > 0.0:
+        said.append(f"Structure of {_percent(diagnosis.left)} of the response is left beside it.")
     if first.tied_with:
         said.append(f"This record cannot tell it from {', '.join(term_names(n) for n in first.tied_with)}.")
     return said
 
 
-def _unknown(found: Diagnosis) -> list[str]:
+def _unknown(diagnosis: Diagnosis) -> list[str]:
+    prediction = diagnosis.comparison.prediction
     said = [
-        f"Something is missing that no candidate explains: {_percent(found.response_error)} error of the response, "
-        f"of which {_percent(found.noise)} would be noise."
+        f"Something is missing that no candidate explains: {_percent(prediction.error)} error of the response, "
+        f"of which {_percent(prediction.floor)} would be noise."
     ]
-    best = found.candidates[0] if found.candidates else None
+    best = diagnosis.candidates[0] if diagnosis.candidates else None
     if best is not None and best.gain.explained > 0.0 and best.p_value < 0.05:
         said.append(
             f"The nearest, {term_names(best.name)}, leaves {_percent(best.response_error)}; "
             f"{_doubt(best)}, so its shape is not right."
         )
-    families = sorted(found.families.items(), key=lambda item: -item[1])
+    families = sorted(diagnosis.families.items(), key=lambda item: -item[1])
     if families and families[0][1] > DEPENDENCE:
         named = [name for name, share in families if share > families[0][1] - CLOSE]
         said.append(

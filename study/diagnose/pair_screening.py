@@ -17,11 +17,9 @@ from scipy.signal import get_window
 from study.diagnose.ranking import Ranked
 from study.equations.model import Model, ModelTerm
 from study.identify.frequency_domain.inputs import history, reverse_inputs
-from study.identify.time_domain.held_out import FAINT
+from study.identify.frequency_domain.starting_values import FAINT
 from study.identify.time_domain.shape_search import Baseline, sensitivity
-from study.records.completion import complete
-from study.records.plan import Plan
-from study.records.record import Record
+from study.records.prepared import Prepared
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 
@@ -45,39 +43,34 @@ class PairStart:
     model: Model
 
 
-def promising(
-    rows: Sequence[Ranked], base: Baseline, record: Record, how: Plan, held: tuple[str, ...]
-) -> list[PairStart]:  # fmt: skip
+def promising(rows: Sequence[Ranked], base: Baseline, prepared: Prepared) -> list[PairStart]:
     """The best pairs of the reverse system and those of the sensitivities; the same pair may begin at both places.
 
     Parameters
     ----------
     rows : sequence of Ranked
         The candidates with their shape parameters.
-    base, record, how, held
+    base, prepared
         As for :func:`study.diagnose.pairs.best_pair`.
     """
-    entries = {r.name: next(t for t in r.found.model.terms if t.name == r.name) for r in rows}
-    reverse = _of_the_reverse_system(entries, base, record, how, held)
-    return reverse + _of_the_sensitivities(entries, base, record, how)
+    entries = {r.name: next(t for t in r.fit.model.terms if t.name == r.name) for r in rows}
+    return _of_the_reverse_system(entries, base, prepared) + _of_the_sensitivities(entries, base, prepared)
 
 
-def _of_the_reverse_system(
-    entries: Mapping[str, ModelTerm], base: Baseline, record: Record, how: Plan, held: tuple[str, ...]
-) -> list[PairStart]:
+def _of_the_reverse_system(entries: Mapping[str, ModelTerm], base: Baseline, prepared: Prepared) -> list[PairStart]:
     """Pairs with coefficients, all of them anew, from the reverse system; best first."""
-    known = base.found.model
+    known = base.fit.model
     everything = known
     for entry in entries.values():
         everything = everything.with_term(entry)
     try:
-        columns, target = _spectra(everything, base, record, how)
+        columns, target = _spectra(everything, base, prepared)
     except StudyError:
         return []
     own = [key for key in known.values if key in columns]
-    fixed = [key for key in own if key in held]
+    fixed = [key for key in own if key not in base.fit.keys]
     target = target - sum((float(known.values[k] or 0.0) * columns[k] for k in fixed), np.zeros(len(target)))
-    free = [key for key in own if key not in held]
+    free = [key for key in own if key in base.fit.keys]
     found: list[tuple[float, PairStart]] = []
     for one, other in combinations([n for n, e in entries.items() if set(e.term.symbols) <= set(columns)], 2):
         keys = [*free, *entries[one].term.symbols, *entries[other].term.symbols]
@@ -90,11 +83,11 @@ def _of_the_reverse_system(
 
 
 def _of_the_sensitivities(
-    entries: Mapping[str, ModelTerm], base: Baseline, record: Record, how: Plan
+    entries: Mapping[str, ModelTerm], base: Baseline, prepared: Prepared
 ) -> list[PairStart]:  # fmt: skip
     """Pairs with coefficients of zero beside the fitted model; best first."""
-    known, residual = base.found.model, base.found.residual
-    tried = {n: sensitivity(e.term, tuple(float(p or 0.0) for p in e.parameters), base, record, how)
+    known, residual = base.fit.model, base.fit.residual
+    tried = {n: sensitivity(e.term, tuple(float(p or 0.0) for p in e.parameters), base, prepared)
              for n, e in entries.items()}  # fmt: skip
     columns = {name: added for name, added in tried.items() if added is not None}
     found: list[tuple[float, PairStart]] = []
@@ -111,19 +104,18 @@ def _best(found: list[tuple[float, PairStart]]) -> list[PairStart]:
     return [start for _, start in sorted(found, key=lambda f: f[0])[:TRIED]]
 
 
-def _spectra(model: Model, base: Baseline, record: Record, how: Plan) -> tuple[dict[str, Floats], Floats]:
+def _spectra(model: Model, base: Baseline, prepared: Prepared) -> tuple[dict[str, Floats], Floats]:
     """Spectra of each coefficient's unit force, and of the measured force, as the response would show them.
 
     Real and imaginary parts of the lines that the force drives, one array a key. Weighted with the linear
     receptance, so that noise on the response weighs as it does in a free run.
     """
-    completed = complete(record.part(*how.fit))
-    part = completed.record.part(completed.edge, len(completed.record) - completed.edge)
+    part = prepared.record.part(*prepared.inner(prepared.plan.fit))
     taper = get_window("hann", len(part))
     frequency = np.asarray(rfftfreq(len(part), part.dt))
     force = np.asarray(rfft(taper * part["force"]))
     loud = np.abs(force) ** 2 > FAINT * np.max(np.abs(force) ** 2)
-    keep = (frequency >= completed.band[0]) & (frequency <= frequency[loud][-1])
+    keep = (frequency >= prepared.band[0]) & (frequency <= frequency[loud][-1])
     omega = 2j * np.pi * frequency[keep]
     weight = base.transfer(np.where(omega == 0.0, omega[-1] / len(omega), omega))
     columns: dict[str, Floats] = {}

@@ -6,20 +6,19 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from study.compare.prediction import Prediction, predict
 from study.diagnose import pair_screening
-from study.diagnose.candidates import SHORT, THREADS
 from study.diagnose.pair_screening import PairStart
 from study.diagnose.ranking import Ranked
-from study.identify.time_domain import held_out
+from study.identify.time_domain.fit_model import TRIED
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.part_fit import fit_part
 from study.identify.time_domain.shape_search import Baseline
-from study.records.plan import Plan
-from study.records.record import Record
+from study.records.prepared import Prepared
+from study.support.cores import cores
 from study.support.errors import StudyError
 
-Floats = NDArray[np.float64]
 SAME = 1e-4  # of the unexplained power: pairs that leave less than this leave nothing
 
 
@@ -31,21 +30,19 @@ class Pair:
     ----------
     names : pair of str
         The one that explains more alone comes first.
-    found : FreeRunFit
+    fit : FreeRunFit
         The model with both.
-    residual : array, shape (samples to judge,)
-        Held-out residual.
+    prediction : Prediction
+        Its free run along the judging part.
     """
 
     names: tuple[str, str]
-    found: FreeRunFit
-    residual: Floats
+    fit: FreeRunFit
+    prediction: Prediction
 
 
-def best_pair(
-    rows: Sequence[Ranked], base: Baseline, record: Record, how: Plan, held: tuple[str, ...]
-) -> Pair | None:  # fmt: skip
-    """The pair that explains most for its number of unknowns, of those preselected.
+def best_pair(rows: Sequence[Ranked], base: Baseline, prepared: Prepared) -> Pair | None:
+    """The pair that explains most for its number of unknowns, of those that the screening puts first.
 
     Parameters
     ----------
@@ -53,30 +50,32 @@ def best_pair(
         The candidates, best first, with their shape parameters.
     base : Baseline
         The fitted model without them.
-    record, how
+    prepared : Prepared
         The record and which parts of it are fitted and judged.
-    held : tuple of str
-        Keys that keep the model's value.
     """
     order = {row.name: i for i, row in enumerate(rows)}
+    held = tuple(key for key in base.fit.model.values if key not in base.fit.keys)
 
     def one(start: PairStart) -> Pair | None:
         first, second = sorted(start.names, key=lambda name: order[name])
-        values = {key: v for key, v in start.model.values.items() if v is not None}
         try:
-            found = held_out.fit(start.model, record, how, held, values, SHORT)
-            return Pair((first, second), found, held_out.held_out_residual(found, record, how))
+            return pair_of((first, second), fit_part(start.model, prepared, held, max_iterations=TRIED), prepared)
         except StudyError:
             return None
 
-    with ThreadPoolExecutor(THREADS) as pool:
-        starts = pair_screening.promising(rows, base, record, how, held)
-        fits = [pair for pair in pool.map(one, starts) if pair is not None]
-    power = float(np.mean(base.found.residual**2))
-    return min(fits, key=lambda pair: _misfit(pair, power), default=None)
+    with ThreadPoolExecutor(cores()) as pool:
+        pairs = [pair for pair in pool.map(one, pair_screening.promising(rows, base, prepared)) if pair is not None]
+    power = float(np.mean(base.fit.residual**2))
+    return min(pairs, key=lambda pair: _misfit(pair, power), default=None)
+
+
+def pair_of(names: tuple[str, str], fit: FreeRunFit, prepared: Prepared) -> Pair | None:
+    """Two effects fitted together, with their prediction; None where its free run does not stay finite."""
+    prediction = predict(fit, prepared)
+    return None if prediction.diverged else Pair(names, fit, prediction)
 
 
 def _misfit(pair: Pair, before: float) -> float:
     """Both parts of the record together, with the price of each unknown (Schwarz, 1978); lower is better."""
-    left = np.concatenate([pair.found.residual, pair.residual])
-    return len(left) * math.log(float(np.mean(left**2)) + SAME * before) + len(pair.found.keys) * math.log(len(left))
+    left = np.concatenate([pair.fit.residual, pair.prediction.residual])
+    return len(left) * math.log(float(np.mean(left**2)) + SAME * before) + len(pair.fit.keys) * math.log(len(left))

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from study.compare.prediction import Prediction
 from study.diagnose import constancy
-from study.diagnose.candidates import Trial
+from study.diagnose.candidates import Candidate
 from study.diagnose.constancy import Curve
 from study.equations.terms import Term
-from study.identify.time_domain import held_out
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.records.plan import Plan, shortened
-from study.records.record import Record
+from study.identify.time_domain.part_fit import linearise
+from study.records.prepared import Prepared
 from study.support import statistics
 from study.support.statistics import Gain
 
@@ -39,14 +39,12 @@ class Ranked:
     ----------
     term : Term
         The effect.
-    found : FreeRunFit
+    fit : FreeRunFit
         The model with it.
     gain : Gain
         What it explains of the held-out residual, with the p value of one comparison.
     p_value : float
         The same with the number of candidates accounted for (Bonferroni).
-    response_error : float
-        Held-out rms residual over rms response, after adding it.
     coefficient, error : float
         Its size (amplitude, for an effect of any phase) and standard error.
     parameters : dict
@@ -59,15 +57,13 @@ class Ranked:
         The coefficient along amplitude.
     tied_with : tuple of str
         Candidates that this record cannot tell from it.
-    residual : array
-        Held-out residual.
     """
 
     term: Term
-    found: FreeRunFit
+    fit: FreeRunFit
+    prediction: Prediction
     gain: Gain
     p_value: float
-    response_error: float
     coefficient: float
     error: float
     parameters: dict[str, float]
@@ -75,12 +71,21 @@ class Ranked:
     flatness: Curve | None
     steadiness: Curve | None
     tied_with: tuple[str, ...]
-    residual: Floats
 
     @property
     def name(self) -> str:
         """Name of the term."""
         return self.term.name
+
+    @property
+    def residual(self) -> Floats:
+        """Held-out residual."""
+        return self.prediction.residual
+
+    @property
+    def response_error(self) -> float:
+        """Rms of the held-out residual over that of the response."""
+        return self.prediction.error
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -93,37 +98,37 @@ class Ranked:
         return changes(self.flatness, self.steadiness)
 
 
-def rank(trials: Sequence[Trial], before: Floats, record: Record, how: Plan) -> list[Ranked]:
+def rank(candidates: Sequence[Candidate], before: Floats, prepared: Prepared) -> list[Ranked]:
     """Candidates by what they leave of the held-out residual, ties by how few unknowns they need.
 
     Parameters
     ----------
-    trials : sequence of Trial
-        Every candidate, fitted and judged.
+    candidates : sequence of Candidate
+        Every one, fitted and judged.
     before : array, shape (samples to judge,)
         Held-out residual without any of them.
-    record, how
+    prepared : Prepared
         The record and which parts of it are fitted and judged.
     """
-    size = float(np.std(record[how.response][how.judge[0] : how.judge[1]]))
-    rows = [_row(t, before, len(trials), size, record, how) for t in trials]
+    rows = [_row(candidate, before, len(candidates), prepared) for candidate in candidates]
     rows.sort(key=lambda r: float(r.residual @ r.residual))
     rows = _ties_by_simplicity(rows)
-    rows = [_examined(row, record, how) if i < EXAMINED else row for i, row in enumerate(rows)]
+    rows = [_examined(row, prepared) if i < EXAMINED else row for i, row in enumerate(rows)]
     rows = _simple_first(_constant_first(rows))
     return [replace(row, tied_with=_tied(row, rows)) for row in rows]
 
 
-def _row(trial: Trial, before: Floats, count: int, size: float, record: Record, how: Plan) -> Ranked:
-    gain = statistics.gain(before, trial.residual)
-    covariance = statistics.clustered_covariance(_jacobian(trial.found, record, how), trial.found.residual)
-    coefficient, error, parameters, errors = _amount(trial, covariance)
+def _row(candidate: Candidate, before: Floats, count: int, prepared: Prepared) -> Ranked:
+    fit = candidate.fit
+    gain = statistics.gain(before, candidate.prediction.residual)
+    covariance = statistics.clustered_covariance(linearise(fit, prepared), fit.residual)
+    coefficient, error, parameters, errors = _amount(candidate, covariance)
     return Ranked(
-        term=trial.term,
-        found=trial.found,
+        term=candidate.term,
+        fit=fit,
+        prediction=candidate.prediction,
         gain=gain,
         p_value=min(1.0, gain.p_value * count),
-        response_error=float(np.sqrt(np.mean(trial.residual**2))) / size,
         coefficient=coefficient,
         error=error,
         parameters=parameters,
@@ -131,20 +136,14 @@ def _row(trial: Trial, before: Floats, count: int, size: float, record: Record, 
         flatness=None,
         steadiness=None,
         tied_with=(),
-        residual=trial.residual,
     )
 
 
-def _jacobian(found: FreeRunFit, record: Record, how: Plan) -> Floats:
-    """Derivatives on the samples that this candidate was fitted on: of a long record, the first ones."""
-    return held_out.linearise(found, record, shortened(how, len(found.residual)))
-
-
-def _amount(trial: Trial, covariance: Floats) -> tuple[float, float, dict[str, float], dict[str, float]]:
+def _amount(candidate: Candidate, covariance: Floats) -> tuple[float, float, dict[str, float], dict[str, float]]:
     """Coefficient and shape parameters of the candidate with standard errors."""
-    found, term = trial.found, trial.term
-    place = {key: i for i, key in enumerate(found.keys)}
-    values = {key: float(found.values[i]) for key, i in place.items()}
+    fit, term = candidate.fit, candidate.term
+    place = {key: i for i, key in enumerate(fit.keys)}
+    values = {key: float(fit.values[i]) for key, i in place.items()}
     errors = {key: math.sqrt(max(float(covariance[i, i]), 0.0)) for key, i in place.items()}
     names = {p.name: f"{term.name}.{p.name}" for p in term.parameters}
     parameters = {name: values[key] for name, key in names.items() if key in values}
@@ -167,8 +166,8 @@ def _unknowns(row: Ranked) -> int:
 
 def _misfit(row: Ranked) -> float:
     """Both parts of the record together, with the price of each unknown (Schwarz, 1978); lower is better."""
-    power = float(row.residual @ row.residual) + float(row.found.residual @ row.found.residual)
-    n = len(row.residual) + len(row.found.residual)
+    power = float(row.residual @ row.residual) + float(row.fit.residual @ row.fit.residual)
+    n = len(row.residual) + len(row.fit.residual)
     return n * math.log(max(power, 1e-300)) + _unknowns(row) * math.log(n)
 
 
@@ -215,10 +214,10 @@ def _distance(row: Ranked, other: Ranked) -> float:
     if row is other:
         return 0.0
     held_out = statistics.difference(row.residual, other.residual)
-    if len(row.found.residual) != len(other.found.residual):
+    if len(row.fit.residual) != len(other.fit.residual):
         return held_out
     both = statistics.difference(
-        np.concatenate([row.found.residual, row.residual]), np.concatenate([other.found.residual, other.residual])
+        np.concatenate([row.fit.residual, row.residual]), np.concatenate([other.fit.residual, other.residual])
     )
     return max(held_out, both)
 
@@ -254,20 +253,20 @@ def _alike(one: Ranked, other: Ranked) -> bool:
     return apart < ALIKE**2 * nearer or apart * size**2 < RESOLUTION**2 * power
 
 
-def _examined(row: Ranked, record: Record, how: Plan) -> Ranked:
+def _examined(row: Ranked, prepared: Prepared) -> Ranked:
     """Follow the candidate's coefficient along frequency and amplitude."""
-    flatness, steady = curves(row.found, row.term, record, how)
+    flatness, steady = curves(row.fit, row.term, prepared)
     return replace(row, flatness=flatness, steadiness=steady)
 
 
-def curves(found: FreeRunFit, term: Term, record: Record, how: Plan) -> tuple[Curve | None, Curve | None]:
+def curves(fit: FreeRunFit, term: Term, prepared: Prepared) -> tuple[Curve | None, Curve | None]:
     """The coefficient of a term in a fitted model along frequency and along amplitude.
 
     None where it is zero, or the model's other coefficients could do all that it does.
     """
-    jacobian = _jacobian(found, record, how)
-    columns = [found.keys.index(s) for s in term.symbols]
-    direction = found.values[columns]
+    jacobian = linearise(fit, prepared)
+    columns = [fit.keys.index(s) for s in term.symbols]
+    direction = fit.values[columns]
     size = float(np.linalg.norm(direction))
     if size == 0.0:
         return None, None
@@ -278,8 +277,8 @@ def curves(found: FreeRunFit, term: Term, record: Record, how: Plan) -> tuple[Cu
     alone = own - basis @ (basis.T @ own)
     if np.linalg.norm(alone) <= INDISTINCT * np.linalg.norm(own):
         return None, None
-    along = constancy.along_frequency(alone, found.residual, size, record.dt)
-    classes = constancy.along_amplitude(alone, found.residual, size)
+    along = constancy.along_frequency(alone, fit.residual, size, prepared.dt)
+    classes = constancy.along_amplitude(alone, fit.residual, size)
     return _unless_empty(along), _unless_empty(classes)
 
 

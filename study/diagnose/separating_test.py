@@ -7,8 +7,7 @@ import numpy as np
 from study.diagnose.ranking import Ranked
 from study.equations.free_run import prepare
 from study.figures.labels import term_names
-from study.records.plan import Plan
-from study.records.record import Record
+from study.records.prepared import Prepared
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 
@@ -17,20 +16,20 @@ DISTINCT = 5.0  # standard errors by which the responses must differ
 LONGEST = 16384  # samples simulated
 
 
-def separating_level(one: Ranked, other: Ranked, record: Record, how: Plan) -> float | None:
+def separating_level(one: Ranked, other: Ranked, prepared: Prepared) -> float | None:
     """The first factor on the force at which the two models would be told apart by a record of this length.
 
     The second model may adjust all of its coefficients to what the first one does; what it still cannot
     follow is held against the noise of this record, taken as white. None where no tried level separates.
     """
     noise = float(np.mean(one.residual**2))
-    span = (how.fit[0], min(how.fit[1], how.fit[0] + LONGEST))
+    record, response, span = prepared.record, prepared.response, prepared.shortened(LONGEST).plan.fit
     for level in LEVELS:
         louder = record.with_channels({"force": level * record["force"]})
         try:
-            target = prepare(one.found.model, louder, response=how.response, span=span).respond({}, (0.0, 0.0))[0]
-            run = prepare(other.found.model, louder, other.found.keys, response=how.response, span=span)
-            values = dict(zip(other.found.keys, (float(v) for v in other.found.values), strict=True))
+            target = prepare(one.fit.model, louder, response=response, span=span).respond({}, (0.0, 0.0))[0]
+            run = prepare(other.fit.model, louder, other.fit.keys, response=response, span=span)
+            values = dict(zip(other.fit.keys, (float(v) for v in other.fit.values), strict=True))
             nearest, jacobian = run.respond(values, (0.0, 0.0))
         except StudyError:
             continue
@@ -42,16 +41,18 @@ def separating_level(one: Ranked, other: Ranked, record: Record, how: Plan) -> f
     return None
 
 
-def advice(rows: Sequence[Ranked], record: Record, how: Plan) -> str:
+def advice(rows: Sequence[Ranked], prepared: Prepared) -> str:
     """A sentence on the tie of the first candidate, or nothing if there is none."""
     if not rows or not rows[0].tied_with:
         return ""
     rival = next((r for r in rows if r.name == rows[0].tied_with[0]), None)
     if rival is None:
         return ""
-    level = separating_level(rows[0], rival, record, how)
+    level = separating_level(rows[0], rival, prepared)
     names = f"{term_names(rows[0].name)} and {term_names(rival.name)}"
     if level is None:
-        other = "another kind of test" if how.response == "displacement" else "the displacement, its mean included,"
+        other = (
+            "another kind of test" if prepared.response == "displacement" else "the displacement, its mean included,"
+        )
         return f"No level from a quarter to five times this one would tell {names} apart; {other} is needed."
     return f"To tell {names} apart, excite at {level:g} times this level."

@@ -1,4 +1,4 @@
-"""The whole diagnosis: fit, try every candidate, and say what the record bears - no less, no more."""
+"""The whole diagnosis: try every candidate, and say what the record bears - no less, no more."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -6,18 +6,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from study.compare.comparison import Comparison
+from study.compare.prediction import Prediction
 from study.diagnose import candidates, dependence, pairs
+from study.diagnose.candidates import Candidate
 from study.diagnose.pairs import Pair
 from study.diagnose.ranking import UNSTEADY, Ranked, changes, curves, rank, wavers
-from study.equations.model import Model
 from study.equations.terms import Term
-from study.identify.time_domain import held_out, shape_search
-from study.identify.time_domain.fit_model import fit_model
+from study.identify.time_domain import shape_search
+from study.identify.time_domain.fit_model import continued
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.part_fit import fit_part
 from study.identify.time_domain.shape_search import Baseline
 from study.records import noise_floor
-from study.records.plan import Plan, shortened
-from study.records.record import Record
+from study.records.prepared import Prepared
 from study.support import statistics
 from study.support.errors import DivergenceError
 
@@ -31,13 +33,13 @@ LEFT = 0.0075  # of the rms response: structure that may be left beside a candid
 FORGIVEN = 0.1  # of the unexplained power: what explains less of a good model's must have a coefficient that stays
 ENOUGH = 0.99  # of the unexplained power: what explains so much is missing, whatever is missing besides
 LACK = 0.03  # held-out share of a residual that general shapes of the motion must explain to be more than chance
-CHANCE = 1e-3  # ... and of the p value of a single one of these shapes, all of them accounted for
+CHANCE = 1e-3  # p value of a single one of these shapes, all of them accounted for
 SEARCHED = 16384  # samples of the fitting part that the search uses
-REFITTED = 6  # ... after which the best so many are fitted on the whole of it
+SETTLED = 6  # of the candidates, the best: fitted on the whole fitting part and with enough steps
 PAIRED = 1  # the best so many candidates are tried together with every other
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Diagnosis:
     """What is missing.
 
@@ -45,14 +47,8 @@ class Diagnosis:
     ----------
     verdict : str
         ``missing_effect``, ``nothing_missing`` or ``unknown_effect``.
-    found : FreeRunFit
-        The model as it was given, fitted.
-    residual : array, shape (samples to judge,)
-        Its held-out residual; the response itself where its free run does not stay finite.
-    response_error : float
-        Its rms over that of the response.
-    noise : float
-        Noise floor over the rms of the response.
+    comparison : Comparison
+        The model as it was given, with its fit, its error and its noise floor.
     candidates : tuple of Ranked
         Best first.
     left : float
@@ -61,26 +57,18 @@ class Diagnosis:
         Two effects that explain together what none does alone; empty otherwise.
     families : dict
         For an unknown effect: held-out share that functions of displacement, velocity, ... explain.
-    diverged : bool
-        Whether the free run of the model as it was given does not stay finite.
     """
 
     verdict: str
-    found: FreeRunFit
-    residual: Floats
-    response_error: float
-    noise: float
+    comparison: Comparison
     candidates: tuple[Ranked, ...]
     left: float
     pair: tuple[str, ...]
     families: dict[str, float]
-    diverged: bool = False
 
 
 def diagnose(
-    model: Model,
-    record: Record,
-    how: Plan,
+    comparison: Comparison,
     *,
     extra: Sequence[Term] = (),
     without: Sequence[str] = (),
@@ -90,91 +78,65 @@ def diagnose(
 
     Parameters
     ----------
-    model : Model
-        The equation believed in; given values are held, the rest is fitted.
-    record : Record
-        Force and response.
-    how : Plan
-        What is fitted and what is judged.
+    comparison : Comparison
+        The equation believed in, fitted to a record: what it holds is held, the rest is fitted.
     extra : sequence of Term
         The user's own candidates.
     without : sequence of str
         Terms of the library to leave out.
     progress : callable, optional
         Called with the number of candidates done.
-
-    Raises
-    ------
-    StudyError
-        If the model cannot be fitted to the record.
     """
-    held = model.held_keys
-    found, finer = fit_model(model, record, how)
-    if finer != how:  # the candidates are told apart at the plan's own steps, and so is the model without them
-        try:
-            found = held_out.fit(found.model, record, how, held, found.model.numbers())
-        except DivergenceError:  # stiff: nothing runs with fewer steps
-            how = finer
-    residual, diverged = _held_out(found, record, how)
-    short = shortened(how, SEARCHED)
-    base = shape_search.baseline(_refitted(found, record, how, short, held), record, short)
-    terms = candidates.candidate_terms(base, extra, without)
-    trials = candidates.try_all(terms, base, record, short, held, progress)
-    if short != how:
-        trials.sort(key=lambda t: float(t.residual @ t.residual))
-        best = [candidates.refitted(t, record, how, held) for t in trials[:REFITTED]]
-        trials = best + trials[REFITTED:]
-    rows = rank(trials, residual, record, how)
-    size = float(np.std(record[how.response][how.judge[0] : how.judge[1]]))
-    noise = _floor([residual, *(r.residual for r in rows[:3])], record.dt)
-    verdict, rows, left, pair = _decide(rows, base, residual, size, record, how, held)
-    families = (
-        dependence.explained_by(dependence.leftover(base.found, base, record, short)) if verdict == UNKNOWN else {}
-    )
-    return Diagnosis(
-        verdict, found, residual, float(np.sqrt(np.mean(residual**2))) / size,
-        noise / size, tuple(rows), left, pair, families, diverged,
-    )  # fmt: skip
+    prepared = comparison.prepared
+    base = search_base(comparison)
+    look = prepared.shortened(SEARCHED)
+    tried = candidates.try_all(candidates.candidate_terms(base, extra, without), base, look, progress)
+    rows = rank(with_best_settled(tried, prepared), comparison.prediction.residual, prepared)
+    verdict, rows, left, pair = _decide(rows, base, comparison)
+    families = dependence.explained_by(dependence.leftover(base, look)) if verdict == UNKNOWN else {}
+    return Diagnosis(verdict, comparison, tuple(rows), left, pair, families)
 
 
-def _held_out(found: FreeRunFit, record: Record, how: Plan) -> tuple[Floats, bool]:
-    """Held-out residual; all of the response where the free run does not stay finite: then it predicts nothing."""
+def search_base(comparison: Comparison) -> Baseline:
+    """The fitted model as candidates are tried beside it: on no more samples, in no more steps, than a search takes."""
+    look = comparison.prepared.shortened(SEARCHED)
+    return shape_search.baseline(_at_search_steps(comparison.fit, look), look)
+
+
+def _at_search_steps(fit: FreeRunFit, look: Prepared) -> FreeRunFit:
+    """A fit on the stretch that the search uses, from where it stands."""
+    held = tuple(key for key in fit.model.values if key not in fit.keys)
     try:
-        return held_out.held_out_residual(found, record, how), False
-    except DivergenceError:
-        measured = record[how.response][slice(*how.judge)]
-        return measured - float(np.mean(measured)), True
+        return fit_part(fit.model, look, held)
+    except DivergenceError:  # stiff: nothing runs with fewer steps
+        return fit_part(fit.model, look, held, steps=fit.steps_per_sample)
 
 
-def _refitted(found: FreeRunFit, record: Record, how: Plan, short: Plan, held: tuple[str, ...]) -> FreeRunFit:
-    """The fit on the stretch that the search uses."""
-    return found if short == how else held_out.fit(found.model, record, short, held, found.model.numbers())
-
-
-def _floor(residuals: Sequence[Floats], dt: float) -> float:
-    """The lowest noise floor that any of the fits shows."""
-    return min(noise_floor.floor(r, dt).noise for r in residuals)
+def with_best_settled(tried: Sequence[Candidate], prepared: Prepared) -> list[Candidate]:
+    """The best candidates fitted as they would be if they were added, then the others."""
+    ordered = sorted(tried, key=lambda c: float(c.prediction.residual @ c.prediction.residual))
+    return candidates.all_settled(ordered[:SETTLED], prepared) + ordered[SETTLED:]
 
 
 def _decide(
-    rows: list[Ranked], base: Baseline, residual: Floats, size: float, record: Record, how: Plan, held: tuple[str, ...]
+    rows: list[Ranked], base: Baseline, comparison: Comparison
 ) -> tuple[str, list[Ranked], float, tuple[str, ...]]:
     """Verdict, candidates in their final order, what is left, and the pair that explains it if none does alone."""
-    credible = [r for r in rows if _credible(r, residual, size)]
+    prediction = comparison.prediction
+    credible = [r for r in rows if _credible(r, prediction)]
     if not credible:
-        error = float(np.sqrt(np.mean(residual**2))) / size
-        left = max(_left(residual, size, record.dt), _lack(base.found, error, record, how))
+        left = max(_left(prediction), _lack(comparison.fit, prediction))
         return (UNKNOWN if left > NEGLIGIBLE else NOTHING), rows, left, ()
     first = credible[0]
-    left = max(_left(first.residual, size, record.dt), _lack(first.found, first.response_error, record, how))
+    left = max(_left(first.prediction), _lack(first.fit, first.prediction))
     if first.gain.explained >= ENOUGH or (left <= LEFT and _steady(first)):
         return MISSING, rows, left, ()
     slight = first.response_error <= LEFT  # two effects that explain little alone explain little together
-    pair = None if slight else _explaining_pair(rows, base, size, record, how, held)
+    pair = None if slight else _explaining_pair(rows, base, comparison.prepared)
     if pair is None:
         return UNKNOWN, rows, left, ()
     first = next(r for r in rows if r.name == pair.names[0])
-    return MISSING, [first] + [r for r in rows if r is not first], _left(pair.residual, size, record.dt), pair.names
+    return MISSING, [first] + [r for r in rows if r is not first], _left(pair.prediction), pair.names
 
 
 def _steady(row: Ranked) -> bool:
@@ -188,62 +150,57 @@ def _steady(row: Ranked) -> bool:
     return row.gain.explained >= FORGIVEN or row.unsteadiness <= UNSTEADY
 
 
-def _credible(row: Ranked, residual: Floats, size: float) -> bool:
-    gained = max(float(np.mean(residual**2) - np.mean(row.residual**2)), 0.0)
-    return row.p_value < LEVEL and gained > (SMALLEST_GAIN * size) ** 2
+def _credible(row: Ranked, before: Prediction) -> bool:
+    gained = max(float(np.mean(before.residual**2) - np.mean(row.residual**2)), 0.0)
+    return row.p_value < LEVEL and gained > (SMALLEST_GAIN * before.size) ** 2
 
 
-def _left(residual: Floats, size: float, dt: float) -> float:
+def _left(prediction: Prediction) -> float:
     """Rms of the structure in a residual over the rms response; zero where noise alone would show as much."""
-    found = noise_floor.floor(residual, dt)
-    return float(np.sqrt(found.excess)) / size if found.significance > SIGNIFICANT else 0.0
+    floor = noise_floor.floor(prediction.difference, prediction.dt, prediction.low)
+    return float(np.sqrt(floor.excess)) / prediction.size if floor.significance > SIGNIFICANT else 0.0
 
 
-def _explaining_pair(
-    rows: list[Ranked], base: Baseline, size: float, record: Record, how: Plan, held: tuple[str, ...]
-) -> Pair | None:
+def _explaining_pair(rows: list[Ranked], base: Baseline, prepared: Prepared) -> Pair | None:
     """Two effects that explain together what the first does not alone, or None.
 
     First the best of those that the reverse system puts first; then the first candidates with every other.
     """
-    short = shortened(how, SEARCHED)
-    found = pairs.best_pair(rows, base, record, short, held)
-    if found is not None and _explains(found, rows, size, record, short):
-        return found
+    look = prepared.shortened(SEARCHED)
+    pair = pairs.best_pair(rows, base, look)
+    if pair is not None and _explains(pair, rows, look):
+        return pair
     for row in rows[:PAIRED]:
-        beside = shape_search.baseline(_refitted(row.found, record, how, short, held), record, short)
-        others = [r.term for r in rows if r.name != row.name]
-        seconds = candidates.try_all(others, beside, record, short, held)
-        second = min(seconds, key=lambda t: float(t.residual @ t.residual), default=None)
+        beside = shape_search.baseline(_at_search_steps(row.fit, look), look)
+        seconds = candidates.try_all([r.term for r in rows if r.name != row.name], beside, look)
+        second = min(seconds, key=lambda c: float(c.prediction.residual @ c.prediction.residual), default=None)
         if second is not None:
-            found = Pair((row.name, second.term.name), second.found, second.residual)
-            if _explains(found, rows, size, record, short):
-                return found
+            pair = Pair((row.name, second.term.name), second.fit, second.prediction)
+            if _explains(pair, rows, look):
+                return pair
     return None
 
 
-def _explains(pair: Pair, rows: list[Ranked], size: float, record: Record, how: Plan) -> bool:
+def _explains(pair: Pair, rows: list[Ranked], prepared: Prepared) -> bool:
     """Whether a pair leaves no structure, does more than the first alone, and neither coefficient moves."""
-    more = statistics.gain(rows[0].residual, pair.residual).p_value * len(rows) < LEVEL
-    if not more or _left(pair.residual, size, record.dt) > LEFT:
-        return False
-    error = float(np.sqrt(np.mean(pair.residual**2))) / size
-    if _lack(pair.found, error, record, how) > LEFT:
+    prediction = pair.prediction
+    more = statistics.gain(rows[0].residual, prediction.residual).p_value * len(rows) < LEVEL
+    if not more or max(_left(prediction), _lack(pair.fit, prediction)) > LEFT:
         return False
     terms = [r.term for r in rows if r.name in pair.names]
-    followed = [curves(pair.found, term, record, how) for term in terms]
-    if error <= LEFT:
+    followed = [curves(pair.fit, term, prepared) for term in terms]
+    if prediction.error <= LEFT:
         return all(changes(*both) <= UNSTEADY for both in followed)
     return not any(wavers(steadiness) for _, steadiness in followed)
 
 
-def _lack(found: FreeRunFit, error: float, record: Record, how: Plan) -> float:
+def _lack(fit: FreeRunFit, prediction: Prediction) -> float:
     """Rms over that of the response which general shapes of the motion and of its past explain of a residual.
 
     Structure that is as broad as noise is not seen in a spectrum; it still depends on the motion.
     """
-    short = shortened(how, len(found.residual))
-    left = dependence.leftover(found, shape_search.baseline(found, record, short), record, short)
+    look = prediction.prepared.shortened(min(len(fit.residual), SEARCHED))
+    left = dependence.leftover(shape_search.baseline(continued(fit, look), look), look)
     shares = dependence.explained_by(left)
     share = max(share for name, share in shares.items() if name != "time")
-    return error * float(np.sqrt(max(share if share > LACK else 0.0, dependence.significant(left, CHANCE))))
+    return prediction.error * float(np.sqrt(max(share if share > LACK else 0.0, dependence.significant(left, CHANCE))))

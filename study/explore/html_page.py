@@ -146,15 +146,16 @@ def template() -> Template:
 def variables(session: Session, live: bool) -> dict[str, Any]:
     """What the template needs beside the panels."""
     return {
-        "record": session.record.name, "model": session.now.model.name, "live": live, "style": _text("page.css"),
-        "script": _text("page.js"), "steps": [words.name(r, i) for i, r in enumerate(session.rungs)],
+        "record": session.prepared.record.name, "model": session.now.model.name, "live": live,
+        "style": _text("page.css"), "script": _text("page.js"),
+        "steps": [words.name(r, i) for i, r in enumerate(session.rungs)],
         "diagnosed": live or any(r.diagnosis is not None for r in session.rungs),
     }  # fmt: skip
 
 
 def title(session: Session) -> str:
     """Title of the page."""
-    return f"{session.record.name}: {session.now.model.name}"
+    return f"{session.prepared.record.name}: {session.now.model.name}"
 
 
 def _text(name: str) -> str:

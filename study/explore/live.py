@@ -76,7 +76,7 @@ class Watcher:
     def _zoomed(self, event: RangesUpdate) -> None:
         """Draw a stretch of a long record with the samples that the screen has room for."""
         first, last = event.x0, event.x1
-        if len(self.shown.now.comparison.judged.time) <= 2 * decimate.BUCKETS:
+        if len(self.shown.now.comparison.prediction.time) <= 2 * decimate.BUCKETS:
             return
         if first is not None and last is not None and math.isfinite(last - first) and last > first:
             self._refine((first, last))
@@ -85,6 +85,6 @@ class Watcher:
         self.span = span
         rung = self.shown.now
         found, scales = rung.comparison, scales_of(rung.comparison)
-        rows = preview.difference(found, rung.shown, scales, within(found, span))
+        rows = preview.difference(rung.shown, scales, within(found, span))
         self.page.sources["would_time"].data = rows
         self.page.sources["time"].data = over_time(found, scales, span)

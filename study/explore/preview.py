@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from study.compare.comparison import Comparison
 from study.compare.force_map import CLASSES, curve, surface
-from study.compare.missing_force import Restoring
+from study.compare.missing_force import MissingForce
 from study.compare.noise import segments_of
 from study.diagnose.ranking import Ranked
 from study.explore import decimate
@@ -27,7 +27,7 @@ def columns(rung: Rung, scales: "Scales") -> dict[str, Columns]:
     found, rows = rung.comparison, rung.shown
     lacking = [rung.would[row.name] for row in rows]
     return {
-        "would_time": difference(found, rows, scales),
+        "would_time": difference(rows, scales),
         "would_spectrum": {str(i): _spectrum(found, row, scales) for i, row in enumerate(rows)},
         "would_u": _curves([(r.displacement, r) for r in lacking], scales.displacement.factor, scales.force.factor),
         "would_v": _curves([(r.velocity, r) for r in lacking], scales.velocity.factor, scales.force.factor),
@@ -35,7 +35,7 @@ def columns(rung: Rung, scales: "Scales") -> dict[str, Columns]:
     }
 
 
-def _curves(lacking: Sequence[tuple[Floats, Restoring]], along: float, factor: float) -> Columns:
+def _curves(lacking: Sequence[tuple[Floats, MissingForce]], along: float, factor: float) -> Columns:
     """A curve for each candidate, all of one length: what is short ends without value."""
     found: Columns = {}
     for i, (values, force) in enumerate(lacking):
@@ -45,18 +45,18 @@ def _curves(lacking: Sequence[tuple[Floats, Restoring]], along: float, factor: f
     return found
 
 
-def _map(lacking: Restoring) -> Floats:
+def _map(lacking: MissingForce) -> Floats:
     return surface(*(x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force))).mean.ravel()
 
 
-def difference(found: Comparison, rows: Sequence[Ranked], scales: "Scales", part: slice = slice(None)) -> Columns:
+def difference(rows: Sequence[Ranked], scales: "Scales", part: slice = slice(None)) -> Columns:
     """The difference that each candidate would leave, over time."""
     factor = scales.difference.factor
-    return {str(i): decimate.extremes(found.judged.above(row.residual)[part]) / factor for i, row in enumerate(rows)}
+    return {str(i): decimate.extremes(row.residual[part]) / factor for i, row in enumerate(rows)}
 
 
 def _spectrum(found: Comparison, row: Ranked, scales: "Scales") -> Floats:
     cut = segments_of(len(row.residual))
-    frequency, density = autospectrum(row.residual, found.judged.dt, cut)
+    frequency, density = autospectrum(row.residual, found.prediction.dt, cut)
     keep = (frequency > 0.0) & (frequency <= found.force.highest)
     return np.sqrt(density[keep]) / scales.difference.factor

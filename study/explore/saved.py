@@ -50,7 +50,7 @@ def saved(session: Session) -> bytes:
 def of_comparison(found: Comparison) -> bytes:
     """The same of a comparison alone, which nobody has diagnosed."""
     rung = Rung(found.model, "as given", None, found)
-    return saved(Session(found.record, found.how, None, (rung,)))
+    return saved(Session(found.prepared, (rung,)))
 
 
 def _marked(ladder: Columns, place: int) -> Columns:

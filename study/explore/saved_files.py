@@ -39,5 +39,5 @@ def files(session: Session, name: str, text: str) -> dict[str, bytes]:
     }
     found |= pictures(now.comparison) | ladder_pictures(steps, stem)
     if now.diagnosis is not None:
-        found |= diagnosis_files(now.diagnosis, now.comparison, now.said)
+        found |= diagnosis_files(now.diagnosis, now.said)
     return found

@@ -9,20 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from study.compare.comparison import Comparison, compare, lacking_with
+from study.compare.comparison import Comparison, compare
 from study.compare.comparison_report import rung as ladder_step
-from study.compare.missing_force import Restoring
+from study.compare.missing_force import MissingForce, missing_force
 from study.diagnose import candidates
-from study.diagnose.candidates import Trial
+from study.diagnose.candidates import Candidate
 from study.diagnose.diagnosis_files import in_words
 from study.diagnose.ranking import Ranked, rank
-from study.diagnose.verdict import Diagnosis, diagnose
+from study.diagnose.verdict import SEARCHED, Diagnosis, diagnose, search_base
 from study.equations import formulas
 from study.equations.model import Model
 from study.equations.terms import LIBRARY, Term, custom
-from study.identify.time_domain import held_out, shape_search
-from study.records.plan import Plan, shortened
-from study.records.record import Record
+from study.identify.time_domain.fit_model import continued, settled
+from study.records.prepared import Prepared
 from study.support.errors import StudyError
 
 Step = dict[str, Any]
@@ -58,7 +57,7 @@ class Rung:
     comparison: Comparison
     diagnosis: Diagnosis | None = None
     said: str = ""
-    would: Mapping[str, Restoring] = field(default_factory=dict[str, Restoring])
+    would: Mapping[str, MissingForce] = field(default_factory=dict[str, MissingForce])
 
     @property
     def shown(self) -> tuple[Ranked, ...]:
@@ -69,7 +68,7 @@ class Rung:
     @property
     def values(self) -> dict[str, float]:
         """Every value as fitted or held."""
-        return self.comparison.found.model.numbers()
+        return self.comparison.fit.model.numbers()
 
 
 @dataclass(frozen=True)
@@ -78,12 +77,8 @@ class Session:
 
     Attributes
     ----------
-    record : Record
-        As it was read.
-    how : Plan
-        What is fitted and what is judged.
-    cutoff : float or None
-        Frequency in hertz above which motions are integrated; None to have it found.
+    prepared : Prepared
+        The record, and what is fitted and judged of it.
     rungs : tuple of Rung
         From the model as given to the present one.
     own : tuple of Term
@@ -92,9 +87,7 @@ class Session:
         Steps of the ladder that was kept beside the model file.
     """
 
-    record: Record
-    how: Plan
-    cutoff: float | None
+    prepared: Prepared
     rungs: tuple[Rung, ...]
     own: tuple[Term, ...] = ()
     earlier: tuple[Step, ...] = ()
@@ -115,10 +108,8 @@ class Session:
 
 def begin(
     model: Model,
-    record: Record,
-    how: Plan,
+    prepared: Prepared,
     *,
-    cutoff: float | None = None,
     earlier: Sequence[Step] = (),
     progress: Told | None = None,
 ) -> Session:
@@ -129,14 +120,13 @@ def begin(
     StudyError
         If the model cannot be compared with the record.
     """
-    found = compare(model, record, how, cutoff=cutoff, progress=progress)
-    return Session(record, how, cutoff, (Rung(model, "as given", None, found),), earlier=tuple(earlier))
+    comparison = compare(model, prepared, progress=progress)
+    return Session(prepared, (Rung(model, "as given", None, comparison),), earlier=tuple(earlier))
 
 
-def climbed(session: Session, model: Model, label: str, start: Mapping[str, float], added: str | None) -> Session:
-    """The session with a model more, fitted from these values."""
-    found = compare(model, session.record, session.how, cutoff=session.cutoff, start=start)
-    return replace(session, rungs=(*session.rungs, Rung(model, label, added, found)))
+def climbed(session: Session, comparison: Comparison, label: str, added: str | None) -> Session:
+    """The session with a model more."""
+    return replace(session, rungs=(*session.rungs, Rung(comparison.model, label, added, comparison)))
 
 
 def candidate(session: Session, name: str) -> Ranked:
@@ -155,10 +145,11 @@ def candidate(session: Session, name: str) -> Ranked:
 
 
 def with_added(session: Session, name: str) -> Session:
-    """The session with a candidate added to the model, fitted from where its diagnosis left it."""
-    row = candidate(session, name)
-    model = session.now.model.with_term(row.term)
-    return climbed(session, model, f"+ {name}", row.found.model.numbers(), name)
+    """The session with a candidate added to the model, as its diagnosis fitted it."""
+    row, prepared = candidate(session, name), session.prepared
+    fit = settled(continued(row.fit, prepared), prepared)
+    comparison = compare(session.now.model.with_term(row.term), prepared, fit=fit)
+    return climbed(session, comparison, f"+ {name}", name)
 
 
 def undone(session: Session) -> Session:
@@ -183,14 +174,19 @@ def with_held(session: Session, key: str, hold: bool) -> Session:
         raise StudyError("m alone cannot be freed; a model of inertia alone has nothing to be fitted to")
     now = session.now.values
     model = session.now.model.with_values({**values, key: now[key] if hold else None})
-    return climbed(session, model, f"{key} {'held' if hold else 'free'}", now, None)
+    comparison = compare(model, session.prepared, start=now)
+    return climbed(session, comparison, f"{key} {'held' if hold else 'free'}", None)
 
 
 def examined(session: Session, progress: Callable[[int], None] | None = None) -> tuple[Rung, Diagnosis]:
     """The present rung with what is missing, in words too, and what each candidate would leave; and the diagnosis."""
-    record, how = session.record, session.how
-    found = diagnose(session.now.model, record, how, extra=session.own, progress=progress)
-    return _foreseen(replace(session.now, diagnosis=found, said=in_words(found, record, how))), found
+    found = diagnose(session.now.comparison, extra=session.own, progress=progress)
+    return _foreseen(replace(session.now, diagnosis=found, said=in_words(found))), found
+
+
+def lacking_with(row: Ranked) -> MissingForce:
+    """The force that the model with a candidate lacks."""
+    return missing_force(row.fit.model, (), row.prediction)
 
 
 def _foreseen(rung: Rung) -> Rung:
@@ -199,9 +195,9 @@ def _foreseen(rung: Rung) -> Rung:
     for row in rung.shown:
         if row.name not in would:
             try:
-                would[row.name] = lacking_with(rung.comparison, row.found)
+                would[row.name] = lacking_with(row)
             except StudyError:
-                would[row.name] = rung.comparison.restoring
+                would[row.name] = rung.comparison.missing_force
     return replace(rung, would=would)
 
 
@@ -228,7 +224,7 @@ def own_term(session: Session, text: str) -> Term:
         name = next(f"own_{i}" for i in range(1, len(taken) + 2) if f"own_{i}" not in taken)
         formula = text
     term = custom(name.strip(), formula.strip())
-    known = ("u", "v", "t", *session.record.extra)
+    known = ("u", "v", "t", *session.prepared.record.extra)
     for used in formulas.names(formula.strip()):
         if used not in known:
             raise StudyError(
@@ -243,15 +239,13 @@ def _no_response(term: Term) -> StudyError:
     return StudyError(f"the expression {term.components[0].shape!r} has no finite response on this record")
 
 
-def _attempted(term: Term, found: Diagnosis, session: Session) -> Trial:
+def _attempted(term: Term, session: Session) -> Candidate:
     """The present model with a term, fitted as the candidates of its diagnosis were."""
-    record, how, held = session.record, session.how, session.now.model.held_keys
-    short = shortened(how, len(found.candidates[-1].found.residual)) if found.candidates else how
-    fit = found.found if short == how else held_out.fit(found.found.model, record, short, held, session.now.values)
-    trial = candidates.attempt(term, shape_search.baseline(fit, record, short), record, short, held)
-    if trial is None:
+    prepared = session.prepared
+    candidate = candidates.attempt(term, search_base(session.now.comparison), prepared.shortened(SEARCHED))
+    if candidate is None:
         raise _no_response(term)
-    return trial if short == how else candidates.refitted(trial, record, how, held)
+    return candidates.all_settled([candidate], prepared)[0]
 
 
 def tried(session: Session, text: str) -> Session:
@@ -268,10 +262,10 @@ def tried(session: Session, text: str) -> Session:
     found = now.diagnosis
     if found is None:
         raise StudyError("the present model is still being diagnosed; a formula can be tried when that is done")
-    known = [Trial(r.term, r.found, r.residual) for r in found.candidates]
+    known = [Candidate(r.term, r.fit, r.prediction) for r in found.candidates]
     try:
         with np.errstate(all="ignore"):  # a formula may overflow: then it has no finite response
-            rows = rank([*known, _attempted(term, found, session)], found.residual, session.record, session.how)
+            rows = rank([*known, _attempted(term, session)], now.comparison.prediction.residual, session.prepared)
     except np.linalg.LinAlgError:
         raise _no_response(term) from None
     ranked = replace(found, candidates=tuple(rows))

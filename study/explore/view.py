@@ -95,7 +95,7 @@ def view(rung: Rung, step: int, live: bool = True) -> View:
     }
     least = least_force(found) / scales.force.factor
     small = {name: _small(c) for name, c in columns.items()}
-    return View(small, scales, found.force.highest, found.how.response, force_limits(found), least)
+    return View(small, scales, found.force.highest, found.plan.response, force_limits(found), least)
 
 
 def _small(columns: Columns) -> Columns:
@@ -114,14 +114,14 @@ def least_force(found: Comparison) -> float:
 
 def scales_of(found: Comparison) -> Scales:
     """Units in which the numbers of a comparison are easy to read."""
-    units, lacking = found.record.units, found.restoring
+    units, lacking = found.record.units, found.missing_force
     u, v = (float(np.max(np.abs(x))) for x in (lacking.displacement, lacking.velocity))
     least = least_force(found)
-    motion = rate if found.how.response != "displacement" else length
-    unit = units.get(found.how.response, "")
+    motion = rate if found.plan.response != "displacement" else length
+    unit = units.get(found.plan.response, "")
     return Scales(
-        response=motion(unit, float(np.max(np.abs(found.judged.measured)))),
-        difference=motion(unit, float(np.max(np.abs(found.judged.residual)))),
+        response=motion(unit, float(np.max(np.abs(found.prediction.measured)))),
+        difference=motion(unit, float(np.max(np.abs(found.prediction.residual)))),
         displacement=length(units.get("displacement", ""), u),
         velocity=rate(units.get("velocity", ""), v),
         force=power(units.get("force", ""), float(np.max(np.abs(lacking.force[lacking.inner]), initial=least))),
@@ -130,7 +130,7 @@ def scales_of(found: Comparison) -> Scales:
 
 def over_time(found: Comparison, scales: Scales, span: tuple[float, float] | None = None) -> Columns:
     """Measured and predicted response and their difference, over a span of time in seconds or all that is judged."""
-    judged, part = found.judged, within(found, span)
+    judged, part = found.prediction, within(found, span)
     return {
         "t": decimate.times(judged.time[part]),
         "measured": decimate.extremes(judged.measured[part]) / scales.response.factor,
@@ -141,7 +141,7 @@ def over_time(found: Comparison, scales: Scales, span: tuple[float, float] | Non
 
 def _close(found: Comparison, scales: Scales) -> Columns:
     """Every sample of the stretch where the model misses most."""
-    judged, near = found.judged, found.judged.closeup
+    judged, near = found.prediction, found.prediction.closeup
     factor = scales.response.factor
     return {
         "t": judged.time[near], "measured": judged.measured[near] / factor, "predicted": judged.predicted[near] / factor
@@ -152,15 +152,15 @@ def within(found: Comparison, span: tuple[float, float] | None) -> slice:
     """The samples of the judging part in a span of time and half of it to either side."""
     if span is None:
         return slice(None)
-    time, reach = found.judged.time, 0.5 * (span[1] - span[0])
+    time, reach = found.prediction.time, 0.5 * (span[1] - span[0])
     first, last = (int(i) for i in np.searchsorted(time, [span[0] - reach, span[1] + reach]))
     return slice(max(0, min(first, len(time) - 2)), max(last, 2))
 
 
 def _noise(found: Comparison, scales: Scales) -> Columns:
     """Twice the rms of the noise to either side, as two horizontal lines."""
-    level = 2.0 * found.noise.rms / scales.difference.factor
-    ends = [float(found.judged.time[0]), float(found.judged.time[-1])]
+    level = 2.0 * found.prediction.noise.rms / scales.difference.factor
+    ends = [float(found.prediction.time[0]), float(found.prediction.time[-1])]
     return {"t": [ends, ends], "level": [[level, level], [-level, -level]]}
 
 
@@ -202,7 +202,7 @@ def _coherence(found: Comparison) -> Columns:
 
 
 def _spectrum(found: Comparison, scales: Scales) -> Columns:
-    noise, factor = found.noise, scales.difference.factor
+    noise, factor = found.prediction.noise, scales.difference.factor
     keep = _heard(noise.frequency, found.force.highest)
     return {
         "f": noise.frequency[keep],
@@ -213,7 +213,7 @@ def _spectrum(found: Comparison, scales: Scales) -> Columns:
 
 def _plane(found: Comparison, scales: Scales) -> Columns:
     """Every cell of the map; those where the motion hardly came have no mean."""
-    lacking = found.restoring
+    lacking = found.missing_force
     plane = surface(*(x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force)))
     left, right = (np.repeat(e, CELLS) for e in (plane.displacement[:-1], plane.displacement[1:]))
     low, high = (np.tile(e, CELLS) for e in (plane.velocity[:-1], plane.velocity[1:]))
@@ -231,7 +231,7 @@ def _plane(found: Comparison, scales: Scales) -> Columns:
 
 
 def _against(found: Comparison, of: str, scale: Scale, force: Scale) -> Columns:
-    lacking = found.restoring
+    lacking = found.missing_force
     values = lacking.displacement if of == "displacement" else lacking.velocity
     line = curve(values[lacking.inner], lacking.force[lacking.inner])
     half = NINETY_FIVE * line.error

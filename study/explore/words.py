@@ -6,12 +6,12 @@ from typing import Any
 
 from study.compare.comparison import Comparison
 from study.compare.comparison_sentences import percent, says
+from study.compare.fitted_coefficients import Coefficient
 from study.diagnose.ranking import Ranked
 from study.diagnose.verdict import MISSING, NOTHING
 from study.explore.page_units import in_text, length, number, rate
 from study.explore.session import Rung
 from study.figures.labels import power_of_ten, term_names
-from study.identify.time_domain.fit_model import Coefficient
 
 VERDICTS = {MISSING: "An effect is missing", NOTHING: "Nothing is missing"}
 UNKNOWN = "Something is missing that no candidate explains"
@@ -60,13 +60,13 @@ def equation(rung: Rung) -> str:
 
 
 def _figures(found: Comparison) -> str:
-    size = found.response_error * found.judged.size
-    scaled = length if found.how.response == "displacement" else rate
-    shown = scaled(found.record.units.get(found.how.response, ""), size)
+    size = found.prediction.error * found.prediction.size
+    scaled = length if found.plan.response == "displacement" else rate
+    shown = scaled(found.record.units.get(found.plan.response, ""), size)
     rms = f"rms {size / shown.factor:.3g} {in_text(shown.unit)}"
     cells = (
-        ("error", "Error of the response", percent(found.response_error), f"{rms}, free run, held out"),
-        ("floor", "Noise floor", percent(found.noise_floor), "what no model could explain"),
+        ("error", "Error of the response", percent(found.prediction.error), f"{rms}, free run, held out"),
+        ("floor", "Noise floor", percent(found.prediction.floor), "what no model could explain"),
         ("force", "Error of the force", percent(found.force.total), "share of its power unexplained"),
     )
     return "".join(

@@ -1,9 +1,11 @@
 """What is fitted and what is judged of a record."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from study.records.record import MOTIONS, Record
 from study.support.errors import StudyError
+
+FEWEST = 64  # samples in a part
 
 
 @dataclass(frozen=True)
@@ -16,14 +18,11 @@ class Plan:
         The measured motion that free runs are compared with.
     fit, judge : pair of int
         First sample and the one after the last of each part; they do not overlap.
-    steps_per_sample : int
-        Runge-Kutta steps in each sampling interval.
     """
 
     response: str
     fit: tuple[int, int]
     judge: tuple[int, int]
-    steps_per_sample: int = 2
 
 
 def make_plan(
@@ -43,21 +42,11 @@ def make_plan(
     fit = fit or (0, half)
     judge = judge or (half, len(record))
     for name, (first, last) in (("fit", fit), ("judge", judge)):
-        if not 0 <= first < last <= len(record) or last - first < 64:
-            raise StudyError(f"the part to {name}, {first}:{last}, must hold 64 samples or more of {len(record)}")
+        if not 0 <= first < last <= len(record) or last - first < FEWEST:
+            raise StudyError(f"the part to {name}, {first}:{last}, must hold {FEWEST} samples or more of {len(record)}")
     if fit[0] < judge[1] and judge[0] < fit[1]:
         raise StudyError(f"the parts to fit {fit[0]}:{fit[1]} and to judge {judge[0]}:{judge[1]} overlap")
     response = measured or next((c for c in MOTIONS if c in record), None)
     if response is None:
         raise StudyError(f"record {record.name!r} has no displacement, velocity or acceleration")
     return Plan(response, fit, judge)
-
-
-def shortened(how: Plan, samples: int) -> Plan:
-    """The same plan with no more than so many samples to fit: enough to tell candidates apart, and sooner done."""
-    return replace(how, fit=(how.fit[0], min(how.fit[1], how.fit[0] + samples)))
-
-
-def with_steps(how: Plan, steps: int) -> Plan:
-    """The same plan with other steps per sample."""
-    return replace(how, steps_per_sample=steps)

@@ -12,14 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from study.compare.comparison import Comparison, compare
+from study.compare.prediction import predict
+from study.diagnose.adding import added
 from study.diagnose.verdict import MISSING, Diagnosis, diagnose
-from study.equations.model import Model, free
-from study.equations.terms import Term
-from study.identify.time_domain import held_out
-from study.identify.time_domain.fit_model import fit_model
-from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.records.plan import Plan, make_plan
-from study.support.errors import DivergenceError, StudyError
+from study.identify.time_domain.part_fit import fit_part
+from study.records.prepared import Prepared, prepare_record
+from study.support.errors import StudyError
 from study.trials.draw import HIDDEN, Trial, make_trial
 
 Row = dict[str, Any]
@@ -98,81 +97,56 @@ def run(order: Order) -> Row:
 
 
 def _judged(order: Order, trial: Trial) -> Row:
-    how = make_plan(trial.record)
-    without = order.hidden if order.kind == REMOVED else ()
-    found = diagnose(trial.believed, trial.record, how, without=without)
-    first = found.candidates[0]
-    missing = found.verdict == MISSING
-    after, finer = _after_adding(trial, how, first.term) if missing else (found.response_error, how)
+    prepared = prepare_record(trial.record)
+    before = compare(trial.believed, prepared)
+    diagnosis = diagnose(before, without=order.hidden if order.kind == REMOVED else ())
+    first = diagnosis.candidates[0]
+    missing = diagnosis.verdict == MISSING
+    after = added(before, first.term) if missing else before
     row: Row = {
-        "verdict": found.verdict,
+        "verdict": diagnosis.verdict,
         "first": first.name,
         "named": first.name if missing else "",
         "tied_with": "+".join(first.tied_with),
-        "pair": "+".join(found.pair),
-        "error_before": found.response_error,
-        "error_after": after,
-        "error_true": error_of_truth(trial, finer),
-        "noise_floor": found.noise,
-        "left": found.left,
+        "pair": "+".join(diagnosis.pair),
+        "error_before": before.prediction.error,
+        "error_after": after.prediction.error,
+        "error_true": error_of_truth(trial, prepared, after.fit.steps_per_sample),
+        "noise_floor": before.prediction.floor,
+        "left": diagnosis.left,
     }
     if missing and order.kind == PAIR:
-        row |= _second(trial, how, first.term)
+        row |= _second(after)
     if missing and order.kind == REMOVED and not first.tied_with:
-        whole = diagnose(trial.believed, trial.record, how)
-        row["tie_with_hidden"] = str(_tied(whole, order.hidden[0], first.name))
+        row["tie_with_hidden"] = str(_tied(diagnose(before), order.hidden[0], first.name))
     return row
 
 
-def _added(trial: Trial, *terms: Term) -> Model:
-    """The model after ``study add``: everything is fitted anew, shape parameters are searched for."""
-    model = trial.believed
-    for term in terms:
-        model = model.with_term(free(term))
-    return model
-
-
-def _after_adding(trial: Trial, how: Plan, *terms: Term) -> tuple[float, Plan]:
-    """Held-out response error after adding, and the plan with the steps that the fit was refined to."""
-    found, finer = fit_model(_added(trial, *terms), trial.record, how)
-    return _held_out(found, trial, finer), finer
-
-
-def _second(trial: Trial, how: Plan, first: Term) -> Row:
+def _second(after: Comparison) -> Row:
     """Diagnose again after adding what came first."""
-    found = diagnose(_added(trial, first), trial.record, how)
-    best = found.candidates[0]
-    missing = found.verdict == MISSING
+    diagnosis = diagnose(after)
+    best = diagnosis.candidates[0]
+    missing = diagnosis.verdict == MISSING
     return {
-        "second_verdict": found.verdict,
+        "second_verdict": diagnosis.verdict,
         "second_named": best.name if missing else "",
         "second_tied_with": "+".join(best.tied_with),
-        "error_after_two": _after_adding(trial, how, first, best.term)[0] if missing else found.response_error,
+        "error_after_two": (added(after, best.term) if missing else after).prediction.error,
     }
 
 
-def _tied(whole: Diagnosis, hidden: str, named: str) -> bool:
+def _tied(diagnosis: Diagnosis, hidden: str, named: str) -> bool:
     """Whether the diagnosis with the whole library says that the record cannot tell the two apart."""
-    ties = {row.name: row.tied_with for row in whole.candidates}
+    ties = {row.name: row.tied_with for row in diagnosis.candidates}
     return named in ties.get(hidden, ()) or hidden in ties.get(named, ())
 
 
-def error_of_truth(trial: Trial, how: Plan) -> float:
+def error_of_truth(trial: Trial, prepared: Prepared, steps: int) -> float:
     """Held-out response error of the true model, fitted as any other, from the true values; NaN if it cannot be."""
     try:
-        found = held_out.fit(trial.truth, trial.record, how, (), trial.truth.numbers())
-        return _held_out(found, trial, how)
+        return predict(fit_part(trial.truth, prepared, (), steps=steps), prepared).error
     except StudyError:
         return math.nan
-
-
-def _held_out(found: FreeRunFit, trial: Trial, how: Plan) -> float:
-    """Rms of what is left of the judging part over that of the response; all of it where the free run runs away."""
-    try:
-        residual = held_out.held_out_residual(found, trial.record, how)
-    except DivergenceError:
-        return 1.0
-    return float(np.sqrt(np.mean(residual**2)) / np.std(trial.record[how.response][slice(*how.judge)]))
 
 
 def chunk(every: Sequence[Order], number: int, count: int) -> list[Order]:

@@ -10,13 +10,13 @@ from study import cli
 from study.compare.by_estimator import CHAOTIC
 from study.compare.comparison import Comparison, compare
 from study.compare.comparison_report import document, summary
+from study.compare.fitted_coefficients import Coefficient
 from study.compare.local_force_error import local_force_error
 from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
 from study.identify import estimators
 from study.identify.estimators.base import Settings
-from study.identify.time_domain.fit_model import Coefficient
 from study.records.completion import CompletedRecord
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.plan import Plan

@@ -12,11 +12,11 @@ from study.compare.across_levels import levels
 from study.compare.comparison import Comparison, across, compare
 from study.compare.comparison_report import as_json, document, summary, tables
 from study.compare.comparison_sentences import says, says_of_all
+from study.compare.fitted_coefficients import Coefficient
 from study.compare.prediction import Judged
 from study.equations.model import Model, ModelTerm, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
-from study.identify.time_domain.fit_model import Coefficient
 from study.records.excitation import Excitation, force
 from study.records.plan import Plan, make_plan
 from study.records.record import Record
@@ -342,7 +342,7 @@ def test_the_missing_force_is_the_hidden_one() -> None:
     held = model(**VALUES)
     found = compare(held, Record(DT, {"force": record["force"], "displacement": record["displacement"]}))
     v = record["velocity"][4096:][200:-200]
-    lacking = found.restoring.force[200:-200]
+    lacking = found.missing_force.force[200:-200]
     true = 400.0 * v * np.abs(v)
     assert np.std(lacking - true) < 0.1 * np.std(true)
     assert found.growths is not None

@@ -132,7 +132,7 @@ def test_a_bad_formula_gets_its_sentence(asked, text, said):
 
 def test_links_add_up_to_the_curves_and_the_map(grown):
     found = grown.rungs[0].comparison
-    tied, lacking = links(found), found.restoring
+    tied, lacking = links(found), found.missing_force
     u, v, force = (x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force))
     for classes, values in ((tied.displacement, u), (tied.velocity, v)):
         visits, sums = classes.visits.sum(axis=0), classes.force.sum(axis=0)
@@ -207,9 +207,9 @@ def test_units_are_written_as_people_write_them():
 def test_the_missing_force_has_one_unit_everywhere(asked):
     rung, factor = asked.now, 1e-5
     record = replace(rung.comparison.record, channels=rung.comparison.record.channels | {})
-    lacking = replace(rung.comparison.restoring, force=rung.comparison.restoring.force * factor)
+    lacking = replace(rung.comparison.missing_force, force=rung.comparison.missing_force.force * factor)
     record.channels["force"] = record.channels["force"] * factor
-    small = view.view(replace(rung, comparison=replace(rung.comparison, record=record, restoring=lacking)), 0)
+    small = view.view(replace(rung, comparison=replace(rung.comparison, record=record, missing_force=lacking)), 0)
     usual = view.view(rung, 0)
     assert usual.scales.force.factor == 1.0
     assert small.scales.force.factor < 0.01

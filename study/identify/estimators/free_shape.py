@@ -14,7 +14,7 @@ def identify(model: Model, record: Record, settings: Settings) -> Identified:
     shapes = tuple(key for key in model.values if "." in key)
     if not shapes:
         return Identified((), None, ())
-    found = output_error.fit(model.with_values(dict.fromkeys(shapes)), record, settings)
+    found = output_error.fit(model.with_values(dict.fromkeys(shapes)), record)
     known = model.with_values({key: found.estimate[key] for key in shapes})
     result = miso.identify(known, record, settings)
     own = output_error.shapes_of(found, shapes)

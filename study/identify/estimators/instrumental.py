@@ -16,7 +16,7 @@ def identify(model: Model, record: Record, settings: Settings) -> Identified:
 
     Coherences are those of the force with the inputs along that motion, which has no noise.
     """
-    found = output_error.fit(model, record, settings)
+    found = output_error.fit(model, record)
     inputs = reverse_inputs(found.model)
     clean = clean_motion(found, record)
     values = instruments.channels(inputs, record, clean)

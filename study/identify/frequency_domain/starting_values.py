@@ -1,52 +1,101 @@
-"""Starting values for a free run from the reverse system: every coefficient at once, linear and nonlinear.
+"""Starting values for a free run: the best linear approximation, and the reverse system's coefficients.
 
-The report's estimate. Noise on the motion biases it, so nothing is concluded from it; but it knows no side
-valleys, in which a fit ends that begins from a linear model where the system is far from linear.
+The best linear approximation ``H(f) = G_Fy / G_FF`` is not biased by noise on the response, and knows nothing of what
+is not linear. The reverse system (the report's estimate) gives every coefficient at once and is biased by noise; but
+it has no local minima, in which a fit ends that begins from a linear model where the system is far from linear.
 """
 
 import numpy as np
 
-from study.equations.model import Model
+from study.equations.model import Model, free
+from study.equations.terms import get
 from study.identify.frequency_domain import coefficients, conditioned
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
-from study.identify.time_domain.held_out import FAINT
-from study.records.completion import complete
-from study.records.plan import Plan
-from study.records.record import Record
+from study.records.prepared import Prepared
+from study.records.record import MOTIONS
 from study.records.spectra import Segments, cross_spectra
 from study.support.errors import StudyError
+from study.support.least_squares import least_squares
 
+LINEAR_ORDERS = {"k": 0, "c": 1, "m": 2}
+FAINT = 1e-3  # share of the strongest line's force below which leakage tells nothing
+SHORT = 512  # samples below which missing coherence may be the record's own shortness
+CHANCE = 0.01  # the linear start uses lines whose coherence noise alone would reach this rarely
 LONGEST, SHORTEST, PARTS = 1024, 64, 12  # samples in a segment, and how many of them at least
 
 
-def reverse_start(model: Model, record: Record, how: Plan) -> dict[str, float]:
+def linear_start(model: Model, prepared: Prepared) -> dict[str, float]:
+    """Mass, damping and stiffness of the best linear approximation; zero for everything else.
+
+    Raises
+    ------
+    StudyError
+        If force and response have nothing in common.
+    """
+    record, response = prepared.record, prepared.response
+    part = record.part(*prepared.plan.fit)
+    length = min(1024, 2 ** int(np.log2(max(len(part) // 8, 16))))
+    force, motion = (part[name] - np.mean(part[name]) for name in ("force", response))
+    matrix = cross_spectra([force, motion], part.dt, Segments(length=length))
+    g, f = matrix.density[1:-1], matrix.frequency[1:-1]
+    power = g[:, 0, 0].real * g[:, 1, 1].real
+    coherence = np.abs(g[:, 0, 1]) ** 2 / np.where(power > 0.0, power, np.inf)
+    coherence = np.clip(coherence, 0.0, 1.0 - 1e-6)
+    by_chance = 1.0 - CHANCE ** (1.0 / max(matrix.averages - 1.0, 1.0))
+    keep = (coherence > by_chance) & (g[:, 0, 0].real > FAINT * np.max(g[:, 0, 0].real))
+    if np.count_nonzero(keep) < 4 and len(part) < SHORT:
+        raise StudyError(
+            f"the part to fit of {record.name!r} has {len(part)} samples, too few to see what force and {response} "
+            f"have in common; fit a longer part, {SHORT} samples or more"
+        )
+    if np.count_nonzero(keep) < 4:
+        raise StudyError(f"force and {response} of {record.name!r} have nothing in common at any frequency")
+    omega = 2j * np.pi * f[keep]
+    receptance = g[keep, 0, 1] / g[keep, 0, 0] / omega ** MOTIONS.index(response)
+    weight = np.abs(receptance) * np.sqrt(coherence[keep] / (1.0 - coherence[keep]))
+    values = model.values
+    wanted = [key for key in LINEAR_ORDERS if key in values]
+    design = np.stack([omega ** LINEAR_ORDERS[key] for key in wanted], axis=1) * weight[:, None]
+    target = weight / receptance
+    solution = least_squares(np.concatenate([design.real, design.imag]), np.concatenate([target.real, target.imag]))
+    start = dict.fromkeys(values, 0.0) | dict(zip(wanted, solution.tolist(), strict=True))
+    if start["m"] <= 0.0:
+        inertial = omega**2 * weight
+        start["m"] = float(np.linalg.norm(target)) / float(np.linalg.norm(inertial))
+    return start
+
+
+def oscillator(prepared: Prepared) -> dict[str, float]:
+    """m, c and k of the best linear oscillator, whatever the model's terms are."""
+    names = ("inertia", "linear_damping", "linear_stiffness")
+    return linear_start(Model("linear", tuple(free(get(name)) for name in names)), prepared)
+
+
+def reverse_start(model: Model, prepared: Prepared) -> dict[str, float]:
     """Coefficients by reverse MI/SO on the fitting part.
 
     Parameters
     ----------
     model : Model
         Which terms act; shape parameters are given, coefficients are ignored.
-    record : Record
-        Force and at least one motion; the others are derived.
-    how : Plan
-        The part to fit.
+    prepared : Prepared
+        The record and the part of it to fit.
 
     Raises
     ------
     StudyError
-        If a motion cannot be derived, the part is too short, or an input has no power.
+        If the part is too short, an input has no power, or the mass comes out negative.
     """
-    completed = complete(record.part(*how.fit))
-    part = completed.record.part(completed.edge, len(completed.record) - completed.edge)
+    part = prepared.record.part(*prepared.inner(prepared.plan.fit))
     inputs = reverse_inputs(model)
     cut = Segments(length=int(np.clip(2 ** int(np.log2(len(part) / PARTS)), SHORTEST, LONGEST)))
     matrix = cross_spectra([*histories(inputs, part), part["force"]], part.dt, cut)
     force = matrix.density[:, -1, -1].real
     driven = matrix.frequency[(force > FAINT * np.max(force)) & (matrix.frequency > 1.5 / (cut.length * part.dt))]
     if driven.size < len(inputs):
-        raise StudyError(f"the force of {record.name!r} drives too few frequencies for {len(inputs)} inputs")
-    band = (max(float(driven[0]), completed.band[0]), min(float(driven[-1]), completed.band[1]))
-    found = coefficients.fit(conditioned.analyse(matrix), inputs, band, cut.line_inflation())
-    if not np.all(np.isfinite(found.values)):
-        raise StudyError(f"the reverse system of {model.name!r} and {record.name!r} has no solution")
-    return dict(zip(found.symbols, found.values.tolist(), strict=True))
+        raise StudyError(f"the force of {part.name!r} drives too few frequencies for {len(inputs)} inputs")
+    band = (max(float(driven[0]), prepared.band[0]), min(float(driven[-1]), prepared.band[1]))
+    estimate = coefficients.fit(conditioned.analyse(matrix), inputs, band, cut.line_inflation())
+    if not np.all(np.isfinite(estimate.values)) or not estimate["m"] > 0.0:
+        raise StudyError(f"the reverse system of {model.name!r} and {part.name!r} has no solution")
+    return dict(zip(estimate.symbols, estimate.values.tolist(), strict=True))

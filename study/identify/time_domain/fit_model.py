@@ -1,92 +1,61 @@
-"""The fit that a comparison stands on: what the model leaves open, estimated on the fitting part."""
+"""The one fit of a model to a record: where it starts, open shape parameters, enough steps, local minima, chaos.
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+Reproduction, comparison, diagnosis and page all fit a model here. A caller says where to start, never how to go on. A
+free run of a strongly nonlinear system with somewhat wrong coefficients drifts out of step with the measured motion,
+and the sum of squares has local minima there; so every search has several starts, the best is kept, and what none of
+them brings to a minimum is begun anew from multiple shooting, within whose segments nothing drifts far.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri, stdtrit
 
-from study.equations import dimensions
-from study.equations.free_run import prepare
 from study.equations.model import Model, ModelTerm
-from study.equations.terms import LIBRARY, QUANTITIES
-from study.identify.frequency_domain.coefficients import Estimate
+from study.equations.substeps import needed_steps
+from study.equations.terms import LIBRARY
 from study.identify.frequency_domain.inputs import history, reverse_inputs
-from study.identify.time_domain import held_out, shape_search
+from study.identify.frequency_domain.starting_values import linear_start, reverse_start
+from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.multiple_shooting import fit_in_pieces
-from study.records.completion import complete
-from study.records.plan import Plan
-from study.records.record import Record
+from study.identify.time_domain.multiple_shooting import fit_in_pieces, lost, magnifies
+from study.identify.time_domain.part_fit import STEPS, fit_part, linearise, run_of
+from study.identify.time_domain.shape_search import Baseline
+from study.records.prepared import Prepared
 from study.records.states import angular_rate
 from study.support.errors import DivergenceError, StudyError
+from study.support.least_squares import least_squares
 from study.support.statistics import clustered_covariance
 
 Floats = NDArray[np.float64]
-POOR = 0.05  # of the rms response: a fit that leaves more is tried again from pieces
-PERIODS = 50.0  # of the motion, in the stretch that the pieces are cut from ...
-SHORT, LONG = 512, 2048  # ... and its limits in samples
+Values = Mapping[str, float]
+SEARCHED = 4096  # samples, at most, that a search for open shape parameters looks at
+PERIODS = 50.0  # of the motion, in the stretch that multiple shooting starts a search from
+SHORTEST, LONGEST = 512, 2048  # samples in that stretch
+TRIED, KEPT = 15, 40  # free runs of a fit that tries a start, and of one that is kept
+NEAR = 0.01  # standard errors: as near a minimum as the fit of a search has to come
 SHIFT = 0.3  # standard errors by which the integration may shift a coefficient
-MOST_STEPS = 8  # per sample
+MOST_STEPS = 8  # in a sampling interval, unless the model's own rates ask for more
 
 
-@dataclass(frozen=True)
-class Coefficient:
-    """A coefficient or shape parameter of a fitted model.
+def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> FreeRunFit:
+    """Fit all that a model leaves open; what it gives is held.
 
-    Attributes
+    Parameters
     ----------
-    key, term : str
-        Its name, and that of the term it belongs to.
-    value : float
-        Estimate, or the value that was held.
-    error : float or None
-        Standard error, which allows for a residual that is no white noise; None if the value was held.
-    unit : str
-        In the units of the record.
-    freedom : float
-        Degrees of freedom of the standard error.
-    """
-
-    key: str
-    term: str
-    value: float
-    error: float | None
-    unit: str
-    freedom: float = math.inf
-
-    @property
-    def held(self) -> bool:
-        """Whether the model gave the value."""
-        return self.error is None
-
-    @property
-    def interval(self) -> tuple[float, float] | None:
-        """95 % confidence interval, by Student's t; None if the value was held."""
-        if self.error is None:
-            return None
-        half = _quantile(self.freedom) * self.error
-        return self.value - half, self.value + half
-
-
-def _quantile(freedom: float) -> float:
-    """Standard errors on either side that hold 95 %."""
-    return float(stdtrit(freedom, 0.975)) if math.isfinite(freedom) else float(ndtri(0.975))
-
-
-def fit_model(
-    model: Model, record: Record, how: Plan, start: Mapping[str, float] | None = None
-) -> tuple[FreeRunFit, Plan]:
-    """Fit all that the model leaves open; shape parameters that it leaves out are searched for.
-
-    With ``start``, a value for everything that is left open, the fit begins there and nothing is searched for.
+    model : Model
+        Shape parameters that it leaves open are searched for.
+    prepared : Prepared
+        The record and the part of it to fit.
+    start : mapping of float, optional
+        A value for everything that is left open: the fit begins there and nothing is searched for.
 
     Returns
     -------
-    FreeRunFit, Plan
-        The plan's steps are doubled until the error of the integration matters no more.
+    FreeRunFit
+        With so many steps that the integration shifts no coefficient by what its error shows. In segments
+        (``restarts``) where the fitted system is chaotic.
 
     Raises
     ------
@@ -95,144 +64,190 @@ def fit_model(
     """
     if "inertia" not in model:
         raise StudyError(f"model {model.name!r} has no inertia; a free run needs it")
-    _check_own_formulas(model, record)
-    held = model.held_keys
+    _check_own_formulas(model, prepared)
     if start is not None:
-        return _refined(held_out.fit(model, record, how, held, start), record, how, held)
+        return settled(
+            fit_part(model, prepared, model.held_keys, start, steps=_rough(model, prepared, start)), prepared
+        )
     unknown = tuple(t for t in model.terms if None in t.parameters)
-    grown = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
-    found = _from_afar(grown, record, how, _held(grown, held))
+    known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
+    look = prepared.shortened(SEARCHED) if unknown else prepared
+    fit = best_fit(known, look, first_starts(known, look))
     for entry in unknown:
-        found = _with_shape(found, entry, record, how, held)
-    ordered = replace(model, terms=tuple(_named(found.model, t.name) for t in model.terms))
-    return _refined(replace(found, model=ordered), record, how, held)
+        fit = with_term(fit, entry, shape_search.baseline(fit, look), look)
+    ordered = replace(model, terms=tuple(next(t for t in fit.model.terms if t.name == e.name) for e in model.terms))
+    return settled(continued(replace(fit, model=ordered), prepared), prepared)
 
 
-def _check_own_formulas(model: Model, record: Record) -> None:
-    """A user's formula must be a number all along the measured motion: a fit that it stops would be blamed else."""
-    if all(term.name in LIBRARY for term in model.terms):
-        return
-    completed = complete(record)
-    motion = completed.record.part(completed.edge, len(record) - completed.edge)
-    known = replace(model, terms=tuple(t for t in model.terms if None not in t.parameters))
-    for item in reverse_inputs(known):
-        if any(name not in LIBRARY for name in item.terms):
-            history(item, motion)
+def first_starts(model: Model, prepared: Prepared) -> list[dict[str, float]]:
+    """Where a fit from nothing begins: the best linear approximation, and the reverse system's solution if any."""
+    linear = linear_start(model, prepared)
+    starts = [linear, linear | _reversed(model, prepared)]
+    return [{key: value for key, value in start.items() if key not in model.held_keys} for start in starts]
 
 
-def _from_afar(model: Model, record: Record, how: Plan, held: tuple[str, ...]) -> FreeRunFit:
-    """A fit from the linear start; if it is poor, also one that begins with pieces of a few periods.
+def with_term(fit: FreeRunFit, entry: ModelTerm, base: Baseline, prepared: Prepared) -> FreeRunFit:
+    """The fitted model with one term more, the best of fits from several starts.
 
-    A free run of a strongly nonlinear system with somewhat wrong coefficients drifts out of step with the
-    measured motion, and the sum of squares has side valleys there. Within pieces nothing drifts far.
-    """
-    measured = record[how.response][slice(*how.fit)]
-    try:
-        found = held_out.fit(model, record, how, held)
-    except DivergenceError:  # the linear start, with the values that are held, is no system that stays finite
-        return from_pieces(model, record, how, held)
-    if not found.keys or (found.converged and found.rms < POOR * float(np.std(measured))):
-        return found
-    try:
-        again = from_pieces(model, record, how, held)
-    except StudyError:
-        return found
-    return again if again.rms < found.rms else found
-
-
-def from_pieces(model: Model, record: Record, how: Plan, held: tuple[str, ...]) -> FreeRunFit:
-    """A fit that begins where one in pieces of about a period ends, which knows no side valleys.
+    These are points of a search over the term's shape parameters beside the fitted model, and the best of them anew,
+    with all coefficients from the reverse system, or beside a linear model where that has no solution: it matters where
+    the model without the term was driven to a far corner by its lack.
 
     Raises
     ------
     StudyError
-        If the model cannot run even in pieces.
+        If none of them has a finite response.
     """
-    measured = record[how.response][slice(*how.fit)]
-    length = round(PERIODS * 2.0 * np.pi / (angular_rate(measured, record.dt) * record.dt))
-    span = (how.fit[0], min(how.fit[0] + int(np.clip(length, SHORT, LONG)), how.fit[1]))
-    start = {key: v for key, v in held_out.linear_start(model, record, how).items() if key not in held}
-    near = fit_in_pieces(model, record, start=start, held=held, response=how.response, span=span)
-    return held_out.fit(model, record, how, held, dict(zip(near.keys, near.values.tolist(), strict=True)))
-
-
-def _refined(found: FreeRunFit, record: Record, how: Plan, held: tuple[str, ...]) -> tuple[FreeRunFit, Plan]:
-    """The fit with so many steps per sample that halving them shifts no coefficient by what its error shows."""
-    while found.keys and how.steps_per_sample < MOST_STEPS:
-        jacobian = held_out.linearise(found, record, how)
-        finer = replace(how, steps_per_sample=2 * how.steps_per_sample)
-        runs = [
-            prepare(found.model, record, response=p.response, steps_per_sample=p.steps_per_sample, span=p.fit)
-            for p in (how, finer)
-        ]
-        coarse, fine = (run.respond({}, found.initial)[0] for run in runs)
-        scale = np.maximum(np.sqrt(np.sum(jacobian**2, axis=0)), 1e-300)
-        moved = np.asarray(
-            np.linalg.lstsq(jacobian / scale, np.subtract(coarse, fine), rcond=1e-12)[0], dtype=np.float64
-        )
-        deviations = np.sqrt(np.diag(clustered_covariance(jacobian, found.residual)))
-        if np.all(np.abs(moved / scale) <= SHIFT * deviations):
-            break
-        how = finer
-        start = dict(zip(found.keys, found.values.tolist(), strict=True))
-        found = held_out.fit(found.model, record, how, held, start)
-    return found, how
-
-
-def _held(model: Model, held: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(key for key in held if key in model.values)
-
-
-def _named(model: Model, name: str) -> ModelTerm:
-    return next(t for t in model.terms if t.name == name)
-
-
-def _with_shape(
-    before: FreeRunFit, entry: ModelTerm, record: Record, how: Plan, held: tuple[str, ...]
-) -> FreeRunFit:  # fmt: skip
-    """The fit with one term more, the best of those that begin at the best points of a search."""
+    held = tuple(key for key in fit.model.values if key not in fit.keys)
     given = {key: value for key, value in entry.values.items() if value is not None}
-    known = {key: value for key, value in before.model.values.items() if value is not None}
-    grown = before.model.with_term(entry)
-    fits: list[FreeRunFit] = []
-    for point in shape_search.starts(entry.term, shape_search.baseline(before, record, how), record, how):
-        begin = known | dict(zip(entry.keys, point.coefficients + point.parameters, strict=True)) | given
-        try:
-            fits.append(held_out.fit(grown.with_values(begin), record, how, _held(grown, held), begin))
-        except StudyError:
-            continue
-    if not fits:
+    known = fit.model.numbers()
+    grown = fit.model.with_term(entry)
+    points = shape_search.starts(entry.term, base, prepared)
+    starts = [known | dict.fromkeys(entry.term.symbols, 0.0) | _shapes(entry, p.parameters) | given for p in points]
+    if points:
+        anew = _reversed(grown.with_values(starts[0]), prepared) or base.linear
+        starts.append(starts[0] | {k: v for k, v in anew.items() if k in (*fit.keys, *entry.term.symbols)} | given)
+    try:
+        return best_fit(grown, prepared, starts, (*held, *given))
+    except StudyError:
         missing = ", ".join(key for key, value in entry.values.items() if value is None)
-        raise StudyError(f"no values of {missing} let {entry.name} follow {record.name}; give them in the model file")
-    return min(fits, key=lambda f: f.rms)
+        raise StudyError(
+            f"no values of {missing} let {entry.name} follow {prepared.record.name}; give them in the model file"
+        ) from None
 
 
-def coefficients(
-    found: FreeRunFit, record: Record, how: Plan, known: Estimate | None = None
-) -> tuple[Coefficient, ...]:
-    """Every coefficient with its standard error and unit, in the order of the model.
+def best_fit(
+    model: Model, prepared: Prepared, starts: Iterable[Values], held: Sequence[str] | None = None
+) -> FreeRunFit:  # fmt: skip
+    """The best of fits from several starts.
 
-    ``known`` is what was not found by this fit.
+    With open shape parameters each start is first fitted with these held: the misfit along a dead band or a gap has
+    kinks and local minima in which a fit of everything at once gets stuck.
+
+    Raises
+    ------
+    StudyError
+        If there is no finite response from any start.
     """
-    errors = {key: known.error(key) for key in known.symbols} if known else {}
-    freedom = known.freedom if known else math.inf
-    if found.keys:
-        covariance = clustered_covariance(held_out.linearise(found, record, how), found.residual)
-        deviations = np.sqrt(np.diag(covariance))
-        errors |= {key: float(deviations[i]) for i, key in enumerate(found.keys)}
-    force, length = record.units.get("force", "N"), record.units.get("displacement", "m")
-    return tuple(
-        Coefficient(key, entry.name, float(value), errors.get(key), _unit(entry, key, force, length), freedom)
-        for entry in found.model.terms
-        for key, value in entry.values.items()
-        if value is not None
-    )
+    held = model.held_keys if held is None else tuple(held)
+    shapes = tuple(key for key in model.values if "." in key and key not in held)
+    first = [_tried(model, prepared, (*held, *shapes), start, TRIED) for start in starts]
+    best = min((fit for fit in first if fit is not None), key=lambda fit: fit.rms, default=None)
+    if best is not None and (shapes or not best.converged):
+        best = _better(best, _tried(best.model, prepared, held, best.model.numbers(), KEPT)) or best
+    if best is None or not best.converged:
+        apart = _from_segments(best.model if best else model, prepared, (*held, *shapes))
+        if apart is not None and shapes:
+            apart = _better(apart, _tried(apart.model, prepared, held, apart.model.numbers(), KEPT))
+        best = _better(best, apart)
+    if best is None:
+        raise StudyError(f"{model.name!r} has no finite response to the force of {prepared.record.name!r}")
+    return best
 
 
-def _unit(entry: ModelTerm, key: str, force: str, length: str) -> str:
-    if key in entry.term.symbols:
-        return entry.term.unit(key, force, length)
-    parameter = next(p for p in entry.term.parameters if key == f"{entry.name}.{p.name}")
-    powers = QUANTITIES[parameter.quantity]
-    unit = dimensions.compose("", length, (-powers[0], -powers[1])).strip()
-    return "Hz" if parameter.quantity == "frequency" else unit.replace("/", "1/")
+def continued(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
+    """The fit on another part of the record, such as the whole fitting part behind a search, from where it stands."""
+    if len(fit.residual) == len(prepared.fitted):
+        return fit
+    held = tuple(key for key in fit.model.values if key not in fit.keys)
+    return fit_part(fit.model, prepared, held, fit.model.numbers(), steps=fit.steps_per_sample)
+
+
+def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
+    """The fit at its minimum with enough steps; in segments where a chaotic system loses the motion in one run."""
+    fit = with_enough_steps(fit, prepared)
+    if not lost(fit, prepared.fitted):
+        return fit
+    held = tuple(key for key in fit.model.values if key not in fit.keys)
+    if not magnifies(fit, prepared):
+        return _better(fit, _from_segments(fit.model, prepared, held, fit.steps_per_sample)) or fit
+    try:
+        apart = fit_in_pieces(
+            fit.model, prepared.record, held=held, response=prepared.response, span=prepared.plan.fit,
+            steps_per_sample=fit.steps_per_sample,
+        )  # fmt: skip
+        together = fit_part(
+            apart.model, prepared, held, steps=fit.steps_per_sample, initial=np.atleast_2d(apart.initial)[:1]
+        )
+    except DivergenceError:  # where segments fail as well, the one free run is what there is
+        return fit
+    return apart if lost(together, prepared.fitted) else together
+
+
+def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
+    """The fit with so many steps per sample that halving them shifts no coefficient by what its error shows."""
+    held = tuple(key for key in fit.model.values if key not in fit.keys)
+    most = max(MOST_STEPS, needed_steps(fit.model, prepared.record, prepared.response).rough)
+    while fit.keys and fit.steps_per_sample < most:
+        jacobian = linearise(fit, prepared)
+        coarse, fine = (run_of(fit, prepared, finer=n).respond({}, fit.initial)[0] for n in (1, 2))
+        moved = least_squares(jacobian, np.subtract(coarse, fine), 1e-12)
+        deviations = np.sqrt(np.diag(clustered_covariance(jacobian, fit.residual)))
+        if np.all(np.abs(moved) <= SHIFT * deviations):
+            break
+        finer = fit_part(
+            fit.model, prepared, held, fit.model.numbers(), steps=2 * fit.steps_per_sample,
+            initial=np.atleast_2d(fit.initial),
+        )  # fmt: skip
+        fit = finer
+    return fit
+
+
+def _rough(model: Model, prepared: Prepared, start: Values) -> int:
+    """Steps of a search's runs: those of every search, or more where the model's own rates ask for them."""
+    return max(STEPS, needed_steps(model.with_values(start), prepared.record, prepared.response).rough)
+
+
+def _tried(model: Model, prepared: Prepared, held: Sequence[str], start: Values, runs: int) -> FreeRunFit | None:
+    """A fit from one start; None where the model has no finite response there."""
+    begun = model.with_values(start)
+    try:
+        steps = _rough(begun, prepared, start)
+        return fit_part(begun, prepared, held, steps=steps, max_iterations=runs, offset=NEAR)
+    except StudyError:
+        return None
+
+
+def _better(one: FreeRunFit | None, other: FreeRunFit | None) -> FreeRunFit | None:
+    """The fit with the smaller residual; of two alike the later one, which knows more errors."""
+    if one is None or other is None:
+        return one or other
+    return other if other.rms <= one.rms else one
+
+
+def _from_segments(model: Model, prepared: Prepared, held: Sequence[str], steps: int = STEPS) -> FreeRunFit | None:
+    """A fit that begins where multiple shooting ends; None where the model cannot run even in segments."""
+    length = round(PERIODS * 2.0 * np.pi / (angular_rate(prepared.fitted, prepared.dt) * prepared.dt))
+    stretch = prepared.shortened(int(np.clip(length, SHORTEST, LONGEST)))
+    linear = linear_start(model, stretch)
+    start = {key: value for key, value in linear.items() if key not in held and "." not in key}
+    try:
+        near = fit_in_pieces(
+            model, prepared.record, start=start, held=held, response=prepared.response, span=stretch.plan.fit
+        )
+        return fit_part(near.model, prepared, held, steps=steps)
+    except StudyError:
+        return None
+
+
+def _reversed(model: Model, prepared: Prepared) -> dict[str, float]:
+    """Coefficients from the reverse system; none where it has no solution."""
+    try:
+        return reverse_start(model, prepared)
+    except StudyError:
+        return {}
+
+
+def _shapes(entry: ModelTerm, parameters: Sequence[float]) -> dict[str, float]:
+    return dict(zip(entry.keys[len(entry.coefficients) :], parameters, strict=True))
+
+
+def _check_own_formulas(model: Model, prepared: Prepared) -> None:
+    """A user's formula must be a number all along the measured motion: a fit that it stops would be blamed else."""
+    if all(term.name in LIBRARY for term in model.terms):
+        return
+    motion = prepared.record.part(*prepared.inner((0, len(prepared.record))))
+    known = replace(model, terms=tuple(t for t in model.terms if None not in t.parameters))
+    for item in reverse_inputs(known):
+        if any(name not in LIBRARY for name in item.terms):
+            history(item, motion)

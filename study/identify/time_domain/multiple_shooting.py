@@ -11,6 +11,7 @@ from study.equations.substeps import needed_steps
 from study.identify.time_domain.continuation import NEAR, NEGLIGIBLE, fit_pieces, joined
 from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
 from study.identify.time_domain.shooting import Pieces, even_restarts, needed_restarts
+from study.records.prepared import Prepared
 from study.records.record import Record
 from study.support.errors import DivergenceError
 
@@ -20,7 +21,6 @@ LOOSE = 12  # free runs that pieces which know nothing of each other are given a
 SOFT, SOFTLY = (0.3, 1.0, 3.0), 5  # ties that lead coefficients near the truth (see ``fit_free_run``); runs with each
 FIRM, FIRMLY = 30.0, 12  # tied so, pieces know of each other most of what the noise lets them
 TIGHT, TIGHTLY = 100.0, 30  # tied so, they are one motion
-GLANCE = 10  # free runs after which a fit of a whole record that has lost the motion is given up
 CLEAN = 0.01  # of the response's standard deviation: a residual to which long steps of the integrator may add
 POOR = 0.05  # of the response's standard deviation: a residual that may hide a motion
 SMOOTH = 0.5  # correlation of neighbouring samples of a residual; white noise has none
@@ -72,72 +72,26 @@ def fit_in_pieces(
     return _joined_and_tied(near, loose, pieces, rough, held)
 
 
-def fit_record(
-    model: Model,
-    record: Record,
-    *,
-    start: Mapping[str, float] | None = None,
-    held: Collection[str] = (),
-    response: str = "displacement",
-    steps_per_sample: int | None = None,
-    max_iterations: int = 60,
-) -> FreeRunFit:
-    """Fit a model to a whole record: in one free run where that holds, in pieces where it does not.
+def lost(fit: FreeRunFit, measured: Floats) -> bool:
+    """Whether a fit is at no minimum, or at a local one: what it leaves is much of the response, and looks like motion.
 
-    Steps are those that the starting model needs (``substeps``) unless they are given; the first runs take
-    fewer, which cost less and lead as near. One free run is believed if the fit converges, leaves no part of the
-    motion (a residual that is large and smooth), and the fitted system does not magnify a disturbance tenfold anywhere
-    on its way (``shooting.needed_restarts``, from the exact sensitivities). A system that does loses the record
-    however true the model, and its sum of squares is full of side valleys; half the steps are many enough for pieces
-    of it. Parameters and result are those of :func:`free_run_fit.fit_free_run`.
-
-    Raises
-    ------
-    DivergenceError
-        If the model diverges within a period of its start.
-    StudyError
-        As :func:`free_run_fit.fit_free_run`.
+    ``measured`` is the response that it was fitted to.
     """
-    steps = needed_steps(model.with_values(dict(start or {})), record, response, steps_per_sample)
-    coarse = max(steps.fine // 2, 1)
-    try:
-        near = fit_free_run(
-            model, record, start=start, held=held, response=response,
-            steps_per_sample=min(steps.rough, coarse),
-            max_iterations=min(GLANCE, max_iterations),
-        )  # fmt: skip
-        if not astray(near, record[response]):
-            found = fit_free_run(
-                near.model, record, held=held, response=response, steps_per_sample=steps.fine,
-                max_iterations=max_iterations, initial=near.initial,
-            )  # fmt: skip
-            if found.converged and not (
-                astray(found, record[response]) or magnifies(found, record, response, steps.fine)
-            ):
-                return found
-    except DivergenceError:
-        pass
-    return fit_in_pieces(
-        model, record, start=start, held=held, response=response, steps_per_sample=coarse, max_iterations=max_iterations
-    )
-
-
-def astray(found: FreeRunFit, measured: Floats) -> bool:
-    """Whether a fit ended in a side valley: what it leaves is a good part of the response, and looks like motion."""
-    if found.rms < POOR * float(np.std(measured)):
+    if not fit.converged:
+        return True
+    if fit.rms < POOR * float(np.std(measured)):
         return False
-    neighbours = 1.0 - float(np.mean(np.diff(found.residual) ** 2)) / (2.0 * found.rms**2)
+    neighbours = 1.0 - float(np.mean(np.diff(fit.residual) ** 2)) / (2.0 * fit.rms**2)
     return neighbours > SMOOTH
 
 
-def magnifies(
-    found: FreeRunFit, record: Record, response: str, steps: int, span: tuple[int, int] | None = None
-) -> bool:
-    """Whether disturbances of a fitted free run grow along a span of the record, as those of a chaotic one do."""
-    whole = span or (0, len(record))
-    pieces = Pieces(record, response, whole, even_restarts(record, response, whole), steps)
-    states = pieces.passing(found.model, (), found.initial)
-    return bool(needed_restarts(found.model, record, states, whole, pieces.restarts, steps))
+def magnifies(fit: FreeRunFit, prepared: Prepared) -> bool:
+    """Whether disturbances of a fitted free run grow on the way that it was fitted to, as those of a chaotic one do."""
+    record, response, first = prepared.record, prepared.response, prepared.plan.fit[0]
+    span = (first, first + len(fit.residual))
+    pieces = Pieces(record, response, span, even_restarts(record, response, span), fit.steps_per_sample)
+    states = pieces.passing(fit.model, fit.restarts, fit.initial)
+    return bool(needed_restarts(fit.model, record, states, span, pieces.restarts, fit.steps_per_sample))
 
 
 def _joined_and_tied(

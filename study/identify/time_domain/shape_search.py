@@ -5,21 +5,20 @@ would add (the sensitivity at a zero coefficient, exact), after all that the mod
 could do has been taken out. One free run a point; the best few points start a fit of everything.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, rfft, rfftfreq
 
-from study.equations.free_run import FreeRun, prepare
-from study.equations.model import Model, ModelTerm, free
-from study.equations.terms import Term, get
-from study.identify.time_domain import held_out
+from study.equations.model import ModelTerm
+from study.equations.terms import Term
+from study.identify.frequency_domain.starting_values import linear_start, oscillator
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.records.plan import Plan
-from study.records.record import MOTIONS, Record
+from study.identify.time_domain.part_fit import linearise, run_of
+from study.records.prepared import Prepared
+from study.records.record import MOTIONS
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 
@@ -36,7 +35,7 @@ class Baseline:
 
     Attributes
     ----------
-    found : FreeRunFit
+    fit : FreeRunFit
         The fit.
     basis : array, shape (n, p)
         Orthonormal basis of everything its own coefficients and initial state could change.
@@ -52,7 +51,7 @@ class Baseline:
         Place of the measured response in ``MOTIONS``.
     """
 
-    found: FreeRunFit
+    fit: FreeRunFit
     basis: Floats
     displacement: Floats
     linear: dict[str, float]
@@ -75,30 +74,23 @@ class Start:
     share: float
 
 
-def baseline(found: FreeRunFit, record: Record, how: Plan) -> Baseline:
+def baseline(fit: FreeRunFit, prepared: Prepared) -> Baseline:
     """Prepare a fitted model for the search."""
-    jacobian = held_out.linearise(found, record, how)
+    jacobian = linearise(fit, prepared)
     scale = np.linalg.norm(jacobian, axis=0)
     basis = np.linalg.qr(jacobian / np.where(scale > 0.0, scale, 1.0))[0]
-    motion = prepare(found.model, record, response="displacement", steps_per_sample=how.steps_per_sample, span=how.fit)
-    displacement, _ = motion.respond({}, found.initial)
-    linear = held_out.linear_start(found.model, record, how)
-    oscillator = Model("linear", tuple(free(get(n)) for n in ("inertia", "linear_damping", "linear_stiffness")))
-    approximation = held_out.linear_start(oscillator, record, how)
-    return Baseline(found, basis, displacement, linear, approximation, record.dt, MOTIONS.index(how.response))
-
-
-def _run(model: Model, record: Record, how: Plan, keys: Sequence[str]) -> FreeRun:
-    return prepare(
-        model, record, keys, response=how.response, steps_per_sample=how.steps_per_sample, span=how.fit
+    displacement, _ = run_of(fit, prepared, motion="displacement").respond({}, fit.initial)
+    row = MOTIONS.index(prepared.response)
+    return Baseline(
+        fit, basis, displacement, linear_start(fit.model, prepared), oscillator(prepared), prepared.dt, row
     )  # fmt: skip
 
 
-def starts(term: Term, base: Baseline, record: Record, how: Plan) -> list[Start]:
+def starts(term: Term, base: Baseline, prepared: Prepared) -> list[Start]:
     """The best points of the search over a candidate's shape parameters, best first."""
     tried: list[Start] = []
-    for parameters in grid(term, base, record, how):
-        point = _try(term, parameters, base, record, how)
+    for parameters in grid(term, base):
+        point = _try(term, parameters, base, prepared)
         if point is not None:
             tried.append(point)
     best = sorted(tried, key=lambda s: -s.share)
@@ -109,17 +101,17 @@ def starts(term: Term, base: Baseline, record: Record, how: Plan) -> list[Start]
 
 
 def sensitivity(
-    term: Term, parameters: tuple[float, ...], base: Baseline, record: Record, how: Plan
+    term: Term, parameters: tuple[float, ...], base: Baseline, prepared: Prepared
 ) -> Floats | None:  # fmt: skip
     """What small amounts of a candidate add to the response that the model's own coefficients cannot, (n, components).
 
     None where the model with it does not run, or nothing is left.
     """
     entry = ModelTerm(term, (0.0,) * len(term.components), parameters)
-    model = base.found.model.with_term(entry)
+    model = base.fit.model.with_term(entry)
     try:
-        run = _run(model, record, how, term.symbols)
-        _, added = run.respond(dict.fromkeys(term.symbols, 0.0), base.found.initial)
+        run = run_of(replace(base.fit, model=model), prepared, term.symbols)
+        _, added = run.respond(dict.fromkeys(term.symbols, 0.0), base.fit.initial)
     except StudyError:
         return None
     added = added - base.basis @ (base.basis.T @ added)
@@ -127,20 +119,20 @@ def sensitivity(
 
 
 def _try(
-    term: Term, parameters: tuple[float, ...], base: Baseline, record: Record, how: Plan
+    term: Term, parameters: tuple[float, ...], base: Baseline, prepared: Prepared
 ) -> Start | None:  # fmt: skip
     """One point: least squares of the residual on the candidate's sensitivities."""
-    added = sensitivity(term, parameters, base, record, how)
+    added = sensitivity(term, parameters, base, prepared)
     if added is None:
         return None
-    residual = base.found.residual
+    residual = base.fit.residual
     amounts = least_squares(added, residual, 1e-8)
     power = float(residual @ residual)
     share = 1.0 - float(np.sum((residual - added @ amounts) ** 2)) / power if power > 0.0 else 0.0
     return Start(parameters, tuple(float(a) for a in amounts), share)
 
 
-def grid(term: Term, base: Baseline, record: Record, how: Plan) -> list[tuple[float, ...]]:
+def grid(term: Term, base: Baseline) -> list[tuple[float, ...]]:
     """Points to try: amplitudes from the motion, times from the resonance, frequencies from spectra."""
     if not term.parameters:
         return [()]
@@ -150,23 +142,23 @@ def grid(term: Term, base: Baseline, record: Record, how: Plan) -> list[tuple[fl
         case "one_sided_contact":
             return [(float(x),) for x in np.quantile(base.displacement, np.linspace(0.1, 0.985, 16))]
         case "relaxation":
-            return [(float(x) / _rate(base, record.dt),) for x in np.geomspace(0.05, 20.0, 12)]
+            return [(float(x) / _rate(base),) for x in np.geomspace(0.05, 20.0, 12)]
         case "hysteresis":
             size = 1.0 / float(np.std(base.displacement))
             betas = size * np.array([0.15, 0.4, 1.0, 2.5, 6.0])
             return [(float(b), float(b * g)) for b, g in product(betas, (-0.9, -0.3, 0.3, 0.9))]
         case "periodic_stiffness":
-            return _around(modulation_lines(base), how, record.dt)
+            return _around(modulation_lines(base), base)
         case "harmonic_force":
-            return _around(residual_lines(base), how, record.dt)
+            return _around(residual_lines(base), base)
         case _:
             raise StudyError(f"there is no search for the shape parameters of {term.name!r}")
 
 
-def _rate(base: Baseline, dt: float) -> float:
+def _rate(base: Baseline) -> float:
     """Typical angular frequency of the motion in rad/s: rms velocity over rms displacement."""
     u = base.displacement
-    return float(np.std(np.gradient(u, dt)) / np.std(u))
+    return float(np.std(np.gradient(u, base.dt)) / np.std(u))
 
 
 def _windowed(values: Floats) -> Complexes:
@@ -179,10 +171,10 @@ def modulation_lines(base: Baseline) -> list[float]:
     The response added by ``u cos(2 pi f t)`` is ``H * (u cos)``; its product with the residual, summed,
     is one line of the spectrum of ``u`` times the residual filtered by H backwards in time.
     """
-    n = len(base.found.residual)
+    n = len(base.fit.residual)
     receptance = base.transfer(np.asarray(2j * np.pi * rfftfreq(n, base.dt), dtype=np.complex128))
     receptance[0] = receptance[1] if not np.isfinite(receptance[0]) else receptance[0]
-    matched = irfft(np.conj(receptance) * rfft(base.found.residual), n)
+    matched = irfft(np.conj(receptance) * rfft(base.fit.residual), n)
     numerator = np.abs(_windowed(matched * base.displacement)) ** 2
     passband = irfft(np.abs(receptance) ** 2, n)
     spread = irfft(np.abs(rfft(base.displacement)) ** 2, n)
@@ -192,7 +184,7 @@ def modulation_lines(base: Baseline) -> list[float]:
 
 def residual_lines(base: Baseline) -> list[float]:
     """Lines that stand out of the residual's own spectrum."""
-    return _lines(np.abs(_windowed(base.found.residual)) ** 2)
+    return _lines(np.abs(_windowed(base.fit.residual)) ** 2)
 
 
 def _lines(spectrum: Floats) -> list[float]:
@@ -216,7 +208,7 @@ def _top(three: Floats) -> float:
     return 0.5 * float(three[0] - three[2]) / bend if bend < 0.0 else 0.0
 
 
-def _around(lines: list[float], how: Plan, dt: float) -> list[tuple[float, ...]]:
+def _around(lines: list[float], base: Baseline) -> list[tuple[float, ...]]:
     """Each line, and a third of a line to either side: a fit finds its way from there."""
-    resolution = 1.0 / ((how.fit[1] - how.fit[0]) * dt)
+    resolution = 1.0 / (len(base.fit.residual) * base.dt)
     return [((line + shift) * resolution,) for line in lines for shift in (-0.35, 0.0, 0.35)]

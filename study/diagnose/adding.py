@@ -1,0 +1,21 @@
+"""A term added to a fitted model: the fit begins where the candidate ended, and never ends worse."""
+
+from study.compare.comparison import Comparison, compare
+from study.diagnose.verdict import SEARCHED, search_base
+from study.equations.model import free
+from study.equations.terms import Term
+from study.identify.time_domain.fit_model import continued, settled, with_term
+
+
+def added(comparison: Comparison, term: Term) -> Comparison:
+    """The comparison of the model with a term more, fitted as a diagnosis fits that candidate.
+
+    Raises
+    ------
+    StudyError
+        If the model with it has no finite response.
+    """
+    prepared = comparison.prepared
+    fit = with_term(search_base(comparison).fit, free(term), search_base(comparison), prepared.shortened(SEARCHED))
+    fit = settled(continued(fit, prepared), prepared)
+    return compare(comparison.model.with_term(term), prepared, fit=fit)

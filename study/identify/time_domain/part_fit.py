@@ -1,0 +1,125 @@
+"""A free run fitted to one part of a record, and run along the part that is judged."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.equations.free_run import FreeRun, prepare
+from study.equations.model import Model
+from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
+from study.records.prepared import Prepared
+from study.support.levenberg_marquardt import OFFSET
+
+Floats = NDArray[np.float64]
+STEPS = 2  # Runge-Kutta steps in a sampling interval while a search compares models
+
+
+def fit_part(
+    model: Model,
+    prepared: Prepared,
+    held: Collection[str],
+    start: Mapping[str, float] | None = None,
+    *,
+    steps: int = STEPS,
+    max_iterations: int = 60,
+    initial: Floats | None = None,
+    offset: float = OFFSET,
+) -> FreeRunFit:
+    """Fit what is not held on the fitting part, from ``start`` where it has a value and from the model elsewhere.
+
+    Raises
+    ------
+    StudyError
+        If the model cannot run with these values, or a value is missing.
+    """
+    begin = {key: value for key, value in (start or {}).items() if key not in held}
+    return fit_free_run(
+        model, prepared.record, start=begin, held=held, response=prepared.response, steps_per_sample=steps,
+        span=prepared.plan.fit, max_iterations=max_iterations, offset=offset,
+        initial="estimate" if initial is None else initial,
+    )  # fmt: skip
+
+
+def run_of(
+    fit: FreeRunFit, prepared: Prepared, keys: Sequence[str] = (), *, motion: str | None = None, finer: int = 1
+) -> FreeRun:
+    """The free run of a fit along the samples that it was fitted to, ``finer`` times as many steps taken."""
+    first = prepared.plan.fit[0]
+    return prepare(
+        fit.model, prepared.record, keys, response=motion or prepared.response,
+        steps_per_sample=finer * fit.steps_per_sample, span=(first, first + len(fit.residual)), restarts=fit.restarts,
+    )  # fmt: skip
+
+
+def linearise(fit: FreeRunFit, prepared: Prepared) -> Floats:
+    """Derivatives of the response on the samples that were fitted, shape (n, keys + 2): keys, then initial states."""
+    values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
+    return run_of(fit, prepared, fit.keys).respond(values, fit.initial, 2)[1]
+
+
+@dataclass(frozen=True)
+class JudgingRun:
+    """The free run of a fitted model that covers the judging part.
+
+    Where that follows the fitting part the run goes on through both. Elsewhere, or where the fit begins anew at
+    restarts, its initial state, and nothing else, is estimated from the judging part.
+
+    Attributes
+    ----------
+    fit : FreeRunFit
+        The fitted model.
+    prepared : Prepared
+        The record and its parts.
+    first : int
+        Sample of the record at which the run begins.
+    initial : array, shape (states,)
+        State there.
+    """
+
+    fit: FreeRunFit
+    prepared: Prepared
+    first: int
+    initial: Floats
+
+    def motion(self, name: str, finer: int = 1) -> Floats:
+        """A motion on the judging part, shape (samples to judge,); with more steps if asked.
+
+        Raises
+        ------
+        DivergenceError
+            If the free run leaves the range of finite numbers.
+        """
+        run = self._run((), name, finer)
+        return run.respond({}, self.initial)[0][self.prepared.plan.judge[0] - self.first :]
+
+    def derivatives(self, fit: FreeRunFit) -> Floats:
+        """As :func:`linearise`, on the judging part, of a fit with the same motion."""
+        values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
+        run = self._run(fit.keys, self.prepared.response, 1, fit.model)
+        return run.respond(values, self.initial, 2)[1][self.prepared.plan.judge[0] - self.first :]
+
+    def _run(self, keys: Sequence[str], motion: str, finer: int, model: Model | None = None) -> FreeRun:
+        return prepare(
+            model or self.fit.model, self.prepared.record, keys, response=motion,
+            steps_per_sample=finer * self.fit.steps_per_sample, span=(self.first, self.prepared.plan.judge[1]),
+        )  # fmt: skip
+
+
+def judging_run(fit: FreeRunFit, prepared: Prepared) -> JudgingRun:
+    """The free run that the fitted model is judged by.
+
+    Raises
+    ------
+    DivergenceError
+        If it leaves the range of finite numbers.
+    """
+    plan = prepared.plan
+    if plan.judge[0] == plan.fit[1] and not fit.restarts:
+        return JudgingRun(fit, prepared, plan.fit[0], fit.initial)
+    again = fit_free_run(
+        fit.model, prepared.record, held=tuple(fit.model.values), response=plan.response,
+        steps_per_sample=fit.steps_per_sample, span=plan.judge,
+    )  # fmt: skip
+    return JudgingRun(fit, prepared, plan.judge[0], again.initial)

@@ -1,0 +1,103 @@
+"""A record made ready once, at the door: everything that fits, predicts, compares or diagnoses takes it from here."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.records.completion import complete
+from study.records.plan import Plan, make_plan
+from study.records.record import Record
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A record in consistent units, with all three motions, and what is fitted and judged of it.
+
+    Attributes
+    ----------
+    record : Record
+        Force, displacement, velocity, acceleration and any further channels.
+    plan : Plan
+        The measured response, the part to fit and the part to judge.
+    band : (float, float)
+        Lowest and highest frequency in hertz at which all three motions are right; judgements leave the rest out.
+    edge : int
+        Samples at each end that derivatives and integrals leave uncertain.
+    notes : tuple of str
+        What was converted or computed, a sentence each.
+    """
+
+    record: Record
+    plan: Plan
+    band: tuple[float, float]
+    edge: int
+    notes: tuple[str, ...] = ()
+
+    @property
+    def response(self) -> str:
+        """The measured motion that free runs are compared with."""
+        return self.plan.response
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval in seconds."""
+        return self.record.dt
+
+    @property
+    def fitted(self) -> Floats:
+        """The measured response of the fitting part, shape (samples to fit,)."""
+        return self.record[self.plan.response][slice(*self.plan.fit)]
+
+    @property
+    def judged(self) -> Floats:
+        """The measured response of the judging part, shape (samples to judge,)."""
+        return self.record[self.plan.response][slice(*self.plan.judge)]
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the response within the fitting part."""
+        return float(np.std(self.fitted))
+
+    def inner(self, span: tuple[int, int]) -> tuple[int, int]:
+        """A span without the uncertain samples at the ends of the record."""
+        return max(span[0], self.edge), min(span[1], len(self.record) - self.edge)
+
+    def with_fit(self, first: int, last: int) -> "Prepared":
+        """The same record with another part to fit."""
+        return replace(self, plan=replace(self.plan, fit=(first, last)))
+
+    def shortened(self, samples: int) -> "Prepared":
+        """The same with no more than so many samples to fit: enough to tell candidates apart, and sooner done."""
+        first, last = self.plan.fit
+        return self if last - first <= samples else self.with_fit(first, first + samples)
+
+
+def prepare_record(record: Record, plan: Plan | None = None, cutoff: float | None = None) -> Prepared:
+    """Bring a record into consistent units, complete its motions, and settle what is fitted and judged.
+
+    Parameters
+    ----------
+    record : Record
+        Force and at least one motion, as read.
+    plan : Plan, optional
+        :func:`study.records.plan.make_plan` if left out.
+    cutoff : float, optional
+        Frequency in hertz above which a measured velocity or acceleration is integrated, and below which nothing is
+        judged; found from the record if left out.
+
+    Raises
+    ------
+    StudyError
+        If no motion was measured, units cannot be brought together, or the cut-off is none.
+    """
+    plan = plan or make_plan(record)
+    completed = complete(record, cutoff)
+    return Prepared(completed.record, plan, completed.band, completed.edge, completed.says)
+
+
+def whole(record: Record, response: str = "displacement") -> Prepared:
+    """A record of which all is fitted and nothing judged, as the estimators of the reproduction have it."""
+    return prepare_record(record, Plan(response, (0, len(record)), (len(record), len(record))))
