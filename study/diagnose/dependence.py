@@ -81,10 +81,8 @@ def leftover(base: Baseline, prepared: Prepared) -> Leftover:
     try:
         run = judging_run(fit, prepared)
         later = [run.motion(name) for name in MOTIONS[:2]]
-        later += [
-            prepared.judged - run.motion(prepared.response),
-            run.derivatives(shaped)[:, : len(shaped.keys) + states],
-        ]
+        later.append(prepared.judged - run.motion(prepared.response))
+        later.append(run.derivatives(shaped)[:, : len(shaped.keys) + states])
     except DivergenceError:
         split = len(fit.residual) // 2
     else:
