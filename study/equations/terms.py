@@ -9,6 +9,7 @@ To add an effect, add one entry to ``LIBRARY`` and one row to the parametrised t
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from study.equations import dimensions, formulas
 from study.equations.graph import Graph
@@ -83,10 +84,22 @@ class Term:
         """Names of the coefficients."""
         return tuple(c.symbol for c in self.components)
 
+    @cached_property  # a diagnosis prepares hundreds of runs
+    def channels(self) -> tuple[str, ...]:
+        """Measured channels that its formulas name, in alphabetical order.
+
+        A channel is whatever is not u, v, t or pi, a parameter, or z where the term has a state of its own: what a
+        record happens to call so is never meant.
+        """
+        own = {*formulas.VARIABLES, *(p.name for p in self.parameters), *(("z",) if self.state else ())}
+        texts = (*(c.shape for c in self.components), *((self.state,) if self.state else ()))
+        return tuple(sorted({name for text in texts for name in formulas.names(text)} - own))
+
     def unit(self, symbol: str, force: str, length: str) -> str:
         """Unit of one coefficient for a record with these units of force and length."""
         component = next(c for c in self.components if c.symbol == symbol)
-        known = {p.name: QUANTITIES[p.quantity] for p in self.parameters} | {"z": STATE_DIMENSIONS}
+        known = {p.name: QUANTITIES[p.quantity] for p in self.parameters}
+        known |= {"z": STATE_DIMENSIONS} if self.state else {}
         powers = dimensions.dimensions(component.shape, known)
         if powers is not None:
             powers = (powers[0], powers[1] - component.order)
@@ -239,6 +252,9 @@ def get(name: str) -> Term:
 
 def custom(name: str, force: str) -> Term:
     """A user's own term: ``force`` is a formula of u, v, t and the names of extra measured channels.
+
+    u, v, t and pi are displacement, velocity, time and the number, even where a channel is called so. The term has no
+    state: z is a channel like any other.
 
     Raises
     ------
