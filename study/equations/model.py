@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from study.equations import formulas
 from study.equations.graph import Graph, Program
-from study.equations.terms import Component, Term
+from study.equations.term import Component, Term
 from study.support.errors import StudyError
 
 FIXED_INPUTS = (*formulas.VARIABLES, "force")  # the registers that every forward program begins with
@@ -44,7 +44,7 @@ class ModelTerm:
     @property
     def keys(self) -> tuple[str, ...]:
         """Names of its coefficients, then of its shape parameters as ``term.parameter``."""
-        return self.term.symbols + tuple(f"{self.name}.{p.name}" for p in self.term.parameters)
+        return self.term.keys
 
     @property
     def values(self) -> dict[str, float | None]:

@@ -10,7 +10,8 @@ from study.equations.free_run import predict, prepare
 from study.equations.model import Model, forward_graph, forward_program, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.substeps import needed_steps
-from study.equations.terms import LIBRARY, Component, Term, custom
+from study.equations.term import Component, Term
+from study.equations.terms import LIBRARY, custom
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
 from study.identify.time_domain.free_run_fit import fit_free_run
 from study.records.record import Record

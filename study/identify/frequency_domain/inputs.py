@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from study.equations import formulas, kernels
 from study.equations.graph import Graph
 from study.equations.model import Model, ModelTerm, with_registers
-from study.equations.terms import Component
+from study.equations.term import Component
 from study.records.interpolation import between_samples
 from study.records.record import Record
 from study.support.errors import StudyError

@@ -7,7 +7,6 @@ could do has been taken out. One free run a point; the best few points start a f
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,8 @@ from scipy.fft import irfft, rfft, rfftfreq
 
 from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model, ModelTerm, free
-from study.equations.terms import Term, get
+from study.equations.term import Parameter, Term
+from study.equations.terms import get
 from study.identify.time_domain import held_out
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.plan import Plan
@@ -102,7 +102,7 @@ def starts(term: Term, base: Baseline, record: Record, how: Plan) -> list[Start]
         if point is not None:
             tried.append(point)
     best = sorted(tried, key=lambda s: -s.share)
-    if term.name in ("periodic_stiffness", "harmonic_force", "hysteresis"):
+    if not any(p.search.blunt for p in term.parameters):
         return best[:STARTS]
     step = max(1, (len(tried) - 1) // (SPREAD - 1))
     return best[:1] + [point for point in tried[::step] if point is not best[0]]
@@ -142,25 +142,31 @@ def _try(
 
 def grid(term: Term, base: Baseline, record: Record, how: Plan) -> list[tuple[float, ...]]:
     """Points to try: amplitudes from the motion, times from the resonance, frequencies from spectra."""
-    if not term.parameters:
-        return [()]
-    match term.name:
-        case "dead_band":
-            return [(float(x),) for x in np.quantile(np.abs(base.displacement), np.linspace(0.08, 0.97, 14))]
-        case "one_sided_contact":
-            return [(float(x),) for x in np.quantile(base.displacement, np.linspace(0.1, 0.985, 16))]
-        case "relaxation":
-            return [(float(x) / _rate(base, record.dt),) for x in np.geomspace(0.05, 20.0, 12)]
-        case "hysteresis":
-            size = 1.0 / float(np.std(base.displacement))
-            betas = size * np.array([0.15, 0.4, 1.0, 2.5, 6.0])
-            return [(float(b), float(b * g)) for b, g in product(betas, (-0.9, -0.3, 0.3, 0.9))]
-        case "periodic_stiffness":
-            return _around(modulation_lines(base), how, record.dt)
-        case "harmonic_force":
-            return _around(residual_lines(base), how, record.dt)
-        case _:
-            raise StudyError(f"there is no search for the shape parameters of {term.name!r}")
+    points: list[tuple[float, ...]] = [()]
+    for parameter in term.parameters:
+        points = [(*point, x) for point in points for x in _places(parameter, point, base, record, how)]
+    return points
+
+
+def _places(parameter: Parameter, point: tuple[float, ...], base: Baseline, record: Record, how: Plan) -> list[float]:
+    """Values of one shape parameter to try beside those of the parameters before it."""
+    places, u = np.array(parameter.search.places), base.displacement
+    match parameter.search.kind:
+        case "quantiles of |u|":
+            found = np.quantile(np.abs(u), places)
+        case "quantiles of u":
+            found = np.quantile(u, places)
+        case "times of the motion":
+            found = places / _rate(base, record.dt)
+        case "per amplitude":
+            found = places * (1.0 / float(np.std(u)))
+        case "shares of the one before":
+            found = places * point[-1]
+        case "lines of the modulation":
+            found = _around(modulation_lines(base), places, how, record.dt)
+        case "lines of the residual":
+            found = _around(residual_lines(base), places, how, record.dt)
+    return [float(x) for x in found]
 
 
 def _rate(base: Baseline, dt: float) -> float:
@@ -216,7 +222,7 @@ def _top(three: Floats) -> float:
     return 0.5 * float(three[0] - three[2]) / bend if bend < 0.0 else 0.0
 
 
-def _around(lines: list[float], how: Plan, dt: float) -> list[tuple[float, ...]]:
-    """Each line, and a third of a line to either side: a fit finds its way from there."""
+def _around(lines: list[float], shifts: Floats, how: Plan, dt: float) -> Floats:
+    """Frequencies so many lines to either side of each line, in hertz, shape (lines * shifts,)."""
     resolution = 1.0 / ((how.fit[1] - how.fit[0]) * dt)
-    return [((line + shift) * resolution,) for line in lines for shift in (-0.35, 0.0, 0.35)]
+    return np.add.outer(np.array(lines), shifts).ravel() * resolution
