@@ -31,6 +31,7 @@ def test_every_effect_can_be_hidden_at_its_share(name: str) -> None:
     again = simulate(trial.truth, trial.record["force"], trial.record.dt, Integrator("rk4", 8))
     assert share_of(trial.truth, name, again) == pytest.approx(trial.shares[0], rel=1e-12)
     assert SHARE[0] <= trial.shares[0] <= SHARE[1]
+    assert [t.term.physical(t.values) for t in trial.truth.terms if t.term.physical(t.values)] == []
 
 
 @pytest.mark.parametrize("seed", range(820, 824))
