@@ -28,7 +28,7 @@ for _case in STUDY.cases:
         output:
             **figures_of(_case, IDENTIFIED, DESCRIBED),
         params:
-            title=STUDY.cases[_case].title,
+            title=STUDY.cases[_case].row.title,
             drawn=STUDY.drawn(_case),
         benchmark:
             f"results/benchmarks/draw.{_case}.tsv"
@@ -48,8 +48,8 @@ for _case in STUDY.cases:
             output:
                 **figures_of(_case, PRELIMINARY, DESCRIBED),
             params:
-                title=STUDY.cases[_case].title,
-                segments=STUDY.settings["segments"],
+                title=STUDY.cases[_case].row.title,
+                segments=STUDY.settings.segments.plain(),
             benchmark:
                 f"results/benchmarks/draw_preliminary.{_case}.tsv"
             script:

@@ -5,7 +5,7 @@ effect hidden and taken out of the library (``removed``).
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -19,6 +19,7 @@ from study.identify.time_domain import held_out
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.plan import Plan, make_plan
+from study.reproduction.settings import TrialSettings
 from study.support.errors import DivergenceError, StudyError
 from study.trials.draw import HIDDEN, Trial, make_trial
 
@@ -57,26 +58,25 @@ class Order:
     response: str
 
 
-def orders(settings: Mapping[str, Any]) -> list[Order]:
+def orders(settings: TrialSettings) -> list[Order]:
     """Every trial of the published run: all effects at all noises and responses, each with a seed of its own.
 
     Parameters
     ----------
-    settings : mapping
+    settings : TrialSettings
         ``trials`` of the configuration: ``first_seed``, ``noises``, how many ``rounds`` of single effects and
         of ``none`` at each noise and response, and how many ``pairs`` and ``removed`` trials of each effect.
     """
-    noises: list[float] = settings["noises"]
-    grid = [(noise, response) for noise in noises for response in RESPONSES]
+    grid = [(noise, response) for noise in settings.noises for response in RESPONSES]
     wanted: list[tuple[str, tuple[str, ...], tuple[float, str]]] = []
-    wanted += [(SINGLE, (name,), place) for _ in range(settings["rounds"]) for place in grid for name in HIDDEN]
-    wanted += [(NONE, (), place) for _ in range(settings["none"]) for place in grid]
+    wanted += [(SINGLE, (name,), place) for _ in range(settings.rounds) for place in grid for name in HIDDEN]
+    wanted += [(NONE, (), place) for _ in range(settings.none) for place in grid]
     couples = list(combinations(HIDDEN, 2))
-    drawn = np.random.default_rng(settings["first_seed"]).permutation(len(couples))[: settings["pairs"]]
+    drawn = np.random.default_rng(settings.first_seed).permutation(len(couples))[: settings.pairs]
     wanted += [(PAIR, couples[j], grid[i % len(grid)]) for i, j in enumerate(drawn)]
-    removed = [name for _ in range(settings["removed"]) for name in HIDDEN]
+    removed = [name for _ in range(settings.removed) for name in HIDDEN]
     wanted += [(REMOVED, (name,), grid[i % len(grid)]) for i, name in enumerate(removed)]
-    first = settings["first_seed"]
+    first = settings.first_seed
     return [Order(kind, first + i, hidden, *place) for i, (kind, hidden, place) in enumerate(wanted)]
 
 
