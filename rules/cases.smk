@@ -28,7 +28,7 @@ for _case in STUDY.cases:
         output:
             **figures_of(_case, IDENTIFIED, DESCRIBED),
         params:
-            title=STUDY.cases[_case].row.title,
+            title=STUDY.cases[_case].title,
             drawn=STUDY.drawn(_case),
         benchmark:
             f"results/benchmarks/draw.{_case}.tsv"
@@ -42,13 +42,13 @@ for _case in STUDY.cases:
                 f"draw_preliminary.{_case}"
             input:
                 record=f"results/{_case}/record.csv",
-                model=STUDY.cases[_case].model,
+                model=STUDY.cases[_case].model_file,
                 style=STYLE,
                 code=CODE["preliminary"],
             output:
                 **figures_of(_case, PRELIMINARY, DESCRIBED),
             params:
-                title=STUDY.cases[_case].row.title,
+                title=STUDY.cases[_case].title,
                 segments=STUDY.settings.segments.plain(),
             benchmark:
                 f"results/benchmarks/draw_preliminary.{_case}.tsv"

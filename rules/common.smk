@@ -44,7 +44,7 @@ def compared_settings(case):
 
 
 def model_of(wildcards):
-    return STUDY.cases[wildcards.case].model
+    return STUDY.cases[wildcards.case].model_file
 
 
 def pictures(stem):
@@ -73,7 +73,7 @@ def figures_of(case, kinds, described):
             page = {
                 "caption": f"captions/{kind}.rst",
                 "category": "Figures",
-                "subcategory": STUDY.cases[case].row.title,
+                "subcategory": STUDY.cases[case].title,
                 "labels": {"figure": number, "shows": described[kind]},
             }
             found[kind] = [report(png, **page), svg]

@@ -10,7 +10,7 @@ ERROR_RESULTS = ["results/estimators.csv", *pictures("estimators")]
 rule estimator_errors:
     priority: 1
     input:
-        models=[case.model for case in STUDY.cases.values()],
+        models=[case.model_file for case in STUDY.cases.values()],
         code=CODE["monte_carlo"],
     output:
         table=report(

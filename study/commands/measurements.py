@@ -9,12 +9,11 @@ from typing import Annotated
 from pydantic import BeforeValidator, Field
 
 from study.commands.parser import parser
-from study.support.config_files import Row, read_rows
-from study.support.errors import StudyError
+from study.support.config_files import Row, Text, read_rows
+from study.support.errors import StudyError, at, expect
 
 VARIABLE = "$STUDY_DATA"  # at the beginning of a path: the folder that this environment variable names
 TAKEN = ("--out", "--model", "-h", "--help")
-Text = Annotated[str, Field(min_length=1)]
 
 
 def _words(text: object) -> object:
@@ -26,12 +25,9 @@ def _words(text: object) -> object:
     except ValueError as error:
         raise StudyError(f"options {text!r} cannot be split into words: {error}") from None
     for word in words:
-        if word.partition("=")[0] in TAKEN:
-            raise StudyError(f"options name {word}, which the workflow gives; leave it out")
-    try:
+        expect(word.partition("=")[0] not in TAKEN, f"options name {word}, which the workflow gives; leave it out")
+    with at("options"):
         parser().parse_args(["compare", "record", "--model", "model", *words])
-    except StudyError as error:
-        raise StudyError(f"options: {error}") from None
     return words
 
 
@@ -81,16 +77,15 @@ def load(folder: Path, cases: Collection[str] = ()) -> Mapping[str, Measurement]
     """
     measurements: dict[str, Measurement] = {}
     models = folder.parent / "models"
+    known = ", ".join(sorted(path.stem for path in models.rglob("*.yaml")))
     for where, row in read_rows(folder / "measurements.tsv", Measurement):
-        if row.record in measurements:
-            raise StudyError(f"{where}: the record stands twice; expected each name once")
-        for name in (row.record, f"{row.record}_climb"):
-            if name in cases:
-                raise StudyError(f"{where}: {name!r} is a case of cases.tsv; give the record or the case another name")
         model = models / f"{row.model}.yaml"
-        if not model.is_file():
-            known = ", ".join(sorted(p.stem for p in models.rglob("*.yaml")))
-            raise StudyError(f"{where}: there is no model {row.model!r}; models/ holds {known}")
+        with at(where):
+            expect(row.record not in measurements, "the record stands twice; expected each name once")
+            for name in (row.record, f"{row.record}_climb"):
+                case = f"{name!r} is a case of cases.tsv; give the record or the case another name"
+                expect(name not in cases, case)
+            expect(model.is_file(), f"there is no model {row.model!r}; models/ holds {known}")
         path = row.path.replace(VARIABLE, os.environ.get(VARIABLE[1:]) or VARIABLE, 1)
         measurements[row.record] = row.model_copy(update={"path": path, "model": str(model)})
     return measurements
@@ -104,11 +99,7 @@ def check_present(path: Path) -> None:
     StudyError
         If not, or if no folder of data is named.
     """
+    named = VARIABLE[1:]
     if VARIABLE in path.parts:
-        raise StudyError(
-            f"{path}: {VARIABLE[1:]} is not set; expected the folder that holds {path.relative_to(VARIABLE)}"
-        )
-    if not path.is_file():
-        raise StudyError(
-            f"{path} is not there; the project holds no data: set {VARIABLE[1:]} to the folder that holds them"
-        )
+        raise StudyError(f"{path}: {named} is not set; expected the folder that holds {path.relative_to(VARIABLE)}")
+    expect(path.is_file(), f"{path} is not there; the project holds no data: set {named} to the folder that holds them")

@@ -8,15 +8,9 @@ from typing import Annotated
 from pydantic import BeforeValidator, Field
 
 from study.reproduction import case_names, preconditions
-from study.reproduction.settings import (
-    ExcitationSettings,
-    IdentificationSettings,
-    Positive,
-    RecordSettings,
-    StudySettings,
-)
-from study.support.config_files import Row, read_rows, read_yaml
-from study.support.errors import StudyError
+from study.reproduction.settings import IdentificationSettings, Positive, RecordSettings, StudySettings
+from study.support.config_files import Row, Text, read_rows, read_yaml
+from study.support.errors import StudyError, at, expect
 
 IDENTIFIED = ("linear", "nonlinear", "coherence", "histogram")  # drawn of every case
 PRELIMINARY = ("pattern", "autospectrum", "force_history", "force_histogram")  # of Section 3: drawn where numbered
@@ -24,11 +18,10 @@ NAME = "up to 64 of a to z, 0 to 9 and _, a letter first, and a dot between two 
 Name = Annotated[  # a dot elsewhere is that of a file or of a rule
     str, Field(pattern=r"^[a-z]([a-z0-9_]|(?<=[0-9])[.](?=[0-9]))*\Z", max_length=64, description=NAME)
 ]
-Text = Annotated[str, Field(min_length=1)]
 Number = Annotated[Annotated[int, Field(ge=1)] | None, BeforeValidator(lambda cell: cell or None)]
 
 
-class CaseRow(Row):
+class Case(Row):
     """One row of ``config/cases.tsv``; the numbers are those of the report's figures."""
 
     case: Name
@@ -47,7 +40,13 @@ class CaseRow(Row):
     force_histogram: Number
     title: Text
 
-    def stems(self) -> dict[str, str]:
+    @property
+    def model_file(self) -> str:
+        """Where the system is described."""
+        return f"models/{self.model}.yaml"
+
+    @property
+    def figures(self) -> dict[str, str]:
         """By kind the stem of a figure's files: by its number, or in ``IDENTIFIED`` by the case where it has none."""
         numbers = {kind: getattr(self, kind) for kind in IDENTIFIED + PRELIMINARY}
         return {
@@ -55,28 +54,6 @@ class CaseRow(Row):
             for kind, number in numbers.items()
             if number or kind in IDENTIFIED
         }
-
-
-@dataclass(frozen=True)
-class Case:
-    """What the jobs of a case need.
-
-    Attributes
-    ----------
-    row : CaseRow
-        As ``config/cases.tsv`` has it.
-    model : str
-        Path of the model file.
-    excitation : ExcitationSettings
-        Kind and settings of the force, seed included.
-    figures : dict
-        Stem of the file name of each kind of figure that is drawn.
-    """
-
-    row: CaseRow
-    model: str
-    excitation: ExcitationSettings
-    figures: dict[str, str]
 
 
 @dataclass(frozen=True)
@@ -89,14 +66,14 @@ class StudyConfig:
     @property
     def noise(self) -> dict[str, float]:
         """Noise of each case: mean square on the displacement over that of the displacement."""
-        return {name: case.row.noise for name, case in self.cases.items()}
+        return {name: case.noise for name, case in self.cases.items()}
 
     def record_settings(self, case: str) -> RecordSettings:
         """What a case's record depends on; a job re-runs when it changes."""
-        row = self.cases[case].row
+        row = self.cases[case]
         return RecordSettings(
             case=case,
-            excitation=self.cases[case].excitation,
+            excitation=self.settings.excitations[row.excitation],
             level=row.level,
             noise=row.noise,
             noise_seed=self.settings.noise_seed if row.noise > 0.0 else None,
@@ -109,7 +86,7 @@ class StudyConfig:
         shared, tolerances = self.settings, self.settings.tolerances
         return IdentificationSettings(
             case=case,
-            also_assumed=self.cases[case].row.also_assumed,
+            also_assumed=self.cases[case].also_assumed,
             estimators=estimators or shared.estimators,
             segments=shared.segments,
             fit_band=shared.fit_band,
@@ -122,13 +99,13 @@ class StudyConfig:
 
     def period(self, case: str) -> int | None:
         """Samples in a period of a case's force, where it repeats."""
-        periods = self.cases[case].excitation.periods or 1
+        periods = self.settings.excitations[self.cases[case].excitation].periods or 1
         return self.settings.sampling.samples // periods if periods > 1 else None
 
     def drawn(self, case: str) -> list[str]:
         """The estimators that a case's figures show."""
         drawn = self.settings.drawn
-        return list(drawn.with_noise if self.cases[case].row.noise > 0.0 else drawn.without_noise)
+        return list(drawn.with_noise if self.cases[case].noise > 0.0 else drawn.without_noise)
 
 
 def load(folder: Path) -> StudyConfig:
@@ -143,43 +120,44 @@ def load(folder: Path) -> StudyConfig:
     """
     source, models = folder / "config.yaml", folder.parent / "models"
     settings = read_yaml(source, StudySettings)
-    with preconditions.named(source):
+    with at(source):
         preconditions.check_settings(settings)
     cases: dict[str, Case] = {}
     stems: dict[str, str] = {}
     taken = case_names.taken(folder.parent, settings.estimator_errors.many)
-    for where, row in read_rows(folder / "cases.tsv", CaseRow):
-        with preconditions.named(where):
-            if row.case in cases:
-                raise StudyError("the case stands twice; expected each name once")
-            if row.case in taken:
-                raise StudyError(f"{row.case!r} is the name of {taken[row.case]}; give the case another")
-            cases[row.case] = _case(row, settings, models, stems)
-    with preconditions.named(source):
+    for where, case in read_rows(folder / "cases.tsv", Case):
+        with at(where):
+            expect(case.case not in cases, "the case stands twice; expected each name once")
+            name = taken.get(case.case)
+            expect(not name, f"{case.case!r} is the name of {name}; give the case another")
+            _check_case(case, settings, models, stems)
+        cases[case.case] = case
+    with at(source):
         preconditions.check_tolerances(settings.tolerances, models, list(cases))
         preconditions.check_claims(settings)
     return StudyConfig(settings, cases)
 
 
-def _case(row: CaseRow, settings: StudySettings, models: Path, taken: dict[str, str]) -> Case:
-    """A case, its model and force checked; ``taken`` holds the stems of the figures of the rows before."""
-    path = models / f"{row.model}.yaml"
-    if not path.is_file():
-        known = ", ".join(sorted(p.stem for p in models.glob("*.yaml")))
-        raise StudyError(f"there is no system {row.model!r}; {models.name}/ holds {known}")
-    if row.excitation not in settings.excitations:
+def _check_case(case: Case, settings: StudySettings, models: Path, taken: dict[str, str]) -> None:
+    """Whether a case has its model, its force and its figures; ``taken`` holds the stems of the rows before."""
+    path = models / f"{case.model}.yaml"
+    known = ", ".join(sorted(p.stem for p in models.glob("*.yaml")))
+    expect(path.is_file(), f"there is no system {case.model!r}; {models.name}/ holds {known}")
+    excitation = settings.excitations.get(case.excitation)
+    if excitation is None:
         known = ", ".join(settings.excitations)
-        raise StudyError(f"there is no excitation {row.excitation!r}; config.yaml names {known}")
-    excitation, figures = settings.excitations[row.excitation], row.stems()
-    model = preconditions.check_model(path, row.also_assumed, settings)
+        raise StudyError(f"there is no excitation {case.excitation!r}; config.yaml names {known}")
+    model = preconditions.check_model(path, case.also_assumed, settings)
     preconditions.check_periods(excitation, settings)
     preconditions.check_reached(excitation, settings)
-    for kind, stem in figures.items():
-        if stem in taken:
-            raise StudyError(f"{kind} is {getattr(row, kind)}, a number that {taken[stem]} has already")
-        taken[stem] = f"{kind} of the case {row.case!r}"
-    if row.autospectrum and "periodic_stiffness" not in model:
-        raise StudyError(f"autospectrum is {row.autospectrum}; its lines need a term periodic_stiffness")
-    if row.pattern and (model.states or not model.numbers().get("k", 0.0) > 0.0):
-        raise StudyError(f"pattern is {row.pattern}; it needs a linear stiffness above zero and no term with a memory")
-    return Case(row, str(Path(models.name) / path.name), excitation, figures)
+    for kind, stem in case.figures.items():
+        expect(stem not in taken, f"{kind} is {getattr(case, kind)}, a number that {taken.get(stem)} has already")
+        taken[stem] = f"{kind} of the case {case.case!r}"
+    expect(
+        not case.autospectrum or "periodic_stiffness" in model,
+        f"autospectrum is {case.autospectrum}; its lines need a term periodic_stiffness",
+    )
+    expect(
+        not case.pattern or (not model.states and model.numbers().get("k", 0.0) > 0.0),
+        f"pattern is {case.pattern}; it needs a linear stiffness above zero and no term with a memory",
+    )

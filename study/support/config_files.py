@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, cast, get_args
+from typing import Annotated, Any, TypeVar, cast, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from study.support.errors import StudyError
 from study.support.files import read_text
@@ -45,6 +45,7 @@ class Row(Section):
     model_config = ConfigDict(strict=False)
 
 
+Text = Annotated[str, Field(min_length=1)]
 S = TypeVar("S", bound=Section)
 R = TypeVar("R", bound=Row)
 

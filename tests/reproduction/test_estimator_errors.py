@@ -181,7 +181,7 @@ def test_an_estimator_that_finds_nothing_stands_at_the_edge(table):
 def test_the_kept_table_is_what_this_code_gives(case, names, systems):
     """Its first seeds again; where this fails, `make estimators` is due."""
     settings = CONFIG.record_settings(case).without_seeds(), CONFIG.identification_settings(case, tuple(names))
-    model = systems[Path(CONFIG.cases[case].model).stem]
+    model = systems[CONFIG.cases[case].model]
     own = estimator_errors.errors(ensemble.estimates(model, *settings, [7001, 7002], workers=1))
     kept = pd.read_csv(ROOT / "docs" / "estimators.csv")
     assert estimator_errors.differing(own, kept) == [], "other settings, other code, or other rounding"

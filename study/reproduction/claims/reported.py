@@ -9,7 +9,7 @@ from typing import Annotated, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from study.support.config_files import Row, read_rows
+from study.support.config_files import Row, Text, read_rows
 from study.support.errors import StudyError
 
 MANY = 8  # numbers that still read well in one cell
@@ -75,8 +75,8 @@ class Statement(Row):
         str,
         Field(pattern=r"^[a-z0-9_]+([.][a-z0-9_]+)*\Z", description="names of a to z, 0 to 9 and _ with dots between"),
     ]
-    where: Annotated[str, Field(min_length=1)]
-    what: Annotated[str, Field(min_length=1)]
+    where: Text
+    what: Text
     value: Annotated[float | None, BeforeValidator(lambda cell: None if cell == "" else cell)]
     unit: str
 
