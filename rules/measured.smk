@@ -9,7 +9,7 @@ with one_sentence():
     MEASUREMENTS = measurements.load(Path("config"), STUDY.cases)
 
 CODE["measured"] = rests_on(Path("scripts/measured.py"))
-CODE["measured"] += [f"study/explore/html_page.{ending}" for ending in ("html", "css", "js")]
+CODE["measured"] += [f"study/explore/page.{ending}" for ending in ("html", "css", "js")]
 SEEN = {
     "comparison": ("response", "force_error", "missing_force", "error_in_time"),
     "diagnosis": ("candidates", "constancy"),

@@ -71,7 +71,11 @@ class Run:
 
 
 def study(
-    models: Mapping[str, Model], record: RecordSettings, told: Settings, seeds: Sequence[int], readings: Sequence[str]
+    models: Mapping[str, Model],
+    record: RecordSettings,
+    estimation: Settings,
+    seeds: Sequence[int],
+    readings: Sequence[str],
 ) -> pd.DataFrame:
     """Every system under every setting.
 
@@ -81,7 +85,7 @@ def study(
         Systems by name, every value known.
     record : RecordSettings
         How records are made.
-    told : Settings
+    estimation : Settings
         How they are identified.
     seeds : sequence of int
         Of the forces.
@@ -94,16 +98,16 @@ def study(
         for reading in readings:
             excitation = record.excitation.model_copy(update={"reading": reading})
             base = record.model_copy(update={"excitation": excitation})
-            fine = _runs(model, base, FINE, told, seeds)
+            fine = _runs(model, base, FINE, estimation, seeds)
             for integrator in STUDIED if reading == readings[0] else STUDIED[:1]:
-                runs = _runs(model, base, integrator, told, seeds)
+                runs = _runs(model, base, integrator, estimation, seeds)
                 about = {"system": name, "reading": reading, **integrator.plain(), "seeds": len(seeds)}
                 rows += _rows(about, true_parameters(model.values), fine, runs, seeds)
     return pd.DataFrame([asdict(row) for row in rows])
 
 
 def _runs(
-    model: Model, record: RecordSettings, integrator: IntegratorSettings, told: Settings, seeds: Iterable[int]
+    model: Model, record: RecordSettings, integrator: IntegratorSettings, estimation: Settings, seeds: Iterable[int]
 ) -> list[Run]:
     stepped = record.model_copy(update={"integrator": integrator})
 
@@ -112,7 +116,7 @@ def _runs(
             made = make_record(model, stepped, seed=seed)
         except DivergenceError as error:
             return Run({}, error.time)
-        return Run({p.name: p.value for p in miso.identify(model, made, told).parameters})
+        return Run({p.name: p.value for p in miso.identify(model, made, estimation).parameters})
 
     return threaded(one, list(seeds))
 

@@ -1,6 +1,7 @@
 """Measured and public records; they are found beside the project or where STUDY_DATA says (see the README)."""
 
 import os
+import shutil
 from pathlib import Path
 
 import h5py
@@ -91,3 +92,28 @@ def test_without_the_variable_a_job_says_what_to_set(monkeypatch):
     says = r"STUDY_DATA is not set; expected the folder that holds silverbox/SNLS80mV\.mat"
     with pytest.raises(StudyError, match=says):
         measurements.check_present(Path(row.path))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("silverbox\t$", "Silverbox\t$", "record is 'Silverbox'; expected up to 64 of a to z, 0 to 9 and _, a letter"),
+        ("oscillator\t6", "oscillator\t21", "(record 'silverbox'): steps is '21'; expected 20 or less"),
+        ("oscillator\t6", "oscillator\tsix", "(record 'silverbox'): steps is 'six'; expected a whole number"),
+        ("believed/oscillator\t6", "oscilator\t6", "there is no model 'oscilator'; models/ holds dead_band, duffing"),
+        ("--column force=V1", "--out a", "options name --out, which the workflow gives; leave it out"),
+        ("--column force=V1", "--column 'force", "cannot be split into words: No closing quotation"),
+        ("--fs 610.3515625", "--fs fast", "(record 'silverbox'): options: "),
+        ("bouc_wen\t", "silverbox\t", "row 3 (record 'silverbox'): the record stands twice; expected each name once"),
+    ],
+)
+def test_faults_of_a_row(tmp_path, old, new, says):
+    shutil.copytree(ROOT / "models", tmp_path / "models")
+    (tmp_path / "config").mkdir()
+    text = (ROOT / "config" / "measurements.tsv").read_text()
+    assert old in text
+    (tmp_path / "config" / "measurements.tsv").write_text(text.replace(old, new, 1))
+    with pytest.raises(StudyError) as caught:
+        measurements.load(tmp_path / "config")
+    assert str(caught.value).startswith(f"{tmp_path / 'config' / 'measurements.tsv'}, row ")
+    assert says in str(caught.value)
