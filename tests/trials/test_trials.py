@@ -15,11 +15,12 @@ from study.equations.terms import LIBRARY
 from study.identify.time_domain import held_out
 from study.records.plan import make_plan
 from study.records.readers import read_record
+from study.reproduction.settings import TrialSettings
 from study.support.errors import StudyError
 from study.trials import HIDDEN, SHARE, make_trial, reach, runs, sealed, share_of
 from study.trials.runs import COLUMNS, Order, Row
 
-SETTINGS = {"first_seed": 100, "noises": [0.0, 0.05], "rounds": 1, "none": 2, "pairs": 4, "removed": 1, "jobs": 3}
+SETTINGS = TrialSettings(first_seed=100, noises=(0.0, 0.05), rounds=1, none=2, pairs=4, removed=1, jobs=3)
 
 
 @pytest.mark.parametrize("name", HIDDEN)
