@@ -12,18 +12,16 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.equations import kernels
 from study.equations.graph import Op, Program
 from study.equations.model import Model, forward_graph, named_channels, with_registers
 from study.records.interpolation import between_samples
 from study.records.record import MOTIONS, Record
+from study.support.arrays import Floats, Ints
 from study.support.errors import DivergenceError, StudyError
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-SHARED = 4096  # steps from which on two threads share the pieces; with fewer, starting one takes what it saves
+SHARED = 4096  # steps from which on two threads share the segments; with fewer, starting one takes what it saves
 REMEMBERED = 4  # channels of which the values between the samples are kept
 SIDE = "side of v"  # the input that stands for sgn v while a step lasts
 
@@ -94,9 +92,9 @@ class FreeRun:
         DivergenceError
             If the response leaves the range of finite numbers.
         StudyError
-            If there is not one initial state a piece.
+            If there is not one initial state a segment.
         """
-        response, own, _ = self.respond_by_piece(values, initial, free_states)
+        response, own, _ = self.respond_by_segment(values, initial, free_states)
         if not self.cuts:
             return response, own
         keys, bounds = len(self.keys), (0, *self.cuts, self.samples)
@@ -106,44 +104,46 @@ class FreeRun:
             jacobian[begin:end, keys + i * free_states : keys + (i + 1) * free_states] = own[begin:end, keys:]
         return response, jacobian
 
-    def respond_by_piece(
+    def respond_by_segment(
         self, values: Mapping[str, float], initial: Sequence[float] | Floats, free_states: int = 0
     ) -> tuple[Floats, Floats, Floats]:
-        """As :meth:`respond`, the derivatives by the initial state of each sample's own piece alone.
+        """As :meth:`respond`, the derivatives by the initial state of each sample's own segment alone.
 
         Returns
         -------
         response : array, shape (samples,)
         jacobian : array, shape (samples, keys + free_states)
         arrivals : array, shape (cuts, states, 1 + keys + free_states)
-            State in which each piece but the last arrives where the next begins, beside its derivatives.
+            State in which each segment but the last arrives where the next begins, beside its derivatives.
         """
         states, bounds = np.atleast_2d(initial), (0, *self.cuts, self.samples)
         if len(states) != len(bounds) - 1:
-            raise StudyError(f"{len(states)} initial states were given; {len(bounds) - 1} pieces need one each")
+            raise StudyError(f"{len(states)} initial states were given; {len(bounds) - 1} segments need one each")
         program = with_registers(self.program, {key: values[key] for key in self.keys})
         first_free = 1 + len(self.keys)
         out = np.empty((self.samples, first_free + free_states))
-        state = np.zeros((len(states), len(self.slots) + 1, out.shape[1]))  # of all pieces: one each would take longer
+        state = np.zeros(
+            (len(states), len(self.slots) + 1, out.shape[1])
+        )  # of all segments: one each would take longer
         state[:, : states.shape[1], 0] = states
         state[:, range(free_states), range(first_free, out.shape[1])] = 1.0
         if len(states) == 1 or self.samples * self.steps < SHARED:
-            self._pieces(program, bounds, state, out)
+            self._segments(program, bounds, state, out)
         else:
-            half = 1 + int(np.argmin(np.abs(np.array(bounds[1:-1]) - self.samples / 2)))  # pieces differ in length
+            half = 1 + int(np.argmin(np.abs(np.array(bounds[1:-1]) - self.samples / 2)))  # segments differ in length
             with ThreadPoolExecutor(1) as beside:
-                other = beside.submit(self._pieces, program, bounds[half:], state[half:], out)
-                self._pieces(program, bounds[: half + 1], state[:half], out)
+                other = beside.submit(self._segments, program, bounds[half:], state[half:], out)
+                self._segments(program, bounds[: half + 1], state[:half], out)
                 other.result()
         return out[:, 0], out[:, 1:], state[:-1]
 
     def passing(self, initial: Mapping[int, Floats]) -> Floats:
-        """State at the first sample of each piece, shape (cuts + 1, states), of a motion in fewer pieces.
+        """State at the first sample of each segment, shape (cuts + 1, states), of a motion in fewer segments.
 
         Parameters
         ----------
         initial : mapping of arrays, shape (states,)
-            State of the first piece, by the number 0, and of those that begin anew, by theirs.
+            State of the first segment, by the number 0, and of those that begin anew, by theirs.
 
         Raises
         ------
@@ -153,16 +153,16 @@ class FreeRun:
         bounds = (0, *self.cuts, self.samples)
         states, state = np.empty((len(bounds) - 1, len(self.slots) + 1)), np.empty((1, len(self.slots) + 1, 1))
         room = np.empty((self.samples, 1))
-        for i, piece in enumerate(pairwise(bounds)):
+        for i, segment in enumerate(pairwise(bounds)):
             if i in initial:
                 state[0, :, 0] = initial[i]
             states[i] = state[0, :, 0]
-            self._pieces(self.program, piece, state, room)
+            self._segments(self.program, segment, state, room)
         return states
 
-    def _pieces(self, program: Program, bounds: Sequence[int], states: Floats, out: Floats) -> None:
-        """Response beside its derivatives, into ``out``; leaves each piece's state as it is where the next begins."""
-        failed = kernels.integrate_pieces(
+    def _segments(self, program: Program, bounds: Sequence[int], states: Floats, out: Floats) -> None:
+        """Response beside its derivatives, into ``out``; leaves each segment's state as it is where the next begins."""
+        failed = kernels.integrate_segments(
             program.code, program.first, program.registers.copy(), self.slots, self.side, self.start, self.dt,
             self.steps, self.drive, np.array(bounds), states, self.row, out,
         )  # fmt: skip

@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
+
+from study.support.arrays import Floats, Ints
 
 
 class Op(IntEnum):
@@ -58,11 +59,11 @@ class Program:
         Registers of the results, in the order in which they were asked for.
     """
 
-    code: NDArray[np.int64]
-    registers: NDArray[np.float64]
+    code: Ints
+    registers: Floats
     first: int
     inputs: dict[str, int]
-    outputs: NDArray[np.int64]
+    outputs: Ints
 
 
 @dataclass

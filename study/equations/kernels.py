@@ -11,12 +11,9 @@ then the extra channels, then the states z, then coefficients and shape paramete
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.equations.jit import compiled, inlined
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from study.support.arrays import Floats, Ints
 
 
 @compiled
@@ -419,14 +416,14 @@ def integrate_variation(
 
 
 @compiled
-def integrate_pieces(
+def integrate_segments(
     code: Ints, first: int, r: Floats, slots: Ints, side: int, start: float, dt: float,
     steps: int, drive: Floats, bounds: Ints, states: Floats, row: int, out: Floats,
 ) -> int:  # fmt: skip
-    """:func:`integrate_variation` of one piece after the other, between neighbouring ``bounds``, each from its state.
+    """:func:`integrate_variation` of one segment after the other, between neighbouring ``bounds``, each from its state.
 
-    A piece runs on to the first sample of the next, which writes over it; the last one leaves that sample to
-    whoever runs the pieces after it.
+    A segment runs on to the first sample of the next, which writes over it; the last one leaves that sample to
+    whoever runs the segments after it.
     """
     for i in range(bounds.shape[0] - 1):
         begin, end = bounds[i], bounds[i + 1]

@@ -7,12 +7,10 @@ None where it is to be estimated. Models are immutable; ``with_term`` and ``with
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from study.equations import formulas
 from study.equations.graph import Graph, Program
 from study.equations.term import Component, Term
+from study.support.arrays import Floats
 from study.support.errors import StudyError
 
 FIXED_INPUTS = (*formulas.VARIABLES, "force")  # the registers that every forward program begins with
@@ -264,7 +262,7 @@ def forward_program(model: Model, channels: tuple[str, ...] = ()) -> Program:
 
 def with_registers(program: Program, values: Mapping[str, float]) -> Program:
     """The program with named inputs set."""
-    registers: NDArray[np.float64] = program.registers.copy()
+    registers: Floats = program.registers.copy()
     for name, value in values.items():
         registers[program.inputs[name]] = value
     return replace(program, registers=registers)

@@ -1,12 +1,11 @@
 """A user's own term that says nothing, or what other terms of the model say already."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.equations.model import Model, unit_forces
 from study.equations.terms import LIBRARY
+from study.support.arrays import Floats
 
-Floats = NDArray[np.float64]
 POINTS, FEWEST = 512, 32  # random motions at which formulas are compared, and how many of them must be finite
 DECADES = 6.0  # their sizes lie so far on either side of one: a record's unit of length is unknown
 NOTHING = 1e-150  # a force below cannot be told from zero

@@ -9,15 +9,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.equations import kernels
 from study.equations.model import Model, forward_program, named_channels
 from study.records.interpolation import between_samples
 from study.records.record import SI_UNITS, Record
+from study.support.arrays import Floats
 from study.support.errors import DivergenceError, StudyError
 
-Floats = NDArray[np.float64]
 PLENTY = 8  # steps per sample with which a system that can be held is held
 METHODS = {"abm4": kernels.integrate_abm4, "rk4": kernels.integrate_rk4}
 

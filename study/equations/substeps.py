@@ -3,15 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.equations import kernels
 from study.equations.free_run import prepare
 from study.equations.model import Model
 from study.records.record import Record
 from study.records.states import angular_rate, starting_states
+from study.support.arrays import Floats
 
-Floats = NDArray[np.float64]
 POINTS = 64  # of the motion, at which the equation of motion is linearised
 ROUGH = 0.5  # largest step, as a product with the fastest rate, of a search's first runs: they lead near and no more
 FINE = 0.125  # ... with the middle rate, of the runs that estimates come from

@@ -10,16 +10,15 @@ by (2 pi f)^2, would swamp everything else. The band that is left is stated, for
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from scipy.signal import lfilter, lfiltic
 
 from study.records.record import MOTIONS, SI_UNITS, Record
 from study.records.spectra import Segments, autospectrum
+from study.support.arrays import Floats
 from study.support.errors import StudyError
 from study.support.units import ROLES, VOLTAGE, Unit, parse_unit, role_unit
 
-Floats = NDArray[np.float64]
 ORDER = 64  # coefficients of the linear prediction at each end
 TRAINING = 4096  # samples that it is learnt from
 PREDICTABLE = 1e-14  # of the power: what may be left unpredicted, above the rounding errors of the recursion

@@ -9,12 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 
+from study.support.arrays import Complexes, Floats, Ints
 from study.support.errors import StudyError
 
-Floats = NDArray[np.float64]
 FORCE_STREAM, NOISE_STREAM = 0, 1
 READINGS = ("raw", "filtered")
 SWEEPS = ("linear", "logarithmic")
@@ -250,7 +249,7 @@ def _pierson_moskowitz(excitation: Excitation, length: int, dt: float, generator
     frequency = np.arange(length // 2 + 1) / (length * dt)
     variance = _pierson_moskowitz_density(excitation, frequency, length, dt) / (length * dt)
     normal = generator.standard_normal((2, len(frequency)))
-    spectrum: NDArray[np.complex128] = 0.5 * length * np.sqrt(variance) * (normal[0] + 1j * normal[1])
+    spectrum: Complexes = 0.5 * length * np.sqrt(variance) * (normal[0] + 1j * normal[1])
     if length % 2 == 0:
         spectrum[-1] = np.sqrt(2.0) * spectrum[-1].real  # one quadrature carries what two carry elsewhere
     return np.asarray(irfft(spectrum, length), dtype=np.float64)
@@ -268,7 +267,7 @@ def _pierson_moskowitz_density(excitation: Excitation, frequency: Floats, _lengt
     return np.where(inside, 5.0 * excitation.level * ratio / f * np.exp(-1.25 * ratio), 0.0)
 
 
-def _lines(excitation: Excitation, length: int, dt: float) -> NDArray[np.int64]:
+def _lines(excitation: Excitation, length: int, dt: float) -> Ints:
     """Harmonics of the period which a multisine holds."""
     span = length * dt
     first = max(1, int(np.ceil(excitation.start_frequency * span * (1.0 - ROUNDING))))

@@ -6,10 +6,10 @@ band-limited interpolation is exact for a record without content above its Nyqui
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 
-Floats = NDArray[np.float64]
+from study.support.arrays import Floats
+
 EDGE = 512  # samples by which a record that does not close on itself is continued at each end
 CLOSES = 10.0  # a record that does not close has many times the energy there of one whose ends are continued
 

@@ -7,12 +7,11 @@ autospectrum. What stands above it in other bands is structure that a better mod
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.records.spectra import Segments, autospectrum
+from study.support.arrays import Floats
 from study.support.errors import StudyError
 
-Floats = NDArray[np.float64]
 BANDS = 20  # or as many as there are lines
 FEWEST = 8  # lines
 QUIET = 5  # so many of the bands, the quietest, give the floor

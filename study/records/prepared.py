@@ -3,13 +3,11 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.records.completion import complete
 from study.records.plan import Plan, make_plan
 from study.records.record import Record
-
-Floats = NDArray[np.float64]
+from study.support.arrays import Floats
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,13 +9,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import rfftfreq
 
+from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 CHUNK = 64  # segments transformed at a time: they stay in the cache, and memory does not grow with the record
 
 

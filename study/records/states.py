@@ -4,11 +4,10 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.records.record import Record
+from study.support.arrays import Floats
 
-Floats = NDArray[np.float64]
 REACH = 0.2  # of a period: half width of the cubic that smooths a displacement into a state
 
 

@@ -1,36 +1,36 @@
-"""Normal equations of least squares over pieces of a record.
+"""Normal equations of least squares over segments of a record.
 
-Some variables are shared by all samples (coefficients), others belong to one piece each (the state that it
-begins with). Those are eliminated piece by piece, so that a fit in hundreds of pieces costs no more linear
-algebra than one in a single piece.
+Some variables are shared by all samples (coefficients), others belong to one segment each (its initial state). The
+latter are eliminated segment by segment, so that a fit in hundreds of segments costs no more linear algebra than one
+in a single segment.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
-Floats = NDArray[np.float64]
-BLOCK = 32  # samples, of which products are summed together
+from study.support.arrays import Floats
+
+BLOCK = 32  # samples whose products are summed together
 INDISTINCT = 1e-12  # eigenvalue of a scaled normal matrix below which variables cannot be told apart
 
 
 @dataclass(frozen=True)
 class Normal:
-    """``J^T J`` and ``J^T residual`` for columns of unit length; k shared variables, f own ones of each of N pieces.
+    """``J^T J`` and ``J^T residual`` for columns of unit length; k shared variables, f own ones of each of N segments.
 
     Attributes
     ----------
     shared : array, shape (k, k)
         Products of the shared columns.
     cross : array, shape (N, k, f)
-        Those of the shared with the own columns of each piece.
+        Those of the shared with the own columns of each segment.
     own : array, shape (N, f, f)
         Those of the own columns.
     links : array, shape (N - 1, f, f), or None
-        Those of the own columns of each piece but the first (rows) with those of the piece before.
+        Those of the own columns of each segment but the first (rows) with those of the segment before.
     right : array, shape (k,)
         Products of the shared columns with the residual.
     own_right : array, shape (N, f)
@@ -49,7 +49,7 @@ class Normal:
         if self.links is not None:
             return _tridiagonal(self.own, self.links, damping, right)
         values, vectors = np.linalg.eigh(self.own)
-        known = values + damping > INDISTINCT  # a piece may not show every direction
+        known = values + damping > INDISTINCT  # a segment may not show every direction
         inverse = np.where(known, 1.0 / np.where(known, values + damping, 1.0), 0.0)
         solved = (vectors * inverse[:, None, :]) @ (vectors.transpose(0, 2, 1) @ right)
         return np.asarray(solved, dtype=np.float64)
@@ -69,7 +69,7 @@ class Normal:
         return self._left(0.0, *self._eliminated(0.0))[0]
 
     def step(self, damping: float) -> Floats:
-        """Solution with ``damping`` added to the diagonal: shared variables, then piece by piece the own ones."""
+        """Solution with ``damping`` added to the diagonal: shared variables, then segment by segment the own ones."""
         answers, alone = self._eliminated(damping)
         shared = np.asarray(np.linalg.solve(*self._left(damping, answers, alone)), dtype=np.float64)
         return np.concatenate([shared, (alone - answers @ shared).ravel()])
@@ -88,15 +88,15 @@ class Normal:
 
 
 @dataclass(frozen=True)
-class Ties:
-    """What holds the pieces together: the state in which each arrives is to be that in which the next begins.
+class ContinuityGaps:
+    """Penalised continuity constraints: each segment is to arrive in the state in which the next begins.
 
     Attributes
     ----------
     gaps : array, shape (N - 1, f)
-        By how much it is not, times the weight.
+        Differences of the two states, times the weight.
     jacobian : array, shape (N - 1, f, k + f)
-        Derivatives of the gaps by the shared variables and by those of the piece before.
+        Derivatives of the gaps by the shared variables and by those of the segment before.
     weight : array, shape (f,)
         Derivative by the state after, with its sign turned.
     """
@@ -107,7 +107,7 @@ class Ties:
 
 
 def _tridiagonal(own: Floats, links: Floats, damping: float, right: Floats) -> Floats:
-    """Solve the block tridiagonal equations of pieces that are tied to their neighbours, right sides (N, f, m)."""
+    """Solve the block tridiagonal equations of segments under continuity constraints, right sides (N, f, m)."""
     count, f, m = right.shape
     bands = np.zeros((2 * f, count * f))
     for row in range(f):
@@ -121,10 +121,10 @@ def _tridiagonal(own: Floats, links: Floats, damping: float, right: Floats) -> F
 
 
 def _products(rows: Floats, begins: Sequence[int]) -> Floats:
-    """``X^T X`` of the rows X of each piece, shape (N, columns, columns).
+    """``X^T X`` of the rows X of each segment, shape (N, columns, columns).
 
-    Pieces are cut to blocks alike in length, short ones filled up with zeros: one product of all blocks together
-    takes a sixth of the time of hundreds of small ones.
+    Segments are cut to blocks of equal length, short ones padded with zeros: one product of all blocks together takes
+    a sixth of the time of hundreds of small ones.
     """
     if len(begins) == 1:
         return np.asarray((rows.T @ rows)[None], dtype=np.float64)
@@ -140,7 +140,7 @@ def _products(rows: Floats, begins: Sequence[int]) -> Floats:
 
 
 def normal_equations(
-    residual: Floats, jacobian: Floats, shared: int, begins: Sequence[int], ties: Ties | None = None
+    residual: Floats, jacobian: Floats, shared: int, begins: Sequence[int], continuity: ContinuityGaps | None = None
 ) -> tuple[Floats, Normal]:
     """Normal equations of a residual, and the lengths of the columns.
 
@@ -149,13 +149,13 @@ def normal_equations(
     residual : array, shape (n,)
         Measured minus predicted.
     jacobian : array, shape (n, k + f)
-        Derivatives of what is predicted: by the shared variables, then by those of the sample's own piece.
+        Derivatives of what is predicted: by the shared variables, then by those of the sample's own segment.
     shared : int
         k.
     begins : sequence of int
-        First sample of each piece.
-    ties : Ties, optional
-        Gaps between the pieces, which are to vanish too.
+        First sample of each segment.
+    continuity : ContinuityGaps, optional
+        Gaps between the segments, which are to vanish too.
 
     Returns
     -------
@@ -166,15 +166,15 @@ def normal_equations(
     products = _products(np.column_stack([jacobian, residual]), begins)
     grams, rights = products[:, :-1, :-1], products[:, :-1, -1]
     links = None
-    if ties is not None:
-        turned = ties.jacobian.transpose(0, 2, 1)
-        after = -ties.weight[:, None] * ties.jacobian  # rows: the state after
-        grams[:-1] += turned @ ties.jacobian
+    if continuity is not None:
+        turned = continuity.jacobian.transpose(0, 2, 1)
+        after = -continuity.weight[:, None] * continuity.jacobian  # rows: the state after
+        grams[:-1] += turned @ continuity.jacobian
         grams[1:, shared:, :shared] += after[:, :, :shared]
         grams[1:, :shared, shared:] += after[:, :, :shared].transpose(0, 2, 1)
-        grams[1:, shared:, shared:] += np.diag(ties.weight**2)
-        rights[:-1] -= (turned @ ties.gaps[:, :, None])[:, :, 0]
-        rights[1:, shared:] += ties.weight * ties.gaps
+        grams[1:, shared:, shared:] += np.diag(continuity.weight**2)
+        rights[:-1] -= (turned @ continuity.gaps[:, :, None])[:, :, 0]
+        rights[1:, shared:] += continuity.weight * continuity.gaps
         links = after[:, :, shared:]
     lengths = np.sqrt(np.einsum("nii->ni", grams))
     together, own = np.sqrt(np.sum(lengths[:, :shared] ** 2, axis=0)), lengths[:, shared:]

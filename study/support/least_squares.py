@@ -3,9 +3,8 @@
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from study.support.arrays import Floats
 
 
 def least_squares(columns: Floats, target: Floats, cutoff: float = 1e-12) -> Floats:

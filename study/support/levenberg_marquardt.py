@@ -11,18 +11,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.support.block_normal import INDISTINCT, Normal, Ties, normal_equations
+from study.support.arrays import Floats
+from study.support.block_normal import INDISTINCT, ContinuityGaps, Normal, normal_equations
 
-Floats = NDArray[np.float64]
-OFFSET = 1e-4  # converged when the next step is below this many standard errors (Bates and Watts, 1981)
-ROUNDING = 1e-11  # ... or changes the response by less than this share of it
+OFFSET = 1e-4  # length of the next step, in standard errors, at which a search has converged (Bates and Watts, 1981)
+ROUNDING = 1e-11  # share of the response that a step changes at which a search has converged too
 PATIENCE = 8  # trials that may pass without lowering the error by what matters
-MATTERS = 1e-3  # ... as a share of what one standard error brings
+MATTERS = 1e-3  # fall of the error that matters, as a share of what a step of one standard error brings
 
 
 @dataclass(frozen=True)
 class Point:
-    """A point of the search; n samples, p variables: shared ones, then piece by piece its own.
+    """A point of the search; n samples, p variables: shared ones, then segment by segment its own.
 
     Attributes
     ----------
@@ -59,16 +59,21 @@ class Point:
 
 
 def point_at(
-    x: Floats, residual: Floats, jacobian: Floats, shared: int, begins: Sequence[int], ties: Ties | None = None
+    x: Floats,
+    residual: Floats,
+    jacobian: Floats,
+    shared: int,
+    begins: Sequence[int],
+    continuity: ContinuityGaps | None = None,
 ) -> Point | None:
     """The point with this residual and Jacobian (``block_normal``); None if they are not finite.
 
-    The gaps of ties count among the residual.
+    Weighted gaps between segments count among the residual.
     """
-    with np.errstate(over="ignore", invalid="ignore"):  # on its way out of range: refused below
-        scale, normal = normal_equations(residual, jacobian, shared, begins, ties)
-        if ties is not None:
-            residual = np.concatenate([residual, -ties.gaps.ravel()])
+    with np.errstate(over="ignore", invalid="ignore"):  # what is out of range is refused below
+        scale, normal = normal_equations(residual, jacobian, shared, begins, continuity)
+        if continuity is not None:
+            residual = np.concatenate([residual, -continuity.gaps.ravel()])
         cost = float(residual @ residual)
     if not (np.isfinite(cost) and np.all(np.isfinite(scale)) and np.all(np.isfinite(normal.shared))):
         return None
@@ -88,7 +93,7 @@ class End:
 def minimise(
     linearise: Callable[[Floats], Point | None], point: Point, size: float, max_iterations: int, offset: float = OFFSET
 ) -> End:
-    """Search from a point, with Nielsen's damping.
+    """Search from a point with Nielsen's damping.
 
     Parameters
     ----------
@@ -101,19 +106,19 @@ def minimise(
     max_iterations : int
         Trials after which to give up.
     offset : float
-        How near a minimum counts as one: length of the next step in standard errors.
+        Length of the next step, in standard errors, at which the search has converged.
     """
     count = len(point.x)
     freedom = max(len(point.residual) - count, 1)
     damping, growth, costs = 1e-3, 2.0, list[float]()
     for iteration in range(1, max_iterations + 1):
-        one = count * point.cost / freedom  # what a step of one standard error brings
+        unit = count * point.cost / freedom  # what a step of one standard error brings
         fall = point.normal.decrement()
-        if fall <= offset**2 * one or fall <= (ROUNDING * size) ** 2:
+        if fall <= offset**2 * unit or fall <= (ROUNDING * size) ** 2:
             return End(point, True, iteration, f"converged after {iteration} free runs")
         costs.append(point.cost)
-        if len(costs) > PATIENCE and costs[-1 - PATIENCE] - point.cost < MATTERS * one:
-            return _stalled(point, iteration, float(np.sqrt(fall / one)))
+        if len(costs) > PATIENCE and costs[-1 - PATIENCE] - point.cost < MATTERS * unit:
+            return _stalled(point, iteration, float(np.sqrt(fall / unit)))
         step = point.normal.step(damping)
         trial = linearise(point.x + step / point.scale)
         expected = float(step @ (damping * step + point.normal.gradient()))
@@ -127,7 +132,7 @@ def minimise(
 
 
 def _stalled(point: Point, iteration: int, offset: float) -> End:
-    """Friction and stops make the sum of squares kinked, and its minimum may lie in a kink."""
+    """The end of a search in a kink of the sum of squares, such as friction and stops make; it may be the minimum."""
     if offset <= 1.0:
         return End(point, True, iteration, f"converged after {iteration} free runs to where no step lowers the error")
     why = f"no step lowers the error, though one of {offset:.2g} standard errors should"

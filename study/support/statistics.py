@@ -7,10 +7,10 @@ Sums of squares over blocks much longer than the response's memory are independe
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import wilcoxon
 
-Floats = NDArray[np.float64]
+from study.support.arrays import Floats
+
 BLOCKS = 24
 TESTED = 48  # blocks of a test that ranks them: with 24 it could not be sure of what is plain
 SHORTEST = 16  # samples in a block

@@ -7,9 +7,9 @@ import pytest
 
 from study.equations.free_run import predict
 from study.equations.simulate import simulate
-from study.identify.time_domain.continuation import fit_pieces, joined
-from study.identify.time_domain.multiple_shooting import fit_in_pieces
-from study.identify.time_domain.shooting import Pieces, even_restarts
+from study.identify.time_domain.continuation import fit_segments, lengthen
+from study.identify.time_domain.multiple_shooting import fit_in_segments
+from study.identify.time_domain.shooting import ShootingSegments, even_restarts
 from study.records.excitation import displacement_noise
 from study.records.record import Record
 
@@ -29,7 +29,7 @@ def in_pieces(record, restarts=None):
     span = (0, len(record))
     if restarts is None:
         restarts = even_restarts(record, "displacement", span)
-    return Pieces(record, "displacement", span, tuple(restarts), 4)
+    return ShootingSegments(record, "displacement", span, tuple(restarts), 4)
 
 
 def test_a_motion_passes_the_ends_of_pieces_as_it_is(make_model, report_force):
@@ -53,8 +53,8 @@ def test_a_motion_passes_the_ends_of_pieces_as_it_is(make_model, report_force):
 def test_neighbours_are_joined_to_long_pieces_beside_the_true_motion(chaotic):
     record, clean, model = chaotic
     pieces = in_pieces(record)
-    loose = fit_pieces(model, pieces, pieces.first_states(model), (), 12)
-    longer = joined(loose, pieces, ())[-1]
+    loose = fit_segments(model, pieces, pieces.first_states(model), (), 12)
+    longer = lengthen(loose, pieces, ())[-1]
     assert len(longer.restarts) < len(pieces.restarts) / 10
     assert set(longer.restarts) < set(pieces.restarts)
     noise = np.sqrt(NOISE) * np.std(clean["displacement"])
@@ -77,16 +77,16 @@ def test_what_is_no_one_motion_is_left_apart(chaotic):
     record = record.with_channels({"displacement": displacement})
     restarts = range(128, 4096, 128)
     pieces = in_pieces(record, restarts)
-    loose = fit_pieces(model, pieces, pieces.first_states(model), tuple(model.values), 12)
-    assert struck in joined(loose, pieces, tuple(model.values))[-1].restarts
+    loose = fit_segments(model, pieces, pieces.first_states(model), tuple(model.values), 12)
+    assert struck in lengthen(loose, pieces, tuple(model.values))[-1].restarts
 
 
 def test_pieces_stay_as_they_are_where_longer_ones_run_away(systems, records):
     """A softening spring which loses its hold within a second; pieces of a fifth of one are over before."""
     model = systems["duffing"].with_values({"k3": -1e7})
     pieces = in_pieces(records["duffing"].part(0, 2048), range(10, 2048, 10))
-    loose = fit_pieces(model, pieces, pieces.first_states(model), tuple(model.values), 3)
-    left = joined(loose, pieces, tuple(model.values))[-1]
+    loose = fit_segments(model, pieces, pieces.first_states(model), tuple(model.values), 3)
+    left = lengthen(loose, pieces, tuple(model.values))[-1]
     assert np.all(np.isfinite(left.residual))
     assert left.restarts
 
@@ -94,7 +94,7 @@ def test_pieces_stay_as_they_are_where_longer_ones_run_away(systems, records):
 def test_a_clean_record_needs_no_ties(systems, records):
     model, record = systems["dead_band"], records["dead_band"].part(0, 4096)
     start = {"dead_band.u_g": 0.00275}
-    found = fit_in_pieces(model, record, start=start, steps_per_sample=4)
+    found = fit_in_segments(model, record, start=start, steps_per_sample=4)
     assert found.rms < 1e-3 * np.std(record["displacement"])
     assert found.estimate["dead_band.u_g"] == pytest.approx(0.0025, rel=1e-3)
 
@@ -105,7 +105,7 @@ def test_the_width_is_found_within_its_errors_which_are_below_a_hundredth(system
     noise = displacement_noise(clean["displacement"], NOISE, seed)
     record = clean.with_channels({"displacement": clean["displacement"] + noise})
     start = {key: 1.05 * value for key, value in systems["dead_band"].numbers().items()}
-    found = fit_in_pieces(systems["dead_band"], record, start=start)
+    found = fit_in_segments(systems["dead_band"], record, start=start)
     width, error = found.estimate["dead_band.u_g"], found.estimate.error("dead_band.u_g")
     assert abs(width - 0.0025) < 3.5 * error
     assert error < 0.01 * 0.0025
@@ -119,7 +119,7 @@ def test_a_stiff_system_is_found_from_afar(c, k, make_model, report_force):
     model = make_model("stiff", terms)
     record = simulate(model, report_force, 0.02).part(0, 2048)
     start = {"c": 0.7 * c, "k": 1.3 * k}
-    found = fit_in_pieces(model, record, start=start, steps_per_sample=8)
+    found = fit_in_segments(model, record, start=start, steps_per_sample=8)
     assert found.converged
     assert found.estimate["c"] == pytest.approx(c, rel=0.02)
     assert found.estimate["k"] == pytest.approx(k, rel=0.02)
@@ -131,8 +131,8 @@ def test_where_no_motion_is_found_the_pieces_say_so(systems, records):
     noise = displacement_noise(clean["displacement"], NOISE, 33)
     record = clean.with_channels({"displacement": clean["displacement"] + noise}).part(0, 4096)
     model = systems["dead_band"].with_values({"dead_band.u_g": 0.0075})
-    found = fit_in_pieces(model, record, held=("dead_band.u_g",), steps_per_sample=2)
+    found = fit_in_segments(model, record, held=("dead_band.u_g",), steps_per_sample=2)
     assert found.keys == ("m", "c", "k", "kg")
     assert found.steps_per_sample == 2
     assert not found.converged
-    assert found.message == f"no single motion follows the record; {len(found.restarts) + 1} pieces of it were fitted"
+    assert found.message == f"no single motion follows the record; {len(found.restarts) + 1} segments of it were fitted"

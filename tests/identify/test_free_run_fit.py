@@ -14,8 +14,8 @@ from study.identify.frequency_domain import coefficients
 from study.identify.frequency_domain.conditioned import analyse
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
 from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
-from study.identify.time_domain.multiple_shooting import fit_in_pieces
-from study.identify.time_domain.shooting import REACHES, Pieces
+from study.identify.time_domain.multiple_shooting import fit_in_segments
+from study.identify.time_domain.shooting import REACHES, ShootingSegments
 from study.records.excitation import displacement_noise
 from study.records.record import MOTIONS, SI_UNITS, Record
 from study.records.spectra import Segments, cross_spectra
@@ -230,7 +230,7 @@ def test_pieces_are_free_runs_of_their_own(systems: dict[str, Model], records: d
     differences = central_differences_of_a_state(run, values, states)
     np.testing.assert_allclose(jacobian[:, len(values) + 2], differences, atol=1e-7)
     assert not np.any(jacobian[:100, len(values) + 2 :])
-    with pytest.raises(StudyError, match="2 initial states were given; 3 pieces need one each"):
+    with pytest.raises(StudyError, match="2 initial states were given; 3 segments need one each"):
         run.respond(values, states[:2])
 
 
@@ -248,7 +248,7 @@ def test_a_regular_system_needs_no_pieces(systems: dict[str, Model], records: di
     model, record = systems["duffing_van_der_pol"], noisy(records["duffing_van_der_pol"], 0.05, 4).part(0, 2048)
     far = {"m": 3.0, "c": 1.0, "k": 100.0, "k3": 0.0, "c3": 0.0}
     assert not fit_free_run(model, record, start=far).converged
-    fit = fit_in_pieces(model, record, start=far)
+    fit = fit_in_segments(model, record, start=far)
     assert fit.converged
     near = fit_free_run(model, record)
     np.testing.assert_allclose(fit.values, near.values, rtol=1e-4)
@@ -257,7 +257,7 @@ def test_a_regular_system_needs_no_pieces(systems: dict[str, Model], records: di
 
 def test_first_states_are_the_best_of_several_widths(systems: dict[str, Model], records: dict[str, Record]) -> None:
     model, record, cuts = systems["duffing"], noisy(records["duffing"], 0.05, 2), (100, 200, 300)
-    pieces = Pieces(record, "displacement", (0, 400), cuts, 4)
+    pieces = ShootingSegments(record, "displacement", (0, 400), cuts, 4)
     begun = pieces.misfits(model, pieces.first_states(model))
     for reach in REACHES:
         one = starting_states(record, "displacement", (0, *cuts), reach)
@@ -270,7 +270,7 @@ def test_tied_pieces_are_one_motion(systems: dict[str, Model], records: dict[str
     whole, cuts = fit_free_run(model, record), tuple(range(128, 2048, 128))
     states = starting_states(record, "displacement", (0, *cuts))
     loose = fit_free_run(model, record, restarts=cuts, initial=states)
-    tied = fit_free_run(model, record, restarts=cuts, initial=loose.initial, tie=1000.0)
+    tied = fit_free_run(model, record, restarts=cuts, initial=loose.initial, continuity=1000.0)
     assert tied.converged
     deviations = np.sqrt(np.diag(whole.covariance))
     assert np.max(np.abs(tied.values - whole.values) / deviations) < 0.01
@@ -286,7 +286,7 @@ def test_chaotic_system_is_fitted_in_pieces(systems: dict[str, Model], records: 
     whole = fit_free_run(model, record, start=start, steps_per_sample=4)
     noise = np.sqrt(0.05) * np.std(records["dead_band"]["displacement"])
     assert whole.rms > 1.5 * noise
-    fit = fit_in_pieces(model, record, start=start, steps_per_sample=4)
+    fit = fit_in_segments(model, record, start=start, steps_per_sample=4)
     assert fit.rms < 1.05 * noise
     assert fit.initial.ndim == 2
     assert np.max(np.abs(error_in_standard_errors(model, fit))) < 4.0
@@ -358,7 +358,7 @@ def test_a_trial_that_diverges_is_a_rejected_step(
     systems: dict[str, Model], records: dict[str, Record], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     diverged: list[float] = []
-    respond = FreeRun.respond_by_piece
+    respond = FreeRun.respond_by_segment
 
     def watched(self: FreeRun, *arguments: object) -> tuple[Floats, Floats]:
         try:
@@ -367,7 +367,7 @@ def test_a_trial_that_diverges_is_a_rejected_step(
             diverged.append(error.time)
             raise
 
-    monkeypatch.setattr(FreeRun, "respond_by_piece", watched)
+    monkeypatch.setattr(FreeRun, "respond_by_segment", watched)
     model, record = systems["duffing_van_der_pol"], records["duffing_van_der_pol"]
     fit = fit_free_run(model, record, start={"m": 0.3, "c3": 0.0, "k3": 5e7})
     assert diverged

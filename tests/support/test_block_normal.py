@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from study.support.block_normal import Ties
+from study.support.block_normal import ContinuityGaps
 from study.support.levenberg_marquardt import point_at
 
 
@@ -11,7 +11,7 @@ def test_own_variables_are_eliminated_exactly() -> None:
     """Steps, decrement and covariance of pieces, loose and tied, are those of the whole matrix."""
     random, k, f, count = np.random.default_rng(4), 3, 2, 5
     jacobian, residual = random.standard_normal((40, k + f)), random.standard_normal(40)
-    ties = Ties(random.standard_normal((4, f)), random.standard_normal((4, f, k + f)), np.array([2.0, 3.0]))
+    ties = ContinuityGaps(random.standard_normal((4, f)), random.standard_normal((4, f, k + f)), np.array([2.0, 3.0]))
     for tied in (None, ties):
         whole = np.zeros((48, k + count * f))
         for i in range(count):

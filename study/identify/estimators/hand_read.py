@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.equations.model import Model
 from study.identify.estimators import miso
@@ -11,6 +10,7 @@ from study.identify.estimators.base import Identified, Parameter, Settings
 from study.identify.frequency_domain.inputs import Input
 from study.identify.frequency_domain.responses import Responses
 from study.records.record import Record
+from study.support.arrays import Complexes, Floats
 
 LOWEST_LINES = 3  # "the asymptotic behavior of A_1 for f -> 0": the first lines above zero, where no mean is lost
 
@@ -30,9 +30,7 @@ def identify(model: Model, record: Record, settings: Settings) -> Identified:
     return Identified(found.inputs, None, tuple(Parameter(n, v, math.nan) for n, v in _renamed(values)))
 
 
-def read_linear(
-    frequency: NDArray[np.float64], response: NDArray[np.complex128], band: tuple[float, float]
-) -> list[tuple[str, float]]:
+def read_linear(frequency: Floats, response: Complexes, band: tuple[float, float]) -> list[tuple[str, float]]:
     """k as f -> 0, f_n at the minimum of abs(A_1), m = k / (2 pi f_n)^2, c = abs(A_1(f_n)) / (2 pi f_n).
 
     The minimum is looked for in ``band``, in hertz. Only k is read where abs(A_1) has none inside it (a system
@@ -56,7 +54,7 @@ def read_curve(result: Responses, band: tuple[float, float]) -> dict[str, float]
     return dict(read_linear(result.frequency, result.response[0], band))
 
 
-def _vertex(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
+def _vertex(x: Floats, y: Floats) -> tuple[float, float]:
     """Lowest point of the parabola through three points, as the eye puts it between the lines."""
     step = float(x[1] - x[0])
     bend = float(y[0] - 2.0 * y[1] + y[2])
@@ -65,7 +63,7 @@ def _vertex(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, floa
     return float(x[1]) + shift * step, float(y[1]) + slope * shift / 2.0
 
 
-def _plateaus(item: Input, frequency: NDArray[np.float64], response: NDArray[np.complex128]) -> list[tuple[str, float]]:
+def _plateaus(item: Input, frequency: Floats, response: Complexes) -> list[tuple[str, float]]:
     """Each coefficient as the mean height of its own part of A_j: real for order 0, imaginary for order 1."""
     powers = item.powers(frequency)
     return [

@@ -37,7 +37,7 @@ def clean_motion(found: FreeRunFit, record: Record) -> Record:
     motions = {
         name: prepare(
             found.model, record, response=name, steps_per_sample=found.steps_per_sample, restarts=found.restarts
-        ).respond_by_piece({}, found.initial)[0]
+        ).respond_by_segment({}, found.initial)[0]
         for name in MOTIONS[:2]
     }
     return record.with_channels(motions)

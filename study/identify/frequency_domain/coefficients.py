@@ -5,13 +5,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.identify.frequency_domain.inputs import Input
 from study.identify.frequency_domain.responses import Responses
+from study.support.arrays import Complexes, Floats
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 EXACT = 1e-12  # variances below this fraction of the largest are rounding
 
 

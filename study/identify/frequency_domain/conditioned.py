@@ -8,14 +8,12 @@ on inputs scaled to unit power, so that a cube of 1e-8 m^3 beside a displacement
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.identify.frequency_domain.responses import Responses
 from study.records.spectra import SpectralMatrix
+from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 COLLINEAR = 1e-13  # an input of which less than this share is left after conditioning brings nothing new
 SILENT = 1e-13  # a line below this fraction of an input's largest amplitude is the rounding of the others
 

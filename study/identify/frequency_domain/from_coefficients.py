@@ -3,15 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.frequency_domain.inputs import Input
 from study.identify.frequency_domain.responses import Responses
 from study.records.spectra import SpectralMatrix
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
+from study.support.arrays import Complexes, Floats
 
 
 def responses(inputs: Sequence[Input], estimate: Estimate, matrix: SpectralMatrix) -> Responses:

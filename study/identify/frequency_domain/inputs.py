@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.equations import formulas, kernels
 from study.equations.graph import Graph
@@ -16,10 +15,9 @@ from study.equations.model import Model, ModelTerm, with_registers
 from study.equations.term import Component
 from study.records.interpolation import between_samples
 from study.records.record import Record
+from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 STATE_STEPS = 4  # Runge-Kutta steps a sample for a term's own state
 
 

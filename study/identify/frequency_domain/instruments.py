@@ -15,7 +15,6 @@ from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.equations import formulas
 from study.identify.frequency_domain.coefficients import Estimate
@@ -26,9 +25,8 @@ from study.identify.frequency_domain.responses import Responses
 from study.records import spectra
 from study.records.record import Record
 from study.records.spectra import Segments, SpectralMatrix
+from study.support.arrays import Complexes, Floats
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 NODES = 15  # of the Gauss-Hermite rule: exact for shapes up to the power 29, close for kinked ones
 NOISY = {"u": "displacement", "v": "velocity"}  # what a formula calls the channels that carry noise
 TINY = float(np.finfo(np.float64).tiny)

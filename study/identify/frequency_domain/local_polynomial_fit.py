@@ -16,7 +16,6 @@ clusters, by jackknife: Bell and McCaffrey, Survey Methodology 28, 2002).
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import irfft
 
 from study.identify.frequency_domain.coefficients import Estimate
@@ -28,10 +27,9 @@ from study.identify.frequency_domain.local_polynomial_method import (
     noise_variance,
     transients,
 )
+from study.support.arrays import Complexes, Floats, Ints
 from study.support.errors import StudyError
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 STRETCHES = 32  # of the record, that errors are judged by
 
 
@@ -88,7 +86,7 @@ def _inverse(design: Complexes) -> Complexes:
     return inverse[:, :half] + 1j * inverse[:, half:]
 
 
-def _bands(lines: Lines, band: tuple[float, float], how: LocalPolynomial) -> NDArray[np.int64]:
+def _bands(lines: Lines, band: tuple[float, float], how: LocalPolynomial) -> Ints:
     """Lines of each band, shape (bands, lines of a band): side by side, equally wide."""
     inside = np.flatnonzero((lines.frequency >= band[0]) & (lines.frequency <= band[1]))
     count = len(inside) // how.width
@@ -113,7 +111,7 @@ def _clean(values: Complexes, basis: Floats) -> Complexes:
 
 
 def _scatter(
-    influence: Complexes, design: Complexes, residual: Complexes, index: NDArray[np.int64], samples: int
+    influence: Complexes, design: Complexes, residual: Complexes, index: Ints, samples: int
 ) -> Floats:  # fmt: skip
     """Covariance of ``Re(conj(influence) . noise)`` by leaving out one stretch of time after the other, (p, p).
 

@@ -12,14 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import rfft
 
 from study.identify.frequency_domain.responses import Responses
+from study.support.arrays import Complexes, Floats, Ints
 from study.support.errors import StudyError
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 CHUNK = 256  # bands solved at a time: memory does not grow with bands times inputs
 SPARE = 8  # lines in a band beyond the unknowns, for the noise to be seen in
 EXACT = 1e-12  # singular values and variances below this share of the largest are rounding
@@ -144,7 +142,7 @@ def responses(lines: Lines, how: LocalPolynomial) -> Responses:
     )
 
 
-def noise_variance(lines: Lines, index: NDArray[np.int64], how: LocalPolynomial) -> Floats:
+def noise_variance(lines: Lines, index: Ints, how: LocalPolynomial) -> Floats:
     """Mean square per line of what no A_j and no transient explains.
 
     Parameters
@@ -174,7 +172,7 @@ def _powers(width: int, degree: int) -> Floats:
 
 
 def _middles(
-    lines: Lines, index: NDArray[np.int64], how: LocalPolynomial
+    lines: Lines, index: Ints, how: LocalPolynomial
 ) -> tuple[Complexes, Complexes, Floats]:  # fmt: skip
     """A_j in the middle of each band (bands, q), its covariance (bands, q, q), variance of the noise (bands,).
 

@@ -20,17 +20,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import rfft
 
 from study.equations import formulas
 from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.frequency_domain.inputs import Input, histories
 from study.records.record import Record
+from study.support.arrays import Complexes, Floats, Ints
 from study.support.errors import StudyError
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 Chosen = tuple[int, ...]
 MOST = 12  # periods that are told apart; of more, neighbours are averaged first
 NEIGHBOURS = 10  # lines on either side that a variance is averaged over, without its own: a weight must not
@@ -131,7 +129,7 @@ class Periods:
     record: Record
     channels: dict[str, Floats]
     inputs: Sequence[Input]
-    keep: NDArray[np.int64]
+    keep: Ints
     force: Complexes
     powers: tuple[Complexes, ...]
 

@@ -2,11 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
+from study.support.arrays import Complexes, Floats
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from study.identify.frequency_domain.inputs import history, reverse_inputs
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.multiple_shooting import fit_in_pieces, lost, magnifies
+from study.identify.time_domain.multiple_shooting import fit_in_segments, is_chaotic, is_poor
 from study.identify.time_domain.part_fit import STEPS, fit_part, linearise, run_of
 from study.identify.time_domain.shape_search import Baseline
 from study.records.prepared import Prepared
@@ -159,13 +159,13 @@ def continued(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
 def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit at its minimum with enough steps; in segments where a chaotic system loses the motion in one run."""
     fit = with_enough_steps(fit, prepared)
-    if not lost(fit, prepared.fitted):
+    if not is_poor(fit, prepared.fitted):
         return fit
     held = tuple(key for key in fit.model.values if key not in fit.keys)
-    if not magnifies(fit, prepared):
+    if not is_chaotic(fit, prepared):
         return _better(fit, _from_segments(fit.model, prepared, held, fit.steps_per_sample)) or fit
     try:
-        apart = fit_in_pieces(
+        apart = fit_in_segments(
             fit.model, prepared.record, held=held, response=prepared.response, span=prepared.plan.fit,
             steps_per_sample=fit.steps_per_sample,
         )  # fmt: skip
@@ -174,7 +174,7 @@ def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
         )
     except DivergenceError:  # where segments fail as well, the one free run is what there is
         return fit
-    return apart if lost(together, prepared.fitted) else together
+    return apart if is_poor(together, prepared.fitted) else together
 
 
 def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
@@ -226,7 +226,7 @@ def _from_segments(model: Model, prepared: Prepared, held: Sequence[str], steps:
     linear = linear_start(model, stretch)
     start = {key: value for key, value in linear.items() if key not in held and "." not in key}
     try:
-        near = fit_in_pieces(
+        near = fit_in_segments(
             model, prepared.record, start=start, held=held, response=prepared.response, span=stretch.plan.fit
         )
         return fit_part(near.model, prepared, held, steps=steps)

@@ -3,30 +3,28 @@
 The force is taken as known and the noise as additive on the response, so no noisy regressor enters and
 the estimate is not biased by noise (the reverse MI/SO estimate is, Section 5.4). The sum of squares is
 minimised by the method of Levenberg and Marquardt (``levenberg_marquardt``) with exact derivatives
-(``free_run``). A chaotic system is run piece by piece (``shooting``, ``multiple_shooting``).
+(``free_run``). A chaotic system is run segment by segment (``shooting``, ``multiple_shooting``).
 """
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model
 from study.identify.frequency_domain.coefficients import Estimate
 from study.records.record import Record
 from study.records.states import starting_states
-from study.support.block_normal import Ties
+from study.support.arrays import Floats
+from study.support.block_normal import ContinuityGaps
 from study.support.errors import DivergenceError, StudyError
 from study.support.levenberg_marquardt import OFFSET, End, Point, minimise, point_at
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class FreeRunFit:
-    """What a fit in free run found; n samples, p keys.
+    """Result of a fit in free run; n samples, p keys.
 
     Attributes
     ----------
@@ -40,8 +38,8 @@ class FreeRunFit:
         ``s^2 (J^T J)^-1`` with s^2 from the residual, the uncertainty of the initial state included:
         right if the residual is white noise. With the true variance for s^2 it is the Cramer-Rao bound
         for white Gaussian noise.
-    initial : array, shape (states,), or (pieces, states) with restarts
-        Displacement, velocity and the terms' own states at the first sample, of each piece.
+    initial : array, shape (states,), or (segments, states) with restarts
+        Displacement, velocity and the terms' own states at the first sample, of each segment.
     residual : array, shape (n,)
         Measured minus predicted response.
     converged : bool
@@ -51,7 +49,7 @@ class FreeRunFit:
     message : str
         How the fit ended, in a sentence.
     restarts : tuple of int
-        Samples of the record at which pieces after the first begin.
+        Samples of the record at which segments after the first begin.
     steps_per_sample : int
         Runge-Kutta steps that were taken in each sampling interval.
     """
@@ -91,7 +89,7 @@ def fit_free_run(
     restarts: Sequence[int] = (),
     max_iterations: int = 60,
     initial: str | Floats = "estimate",
-    tie: float = 0.0,
+    continuity: float = 0.0,
     offset: float = OFFSET,
 ) -> FreeRunFit:
     """Fit a model in free run.
@@ -100,43 +98,29 @@ def fit_free_run(
     ----------
     model : Model
         Which terms act. Values of ``held`` keys are taken from it; so are starting values that ``start`` lacks.
-    record : Record
-        Force, response, and the extra channels which the user's own terms name.
+    record, response, steps_per_sample, span, restarts
+        As for :func:`free_run.prepare`. The state after each restart is estimated too.
     start : mapping of float
         Starting values by key, for example from MI/SO.
     held : collection of str
         Keys that keep the model's value.
-    response : str
-        The motion to fit: ``displacement``, ``velocity`` or ``acceleration``.
-    steps_per_sample : int
-        Runge-Kutta steps in each sampling interval.
-    span : pair of int, optional
-        First sample, and the one after the last; the whole record if left out.
-    restarts : sequence of int
-        Samples of the record at which the motion begins anew from a state that is estimated too;
-        see ``multiple_shooting`` for systems that need it.
     max_iterations : int
         Free runs after which to give up.
-    initial : str or array, shape (pieces, states)
+    initial : str or array, shape (segments, states)
         ``estimate`` displacement, velocity and the terms' own states at the first sample, or take them
         as zero: ``rest``. An array is estimated too and gives the starting values.
-    tie : float
-        Weight of the gaps between pieces, as shares of the spread of the states, beside that of the
-        residual as a share of the response's. From 100 on the pieces are one motion, all but exactly.
+    continuity : float
+        Weight of the continuity constraints: gaps between segments are penalised as shares of the spread of the
+        states, the residual as a share of the response's. From 100 on the segments are one motion, all but exactly.
     offset : float
-        How near a minimum counts as one: length of the next step in standard errors.
-
-    Returns
-    -------
-    FreeRunFit
-        Also where the fit did not converge; ``message`` says why.
+        Length of the next step, in standard errors, at which a search has converged.
 
     Raises
     ------
     DivergenceError
-        If the model diverges with the starting values.
+        If the model diverges with the starting values. A fit that does not converge says so in ``message``.
     StudyError
-        If a starting value, a channel or an option is not what it has to be.
+        If a starting value, a channel or an option is invalid.
     """
     if response not in record:
         raise StudyError(f"record {record.name!r} has no {response}; it has {', '.join(record.channels)}")
@@ -158,17 +142,17 @@ def fit_free_run(
         states[:, :2] = starting_states(record, response, (first, *restarts))
     measured = record[response][first : first + run.samples]
     positive = tuple(key for entry in model.terms for key in entry.term.positive if key in begin)
-    problem = _Problem(run, measured, free, _weights(tie, measured, states), positive)
+    problem = _Problem(run, measured, free, _weights(continuity, measured, states), positive)
     end = problem.search(np.array([*begin.values(), *states.ravel()]), max_iterations, offset)
     return replace(_result(model, problem, end), restarts=tuple(restarts), steps_per_sample=steps_per_sample)
 
 
-def _weights(tie: float, measured: Floats, states: Floats) -> Floats | None:
-    """Weight of a gap in each state, None where nothing is tied."""
-    if tie <= 0.0 or len(states) < 2:
+def _weights(continuity: float, measured: Floats, states: Floats) -> Floats | None:
+    """Weight of a gap in each state, None without continuity constraints."""
+    if continuity <= 0.0 or len(states) < 2:
         return None
     spread = np.std(states, axis=0)
-    return tie * float(np.std(measured)) / np.where(spread > 0.0, spread, np.inf)
+    return continuity * float(np.std(measured)) / np.where(spread > 0.0, spread, np.inf)
 
 
 def _starting_values(model: Model, start: Mapping[str, float], held: Collection[str]) -> dict[str, float]:
@@ -188,7 +172,7 @@ def _starting_values(model: Model, start: Mapping[str, float], held: Collection[
 
 @dataclass(frozen=True)
 class _Problem:
-    """A search over the keys and, piece by piece, over the free initial states."""
+    """A search over the keys and, segment by segment, the free initial states."""
 
     run: FreeRun
     measured: Floats
@@ -197,7 +181,7 @@ class _Problem:
     positive: tuple[str, ...]
 
     def states(self, x: Floats) -> Floats:
-        """Initial states in the variables, shape (pieces, states)."""
+        """Initial states in the variables, shape (segments, states)."""
         states = np.zeros((len(self.run.cuts) + 1, len(self.run.slots) + 1))
         states[:, : self.free_states] = x[len(self.run.keys) :].reshape(len(states), self.free_states)
         return states
@@ -207,17 +191,16 @@ class _Problem:
         values = dict(zip(self.run.keys, (float(v) for v in x), strict=False))
         if any(values[key] <= 0.0 for key in self.positive):
             return None
+        states = self.states(x)
         try:
-            states = self.states(x)
-            response, jacobian, arrivals = self.run.respond_by_piece(values, states, self.free_states)
+            response, jacobian, arrivals = self.run.respond_by_segment(values, states, self.free_states)
         except DivergenceError:
             return None
-        ties = None
+        continuity = None
         if self.weights is not None:
             gaps = self.weights * (arrivals[:, :, 0] - states[1:])
-            ties = Ties(gaps, self.weights[:, None] * arrivals[:, :, 1:], self.weights)
-        begins = (0, *self.run.cuts)
-        return point_at(x, self.measured - response, jacobian, len(self.run.keys), begins, ties)
+            continuity = ContinuityGaps(gaps, self.weights[:, None] * arrivals[:, :, 1:], self.weights)
+        return point_at(x, self.measured - response, jacobian, len(self.run.keys), (0, *self.run.cuts), continuity)
 
     def search(self, x: Floats, max_iterations: int, offset: float) -> End:
         """The minimum near x."""
@@ -229,9 +212,7 @@ class _Problem:
 
 
 def _result(model: Model, problem: _Problem, end: End) -> FreeRunFit:
-    point, keys = end.point, problem.run.keys
-    p = len(keys)
-    message = end.message
+    point, keys, message = end.point, problem.run.keys, end.message
     unclear = [key for key, undecided in zip(keys, point.undecided(), strict=False) if undecided]
     if unclear:
         message += f"; this record cannot tell apart or does not show {', '.join(unclear)}"
@@ -239,7 +220,7 @@ def _result(model: Model, problem: _Problem, end: End) -> FreeRunFit:
     return FreeRunFit(
         model=model.with_values(dict(zip(keys, (float(v) for v in point.x), strict=False))),
         keys=keys,
-        values=point.x[:p],
+        values=point.x[: len(keys)],
         covariance=point.covariance(),
         initial=states if problem.run.cuts else states[0],
         residual=point.residual[: problem.run.samples],

@@ -8,7 +8,6 @@ could do has been taken out. One free run a point; the best few points start a f
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import irfft, rfft, rfftfreq
 
 from study.equations.model import ModelTerm
@@ -18,11 +17,10 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import linearise, run_of
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS
+from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 PEAKS = 6  # lines of a spectrum that are tried as the frequency of a periodic effect
 STARTS = 4  # points of the search that start a fit
 SPREAD = 5  # ... or so many, from one end of the range to the other, where the search is blunt

@@ -1,7 +1,7 @@
 """Where a free run has to begin anew, because its system magnifies every disturbance.
 
 In a chaotic system (the report's Dead-Band system is one for long stretches) any error grows until the free
-run has nothing to do with the measured motion, however true the model. Pieces that are short against that
+run has nothing to do with the measured motion, however true the model. Segments that are short against that
 growth, each with an initial state of its own, keep the fit well posed (multiple shooting; H. G. Bock, 1983).
 """
 
@@ -9,22 +9,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from study.equations.free_run import prepare
+from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model
 from study.records.record import Record
 from study.records.states import REACH, angular_rate, starting_states
+from study.support.arrays import Floats
 from study.support.errors import DivergenceError
 
-Floats = NDArray[np.float64]
-GROWTH = 10.0  # by how much a disturbance may be magnified within a piece
-PERIODS = 1.0  # length of the pieces that a search from afar begins with
-REACHES = (0.07, 0.15, REACH, 0.3)  # those that are tried where it matters
+GROWTH = 10.0  # factor by which a disturbance may be magnified within a segment
+PERIODS = 1.0  # length of the segments that a search from afar begins with
+REACHES = (0.07, 0.15, REACH, 0.3)  # widths of smoothing, in periods, that are tried for the first states
 
 
 def even_restarts(record: Record, response: str, span: tuple[int, int]) -> tuple[int, ...]:
-    """Restarts that cut a span into pieces of ``PERIODS`` periods of the motion."""
+    """Restarts that cut a span into segments of ``PERIODS`` periods of the motion."""
     first, last = span
     rate = angular_rate(record[response][first:last], record.dt)
     count = max(1, round((last - first) * record.dt * rate / (2.0 * np.pi * PERIODS)))
@@ -34,34 +33,19 @@ def even_restarts(record: Record, response: str, span: tuple[int, int]) -> tuple
 def needed_restarts(
     model: Model, record: Record, states: Floats, span: tuple[int, int], restarts: Sequence[int], steps_per_sample: int
 ) -> tuple[int, ...]:  # fmt: skip
-    """Which restarts of a fitted model have to stay.
+    """Which restarts of a fitted model have to stay, given the state at the beginning of each segment.
 
-    The derivative of the state at a piece's end by that at its beginning is taken from a free run; products
+    The derivative of the state at a segment's end by that at its beginning is taken from a free run; products
     of them say how a disturbance at any restart grows until any later one. Displacement and velocity are
-    weighed by the angular rate of the motion, so that a linear system without damping has growth one.
-
-    Parameters
-    ----------
-    model : Model
-        Every value known.
-    record : Record
-        Gives the force.
-    states : array, shape (pieces, states)
-        State at the beginning of each piece.
-    span : pair of int
-        First sample, and the one after the last.
-    restarts : sequence of int
-        Samples of the record at which the pieces after the first begin.
-    steps_per_sample : int
-        Runge-Kutta steps in each sampling interval.
+    weighted by the angular rate of the motion, so that a linear system without damping has growth one.
     """
     run = prepare(model, record, steps_per_sample=steps_per_sample, span=span, restarts=restarts)
-    motion, _, arrivals = run.respond_by_piece({}, states, 2)
+    motion, _, arrivals = run.respond_by_segment({}, states, 2)
     rate = angular_rate(motion, record.dt)
-    weighed = arrivals[:, :2, 1:] * np.array([[1.0, rate], [1.0 / rate, 1.0]])
+    weighted = arrivals[:, :2, 1:] * np.array([[1.0, rate], [1.0 / rate, 1.0]])
     kept: list[int] = []
-    grown: list[Floats] = []  # from each restart that matters to where the piece at hand ends
-    for begin, through in zip((span[0], *restarts[:-1]), weighed, strict=True):
+    grown: list[Floats] = []  # from each restart that matters to where the present segment ends
+    for begin, through in zip((span[0], *restarts[:-1]), weighted, strict=True):
         grown = [through @ p for p in grown] + [through]
         sizes = [float(np.linalg.norm(p, 2)) for p in grown]
         if max(sizes) > GROWTH and len(grown) > 1:
@@ -73,8 +57,8 @@ def needed_restarts(
 
 
 @dataclass(frozen=True)
-class Pieces:
-    """A span of a record in pieces, for trying initial states that a search could not find by itself.
+class ShootingSegments:
+    """A span of a record cut into segments, each run from an initial state of its own.
 
     Attributes
     ----------
@@ -85,7 +69,7 @@ class Pieces:
     span : pair of int
         First sample, and the one after the last.
     restarts : tuple of int
-        Samples of the record at which the pieces after the first begin.
+        Samples of the record at which the segments after the first begin.
     steps_per_sample : int
         Runge-Kutta steps in each sampling interval.
     """
@@ -101,41 +85,40 @@ class Pieces:
         """Standard deviation of the measured response within the span."""
         return float(np.std(self.record[self.response][slice(*self.span)]))
 
-    def misfits(self, model: Model, states: Floats) -> Floats:
-        """Sum of squares of the residual of each piece, shape (pieces,)."""
-        run = prepare(
+    def _run(self, model: Model) -> FreeRun:
+        return prepare(
             model, self.record, response=self.response, steps_per_sample=self.steps_per_sample,
             span=self.span, restarts=self.restarts,
         )  # fmt: skip
-        residual = self.record[self.response][slice(*self.span)] - run.respond_by_piece({}, states)[0]
+
+    def misfits(self, model: Model, states: Floats) -> Floats:
+        """Sum of squares of the residual of each segment, shape (segments,)."""
+        residual = self.record[self.response][slice(*self.span)] - self._run(model).respond_by_segment({}, states)[0]
         return np.add.reduceat(residual**2, [0, *(r - self.span[0] for r in self.restarts)])
 
     def passing(self, model: Model, restarts: Sequence[int], states: Floats) -> Floats:
-        """State at the beginning of each piece of a motion that begins anew at fewer restarts, shape (pieces, states).
+        """State at the beginning of each segment, of a motion with fewer restarts, shape (segments, states).
 
         ``states`` are those of its first sample and of its ``restarts``, which are among this span's own.
         """
         begins = (self.span[0], *self.restarts)
-        run = prepare(
-            model, self.record, steps_per_sample=self.steps_per_sample, span=self.span, restarts=self.restarts
-        )
         numbers = [begins.index(r) for r in (self.span[0], *restarts)]
-        return run.passing(dict(zip(numbers, np.atleast_2d(states), strict=True)))
+        return self._run(model).passing(dict(zip(numbers, np.atleast_2d(states), strict=True)))
 
     def first_states(self, model: Model) -> Floats:
-        """Initial states as the record shows them, smoothed as widely as fits each piece best.
+        """Initial states as the record shows them, smoothed as widely as fits each segment best.
 
-        Shape (pieces, states). A width with which the model diverges is left out.
+        Shape (segments, states). A width with which the model diverges is left out.
         """
         begins = (self.span[0], *self.restarts)
         best, least = np.zeros((len(begins), 2 + len(model.states))), np.full(len(begins), np.inf)
         for reach in REACHES:
-            tried = np.zeros_like(best)
-            tried[:, :2] = starting_states(self.record, self.response, begins, reach)
+            states = np.zeros_like(best)
+            states[:, :2] = starting_states(self.record, self.response, begins, reach)
             try:
-                misfits = self.misfits(model, tried)
+                misfits = self.misfits(model, states)
             except DivergenceError:
                 continue
-            best = np.where((misfits < least)[:, None], tried, best)
+            best = np.where((misfits < least)[:, None], states, best)
             least = np.minimum(misfits, least)
         return best
