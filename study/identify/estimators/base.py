@@ -1,4 +1,4 @@
-"""What every estimator takes and gives."""
+"""Settings and results of all estimators."""
 
 import math
 from collections.abc import Mapping
@@ -21,12 +21,12 @@ from study.records.spectra import Segments
 
 @dataclass(frozen=True)
 class Settings:
-    """What the estimators may be told.
+    """Settings of the estimators.
 
     Attributes
     ----------
     segments : Segments
-        How the record is cut, for those that cut it.
+        Segments of Welch's method, for estimators that use it.
     band : pair of float
         Lines that the parameters are fitted to, in hertz.
     local_polynomial : LocalPolynomial
@@ -52,7 +52,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Identified:
-    """What an estimator found.
+    """Result of an estimator.
 
     Attributes
     ----------
@@ -66,9 +66,9 @@ class Identified:
     estimate : Estimate or None
         The coefficients themselves, as the model names them, for estimators that find them together.
     note : str
-        What is to be known before the estimates are used, such as that a search did not converge; mostly empty.
+        A warning, such as that a search did not converge; mostly empty.
     shapes : Estimate or None
-        Shape parameters that the estimator found by the way, where ``estimate`` has none.
+        Shape parameters, where they are not part of ``estimate``.
     analysis : MisoResult or None
         Coherences, for estimators whose ``responses`` have none of their own.
     """
@@ -98,14 +98,14 @@ def named_parameters(estimate: Estimate) -> tuple[Parameter, ...]:
     own names: ``u_g``, ``f_m``.
     """
     plain = {s: Parameter(s.rpartition(".")[2], estimate[s], estimate.error(s)) for s in estimate.symbols}
-    found = {s: plain.pop(s) for s in ("m", "c", "k") if s in plain}
-    if {"m", "c", "k"} <= set(found) and found["k"].value > 0.0 and found["m"].value > 0.0:
-        found |= {p.name: p for p in _modal(estimate)}
+    named = {s: plain.pop(s) for s in ("m", "c", "k") if s in plain}
+    if {"m", "c", "k"} <= set(named) and named["k"].value > 0.0 and named["m"].value > 0.0:
+        named |= {p.name: p for p in _modal(estimate)}
     for term in (t for t in LIBRARY.values() if t.reported and t.symbols[0] in plain):
         own = [plain.pop(symbol) for symbol in term.symbols]
         turned = (Parameter(term.reported[0], -own[0].value, own[0].error),)
-        found |= {p.name: p for p in (turned if len(own) == 1 else _phasor(estimate, term))}
-    return (*found.values(), *plain.values())
+        named |= {p.name: p for p in (turned if len(own) == 1 else _phasor(estimate, term))}
+    return (*named.values(), *plain.values())
 
 
 def true_parameters(values: Mapping[str, float | None]) -> dict[str, float]:

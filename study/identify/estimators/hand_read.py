@@ -17,17 +17,17 @@ LOWEST_LINES = 3  # "the asymptotic behavior of A_1 for f -> 0": the first lines
 
 def identify(model: Model, record: Record, settings: Settings) -> Identified:
     """Read k, f_n, m, c, zeta off A_1 and the plateaus off the other A_j, as a hand would."""
-    found = miso.identify(model, record, settings)
-    assert found.responses is not None
-    band, frequency = settings.band, found.responses.frequency
+    result = miso.identify(model, record, settings)
+    assert result.responses is not None
+    band, frequency = settings.band, result.responses.frequency
     keep = (frequency >= band[0]) & (frequency <= band[1])
     values: list[tuple[str, float]] = []
-    for item, response in zip(found.inputs, found.responses.response, strict=True):
+    for item, response in zip(result.inputs, result.responses.response, strict=True):
         if item.shape == "u":
             values += read_linear(frequency, response, band)
         else:
             values += _plateaus(item, frequency[keep], response[keep])
-    return Identified(found.inputs, None, tuple(Parameter(n, v, math.nan) for n, v in _renamed(values)))
+    return Identified(result.inputs, None, tuple(Parameter(n, v, math.nan) for n, v in _renamed(values)))
 
 
 def read_linear(frequency: Floats, response: Complexes, band: tuple[float, float]) -> list[tuple[str, float]]:
@@ -66,18 +66,15 @@ def _vertex(x: Floats, y: Floats) -> tuple[float, float]:
 def _plateaus(item: Input, frequency: Floats, response: Complexes) -> list[tuple[str, float]]:
     """Each coefficient as the mean height of its own part of A_j: real for order 0, imaginary for order 1."""
     powers = item.powers(frequency)
-    return [
-        (part.symbol, float(np.mean((response / powers[:, p]).real)))
-        for p, part in enumerate(item.parts)
-    ]  # fmt: skip
+    return [(part.symbol, float(np.mean((response / powers[:, p]).real))) for p, part in enumerate(item.parts)]
 
 
 def _renamed(values: list[tuple[str, float]]) -> list[tuple[str, float]]:
     """Periodic and dead-band coefficients under the report's names, (4.9) and (4.10)."""
-    found = dict(values)
-    if "km_cos" in found:
-        a, b = found.pop("km_cos"), found.pop("km_sin")
-        found |= {"k_m": math.hypot(a, b), "phase": math.atan2(-b, a)}
-    if "kg" in found:
-        found["k_dead_band"] = -found.pop("kg")
-    return list(found.items())
+    named = dict(values)
+    if "km_cos" in named:
+        a, b = named.pop("km_cos"), named.pop("km_sin")
+        named |= {"k_m": math.hypot(a, b), "phase": math.atan2(-b, a)}
+    if "kg" in named:
+        named["k_dead_band"] = -named.pop("kg")
+    return list(named.items())

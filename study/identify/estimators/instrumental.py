@@ -16,28 +16,28 @@ def identify(model: Model, record: Record, settings: Settings) -> Identified:
 
     Coherences are those of the force with the inputs along that motion, which has no noise.
     """
-    found = output_error.fit(model, record)
-    inputs = reverse_inputs(found.model)
-    clean = clean_motion(found, record)
+    fit = output_error.fit(model, record)
+    inputs = reverse_inputs(fit.model)
+    clean = clean_motion(fit, record)
     values = instruments.channels(inputs, record, clean)
     matrix = spectra.cross_spectra(values, record.dt, settings.segments)
     estimate = instruments.fit(
-        matrix, inputs, settings.band, from_coefficients.response(inputs, found.estimate, matrix.frequency),
+        matrix, inputs, settings.band, from_coefficients.response(inputs, fit.estimate, matrix.frequency),
         instruments.stretches(values, record.dt, settings.segments),
     )  # fmt: skip
-    note = "" if found.converged else found.message
+    note = "" if fit.converged else fit.message
     own = spectra.cross_spectra([*histories(inputs, clean), record["force"]], record.dt, settings.segments)
-    shapes = output_error.shapes_of(found, [key for key in model.values if "." in key])
+    shapes = output_error.shapes_of(fit, [key for key in model.values if "." in key])
     named = (*named_parameters(estimate), *named_parameters(shapes))
     return Identified(inputs, instruments.responses(matrix), named, estimate, note, shapes, conditioned.analyse(own))
 
 
-def clean_motion(found: FreeRunFit, record: Record) -> Record:
+def clean_motion(fit: FreeRunFit, record: Record) -> Record:
     """The record with displacement and velocity of the fitted model in free run."""
     motions = {
         name: prepare(
-            found.model, record, response=name, steps_per_sample=found.steps_per_sample, restarts=found.restarts
-        ).respond_by_segment({}, found.initial)[0]
+            fit.model, record, response=name, steps_per_sample=fit.steps_per_sample, restarts=fit.restarts
+        ).respond_by_segment({}, fit.initial)[0]
         for name in MOTIONS[:2]
     }
     return record.with_channels(motions)

@@ -10,7 +10,7 @@ from study.records.record import Record
 
 def identify(model: Model, record: Record, settings: Settings) -> Identified:
     """A_j(f) of every input in narrow bands, and coefficients from all lines of the band that is fitted."""
-    inputs, how = reverse_inputs(model), settings.local_polynomial
+    inputs, bands = reverse_inputs(model), settings.local_polynomial
     lines = transform([*histories(inputs, record), record["force"]], record.dt)
-    estimate = fit(lines, inputs, settings.band, how)
-    return Identified(inputs, responses(lines, how), named_parameters(estimate), estimate)
+    estimate = fit(lines, inputs, settings.band, bands)
+    return Identified(inputs, responses(lines, bands), named_parameters(estimate), estimate)

@@ -19,7 +19,7 @@ from study.records.prepared import whole
 from study.records.record import Record
 from study.support.errors import DivergenceError
 
-KEPT = 4  # fits: those of the records that the threads are at
+KEPT = 4  # fits: those of the records that the threads are working on
 REFINED = 12  # free runs in which a fit follows a change of steps
 
 
@@ -42,7 +42,7 @@ def shapes_of(fit: FreeRunFit, keys: Collection[str]) -> Estimate:
 
 @lru_cache(maxsize=KEPT)
 def fit(model: Model, record: Record) -> FreeRunFit:
-    """The fit in free run that the estimate is made of; kept a while, for instruments rest on the same one.
+    """The fit in free run behind the estimate; cached, as the instruments use the same one.
 
     Coefficients of the model are left open, shape parameters that it gives are held.
 
@@ -56,11 +56,11 @@ def fit(model: Model, record: Record) -> FreeRunFit:
 
 
 def with_step_error(fit: FreeRunFit, record: Record, held: Collection[str]) -> FreeRunFit:
-    """The fit with what the steps of its free run add to its covariance, where there is hardly any noise.
+    """The fit with the error of the integrator added to its covariance, where there is hardly any noise.
 
     Without noise the residual is the integrator's own error. That of a Runge-Kutta run falls to a sixteenth with
-    halved steps, so the estimates move from these steps to those by fifteen sixteenths of what is wrong with them.
-    Segments whose gaps were penalised are let go for it, which can only add.
+    halved steps, so halving them moves the estimates by fifteen sixteenths of their error. Continuity constraints
+    are dropped for it, which can only add to the change.
     """
     if fit.rms >= CLEAN * float(np.std(record["displacement"])):
         return fit

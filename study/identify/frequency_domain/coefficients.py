@@ -10,7 +10,7 @@ from study.identify.frequency_domain.inputs import Input
 from study.identify.frequency_domain.responses import Responses
 from study.support.arrays import Complexes, Floats
 
-EXACT = 1e-12  # variances below this fraction of the largest are rounding
+EXACT = 1e-12  # variances below this share of the largest are rounding
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Estimate:
     covariance : array, shape (p, p)
         Their random-error covariance.
     freedom : float
-        Degrees of freedom that it rests on; few where it comes from the scatter between few parts of a record.
+        Its degrees of freedom; few where it comes from the scatter between few parts of a record.
     """
 
     symbols: tuple[str, ...]
@@ -54,26 +54,12 @@ class Estimate:
 
 
 def fit(result: Responses, inputs: Sequence[Input], band: tuple[float, float], line_inflation: float) -> Estimate:
-    """Weighted least squares of A_j(f) on powers of j 2 pi f.
+    """Weighted least squares of A_j(f) on powers of j 2 pi f, over the lines of a band (Hz).
 
     Each input is fitted by itself, every line weighted by the inverse of its random-error variance
-    (Bendat and Piersol). Real and imaginary part are fitted together, the coefficients being real.
-
-    Parameters
-    ----------
-    result : Responses
-        Estimates of A_j(f) with their covariance.
-    inputs : sequence of Input
-        What each A_j is made of, in the order of ``result.response``.
-    band : pair of float
-        Lines from the first to the second frequency (Hz) are used.
-    line_inflation : float
-        ``Segments.line_inflation``: neighbouring lines of a windowed spectrum are not independent.
-
-    Returns
-    -------
-    Estimate
-        Coefficients of all inputs; estimates from different inputs keep their covariance.
+    (Bendat and Piersol). Real and imaginary part are fitted together, the coefficients being real. Estimates
+    from different inputs keep their covariance. ``line_inflation`` is that of the segments: neighbouring lines of
+    a windowed spectrum are not independent.
     """
     keep = (result.frequency >= band[0]) & (result.frequency <= band[1])
     frequency = result.frequency[keep]
@@ -87,14 +73,15 @@ def fit(result: Responses, inputs: Sequence[Input], band: tuple[float, float], l
 
 
 def _weights(variance: Floats, response: Complexes) -> Floats:
-    """Inverse variances, to a common factor.
+    """Inverse variances, to a common factor; zero where the input brings nothing and the response is exactly zero."""
+    divisor = floored(variance)
+    return np.where(response == 0.0, 0.0, np.max(divisor, initial=0.0) / divisor)
 
-    A line where the input brings nothing has a response of exactly zero and counts for nothing; lines without
-    any error (a model that explains all to the last digit) count alike.
-    """
+
+def floored(variance: Floats) -> Floats:
+    """Variances to divide by; ones where a model explains everything to the last digit."""
     largest = float(np.max(variance, initial=0.0))
-    weights = largest / np.maximum(variance, EXACT * largest) if largest > 0.0 else np.ones_like(variance)
-    return np.where(response == 0.0, 0.0, weights)
+    return np.maximum(variance, EXACT * largest) if largest > 0.0 else np.ones_like(variance)
 
 
 def _map(powers: Complexes, weights: Floats) -> Complexes:

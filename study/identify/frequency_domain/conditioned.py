@@ -1,8 +1,8 @@
 """Multiple-input/single-output analysis by conditioned spectra (the report's Sections 4.2 to 4.5).
 
-Inputs come in the order in which they are conditioned: ``G_ij.r!`` is what is left of ``G_ij`` when
-the linear effects of inputs 1 to r have been taken out. Every quantity is computed per frequency line,
-on inputs scaled to unit power, so that a cube of 1e-8 m^3 beside a displacement of 1e-3 m is no trouble.
+Inputs come in the order in which they are conditioned: ``G_ij.r!`` is ``G_ij`` without the linear effects of inputs
+1 to r. Every quantity is computed per frequency line, on inputs scaled to unit power, so that a cube of 1e-8 m^3 beside
+a displacement of 1e-3 m does no harm.
 """
 
 from dataclasses import dataclass
@@ -95,10 +95,10 @@ def analyse(matrix: SpectralMatrix) -> MisoResult:
 
 
 def _scale(density: Complexes) -> Floats:
-    """Root of each autospectrum, shape (lines, channels); infinite where an input is silent, so that it scales to nil.
+    """Root of each autospectrum, shape (lines, channels); infinite where an input is silent, so that it scales to zero.
 
-    A constant has power at its lowest lines only. Beyond them stands rounding, which is the same in every
-    segment and, scaled to unit power, would pass for an input.
+    A constant has power at its lowest lines only. Rounding at the others is the same in every segment and, scaled to
+    unit power, would pass for an input.
     """
     power = np.sqrt(np.clip(np.einsum("fii->fi", density).real, 0.0, None))
     scale = np.where(power > SILENT * power.max(axis=0), power, np.inf)
@@ -107,7 +107,7 @@ def _scale(density: Complexes) -> Floats:
 
 
 def _condition(density: Complexes) -> tuple[Complexes, Complexes, Floats]:
-    """Take the inputs out one after the other.
+    """Remove the inputs one after the other.
 
     Returns the rows ``G_rj.(r-1)!`` of every stage (lines, q, q + 1), the conditioned responses
     ``L_r`` of (4.23) to (4.25), and the partial coherences of (4.30) and (4.34).

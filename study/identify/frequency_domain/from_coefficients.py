@@ -14,14 +14,8 @@ from study.support.arrays import Complexes, Floats
 def responses(inputs: Sequence[Input], estimate: Estimate, matrix: SpectralMatrix) -> Responses:
     """``A_j(f) = sum of coefficient * factor * (j 2 pi f)^order`` with the covariance of the coefficients.
 
-    Parameters
-    ----------
-    inputs : sequence of Input
-        Inputs of the reverse system.
-    estimate : Estimate
-        Coefficients of all parts of the inputs; others may be there too.
-    matrix : SpectralMatrix
-        Of the inputs and the force: gives the lines, and what the functions leave of the force.
+    The matrix, that of the inputs and the force, gives the lines and what the functions leave of the force. The
+    estimate may have other coefficients too.
     """
     form = _form(inputs, estimate, matrix.frequency)
     covariance = form @ estimate.covariance @ form.conj().transpose(0, 2, 1)

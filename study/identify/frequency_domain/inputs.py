@@ -12,7 +12,6 @@ import numpy as np
 from study.equations import formulas, kernels
 from study.equations.graph import Graph
 from study.equations.model import Model, ModelTerm, with_registers
-from study.equations.term import Component
 from study.records.interpolation import between_samples
 from study.records.record import Record
 from study.support.arrays import Complexes, Floats
@@ -72,15 +71,17 @@ def reverse_inputs(model: Model) -> tuple[Input, ...]:
     StudyError
         If a shape parameter is still unknown.
     """
-    found: dict[tuple[object, ...], Input] = {}
+    inputs: dict[tuple[object, ...], Input] = {}
     for entry in model.terms:
         parameters = _known_parameters(entry)
         for component in entry.term.components:
             state = entry.term.state if component.shape == "z" else None
             key = (component.shape, parameters, state)
-            known = found.get(key, Input(component.shape, (), (), parameters, state))
-            found[key] = _joined(known, entry, component)
-    return tuple(found.values())
+            known = inputs.get(key, Input(component.shape, (), (), parameters, state))
+            part = Part(component.symbol, component.order, component.factor)
+            terms = tuple(dict.fromkeys((*known.terms, entry.name)))
+            inputs[key] = replace(known, parts=(*known.parts, part), terms=terms)
+    return tuple(inputs.values())
 
 
 def _known_parameters(entry: ModelTerm) -> tuple[tuple[str, float], ...]:
@@ -92,20 +93,8 @@ def _known_parameters(entry: ModelTerm) -> tuple[tuple[str, float], ...]:
     return tuple(pairs)
 
 
-def _joined(known: Input, entry: ModelTerm, component: Component) -> Input:
-    part = Part(component.symbol, component.order, component.factor)
-    terms = known.terms if entry.name in known.terms else (*known.terms, entry.name)
-    return replace(known, parts=(*known.parts, part), terms=terms)
-
-
 def histories(inputs: Sequence[Input], record: Record) -> list[Floats]:
-    """Time history of each input, each of shape (n,).
-
-    Raises
-    ------
-    StudyError
-        If a formula needs a channel that the record lacks, or has no finite value somewhere along it.
-    """
+    """Time history of each input, each of shape (n,); raises as :func:`history`."""
     return [record["displacement"] if i.shape == "u" else history(i, record) for i in inputs]
 
 
@@ -115,7 +104,7 @@ def history(item: Input, record: Record) -> Floats:
     Raises
     ------
     StudyError
-        As :func:`histories`.
+        If a formula needs a channel that the record lacks, or has no finite value somewhere along it.
     """
     formula = item.shape if item.state is None else item.state
     own = (*dict(item.parameters), *(("z",) if item.state is not None else ()))  # without a state, z is a channel
@@ -151,7 +140,7 @@ def _finite(values: Floats, item: Input, record: Record) -> Floats:
 def _columns(wanted: Sequence[str], formula: str, record: Record) -> list[Floats]:
     """Motion, time and channels that a formula names; u, v and t are no channels, even where one is called so."""
     motion = {"u": "displacement", "v": "velocity"}
-    data: list[Floats] = []
+    columns: list[Floats] = []
     for name in wanted:
         channel = motion.get(name, name)
         if name != "t" and channel not in (record if name in motion else record.extra):
@@ -159,5 +148,5 @@ def _columns(wanted: Sequence[str], formula: str, record: Record) -> list[Floats
             raise StudyError(
                 f"the formula {formula!r} needs the channel {channel!r}, which {record.name} lacks{beside}"
             )
-        data.append(record.time if name == "t" else record[channel])
-    return data
+        columns.append(record.time if name == "t" else record[channel])
+    return columns

@@ -1,12 +1,12 @@
 """Frequency response functions that noise on the response does not bias: instruments and corrected inputs.
 
 Noise on u makes the reverse system's inputs wrong twice over: ``G_XX`` gains the noise's own power, and the mean
-of a distorted input is not the input's, as ``E[(u + n)^3 | u] = u^3 + 3 sigma^2 u`` shows. A motion free
-of noise, that of a model fitted in free run, mends both. Its inputs ``Z_j = g_j(u^)`` have nothing in
-common with the noise, so that ``A = G_ZX^-1 G_ZF`` holds as soon as the inputs X_j have the right mean; and
-they get it by ``X_j = g_j(u + n) - (E[g_j(u^ + n)] - g_j(u^))``, whatever the shape g_j.
+of a distorted input is not the input's, as ``E[(u + n)^3 | u] = u^3 + 3 sigma^2 u`` shows. The motion of a model
+fitted in free run has no noise and removes both errors. Its inputs ``Z_j = g_j(u^)`` are independent of the noise,
+so that ``A = G_ZX^-1 G_ZF`` holds as soon as the inputs X_j have the right mean; and they get it by
+``X_j = g_j(u + n) - (E[g_j(u^ + n)] - g_j(u^))``, whatever the shape g_j.
 
-The measured response still decides: A_j(f) is free to differ from the form that the model gives it.
+A_j(f) still comes from the measured response and may differ from the form that the model gives it.
 """
 
 import math
@@ -31,30 +31,18 @@ NODES = 15  # of the Gauss-Hermite rule: exact for shapes up to the power 29, cl
 NOISY = {"u": "displacement", "v": "velocity"}  # what a formula calls the channels that carry noise
 TINY = float(np.finfo(np.float64).tiny)
 _pinv = cast(Any, np.linalg.pinv)  # its annotation leaves the element type open
-STRETCHES = 16  # of the record, that the errors of coefficients are judged by, ...
-FEWEST, SPAN = 8, 1  # ... how many are enough, and how many segments long each is at least
+STRETCHES, FEWEST = 16, 8  # parts of the record, at most and at least, whose scatter gives the errors of coefficients
 FAINT = 1e-8  # noise below this share of a channel's mean square is the rounding of the free run
 
 
 def channels(inputs: Sequence[Input], record: Record, clean: Record) -> list[Floats]:
-    """q instruments, then q corrected inputs, then the force.
-
-    Parameters
-    ----------
-    inputs : sequence of Input
-        Inputs of the reverse system, q of them.
-    record : Record
-        As measured.
-    clean : Record
-        The same, its displacement and velocity those of the fitted model in free run.
-    """
-    instruments = [history(item, clean) for item in inputs]
-    return [*instruments, *corrected(inputs, record, clean), record["force"]]
+    """q instruments, then q corrected inputs, then the force; ``clean`` has the motion of the fitted model."""
+    return [*(history(item, clean) for item in inputs), *corrected(inputs, record, clean), record["force"]]
 
 
 def stretches(values: Sequence[Floats], dt: float, segments: Segments) -> list[SpectralMatrix]:
-    """Spectral matrices of stretches of the record, which have nothing in common; none if it is too short for them."""
-    count = min(STRETCHES, len(values[0]) // (SPAN * segments.length))
+    """Spectral matrices of stretches of the record that do not overlap; none if it is too short for them."""
+    count = min(STRETCHES, len(values[0]) // segments.length)
     if count < FEWEST:
         return []
     length = len(values[0]) // count
@@ -62,12 +50,9 @@ def stretches(values: Sequence[Floats], dt: float, segments: Segments) -> list[S
 
 
 def responses(matrix: SpectralMatrix) -> Responses:
-    """``A = G_ZX^-1 G_ZF`` with the covariance ``G_ZX^-1 G_ZZ G_ZX^-H G_ee / (n_d - q)``, e what is left of the force.
+    """``A = G_ZX^-1 G_ZF`` from the matrix of :func:`channels`; e is what is left of the force.
 
-    Parameters
-    ----------
-    matrix : SpectralMatrix
-        Of :func:`channels`.
+    The covariance is ``G_ZX^-1 G_ZZ G_ZX^-H G_ee / (n_d - q)``.
     """
     density, count = matrix.density, matrix.density.shape[1] // 2
     scale = np.sqrt(np.maximum(np.einsum("fii->fi", density).real, TINY))
@@ -93,22 +78,22 @@ def fit(
 
     With ``Psi`` the instruments and ``Phi`` the inputs, each times its powers of ``j 2 pi f``, the
     coefficients solve ``Re sum Psi^H Phi / G_ee theta = Re sum Psi^H F / G_ee``. Fitting A_j(f) line by line
-    would weigh lines by errors that are estimated with them, which biases under much noise.
+    would weight lines by errors that are estimated with them, which biases under much noise.
 
-    What noise leaves of a corrected cube is that noise times u^2, which is loud where the motion is large. Errors
-    are therefore judged by the scatter between stretches of the record; by G_ee, as if it were stationary, where the
-    record is too short for that.
+    The noise of a corrected cube is proportional to u^2, hence large where the motion is. Errors are therefore
+    judged by the scatter between stretches of the record; by G_ee, as if it were stationary, where the record is too
+    short for that.
 
     Parameters
     ----------
     matrix : SpectralMatrix
         Of :func:`channels`.
     inputs : sequence of Input
-        What each A_j is made of.
+        Those of the reverse system.
     band : pair of float
         Lines from the first to the second frequency (Hz) are used.
     known : complex array, shape (q, lines)
-        A_j(f) of the fitted model: what it leaves of the force, G_ee, weighs the lines.
+        A_j(f) of the fitted model: what it leaves of the force, G_ee, weights the lines.
     parts : sequence of SpectralMatrix
         As :func:`stretches` gives them.
     """
@@ -143,7 +128,7 @@ def fit(
 
 
 def _jackknife(equations: Sequence[tuple[Floats, Floats]]) -> Floats:
-    """Covariance of the solution of all equations together by leaving out those of one stretch after the other."""
+    """Covariance of the solution of all equations, by leaving out those of one stretch after the other."""
     left, right = (np.stack(side) for side in zip(*equations, strict=True))
     inverses = np.asarray(_pinv(np.sum(left, axis=0) - left), dtype=np.float64)
     without = np.einsum("gpq,gq->gp", inverses, np.sum(right, axis=0) - right)
@@ -159,19 +144,18 @@ def _without_instruments(matrix: SpectralMatrix) -> SpectralMatrix:
 def corrected(inputs: Sequence[Input], record: Record, clean: Record) -> list[Floats]:
     """Inputs from the measured motion whose mean is that of the true ones, each of shape (n,).
 
-    A term with a memory has no such mean at a point of time; its history along the clean motion stands for it,
-    so that its A_j(f) is the model's more than the record's.
+    A term with a memory has no such mean at a point of time; its history along the clean motion takes its place.
     """
     spread = noise_spread(record, clean)
-    found: list[Floats] = []
+    histories: list[Floats] = []
     for item in inputs:
         if item.state is not None:
-            found.append(history(item, clean))
+            histories.append(history(item, clean))
         elif item.shape == "u":
-            found.append(history(item, record))
+            histories.append(history(item, record))
         else:
-            found.append(history(item, record) - (expected(item, clean, spread) - history(item, clean)))
-    return found
+            histories.append(history(item, record) - (expected(item, clean, spread) - history(item, clean)))
+    return histories
 
 
 def noise_spread(record: Record, clean: Record) -> dict[str, Floats]:

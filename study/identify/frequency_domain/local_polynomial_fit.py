@@ -1,16 +1,15 @@
 """Coefficients from the lines of a whole record, with errors that hold for bursts of noise as well.
 
-The weighted least squares fit of A_j(f) to powers of j 2 pi f, on local polynomials that overlap nowhere and with
-all that their covariance says, comes to the same as least squares of the output on the inputs times those powers,
-band by band with a transient of its own, each band weighted by the noise that the local polynomials find in it.
-So it is done: nothing is lost in between.
+The weighted least squares fit of A_j(f) to powers of j 2 pi f, on local polynomials that do not overlap and with their
+full covariance, is equivalent to least squares of the output on the inputs times those powers, band by band with a
+transient of its own, each band weighted by the noise that the local polynomials find in it. The latter is done here.
 
-What is left of the force is no stationary noise. Without measurement noise it is what was sampled too coarsely,
-and comes in bursts where the motion is large; with noise on the motion, it is that noise times u^2. Lines are
-then not independent, and inverse variances say too little by up to ten times. The influence of each line on a
-coefficient is therefore carried back to time, where sums of influence times residual over stretches that are
-longer than the system's memory are independent; their scatter gives the covariance (a sandwich estimate with
-clusters, by jackknife: Bell and McCaffrey, Survey Methodology 28, 2002).
+The residual force is no stationary noise. Without measurement noise it comes from too coarse a sampling, in bursts
+where the motion is large; with noise on the motion, it is that noise times u^2. Lines are then not independent, and
+inverse variances give errors that are too small by up to a factor of ten. The influence of each line on a coefficient
+is therefore transformed back to time, where sums of influence times residual over stretches that are longer than the
+system's memory are independent; their scatter gives the covariance (a sandwich estimate with clusters, by jackknife:
+Bell and McCaffrey, Survey Methodology 28, 2002).
 """
 
 from collections.abc import Sequence
@@ -18,7 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.fft import irfft
 
-from study.identify.frequency_domain.coefficients import Estimate
+from study.identify.frequency_domain.coefficients import Estimate, floored
 from study.identify.frequency_domain.inputs import Input
 from study.identify.frequency_domain.local_polynomial_method import (
     EXACT,
@@ -30,37 +29,23 @@ from study.identify.frequency_domain.local_polynomial_method import (
 from study.support.arrays import Complexes, Floats, Ints
 from study.support.errors import StudyError
 
-STRETCHES = 32  # of the record, that errors are judged by
+STRETCHES = 32  # parts of the record whose scatter gives the errors
 
 
-def fit(lines: Lines, inputs: Sequence[Input], band: tuple[float, float], how: LocalPolynomial) -> Estimate:
-    """Coefficients of all inputs together.
+def fit(lines: Lines, inputs: Sequence[Input], band: tuple[float, float], settings: LocalPolynomial) -> Estimate:
+    """Coefficients of all inputs that have power from the first to the second frequency of ``band`` (Hz).
 
-    Parameters
-    ----------
-    lines : Lines
-        Transforms of the inputs and the output.
-    inputs : sequence of Input
-        What each A_j is made of, in the order of ``lines.inputs``.
-    band : pair of float
-        Lines from the first to the second frequency (Hz) are used, each in one band.
-    how : LocalPolynomial
-        Smallest bands; they are widened until few lines are left over.
-
-    Returns
-    -------
-    Estimate
-        Coefficients of all inputs that have power in the band; the others are not known.
+    Local bands are widened until few lines are left over.
 
     Raises
     ------
     StudyError
-        If there are fewer lines than one band needs.
+        If there are fewer lines than one local band needs.
     """
-    how.check(len(inputs))
-    index = _bands(lines, band, how)
-    weight = 1.0 / np.sqrt(_floored(noise_variance(lines, index, how)))[:, None]
-    basis = transients(index.shape[1], how.degree)
+    settings.check(len(inputs))
+    index = _bands(lines, band, settings)
+    weight = 1.0 / np.sqrt(floored(noise_variance(lines, index, settings)))[:, None]
+    basis = transients(index.shape[1], settings.degree)
     parts = [(j, part) for j, item in enumerate(inputs) for part in item.parts]
     omega = 2j * np.pi * lines.frequency[index]
     columns = [_clean(p.factor * omega**p.order * lines.inputs[j][index], basis) * weight for j, p in parts]
@@ -86,27 +71,21 @@ def _inverse(design: Complexes) -> Complexes:
     return inverse[:, :half] + 1j * inverse[:, half:]
 
 
-def _bands(lines: Lines, band: tuple[float, float], how: LocalPolynomial) -> Ints:
+def _bands(lines: Lines, band: tuple[float, float], settings: LocalPolynomial) -> Ints:
     """Lines of each band, shape (bands, lines of a band): side by side, equally wide."""
     inside = np.flatnonzero((lines.frequency >= band[0]) & (lines.frequency <= band[1]))
-    count = len(inside) // how.width
+    count = len(inside) // settings.width
     if count == 0:
         raise StudyError(
             f"the record of {lines.samples} samples has {len(inside)} lines from {band[0]:g} to {band[1]:g} Hz; "
-            f"local_polynomial needs {how.width}: a longer record, a wider band or a smaller half_width is right"
+            f"local_polynomial needs {settings.width}; expected a longer record, a wider band or a smaller half_width"
         )
     width = len(inside) // count
     return inside[: count * width].reshape(count, width)
 
 
-def _floored(variance: Floats) -> Floats:
-    """Variances that can be divided by; a model that explains all to the last digit weighs all bands alike."""
-    largest = float(np.max(variance))
-    return np.maximum(variance, EXACT * largest) if largest > 0.0 else np.ones_like(variance)
-
-
 def _clean(values: Complexes, basis: Floats) -> Complexes:
-    """What is left of values (bands, lines) when the transients are taken out."""
+    """Values (bands, lines) less their transients."""
     return values - (values @ basis) @ basis.T
 
 

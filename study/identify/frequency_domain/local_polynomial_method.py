@@ -52,13 +52,7 @@ class LocalPolynomial:
         return 2 * self.half_width + 1
 
     def check(self, inputs: int) -> None:
-        """Refuse bands with too few lines for so many inputs.
-
-        Raises
-        ------
-        StudyError
-            Naming the half width that would do.
-        """
+        """Refuse bands with too few lines for so many inputs, naming the half width that would do."""
         unknowns = (inputs + 1) * (self.degree + 1)
         if self.width < unknowns + SPARE:
             raise StudyError(
@@ -93,15 +87,7 @@ class Lines:
 
 
 def transform(channels: Sequence[Floats], dt: float) -> Lines:
-    """Transform inputs and, last, the output.
-
-    Parameters
-    ----------
-    channels : sequence of arrays, each of shape (n,)
-        Inputs first, output last.
-    dt : float
-        Sampling interval in seconds.
-    """
+    """Transform inputs and, last, the output."""
     samples = len(channels[-1])
     lines = (samples - 1) // 2
     spectra = np.stack([np.asarray(rfft(c), dtype=np.complex128) for c in channels])
@@ -112,7 +98,7 @@ def transform(channels: Sequence[Floats], dt: float) -> Lines:
     return Lines(frequency, inputs, spectra[-1, 1 : lines + 1], 2.0 * dt / samples, samples)
 
 
-def responses(lines: Lines, how: LocalPolynomial) -> Responses:
+def responses(lines: Lines, settings: LocalPolynomial) -> Responses:
     """A_j(f) with their covariance and the noise, in the middle of bands that overlap.
 
     Bands stand half of their half width apart. Estimates of neighbouring ones share lines and so are
@@ -123,42 +109,27 @@ def responses(lines: Lines, how: LocalPolynomial) -> Responses:
     StudyError
         If the record has fewer lines than a band, or a band too few for so many inputs.
     """
-    how.check(len(lines.inputs))
-    if len(lines.frequency) < how.width:
+    settings.check(len(lines.inputs))
+    if len(lines.frequency) < settings.width:
         raise StudyError(
-            f"the record of {lines.samples} samples has {len(lines.frequency)} lines, fewer than the {how.width} of a "
-            "band of local_polynomial; a longer record or a smaller half_width is right"
+            f"the record of {lines.samples} samples has {len(lines.frequency)} lines, fewer than the {settings.width} "
+            "of a band of local_polynomial; expected a longer record or a smaller half_width"
         )
-    first = np.arange(0, len(lines.frequency) - how.width + 1, max(how.half_width // 2, 1))
-    found = [
-        _middles(lines, first[i : i + CHUNK, None] + np.arange(how.width), how) for i in range(0, len(first), CHUNK)
-    ]
-    values, covariance, variance = (np.concatenate([f[i] for f in found]) for i in range(3))
+    first = np.arange(0, len(lines.frequency) - settings.width + 1, max(settings.half_width // 2, 1))
+    index = first[:, None] + np.arange(settings.width)
+    chunks = [_middles(lines, index[i : i + CHUNK], settings) for i in range(0, len(index), CHUNK)]
+    values, covariance, variance = (np.concatenate([chunk[i] for chunk in chunks]) for i in range(3))
     return Responses(
-        frequency=lines.frequency[first + how.half_width],
+        frequency=lines.frequency[first + settings.half_width],
         response=values.T.astype(np.complex128),
         covariance=covariance.astype(np.complex128),
         noise=variance.real * lines.density,
     )
 
 
-def noise_variance(lines: Lines, index: Ints, how: LocalPolynomial) -> Floats:
-    """Mean square per line of what no A_j and no transient explains.
-
-    Parameters
-    ----------
-    lines : Lines
-        The record.
-    index : array of int, shape (bands, lines of a band)
-        Which lines make up each band.
-    how : LocalPolynomial
-        Degree of the polynomials.
-
-    Returns
-    -------
-    array, shape (bands,)
-    """
-    parts = [_middles(lines, index[i : i + CHUNK], how)[2] for i in range(0, len(index), CHUNK)]
+def noise_variance(lines: Lines, index: Ints, settings: LocalPolynomial) -> Floats:
+    """Mean square per line of what no A_j and no transient explains, for each row of line numbers in ``index``."""
+    parts = [_middles(lines, index[i : i + CHUNK], settings)[2] for i in range(0, len(index), CHUNK)]
     return np.concatenate(parts)
 
 
@@ -171,20 +142,18 @@ def _powers(width: int, degree: int) -> Floats:
     return np.linspace(-1.0, 1.0, width)[:, None] ** np.arange(degree + 1)
 
 
-def _middles(
-    lines: Lines, index: Ints, how: LocalPolynomial
-) -> tuple[Complexes, Complexes, Floats]:  # fmt: skip
+def _middles(lines: Lines, index: Ints, settings: LocalPolynomial) -> tuple[Complexes, Complexes, Floats]:
     """A_j in the middle of each band (bands, q), its covariance (bands, q, q), variance of the noise (bands,).
 
     The unknowns of a band are the coefficients of ``x^r`` in every A_j and in T, with x from -1 to 1; in
     the middle, A_j is that of ``x^0``. Inputs are scaled to unit mean square.
     """
-    terms, count = how.degree + 1, len(lines.inputs)
+    terms, count = settings.degree + 1, len(lines.inputs)
     x = lines.inputs[:, index]
     size = np.sqrt(np.mean(np.abs(x) ** 2, axis=2))
     scale = np.where(size > 0.0, size, 1.0)
     unit = np.concatenate([x / scale[:, :, None], np.ones((1, *index.shape), dtype=np.complex128)])
-    powers = _powers(index.shape[1], how.degree)
+    powers = _powers(index.shape[1], settings.degree)
     design = (unit.transpose(1, 2, 0)[:, :, :, None] * powers[:, None, :]).reshape(*index.shape, -1)
     left, singular, right = np.linalg.svd(design, full_matrices=False)
     kept = singular > EXACT * singular[:, :1]

@@ -4,16 +4,16 @@ Periods of one steady motion differ by noise alone, and that noise is independen
 Three things follow for the reverse system ``Y = sum_j A_j X_j``, none of which asks for the noise to be known:
 
 - A period closes on itself: its lines have no leakage, and derivatives are products with ``j 2 pi f``.
-- Products of two different periods have the mean of the products without noise (what makes least squares of
-  noisy inputs too low are the products of a period's noise with itself). So half of the periods, averaged,
-  tell the equations, the other half are their instruments; then they change places.
-- A shape of an average of n periods, ``g(u + noise)``, is wrong by ``b / n`` on average: a cube brings
-  ``3 sigma^2 u / n``. The same shape of averages that leave out one period each is wrong by ``b / (n - 1)``, and
-  ``n g_n - (n - 1) g_(n-1)`` is right to the next order; for powers up to the third it is right (Quenouille,
+- Products of two different periods have the mean of the products without noise (least squares of noisy inputs is
+  biased by the products of a period's noise with itself). So one half of the periods, averaged, gives the equations
+  and the other half their instruments; then they change places.
+- A shape of an average of n periods, ``g(u + noise)``, has a bias of ``b / n``: a cube brings ``3 sigma^2 u / n``.
+  The same shape of averages that leave out one period each has the bias ``b / (n - 1)``, and that of
+  ``n g_n - (n - 1) g_(n-1)`` is of the next order; for powers up to the third it is zero (Quenouille,
   Biometrika 43, 1956).
 
-Lines are weighted by the scatter between periods of what the equation leaves, which holds the noise of force and
-response, and their correlation; standard errors come from the same scatter.
+Lines are weighted by the scatter between periods of the equation's residual, which contains the noise of force and
+response with their correlation; standard errors come from the same scatter.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ import numpy as np
 from scipy.fft import rfft
 
 from study.equations import formulas
-from study.identify.frequency_domain.coefficients import Estimate
+from study.identify.frequency_domain.coefficients import Estimate, floored
 from study.identify.frequency_domain.inputs import Input, histories
 from study.records.record import Record
 from study.support.arrays import Complexes, Floats, Ints
@@ -31,11 +31,9 @@ from study.support.errors import StudyError
 
 Chosen = tuple[int, ...]
 MOST = 12  # periods that are told apart; of more, neighbours are averaged first
-NEIGHBOURS = 10  # lines on either side that a variance is averaged over, without its own: a weight must not
-# know the noise that it weighs
+NEIGHBOURS = 10  # lines on either side that a variance is averaged over: its own line would correlate with the weight
 PASSES = 4  # of weights and coefficients
 DIFFERENT = 0.5  # share of a force's power that may differ between periods
-EXACT = 1e-12  # variances below this share of the largest are rounding
 
 
 def steady(record: Record, settle: int) -> Record:
@@ -71,22 +69,9 @@ def steady(record: Record, settle: int) -> Record:
 
 
 def fit(record: Record, inputs: Sequence[Input], band: tuple[float, float]) -> Estimate:
-    """Coefficients of all inputs together.
+    """Coefficients of all inputs that have power in the band (Hz), from the periods that :func:`steady` gives.
 
-    Parameters
-    ----------
-    record : Record
-        Whole periods of a steady motion, as :func:`steady` gives them.
-    inputs : sequence of Input
-        Of the reverse system.
-    band : pair of float
-        Lines of a period from the first to the second frequency (Hz) are used.
-
-    Returns
-    -------
-    Estimate
-        Coefficients of all inputs that have power in the band; the others are not known. The covariance
-        rests on as many degrees of freedom as there are periods, less one.
+    The covariance has as many degrees of freedom as there are periods, less one.
 
     Raises
     ------
@@ -135,13 +120,7 @@ class Periods:
 
     @staticmethod
     def of(record: Record, inputs: Sequence[Input], band: tuple[float, float]) -> "Periods":
-        """Cut and transform the whole periods of a record.
-
-        Raises
-        ------
-        StudyError
-            If a period has too few lines in the band.
-        """
+        """Cut and transform the whole periods of a record."""
         channels = _grouped(record)
         samples = channels["force"].shape[1]
         frequency: Floats = np.arange(samples // 2 + 1, dtype=np.float64) / (samples * record.dt)
@@ -224,9 +203,9 @@ def _weighted(
     """Coefficients by instruments, and the sum of squares of what each period would shift them by."""
     tested = [(e.instruments * weight[:, None]).conj().T for e in equations]
     normal = np.mean([(z @ e.columns).real for z, e in zip(tested, equations, strict=True)], axis=0)
-    right = np.mean([(z @ e.output).real for z, e in zip(tested, equations, strict=True)], axis=0)
+    right: Floats = np.mean([(z @ e.output).real for z, e in zip(tested, equations, strict=True)], axis=0)
     inverse: Floats = np.asarray(np.linalg.pinv(normal), dtype=np.float64)
-    values: Floats = inverse @ np.asarray(right, dtype=np.float64)
+    values: Floats = inverse @ right
     left = force - own @ values
     left = left - np.mean(left, axis=0)
     shifts: Floats = inverse @ ((instruments * weight[:, None]).conj().T @ left.T).real
@@ -234,9 +213,9 @@ def _weighted(
 
 
 def _weights(scatter: Floats) -> Floats:
-    """Inverse of the mean of each line's neighbours, to a common factor."""
+    """Inverse of the mean over each line's neighbours, to a common factor."""
     kernel = np.ones(2 * NEIGHBOURS + 1)
     kernel[NEIGHBOURS] = 0.0
     variance = np.convolve(scatter, kernel, "same") / np.convolve(np.ones_like(scatter), kernel, "same")
-    largest = float(np.max(variance))
-    return largest / np.maximum(variance, EXACT * largest) if largest > 0.0 else np.ones_like(variance)
+    divisor = floored(variance)
+    return np.max(divisor) / divisor

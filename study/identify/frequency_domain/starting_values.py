@@ -1,8 +1,8 @@
 """Starting values for a free run: the best linear approximation, and the reverse system's coefficients.
 
-The best linear approximation ``H(f) = G_Fy / G_FF`` is not biased by noise on the response, and knows nothing of what
-is not linear. The reverse system (the report's estimate) gives every coefficient at once and is biased by noise; but
-it has no local minima, in which a fit ends that begins from a linear model where the system is far from linear.
+The best linear approximation ``H(f) = G_Fy / G_FF`` is not biased by noise on the response, but covers linear terms
+alone. The reverse system (the report's estimate) gives every coefficient at once and is biased by noise; but it has
+no local minima, in which a fit from a linear model ends where the system is far from linear.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 
 LINEAR_ORDERS = {"k": 0, "c": 1, "m": 2}
-FAINT = 1e-3  # share of the strongest line's force below which leakage tells nothing
+FAINT = 1e-3  # share of the strongest line's force below which a line is leakage
 SHORT = 512  # samples below which missing coherence may be the record's own shortness
 CHANCE = 0.01  # the linear start uses lines whose coherence noise alone would reach this rarely
 LONGEST, SHORTEST, PARTS = 1024, 64, 12  # samples in a segment, and how many of them at least
@@ -43,25 +43,23 @@ def linear_start(model: Model, prepared: Prepared) -> dict[str, float]:
     coherence = np.clip(coherence, 0.0, 1.0 - 1e-6)
     by_chance = 1.0 - CHANCE ** (1.0 / max(matrix.averages - 1.0, 1.0))
     keep = (coherence > by_chance) & (g[:, 0, 0].real > FAINT * np.max(g[:, 0, 0].real))
-    if np.count_nonzero(keep) < 4 and len(part) < SHORT:
-        raise StudyError(
-            f"the part to fit of {record.name!r} has {len(part)} samples, too few to see what force and {response} "
-            f"have in common; fit a longer part, {SHORT} samples or more"
-        )
     if np.count_nonzero(keep) < 4:
+        if len(part) < SHORT:
+            raise StudyError(
+                f"the part to fit of {record.name!r} has {len(part)} samples, too few to see what force and {response} "
+                f"have in common; fit a longer part, {SHORT} samples or more"
+            )
         raise StudyError(f"force and {response} of {record.name!r} have nothing in common at any frequency")
     omega = 2j * np.pi * f[keep]
     receptance = g[keep, 0, 1] / g[keep, 0, 0] / omega ** MOTIONS.index(response)
     weight = np.abs(receptance) * np.sqrt(coherence[keep] / (1.0 - coherence[keep]))
-    values = model.values
-    wanted = [key for key in LINEAR_ORDERS if key in values]
+    wanted = [key for key in LINEAR_ORDERS if key in model.values]
     design = np.stack([omega ** LINEAR_ORDERS[key] for key in wanted], axis=1) * weight[:, None]
     target = weight / receptance
     solution = least_squares(np.concatenate([design.real, design.imag]), np.concatenate([target.real, target.imag]))
-    start = dict.fromkeys(values, 0.0) | dict(zip(wanted, solution.tolist(), strict=True))
+    start = dict.fromkeys(model.values, 0.0) | dict(zip(wanted, solution.tolist(), strict=True))
     if start["m"] <= 0.0:
-        inertial = omega**2 * weight
-        start["m"] = float(np.linalg.norm(target)) / float(np.linalg.norm(inertial))
+        start["m"] = float(np.linalg.norm(target)) / float(np.linalg.norm(omega**2 * weight))
     return start
 
 
@@ -72,14 +70,7 @@ def oscillator(prepared: Prepared) -> dict[str, float]:
 
 
 def reverse_start(model: Model, prepared: Prepared) -> dict[str, float]:
-    """Coefficients by reverse MI/SO on the fitting part.
-
-    Parameters
-    ----------
-    model : Model
-        Which terms act; shape parameters are given, coefficients are ignored.
-    prepared : Prepared
-        The record and the part of it to fit.
+    """Coefficients by reverse MI/SO on the fitting part; those of the model are ignored, its shape parameters used.
 
     Raises
     ------

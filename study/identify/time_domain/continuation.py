@@ -1,4 +1,4 @@
-"""Continuation in segment length: segments are merged with their neighbours while the record lets them be one motion."""
+"""Continuation in segment length: neighbours are merged while the record lets them be one motion."""
 
 from collections.abc import Collection
 from dataclasses import replace

@@ -1,8 +1,8 @@
-"""Starting values for a candidate: where in its shape parameters does it explain most?
+"""Starting values for a candidate: at which shape parameters does it explain most?
 
-The residual of the model in free run is held against the response that a small amount of the candidate
-would add (the sensitivity at a zero coefficient, exact), after all that the model's own coefficients
-could do has been taken out. One free run a point; the best few points start a fit of everything.
+The residual of the model in free run is compared with the response that a small amount of the candidate
+would add (the exact sensitivity at a zero coefficient), less all that the model's own coefficients
+could do. Each point takes one free run; the best few points start a fit of everything.
 """
 
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ from study.support.least_squares import least_squares
 
 PEAKS = 6  # lines of a spectrum that are tried as the frequency of a periodic effect
 STARTS = 4  # points of the search that start a fit
-SPREAD = 5  # ... or so many, from one end of the range to the other, where the search is blunt
+SPREAD = 5  # points that start a fit where the search is blunt, from one end of the range to the other
 
 
 @dataclass(frozen=True)
@@ -85,11 +85,8 @@ def baseline(fit: FreeRunFit, prepared: Prepared) -> Baseline:
 
 def starts(term: Term, base: Baseline, prepared: Prepared) -> list[Start]:
     """The best points of the search over a candidate's shape parameters, best first."""
-    tried: list[Start] = []
-    for parameters in grid(term, base):
-        point = _try(term, parameters, base, prepared)
-        if point is not None:
-            tried.append(point)
+    points = (_try(term, parameters, base, prepared) for parameters in grid(term, base))
+    tried = [point for point in points if point is not None]
     best = sorted(tried, key=lambda s: -s.share)
     if not any(p.search.blunt for p in term.parameters):
         return best[:STARTS]
@@ -146,7 +143,7 @@ def _places(parameter: Parameter, point: tuple[float, ...], base: Baseline) -> l
         case "quantiles of u":
             tried = np.quantile(u, places)
         case "times of the motion":
-            tried = places / _rate(base)
+            tried = places / float(np.std(np.gradient(u, base.dt)) / np.std(u))
         case "per amplitude":
             tried = places * (1.0 / float(np.std(u)))
         case "shares of the one before":
@@ -156,12 +153,6 @@ def _places(parameter: Parameter, point: tuple[float, ...], base: Baseline) -> l
         case "lines of the residual":
             tried = _around(residual_lines(base), places, base)
     return [float(x) for x in tried]
-
-
-def _rate(base: Baseline) -> float:
-    """Typical angular frequency of the motion in rad/s: rms velocity over rms displacement."""
-    u = base.displacement
-    return float(np.std(np.gradient(u, base.dt)) / np.std(u))
 
 
 def _windowed(values: Floats) -> Complexes:
