@@ -1,4 +1,4 @@
-"""Units of coefficients, worked out from the formula they stand before."""
+"""Units of coefficients, derived from the formulas that they multiply."""
 
 import ast
 import re
@@ -8,7 +8,7 @@ from study.equations import formulas
 
 Dimensions = tuple[Fraction, Fraction]  # powers of length and of time
 NONE: Dimensions = (Fraction(0), Fraction(0))
-MASS: Dimensions = (Fraction(1), Fraction(-2))  # of an acceleration: what a mass stands before
+MASS: Dimensions = (Fraction(1), Fraction(-2))  # of an acceleration, the shape whose coefficient is a mass
 VARIABLES: dict[str, Dimensions] = {
     "u": (Fraction(1), Fraction(0)),
     "v": (Fraction(1), Fraction(-1)),
@@ -64,8 +64,8 @@ def _combine(op: ast.operator, a: Dimensions | None, b: Dimensions | None) -> Di
 
 def _function(name: str, arguments: list[Dimensions | None]) -> Dimensions | None:
     if name in ("abs", "max", "min"):
-        found = set(arguments) - {NONE}  # a bare number, as in max(u, 0), takes the other's unit
-        return NONE if not found else found.pop() if len(found) == 1 else None
+        units = set(arguments) - {NONE}  # a bare number, as in max(u, 0), takes the other's unit
+        return NONE if not units else units.pop() if len(units) == 1 else None
     if name == "sqrt":
         a = arguments[0]
         return None if a is None else (a[0] / 2, a[1] / 2)
@@ -75,12 +75,7 @@ def _function(name: str, arguments: list[Dimensions | None]) -> Dimensions | Non
 def compose(force: str, length: str, powers: Dimensions | None) -> str:
     """The unit of a coefficient: force over the unit of its shape, as in ``N s^2/m^2``.
 
-    Parameters
-    ----------
-    force, length : str
-        The record's units of force and displacement.
-    powers : pair of Fraction or None
-        Powers of length and time of the shape; None for a formula whose parts differ.
+    ``powers`` are those of length and time of the shape; None for a formula whose parts differ.
     """
     if powers is None:
         return f"{force} per unit of the formula"

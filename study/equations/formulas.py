@@ -1,7 +1,7 @@
 """A user's formula, such as ``u*abs(u) + 0.1*v**3``, turned into nodes of a graph.
 
-The text is split by Python's own parser and each piece is held against a whitelist: numbers, known
-names, ``+ - * / **`` and the functions below. Nothing is ever evaluated or executed.
+The text is parsed by Python's own parser and each part compared with a whitelist: numbers, known names,
+``+ - * / **`` and the functions below. Nothing is ever evaluated or executed.
 """
 
 import ast
@@ -28,7 +28,7 @@ FUNCTIONS = {
     "max": (Op.MAX, 2),
     "min": (Op.MIN, 2),
 }
-VARIABLES = ("u", "v", "t")  # what these name in a formula is never a column of a record, nor is pi
+VARIABLES = ("u", "v", "t")  # in a formula these, and pi, are never columns of a record
 
 
 class ExpressionError(StudyError):
@@ -68,31 +68,17 @@ def names(text: str) -> list[str]:
     """The names a formula uses, functions and pi aside, in alphabetical order."""
     tree = parse(text)
     functions = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
-    found = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in functions}
-    return sorted(found - {"pi"})
+    used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in functions}
+    return sorted(used - {"pi"})
 
 
 def build(graph: Graph, text: str, known: Mapping[str, int]) -> int:
-    """Add a formula to a graph.
-
-    Parameters
-    ----------
-    graph : Graph
-        Where its nodes go.
-    text : str
-        The formula.
-    known : mapping
-        The node of each name it may use.
-
-    Returns
-    -------
-    int
-        The node of its value.
+    """Add a formula to a graph; ``known`` has the node of each name it may use. Returns the node of its value.
 
     Raises
     ------
     ExpressionError
-        At the first piece that is not on the whitelist, naming it.
+        At the first part that is not on the whitelist, naming it.
     """
     return _Builder(graph, text, known).node(parse(text))
 
@@ -105,13 +91,13 @@ class _Builder:
         return ExpressionError(f"the expression {self.text!r} {why}")
 
     def node(self, tree: ast.expr) -> int:
-        made = self.piece(tree)
-        value = self.graph.constant_value(made)
+        node = self.translated(tree)
+        value = self.graph.constant_value(node)
         if value is not None and not math.isfinite(value):
             raise self.refuse(f"holds {ast.unparse(tree)!r}, which is too large a number")
-        return made
+        return node
 
-    def piece(self, tree: ast.expr) -> int:
+    def translated(self, tree: ast.expr) -> int:
         match tree:
             case ast.Constant(value=value):
                 return self.number(value)

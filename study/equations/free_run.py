@@ -21,9 +21,9 @@ from study.records.record import MOTIONS, Record
 from study.support.arrays import Floats, Ints
 from study.support.errors import DivergenceError, StudyError
 
-SHARED = 4096  # steps from which on two threads share the segments; with fewer, starting one takes what it saves
-REMEMBERED = 4  # channels of which the values between the samples are kept
-SIDE = "side of v"  # the input that stands for sgn v while a step lasts
+SHARED = 4096  # steps from which on two threads share the segments; with fewer, a thread costs more than it saves
+REMEMBERED = 4  # channels whose values between the samples are cached
+SIDE = "side of v"  # the input that stands for sgn v during a step
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class FreeRun:
     Attributes
     ----------
     program : Program
-        Slopes of the states, then their partial derivatives; values that are held are in its registers.
+        Slopes of the states, then their partial derivatives; held values are in its registers.
     slots : int array, shape (states - 1, 1 + states + keys)
         Registers of each slope (but velocity), of its partial derivatives by the states and by the keys.
     side : int
@@ -91,8 +91,6 @@ class FreeRun:
         ------
         DivergenceError
             If the response leaves the range of finite numbers.
-        StudyError
-            If there is not one initial state a segment.
         """
         response, own, _ = self.respond_by_segment(values, initial, free_states)
         if not self.cuts:
@@ -122,33 +120,23 @@ class FreeRun:
         program = with_registers(self.program, {key: values[key] for key in self.keys})
         first_free = 1 + len(self.keys)
         out = np.empty((self.samples, first_free + free_states))
-        state = np.zeros(
-            (len(states), len(self.slots) + 1, out.shape[1])
-        )  # of all segments: one each would take longer
+        state = np.zeros((len(states), len(self.slots) + 1, out.shape[1]))  # one array a segment would take longer
         state[:, : states.shape[1], 0] = states
         state[:, range(free_states), range(first_free, out.shape[1])] = 1.0
         if len(states) == 1 or self.samples * self.steps < SHARED:
-            self._segments(program, bounds, state, out)
+            self._integrate(program, bounds, state, out)
         else:
             half = 1 + int(np.argmin(np.abs(np.array(bounds[1:-1]) - self.samples / 2)))  # segments differ in length
             with ThreadPoolExecutor(1) as beside:
-                other = beside.submit(self._segments, program, bounds[half:], state[half:], out)
-                self._segments(program, bounds[: half + 1], state[:half], out)
+                other = beside.submit(self._integrate, program, bounds[half:], state[half:], out)
+                self._integrate(program, bounds[: half + 1], state[:half], out)
                 other.result()
         return out[:, 0], out[:, 1:], state[:-1]
 
     def passing(self, initial: Mapping[int, Floats]) -> Floats:
-        """State at the first sample of each segment, shape (cuts + 1, states), of a motion in fewer segments.
+        """State at the first sample of each segment, shape (cuts + 1, states), of a motion with fewer restarts.
 
-        Parameters
-        ----------
-        initial : mapping of arrays, shape (states,)
-            State of the first segment, by the number 0, and of those that begin anew, by theirs.
-
-        Raises
-        ------
-        DivergenceError
-            If the motion leaves the range of finite numbers.
+        ``initial`` gives the state of those segments that begin anew, by their numbers; the first, 0, is one of them.
         """
         bounds = (0, *self.cuts, self.samples)
         states, state = np.empty((len(bounds) - 1, len(self.slots) + 1)), np.empty((1, len(self.slots) + 1, 1))
@@ -157,11 +145,11 @@ class FreeRun:
             if i in initial:
                 state[0, :, 0] = initial[i]
             states[i] = state[0, :, 0]
-            self._segments(self.program, segment, state, room)
+            self._integrate(self.program, segment, state, room)
         return states
 
-    def _segments(self, program: Program, bounds: Sequence[int], states: Floats, out: Floats) -> None:
-        """Response beside its derivatives, into ``out``; leaves each segment's state as it is where the next begins."""
+    def _integrate(self, program: Program, bounds: Sequence[int], states: Floats, out: Floats) -> None:
+        """Response and derivatives into ``out``; ``states`` become those at which the next segments begin."""
         failed = kernels.integrate_segments(
             program.code, program.first, program.registers.copy(), self.slots, self.side, self.start, self.dt,
             self.steps, self.drive, np.array(bounds), states, self.row, out,
@@ -203,7 +191,7 @@ def prepare(
     Raises
     ------
     StudyError
-        If a value, a channel, the span or a restart is not what it has to be.
+        If a value, a channel, the span or a restart is invalid.
     """
     first, last = _checked_span(record, span)
     bounds = (first, *restarts, last)
@@ -245,11 +233,9 @@ def _checked_span(record: Record, span: tuple[int, int] | None) -> tuple[int, in
 def _differentiated(model: Model, channels: tuple[str, ...], keys: tuple[str, ...]) -> tuple[Program, Ints, int]:
     """Program of slopes and partial derivatives, their registers, and that of sgn v."""
     held = {key: value for key, value in model.values.items() if key not in keys}
-    missing = [key for key, value in held.items() if value is None]
-    if missing:
+    if missing := [key for key, value in held.items() if value is None]:
         raise StudyError(f"model {model.name!r} gives no value for {', '.join(missing)}; a free run needs all")
-    unknown = [key for key in keys if key not in model.values]
-    if unknown:
+    if unknown := [key for key in keys if key not in model.values]:
         raise StudyError(f"model {model.name!r} has no {', '.join(unknown)}; it has {', '.join(model.values)}")
     forward = forward_graph(model, channels)
     graph = forward.graph
@@ -284,23 +270,9 @@ def predict(
     span: tuple[int, int] | None = None,
     initial: Sequence[float] = (0.0, 0.0),
 ) -> Floats:
-    """Free run of a complete model under a record's force, shape (samples of the span,).
+    """Response of a complete model in free run, shape (samples of the span,); arguments as for :func:`prepare`.
 
-    Parameters
-    ----------
-    model : Model
-        Every value known.
-    record, response, steps_per_sample, span
-        As :func:`prepare`.
-    initial : sequence of float
-        Displacement, velocity and, if given, the terms' own states at the first sample of the span.
-
-    Raises
-    ------
-    DivergenceError
-        If the response leaves the range of finite numbers.
-    StudyError
-        If the model is not complete, or a channel or the span is not what it has to be.
+    ``initial`` has displacement, velocity and, if given, the terms' own states at the first sample of the span.
     """
     model.numbers()
     run = prepare(model, record, response=response, steps_per_sample=steps_per_sample, span=span)

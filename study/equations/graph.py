@@ -1,8 +1,8 @@
 """Expressions as a graph without repetition, their exact derivatives, and their programs for the kernels.
 
 Every force in a model is a node here. Equal subexpressions share one node (``u*u`` in ``u**3`` and in
-its derivative is computed once), derivatives are exact, and :meth:`Graph.program` writes the nodes
-down as the instructions that ``kernels.py`` runs at compiled speed. No text is ever evaluated.
+its derivative is computed once), derivatives are exact, and :meth:`Graph.program` turns the nodes into
+the instructions that ``kernels.py`` runs at compiled speed. No text is ever evaluated.
 """
 
 from collections.abc import Sequence
@@ -136,9 +136,8 @@ class Graph:
 
     def div(self, a: int, b: int) -> int:
         """a / b."""
-        if self.constant_value(a) == 0.0:
-            return a
-        return a if self.constant_value(b) == 1.0 else self._node(Op.DIV, a, b)
+        trivial = self.constant_value(a) == 0.0 or self.constant_value(b) == 1.0
+        return a if trivial else self._node(Op.DIV, a, b)
 
     def unary(self, op: Op, a: int) -> int:
         """A function of one argument."""
@@ -164,10 +163,7 @@ class Graph:
         return self.mul(square, a) if n % 2 else square
 
     def derivative(self, node: int, wrt: int) -> int:
-        """The exact partial derivative of one node with respect to another (an input).
-
-        The derivative of ``sgn`` is taken as zero: it is so everywhere but on the switching line.
-        """
+        """The exact partial derivative of a node by an input; that of ``sgn`` is zero but at the jump."""
         if node == wrt:
             return self.const(1.0)
         key = (node, wrt)
@@ -233,9 +229,7 @@ class Graph:
 
     def program(self, outputs: Sequence[int]) -> Program:
         """Instructions that compute ``outputs`` and nothing else, inputs first, then constants."""
-        needed = self._needed(outputs)
-        count = len(self.names)
-        inputs = {name: index for index, name in enumerate(self.names)}
+        needed, count = self._needed(outputs), len(self.names)
         constants = [n for n in needed if self.nodes[n][0] is Op.CONST]
         first = count + len(constants)
         register = {n: count + i for i, n in enumerate(constants)}
@@ -250,23 +244,19 @@ class Graph:
         registers = np.zeros(first + len(code))
         registers[count:first] = [self.values[self.nodes[n][1]] for n in constants]
         return Program(
-            code=np.array(code, dtype=np.int64).reshape(-1, 3),
-            registers=registers,
-            first=first,
-            inputs=inputs,
+            np.array(code, dtype=np.int64).reshape(-1, 3), registers, first,
+            inputs={name: index for index, name in enumerate(self.names)},
             outputs=np.array([register[n] for n in outputs], dtype=np.int64),
-        )
+        )  # fmt: skip
 
     def _needed(self, outputs: Sequence[int]) -> list[int]:
-        """Every node that the outputs rest on, in an order in which each comes after what it needs."""
+        """Every node that the outputs depend on, in an order in which each comes after its operands."""
         wanted: set[int] = set()
         todo = list(outputs)
         while todo:
             n = todo.pop()
-            if n in wanted:
-                continue
-            wanted.add(n)
             op, a, b = self.nodes[n]
-            if op not in (Op.INPUT, Op.CONST):
+            if n not in wanted and op not in (Op.INPUT, Op.CONST):
                 todo += [a, b]
+            wanted.add(n)
         return sorted(wanted)  # a node is only ever made after its operands

@@ -1,11 +1,9 @@
 """The compiled loops: running a program, and integrating an equation of motion with it.
 
-All kernels stand in this one file, because Numba's disk cache notices a change of the file that holds
+All kernels are in this one file, because Numba's disk cache notices a change of the file that holds
 a function but not of one it calls. A state is ``(u, v, z...)``; the program computes its derivatives
-``(v, a, dz...)`` from the registers ``u, v, t, force, z..., channels...``, which stand first.
-
-Layout of the registers (see ``model.forward_program``): 0 u, 1 v, 2 t, 3 force,
-then the extra channels, then the states z, then coefficients and shape parameters.
+``(v, a, dz...)`` from registers (see ``model.forward_program``): 0 u, 1 v, 2 t, 3 force, then the extra
+channels, the states z, coefficients and shape parameters.
 """
 
 import math
@@ -80,8 +78,8 @@ def _slope(
 ) -> None:  # fmt: skip
     """Derivative of the state ``w[at]`` into ``w[to]``: outputs[0] is the acceleration, the rest those of z.
 
-    Rows are passed by number, not as views: making a view costs as much as three instructions. All of
-    them stand in one array, because every array passed to a function costs as much as an instruction.
+    Rows are passed by number, not as views: making a view costs as much as three instructions. All are in one
+    array, because every array passed to a function costs as much as an instruction.
     """
     channels = drive.shape[1]
     r[0] = w[at, 0]
@@ -101,7 +99,7 @@ def _slope(
 def _rk4_step(
     code: Ints, first: int, r: Floats, outputs: Ints, time: float, h: float, drive: Floats, j: int, w: Floats
 ) -> None:  # fmt: skip
-    """One classical Runge-Kutta step of ``w[0]`` in place; drive[j], drive[j+1], drive[j+2] stand half a step apart.
+    """One classical Runge-Kutta step of ``w[0]`` in place; drive[j], drive[j+1], drive[j+2] are half a step apart.
 
     ``w[1]`` to ``w[3]`` are room for trial, slope and their sum.
     """
@@ -422,8 +420,8 @@ def integrate_segments(
 ) -> int:  # fmt: skip
     """:func:`integrate_variation` of one segment after the other, between neighbouring ``bounds``, each from its state.
 
-    A segment runs on to the first sample of the next, which writes over it; the last one leaves that sample to
-    whoever runs the segments after it.
+    A segment runs on to the first sample of the next, which overwrites it; the last one does not write that sample,
+    which another thread may own.
     """
     for i in range(bounds.shape[0] - 1):
         begin, end = bounds[i], bounds[i + 1]

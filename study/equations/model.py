@@ -51,8 +51,7 @@ class ModelTerm:
 
     def with_values(self, values: Mapping[str, float | None]) -> "ModelTerm":
         """The same term with those of the given values that are its own."""
-        new = {key: values.get(key, old) for key, old in self.values.items()}
-        numbers = tuple(new.values())
+        numbers = tuple(values.get(key, old) for key, old in self.values.items())
         split = len(self.coefficients)
         return replace(self, coefficients=numbers[:split], parameters=numbers[split:])
 
@@ -82,7 +81,7 @@ class Model:
         names = [t.name for t in self.terms]
         for name in names:
             if names.count(name) > 1:
-                raise StudyError(f"model {self.name!r} lists the term {name!r} twice; once is right")
+                raise StudyError(f"model {self.name!r} lists the term {name!r} twice; expected once")
 
     def __contains__(self, name: str) -> bool:
         """Whether a term of this name is in the model."""
@@ -163,14 +162,9 @@ class ForwardGraph:
 
 
 def forward_graph(model: Model, channels: tuple[str, ...] = ()) -> ForwardGraph:
-    """The equation of motion of a model as nodes.
+    """The equation of motion of a model as nodes; coefficients and shape parameters are inputs of the graph.
 
-    Parameters
-    ----------
-    model : Model
-        Its values need not be known: coefficients and shape parameters are inputs of the graph.
-    channels : tuple of str
-        Extra measured channels for the user's own terms (:func:`named_channels`), in the order of the drive.
+    ``channels`` are those of the user's own terms (:func:`named_channels`), in the order of the drive.
 
     Raises
     ------
@@ -203,13 +197,7 @@ def forward_graph(model: Model, channels: tuple[str, ...] = ()) -> ForwardGraph:
 
 
 def named_channels(model: Model, available: Collection[str]) -> tuple[str, ...]:
-    """The channels that the formulas of a model name: a run reads no others, whatever else a record holds.
-
-    Raises
-    ------
-    ExpressionError
-        If one is not among those available, naming these.
-    """
+    """The channels that the formulas of a model name; refuses those that are not available."""
     for entry in model.terms:
         for name in entry.term.channels:
             if name not in available:
@@ -223,8 +211,8 @@ def named_channels(model: Model, available: Collection[str]) -> tuple[str, ...]:
 def unit_forces(model: Model) -> tuple[tuple[str, ...], Program]:
     """Force of each component with a unit coefficient, as a program, and the names of their terms.
 
-    Its registers begin with u, v, t and the model's channels. Left out are inertia, and terms with a shape parameter
-    or a state of their own.
+    Its registers begin with u, v, t and the model's channels. Inertia, and terms with a shape parameter or a state of
+    their own, are left out.
     """
     graph = Graph()
     inputs = {n: graph.input(n) for n in (*formulas.VARIABLES, *model.channels)}
@@ -247,17 +235,9 @@ def _unit_force(graph: Graph, component: Component, names: Mapping[str, int], ra
 
 
 def forward_program(model: Model, channels: tuple[str, ...] = ()) -> Program:
-    """The program of a model whose values are all known, with the values in their registers.
-
-    Raises
-    ------
-    StudyError
-        As :func:`forward_graph` and :meth:`Model.numbers`.
-    """
-    values = model.numbers()
-    forward = forward_graph(model, channels)
-    program = forward.graph.program(forward.slopes)
-    return with_registers(program, values)
+    """The program of a model whose values are all known, with the values in their registers."""
+    values, forward = model.numbers(), forward_graph(model, channels)
+    return with_registers(forward.graph.program(forward.slopes), values)
 
 
 def with_registers(program: Program, values: Mapping[str, float]) -> Program:

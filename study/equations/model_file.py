@@ -10,8 +10,8 @@ A file holds ``name`` and ``terms``; an entry of ``terms`` is a name, or a mappi
       - {term: periodic_stiffness, f_m: 1.0, amplitude: 177.7, phase: 0.0}
       - {term: bracket, force: "u*abs(u) + 0.1*v**3"}    # the user's own
 
-Files come from users, so nothing in them is trusted: size, depth and number of entries are bounded
-before anything is built, aliases and tags are refused, and formulas are parsed, never evaluated.
+Nothing in a file is trusted: size, depth and number of entries are bounded before anything is built, aliases and
+tags are refused, and formulas are parsed, never evaluated.
 """
 
 import json
@@ -22,7 +22,6 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from study.equations import formulas, terms
-from study.equations.graph import Graph
 from study.equations.model import Model, ModelTerm, free
 from study.equations.redundancy import repeated_force
 from study.equations.terms import Term
@@ -37,29 +36,18 @@ WANTED = "a YAML file with 'name' and 'terms', such as models/duffing.yaml"
 
 
 def read_model(path: Path) -> Model:
-    """Read a model file.
-
-    Parameters
-    ----------
-    path : Path
-        A YAML file; a coefficient or shape parameter that it leaves out is None, to be fitted.
+    """Read a model file; a coefficient or shape parameter that it leaves out is None, to be fitted.
 
     Raises
     ------
     StudyError
-        If the file cannot be read or is no model, naming the file, the value and what would be right.
+        If the file cannot be read or is no model, naming the file, the value and what was expected.
     """
     return parse_model(read_text(path, WANTED), path)
 
 
 def parse_model(text: str, source: Path) -> Model:
-    """The model in a YAML text; ``source`` stands in messages and lends its stem to a model without a name.
-
-    Raises
-    ------
-    StudyError
-        As :func:`read_model`.
-    """
+    """The model in a YAML text; ``source`` is named in messages, its stem names a model without a name."""
     try:
         return _model(yaml_text.read_plain(text), source.stem)
     except StudyError as error:
@@ -72,13 +60,7 @@ def format_model(model: Model) -> str:
 
 
 def format_entry(entry: ModelTerm) -> str:
-    """One entry of ``terms``, on one line.
-
-    Raises
-    ------
-    StudyError
-        If a value is not finite.
-    """
+    """One entry of ``terms``, on one line; refuses values that are not finite."""
     known = {key: value for key, value in entry.values.items() if value is not None}
     for key, value in known.items():
         if not math.isfinite(value):
@@ -97,19 +79,10 @@ def format_entry(entry: ModelTerm) -> str:
 
 
 def add_term(path: Path, entry: Term | ModelTerm) -> Model:
-    """Append a term to a model file; every byte that was there stays, comments, order and quoting included.
+    """Append a term to a model file, and return the model that the file now holds.
 
-    Parameters
-    ----------
-    path : Path
-        The model file. It is replaced in one step: on any failure the old one is untouched.
-    entry : Term or ModelTerm
-        What to add; a ModelTerm's known values are written as held.
-
-    Returns
-    -------
-    Model
-        The model the file now holds.
+    Every byte that was there stays, comments, order and quoting included; on any failure the file is untouched. A
+    ModelTerm's known values are written as held.
 
     Raises
     ------
@@ -131,16 +104,10 @@ def add_term(path: Path, entry: Term | ModelTerm) -> Model:
 
 
 def revised(text: str, source: str, model: Model) -> str:
-    """The text of a model file with what has become of its model; comments, order and quoting stay.
+    """The text of a model file, changed to hold this model; comments, order and quoting stay.
 
-    Parameters
-    ----------
-    text : str
-        The file as it was read.
-    source : str
-        Its name, for messages.
-    model : Model
-        The terms of the file in their order, values held or freed, and perhaps further terms.
+    The model has the terms of the file in their order, values held or freed, and perhaps further terms. ``source`` is
+    named in messages.
 
     Raises
     ------
@@ -154,29 +121,27 @@ def revised(text: str, source: str, model: Model) -> str:
         elif entry != before[number]:
             text = yaml_text.with_changed(text, "terms", number, format_entry(entry))
     if not _holds(text, Path(source), model):
-        raise StudyError(f"{source}: its layout leaves no clear place for a change; one entry a line is right")
+        raise StudyError(f"{source}: its layout leaves no clear place for a change; expected one entry a line")
     return text
 
 
 def _model(document: object, stem: str) -> Model:
-    if document is None:
-        raise StudyError("is empty; a mapping of 'name' and 'terms' is right")
     top = as_mapping(document)
     if top is None:
-        raise StudyError(f"holds {shown(document)}; a mapping of 'name' and 'terms' is right")
+        content = "is empty" if document is None else f"holds {shown(document)}"
+        raise StudyError(f"{content}; expected a mapping of 'name' and 'terms'")
     _refuse_unknown(top, ("name", "terms"), "the model")
     name = top.get("name", stem)
     if not isinstance(name, str) or not name.strip() or not name.isprintable() or len(name) > LONGEST_NAME:
-        raise StudyError(f"the name is {shown(name)}; a short text on one line is right")
+        raise StudyError(f"the name is {shown(name)}; expected a short text on one line")
     entries = as_list(top.get("terms"))
     if not entries:
-        what = shown(top["terms"]) if "terms" in top else "missing"
-        raise StudyError(f"'terms' is {what}; a list such as [inertia, linear_damping, linear_stiffness] is right")
+        content = shown(top["terms"]) if "terms" in top else "missing"
+        raise StudyError(f"'terms' is {content}; expected a list such as [inertia, linear_damping, linear_stiffness]")
     if len(entries) > MOST_TERMS:
         raise StudyError(f"'terms' has {len(entries)} entries; at most {MOST_TERMS} are read")
     model = Model(name, tuple(_entry(item, number) for number, item in enumerate(entries, 1)))
-    fault = repeated_force(model)
-    if fault is not None:
+    if fault := repeated_force(model):
         raise StudyError(fault)
     return model
 
@@ -188,7 +153,7 @@ def _entry(item: object, number: int) -> ModelTerm:
             return free(terms.get(item))
         mapping = as_mapping(item)
         if mapping is None:
-            raise StudyError(f"is {shown(item)}; a name or a mapping such as {{term: inertia, value: 1.0}} is right")
+            raise StudyError(f"is {shown(item)}; expected a name or a mapping such as {{term: inertia, value: 1.0}}")
         return _mapping(mapping)
     except StudyError as error:
         raise StudyError(f"entry {number} of 'terms': {error}") from None
@@ -202,15 +167,15 @@ def _refuse_long(name: str) -> None:
 def _mapping(item: Mapping[object, object]) -> ModelTerm:
     name = item.get("term")
     if not isinstance(name, str):
-        got = shown(name) if "term" in item else f"missing in {shown(item)}"
-        raise StudyError(f"'term' is {got}; a name such as 'term: inertia' is right")
+        content = shown(name) if "term" in item else f"missing in {shown(item)}"
+        raise StudyError(f"'term' is {content}; expected a name such as 'term: inertia'")
     _refuse_long(name)
     term = _own(name, item["force"]) if "force" in item else terms.get(name)
     _refuse_unknown(item, _keys(term), name)
     parameters = [_number(item, p.name, name) for p in term.parameters]
     for parameter, value in zip(term.parameters, parameters, strict=True):
         if value is not None and value <= 0.0 and not parameter.signed:
-            raise StudyError(f"{parameter.name} of {name} is {value:g}; a {parameter.meaning} above zero is right")
+            raise StudyError(f"{parameter.name} of {name} is {value:g}; expected a {parameter.meaning} above zero")
     return ModelTerm(term, _coefficients(term, item), tuple(parameters))
 
 
@@ -228,29 +193,23 @@ def _phasor(term: Term) -> bool:
 def _own(name: str, force: object) -> Term:
     """A user's own term; its formula may name u, v, t and measured channels."""
     if not isinstance(force, str):
-        raise StudyError(f"force of {name!r} is {shown(force)}; a formula in quotes is right")
+        raise StudyError(f"force of {name!r} is {shown(force)}; expected a formula in quotes")
     term = terms.custom(name, force)
-    names = formulas.names(force)
     coefficients = {symbol for known in (term, *terms.LIBRARY.values()) for symbol in known.symbols}
-    for used in names:
+    for used in formulas.names(force):
         if used in coefficients:  # a channel of that name would be mixed up with the coefficient
             raise StudyError(
                 f"force of {name!r} uses {used!r}, a coefficient's name; write a number or rename the channel"
             )
-    graph = Graph()
-    formulas.build(graph, force, {used: graph.input(used) for used in names})
     return term
 
 
 def _coefficients(term: Term, item: Mapping[object, object]) -> tuple[float | None, ...]:
-    """The coefficients an entry holds.
-
-    An amplitude A and a phase (rad) are A cos(phase) of the cosine and -A sin(phase) of the sine, as in (4.9).
-    """
+    """The coefficients of an entry: A cos(phase) of the cosine and -A sin(phase) of the sine, as in (4.9)."""
     ways = [key for key in ("value", "amplitude", "phase", "values") if key in item]
     if "values" in item:
         if len(ways) > 1:
-            raise StudyError(f"{term.name} gives both {ways[0]!r} and 'values'; one of them is right")
+            raise StudyError(f"{term.name} gives both {ways[0]!r} and 'values'; expected one of them")
         return _by_symbol(term, item["values"])
     if not _phasor(term):
         return (_number(item, "value", term.name), *(None for _ in term.symbols[1:]))
@@ -258,7 +217,7 @@ def _coefficients(term: Term, item: Mapping[object, object]) -> tuple[float | No
     if amplitude is None and phase is None:
         return (None, None)
     if amplitude is None or phase is None:
-        raise StudyError(f"{term.name} gives {ways[0]!r} alone; amplitude and phase together, or neither, is right")
+        raise StudyError(f"{term.name} gives {ways[0]!r} alone; expected amplitude and phase together, or neither")
     return (amplitude * math.cos(phase), 0.0 - amplitude * math.sin(phase))  # 0 - 0, not -0, at phase 0
 
 
@@ -266,7 +225,7 @@ def _by_symbol(term: Term, values: object) -> tuple[float | None, ...]:
     given = as_mapping(values)
     if given is None:
         like = ", ".join(f"{s}: 1.0" for s in term.symbols)
-        raise StudyError(f"values of {term.name} is {shown(values)}; a mapping such as {{{like}}} is right")
+        raise StudyError(f"values of {term.name} is {shown(values)}; expected a mapping such as {{{like}}}")
     _refuse_unknown(given, term.symbols, f"values of {term.name}")
     return tuple(_number(given, symbol, term.name) for symbol in term.symbols)
 
@@ -282,7 +241,7 @@ def _number(item: Mapping[object, object], key: str, owner: str) -> float | None
                 return float(value)
     if value is None:
         raise StudyError(f"{key} of {owner} is empty; give a number, or leave the key out to have it estimated")
-    raise StudyError(f"{key} of {owner} is {shown(value)}; a finite number such as 355.3 or 2.0e7 is right")
+    raise StudyError(f"{key} of {owner} is {shown(value)}; expected a finite number such as 355.3 or 2.0e7")
 
 
 def _refuse_unknown(item: Mapping[object, object], allowed: Sequence[str], owner: str) -> None:

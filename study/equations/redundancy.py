@@ -1,4 +1,4 @@
-"""A user's own term that says nothing, or what other terms of the model say already."""
+"""A user's own term whose force is zero, or a combination of those of other terms in the model."""
 
 import numpy as np
 
@@ -7,17 +7,17 @@ from study.equations.terms import LIBRARY
 from study.support.arrays import Floats
 
 POINTS, FEWEST = 512, 32  # random motions at which formulas are compared, and how many of them must be finite
-DECADES = 6.0  # their sizes lie so far on either side of one: a record's unit of length is unknown
+DECADES = 6.0  # the range of sizes of the random motions, on either side of one: a record's unit of length is unknown
 NOTHING = 1e-150  # a force below cannot be told from zero
-SAME = 1e-10  # share of a formula that others do not account for: rounding
-TAKES_PART = 1e-6  # share of a formula that another accounts for
+SAME = 1e-10  # share of a formula that others do not account for, at most: rounding
+TAKES_PART = 1e-6  # share of a formula that another accounts for, at least
 
 
 def repeated_force(model: Model) -> str | None:
     """A sentence on the first own term that no record could tell from others, or that is zero; None if all are new.
 
-    Among the others are terms whose coefficient is to be estimated: one that is held takes nothing over. Terms
-    with a shape parameter or a memory are not, as what they say depends on their values.
+    It is compared with terms whose coefficient is to be estimated. Terms with a shape parameter or a memory are left
+    out, as their forces depend on values that are not known yet.
     """
     if all(t.name in LIBRARY for t in model.terms):
         return None
@@ -27,7 +27,7 @@ def repeated_force(model: Model) -> str | None:
     unknown = np.array([name not in held for name in names])
     for i in (i for i, name in enumerate(names) if name not in LIBRARY):
         if size[i] < NOTHING:
-            return f"the force of {names[i]!r} is zero at every motion; a formula that changes with u, v or t is right"
+            return f"the force of {names[i]!r} is zero at every motion; expected a formula that changes with u, v or t"
         others = np.flatnonzero(unknown & (size >= NOTHING) & (np.arange(len(names)) != i))
         shares = _shares(values[:, i], values[:, others]) if unknown[i] else None
         if shares is not None:
@@ -41,7 +41,7 @@ def repeated_force(model: Model) -> str | None:
 
 def _forces(model: Model) -> tuple[tuple[str, ...], Floats]:
     """Names of the terms, and their forces with unit coefficients at random motions, shape (points, components)."""
-    from study.equations import kernels  # compiled code is loaded only where a formulas asks for it
+    from study.equations import kernels  # compiled code is loaded only where a formula needs it
 
     names, program = unit_forces(model)
     rng = np.random.default_rng(1990)
@@ -59,11 +59,10 @@ def _shares(wanted: Floats, others: Floats) -> Floats | None:
 
     Every motion counts alike, whatever its size: u + 1e-9 u^3 is not u.
     """
-    row = np.maximum(np.abs(wanted), np.max(np.abs(others), axis=1, initial=0.0))
-    row = np.maximum(row, NOTHING)
+    row = np.maximum(np.maximum(np.abs(wanted), np.max(np.abs(others), axis=1, initial=0.0)), NOTHING)
     rows, target = others / row[:, None], wanted / row
     size: Floats = np.max(np.abs(rows), axis=0)
-    found = np.asarray(np.linalg.lstsq(rows / size, target, rcond=1e-12)[0], dtype=np.float64)
-    parts = found * rows / size
+    amounts = np.asarray(np.linalg.lstsq(rows / size, target, rcond=1e-12)[0], dtype=np.float64)
+    parts = amounts * rows / size
     left = float(np.linalg.norm(target - np.sum(parts, axis=1)))
     return np.max(np.abs(parts), axis=0) if left < SAME * float(np.linalg.norm(target)) else None

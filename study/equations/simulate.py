@@ -17,7 +17,7 @@ from study.records.record import SI_UNITS, Record
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError, StudyError
 
-PLENTY = 8  # steps per sample with which a system that can be held is held
+PLENTY = 8  # steps per sample with which a stable system is integrated stably
 METHODS = {"abm4": kernels.integrate_abm4, "rk4": kernels.integrate_rk4}
 
 
@@ -75,11 +75,6 @@ def simulate(
         Further channels, for the user's own terms to name.
     units : mapping of str, optional
         Units of the channels; SI where left out.
-
-    Returns
-    -------
-    Record
-        Channels force, displacement, velocity, acceleration, and the extra ones.
 
     Raises
     ------

@@ -11,10 +11,10 @@ from study.records.record import Record
 from study.records.states import angular_rate, starting_states
 from study.support.arrays import Floats
 
-POINTS = 64  # of the motion, at which the equation of motion is linearised
-ROUGH = 0.5  # largest step, as a product with the fastest rate, of a search's first runs: they lead near and no more
-FINE = 0.125  # ... with the middle rate, of the runs that estimates come from
-FEWEST, MOST = 4, 32  # steps of those
+POINTS = 64  # points of the motion at which the equation of motion is linearised
+ROUGH = 0.5  # largest step times the fastest rate, in the first runs of a search
+FINE = 0.125  # largest step times the median rate, in the runs that estimates come from
+FEWEST, MOST = 4, 32  # steps a sample of the runs that estimates come from
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ class Search:
     kind : str
         What ``places`` are: quantiles of a displacement; multiples of the time in which the motion turns by one
         radian, of one over its rms displacement, or of the parameter before; or distances, in lines of the spectrum,
-        from where a stiffness that varies with time would explain most or where the residual stands out.
+        from where a stiffness that varies with time would explain most, or from the peaks of the residual.
     places : tuple of float
         The points to try.
     blunt : bool
@@ -190,16 +190,10 @@ class Term:
         return tuple(key for key in self.keys if key.rpartition(".")[2] in enforced)
 
     def physical(self, values: Mapping[str, float | None]) -> str:
-        """Why this is no physical effect, in a sentence; empty if it is one.
-
-        Parameters
-        ----------
-        values : mapping of float or None
-            Coefficients and shape parameters by key; what is not known is not judged.
-        """
-        found = {key.rpartition(".")[2]: values.get(key) for key in self.keys}
-        known = {name: value for name, value in found.items() if value is not None}
-        return next((said for condition in self.bounds if (said := condition.broken(known))), "")
+        """Why this is no physical effect with these values by key, in a sentence; empty if it is, or may be one."""
+        own = {key.rpartition(".")[2]: values.get(key) for key in self.keys}
+        known = {name: value for name, value in own.items() if value is not None}
+        return next((sentence for condition in self.bounds if (sentence := condition.broken(known))), "")
 
     @property
     def steady(self) -> bool:
@@ -210,8 +204,7 @@ class Term:
     def channels(self) -> tuple[str, ...]:
         """Measured channels that its formulas name, in alphabetical order.
 
-        A channel is whatever is not u, v, t or pi, a parameter, or z where the term has a state of its own: what a
-        record happens to call so is never meant.
+        A channel is whatever is not u, v, t or pi, a parameter, or z where the term has a state of its own.
         """
         own = {*formulas.VARIABLES, *(p.name for p in self.parameters), *(("z",) if self.state else ())}
         texts = (*(c.shape for c in self.components), *((self.state,) if self.state else ()))

@@ -3,11 +3,13 @@
 The force of a term is ``sum over its components of coefficient * factor * (d/dt)^order shape``. One
 entry serves three times: forward (``simulate`` adds the force), reverse (components with the same
 shape form one MI/SO input whose frequency response function is
-``A(f) = sum of coefficient * factor * (j 2 pi f)^order``, the report's Figure 14), and in words. It also says where
-its shape parameters are searched, how a trial draws it and when it is physical: no other module asks for its name.
+``A(f) = sum of coefficient * factor * (j 2 pi f)^order``, the report's Figure 14), and in words. It also defines where
+its shape parameters are searched, how a trial draws it and when it is physical: no other module depends on its name.
 
 To add an effect, add one entry to ``LIBRARY`` and one row to the parametrised tests.
 """
+
+from difflib import get_close_matches
 
 import numpy as np
 
@@ -45,7 +47,7 @@ def _spring(symbol: str, owner: str) -> Condition:
     return Condition(symbol, f"the stiffness of a {owner} is positive")
 
 
-AROUND = (-0.35, 0.0, 0.35)  # a line and a third of a line to either side: a fit finds its way from there
+AROUND = (-0.35, 0.0, 0.35)  # a line and a third of a line to either side: a fit converges from there
 
 _TERMS = (
     _single(
@@ -209,8 +211,6 @@ def get(name: str) -> Term:
         If there is none, naming the nearest.
     """
     if name not in LIBRARY:
-        from difflib import get_close_matches
-
         near = get_close_matches(name, LIBRARY, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else f"; known are {', '.join(LIBRARY)}"
         raise StudyError(f"there is no term {name!r}{hint}")
