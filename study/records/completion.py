@@ -3,8 +3,8 @@
 Derivatives and integrals are taken in the frequency domain, where they are exact for a band-limited
 record that closes on itself. A measured record does not close: its ends are continued by linear
 prediction (Burg's method, always stable) and faded out smoothly, so that no jump at the ends leaks into
-the record. Integration is blind below a cut-off frequency: drift and offset of an accelerometer, divided
-by (2 pi f)^2, would swamp everything else. The band that is left is stated, for judgements to keep to.
+the record. Integration is limited to frequencies above a cut-off: drift and offset of an accelerometer, divided
+by (2 pi f)^2, would otherwise dominate. The remaining band is reported, and judgements are limited to it.
 """
 
 from dataclasses import dataclass, replace
@@ -20,13 +20,13 @@ from study.support.errors import StudyError
 from study.support.units import ROLES, VOLTAGE, Unit, parse_unit, role_unit
 
 ORDER = 64  # coefficients of the linear prediction at each end
-TRAINING = 4096  # samples that it is learnt from
-PREDICTABLE = 1e-14  # of the power: what may be left unpredicted, above the rounding errors of the recursion
+TRAINING = 4096  # samples from which the linear prediction is estimated
+PREDICTABLE = 1e-14  # share of the power at which the prediction is complete, above the rounding of the recursion
 SHORTEST = 512  # samples by which each end is continued, at least
 RINGING = 4.0  # periods of the cut-off frequency by which ends are continued when integrating
-SETTLED = 2.0  # periods of the cut-off frequency at each end that an integrated channel is not yet sure of
+SETTLED = 2.0  # periods of the cut-off frequency at each end where an integrated channel is uncertain
 AVERAGES = 16  # segments, at least, for the spectrum that the cut-off is read from
-NEAR_END = 8  # samples at each end where a derivative leans on the continuation
+NEAR_END = 8  # samples at each end where a derivative depends on the continuation
 
 
 @dataclass(frozen=True)
@@ -38,17 +38,17 @@ class CompletedRecord:
     record : Record
         Force, the three motions and any extra channels.
     band : (float, float)
-        Lowest and highest frequency in hertz at which all three motions are right; judgements leave the rest out.
+        Lowest and highest frequency in hertz at which all three motions are valid.
     edge : int
         Samples at each end that derivatives and integrals leave uncertain; 0 if nothing was computed.
-    says : tuple of str
+    notes : tuple of str
         What was converted or computed, a sentence each.
     """
 
     record: Record
     band: tuple[float, float]
     edge: int
-    says: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
 def complete(record: Record, cutoff: float | None = None) -> CompletedRecord:
@@ -60,85 +60,75 @@ def complete(record: Record, cutoff: float | None = None) -> CompletedRecord:
         Force and at least one motion.
     cutoff : float, optional
         Lowest frequency in hertz that integration keeps (above it the gain is exactly one, below half of it
-        nothing is left). Default: :func:`suggest_cutoff`. If displacement and acceleration are both measured,
-        the velocity is the derivative of the one below the cut-off and the integral of the other above it; without
-        a cut-off it is the derivative of the displacement.
-
-    Returns
-    -------
-    CompletedRecord
+        zero). Default: :func:`suggest_cutoff`. If displacement and acceleration are both measured, the velocity is
+        the derivative of the one below the cut-off and the integral of the other above it; without a cut-off it is
+        the derivative of the displacement.
 
     Raises
     ------
     StudyError
-        If no motion is there, units cannot be brought together, or the cut-off is outside of (0, 1/(2 dt)).
+        If no motion was measured, units cannot be converted, or the cut-off is outside of (0, 1/(2 dt)).
     """
     measured = [m for m in MOTIONS if m in record]
     if not measured:
         raise StudyError(f"{record.name}: no displacement, velocity or acceleration is there; at least one is needed")
     nyquist = 0.5 / record.dt
     if cutoff is not None and not 0.0 < cutoff < nyquist:
-        raise StudyError(f"{record.name}: the cut-off is {cutoff:g} Hz; above 0 and below {nyquist:g} Hz is right")
-    record, says = consistent(record)
+        raise StudyError(f"{record.name}: the cut-off is {cutoff:g} Hz; expected it above 0 and below {nyquist:g} Hz")
+    record, notes = consistent(record)
     if len(measured) == len(MOTIONS):
-        return CompletedRecord(record, (0.0, nyquist), 0, says)
+        return CompletedRecord(record, (0.0, nyquist), 0, notes)
     if measured == ["displacement", "acceleration"] and cutoff is not None:
-        return _blended(record, cutoff, says)
-    return _derived(record, measured, cutoff, says)
+        return _blended(record, cutoff, notes)
+    return _derived(record, measured, cutoff, notes)
 
 
 _OPERATION = {1: "derivative", 2: "second derivative", -1: "integral", -2: "double integral"}
 
 
-def _derived(record: Record, measured: list[str], cutoff: float | None, says: tuple[str, ...]) -> CompletedRecord:
+def _derived(record: Record, measured: list[str], cutoff: float | None, notes: tuple[str, ...]) -> CompletedRecord:
     """Each missing motion from the nearest measured one, by derivatives if there is a choice."""
     integrates = MOTIONS.index(measured[0]) > 0
     low = (suggest_cutoff(record) if cutoff is None else cutoff) if integrates else 0.0
-    found: dict[str, Floats] = {}
-    sentences = list(says)
+    channels: dict[str, Floats] = {}
+    sentences = list(notes)
     for level, name in enumerate(MOTIONS):
         if name in measured:
             continue
         below = [m for m in measured if MOTIONS.index(m) < level]
         source = below[-1] if below else measured[0]
         order = level - MOTIONS.index(source)
-        found[name] = derivative(record[source], record.dt, order, low)
+        channels[name] = derivative(record[source], record.dt, order, low)
         sentences.append(
             f"{name} is the {_OPERATION[order]} of the {source}{f' above {low:.4g} Hz' if order < 0 else ''}"
         )
-    edge = min(int(np.ceil(SETTLED / (low * record.dt))), len(record) // 4) if integrates else NEAR_END
-    return CompletedRecord(record.with_channels(found), (low, 0.5 / record.dt), edge, tuple(sentences))
+    edge = _edge(record, low) if integrates else NEAR_END
+    return CompletedRecord(record.with_channels(channels), (low, 0.5 / record.dt), edge, tuple(sentences))
 
 
-def _blended(record: Record, cutoff: float, says: tuple[str, ...]) -> CompletedRecord:
+def _edge(record: Record, cutoff: float) -> int:
+    """Uncertain samples at each end of an integrated channel."""
+    return min(int(np.ceil(SETTLED / (cutoff * record.dt))), len(record) // 4)
+
+
+def _blended(record: Record, cutoff: float, notes: tuple[str, ...]) -> CompletedRecord:
     """Velocity from both sides: what integration loses below the cut-off, the derivative supplies."""
     slow = derivative(record["displacement"], record.dt, 1)
     fast = derivative(record["acceleration"], record.dt, -1, cutoff)
-    lost = slow - derivative(record["displacement"], record.dt, 1, cutoff)
-    velocity = {"velocity": fast + lost}
-    edge = min(int(np.ceil(SETTLED / (cutoff * record.dt))), len(record) // 4)
-    told = f"velocity is the derivative of the displacement below {cutoff:.4g} Hz and the integral of the acceleration"
-    return CompletedRecord(record.with_channels(velocity), (0.0, 0.5 / record.dt), edge, (*says, f"{told} above"))
+    below = slow - derivative(record["displacement"], record.dt, 1, cutoff)
+    blended = record.with_channels({"velocity": fast + below})
+    note = (
+        f"velocity is the derivative of the displacement below {cutoff:.4g} Hz "
+        "and the integral of the acceleration above"
+    )
+    return CompletedRecord(blended, (0.0, 0.5 / record.dt), _edge(record, cutoff), (*notes, note))
 
 
 def derivative(values: Floats, dt: float, order: int, cutoff: float = 0.0) -> Floats:
-    """Derivative, or integral above a cut-off, in the frequency domain.
+    """Derivative, or integral above a cut-off, in the frequency domain, shape (n,).
 
-    Parameters
-    ----------
-    values : array, shape (n,)
-        Samples.
-    dt : float
-        Sampling interval in seconds.
-    order : int
-        1 and 2 differentiate, -1 and -2 integrate, 0 only leaves out what lies below the cut-off.
-    cutoff : float
-        In hertz: full gain above it, none below half of it, a raised cosine between. Must be above zero to
-        integrate.
-
-    Returns
-    -------
-    array, shape (n,)
+    Orders 1 and 2 differentiate, -1 and -2 integrate, 0 only removes what lies below the cut-off. The gain is full
+    above the cut-off (in hertz; above zero for an integral), zero below half of it, a raised cosine between.
     """
     reach = max(SHORTEST, int(np.ceil(RINGING / (cutoff * dt)))) if cutoff > 0.0 else SHORTEST
     mean = float(np.mean(values))
@@ -174,7 +164,7 @@ def _continued(values: Floats, reach: int) -> Floats:
 
 
 def _predicted(values: Floats, reach: int) -> Floats:
-    """What linear prediction makes of the samples behind the last one, shape (reach,).
+    """Linear prediction of the samples after the last one, shape (reach,).
 
     A prediction of high order is stable in exact arithmetic only; one that grows is replaced by a shorter one.
     """
@@ -214,8 +204,8 @@ def suggest_cutoff(record: Record) -> float:
     """Frequency in hertz above which a measured acceleration or velocity can be integrated.
 
     The autospectrum of the displacement is that of the acceleration over (2 pi f)^4. Towards low frequencies that
-    of a response levels off, that of noise and drift rises as f^-4. Coming from below, the cut-off is where it
-    first stops falling for an octave; at most where the measured motion is strongest.
+    of a response levels off, that of noise and drift rises as f^-4. From below, the cut-off is where it first stops
+    falling for an octave; at most where the measured motion is strongest.
     """
     name = next(m for m in reversed(MOTIONS) if m in record)
     length = min(len(record), max(32, min(4096, 2 * len(record) // AVERAGES)))
@@ -242,42 +232,32 @@ def _smooth(power: Floats) -> Floats:
 def consistent(record: Record) -> tuple[Record, tuple[str, ...]]:
     """The record with velocity per second of displacement and acceleration per second of velocity.
 
-    The unit of length is that of the first of displacement, velocity and acceleration that was measured
-    (metres for an acceleration in g). Numbers that are consistent already are not touched.
-
-    Returns
-    -------
-    record, says : Record, tuple of str
-        Converted where needed, and a sentence on each conversion.
+    Returned beside a sentence on each conversion. The unit of length is that of the first of displacement, velocity
+    and acceleration that was measured (metres for an acceleration in g).
 
     Raises
     ------
     StudyError
-        If a unit is none, or calibrated and uncalibrated (volts) motions are mixed.
+        If a unit is unknown, or calibrated and uncalibrated (volts) motions are mixed.
     """
     measured = [m for m in MOTIONS if m in record]
     units = {m: role_unit(m, record.units.get(m) or SI_UNITS[m]) for m in measured}
     if len({u.powers[3] for u in units.values()}) > 1:
-        told = ", ".join(f"{m} in {u.text}" for m, u in units.items())
-        raise StudyError(f"{record.name}: {told} cannot be compared; all calibrated, or all in volts, is right")
+        mixed = ", ".join(f"{m} in {u.text}" for m, u in units.items())
+        raise StudyError(f"{record.name}: {mixed} cannot be compared; expected all calibrated, or all in volts")
     length = _length(units[measured[0]])
-    right = {m: _rate(length, k) for k, m in enumerate(MOTIONS)}
+    wanted: dict[str, str] = dict(zip(MOTIONS, (length, f"{length}/s", f"{length}/s^2"), strict=True))
     channels: dict[str, Floats] = {}
-    says: list[str] = []
+    notes: list[str] = []
     for motion, unit in units.items():
-        wanted = right[motion]
-        factor = unit.factor / parse_unit(wanted).factor
+        factor = unit.factor / parse_unit(wanted[motion]).factor
         if unit.powers[3] == 0 and factor != 1.0:
             channels[motion] = record[motion] * factor
-            says.append(f"{motion} is converted from {unit.text} to {wanted}")
-    return replace(record.with_channels(channels), units={**record.units, **right}), tuple(says)
+            notes.append(f"{motion} is converted from {unit.text} to {wanted[motion]}")
+    return replace(record.with_channels(channels), units={**record.units, **wanted}), tuple(notes)
 
 
 def _length(unit: Unit) -> str:
     """The unit of length in a unit of motion: ``mm`` in ``mm/s^2``, ``m`` in ``g``."""
     first = unit.text.replace("/", " ").split()[0]
     return first if parse_unit(first).powers in (ROLES["displacement"][0], VOLTAGE) else "m"
-
-
-def _rate(length: str, order: int) -> str:
-    return {0: length, 1: f"{length}/s", 2: f"{length}/s^2"}[order]

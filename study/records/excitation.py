@@ -1,8 +1,8 @@
 """Seeded force histories, their theoretical autospectra, and the noise on the response.
 
-Every history closes on itself (``periods`` times in the record, swept sines aside) and has nothing
-above its cut-off, so that its band-limited interpolation between the samples is exact. Force and noise
-draw from two streams of one seed and never share a number.
+Every history closes on itself (``periods`` times in the record, swept sines aside) and has no content above its
+cut-off, so that its band-limited interpolation between the samples is exact. Force and noise use two independent
+streams of one seed.
 """
 
 from collections.abc import Callable
@@ -23,12 +23,12 @@ SETTINGS = {  # of each kind, beside kind, level and periods
     "random_phase_multisine": ("start_frequency", "stop_frequency", "odd_only"),
     "swept_sine": ("start_frequency", "stop_frequency", "sweep"),
 }
-ROUNDING = 1e-9  # relative: a cut-off that stands on a line of the record keeps that line
+ROUNDING = 1e-9  # relative: a cut-off at a line of the record keeps that line
 
 
 @dataclass(frozen=True)
 class Excitation:
-    """What the force is like; the force itself is :func:`force`.
+    """Kind and settings of a force; :func:`force` gives its history.
 
     Attributes
     ----------
@@ -38,11 +38,11 @@ class Excitation:
     level : float
         Mean square of the force in N^2.
     reading : str
-        What ``level`` is the variance of, for ``gaussian_lowpass``: the ``raw`` white sequence before
-        its low-pass, of which twice the cut-off over the sampling rate is left, or the ``filtered``
-        force. Both hold in expectation: a record scatters about them as a random process does.
+        What ``level`` is the variance of, for ``gaussian_lowpass``: the ``raw`` white sequence before its low-pass,
+        of which a share of twice the cut-off over the sampling rate remains, or the ``filtered`` force. Both hold
+        in expectation.
     cutoff : float
-        Frequency in Hz above which the two random kinds have nothing.
+        Highest frequency in Hz of the two random kinds.
     peak_frequency : float
         Where the Pierson-Moskowitz autospectrum has its peak, in Hz.
     start_frequency, stop_frequency : float
@@ -53,11 +53,6 @@ class Excitation:
         ``linear`` or ``logarithmic`` in frequency.
     periods : int
         How often the same history is repeated in the record.
-
-    Raises
-    ------
-    StudyError
-        At a setting that no force can have, naming it.
     """
 
     kind: str = "gaussian_lowpass"
@@ -110,28 +105,14 @@ class Excitation:
 
 
 def force(excitation: Excitation, samples: int, dt: float, seed: int) -> Floats:
-    """A force history.
+    """A force history in newtons, shape (samples,); ``samples`` is a multiple of ``excitation.periods``.
 
-    Parameters
-    ----------
-    excitation : Excitation
-        What it is like.
-    samples : int
-        Its length, a multiple of ``excitation.periods``.
-    dt : float
-        Sampling interval in seconds.
-    seed : int
-        The same seed gives the same bytes. A swept sine has nothing random and is the same for all.
-
-    Returns
-    -------
-    array, shape (samples,)
-        In newtons.
+    The same seed gives the same bytes. A swept sine is not random and is the same for all.
 
     Raises
     ------
     StudyError
-        If the force does not fit under the Nyquist frequency or into the record.
+        If the force reaches above the Nyquist frequency or does not fit into the record.
     """
     length = _checked_period(excitation, samples, dt)
     period = _HISTORIES[excitation.kind](excitation, length, dt, _generator(seed, FORCE_STREAM))
@@ -139,55 +120,20 @@ def force(excitation: Excitation, samples: int, dt: float, seed: int) -> Floats:
 
 
 def theoretical_autospectrum(excitation: Excitation, frequency: Floats, samples: int, dt: float) -> Floats:
-    """One-sided autospectral density that the force has in expectation.
+    """One-sided autospectral density in N^2/Hz that a :func:`force` has in expectation, at each ``frequency``.
 
     A multisine's lines are spread over the band, and a sweep's density is that of stationary phase
     (mean square over the time spent at each frequency): what an estimate of lower resolution shows.
-
-    Parameters
-    ----------
-    excitation : Excitation
-        What the force is like.
-    frequency : array
-        In hertz.
-    samples, dt : int, float
-        As given to :func:`force`.
-
-    Returns
-    -------
-    array of the shape of ``frequency``
-        In N^2/Hz.
-
-    Raises
-    ------
-    StudyError
-        As :func:`force`.
     """
     length = _checked_period(excitation, samples, dt)
     return _DENSITIES[excitation.kind](excitation, np.asarray(frequency, dtype=np.float64), length, dt)
 
 
 def displacement_noise(displacement: Floats, fraction: float, seed: int) -> Floats:
-    """White Gaussian noise to be added to a displacement (Section 5.4).
+    """White Gaussian noise to be added to a noise-free displacement (Section 5.4), shape (n,).
 
-    Parameters
-    ----------
-    displacement : array, shape (n,)
-        The noise-free response.
-    fraction : float
-        Mean square of the noise, in expectation, over that of the displacement.
-    seed : int
-        That of the force may be given again: the streams are apart.
-
-    Returns
-    -------
-    array, shape (n,)
-        In the unit of the displacement.
-
-    Raises
-    ------
-    StudyError
-        If the fraction is negative or not finite.
+    ``fraction`` is its mean square, in expectation, over that of the displacement. The seed may be that of the force:
+    the streams are independent.
     """
     if not (np.isfinite(fraction) and fraction >= 0.0):
         raise StudyError(f"noise fraction is {fraction:g}; a ratio of mean squares is finite and not negative")
@@ -258,8 +204,7 @@ def _pierson_moskowitz(excitation: Excitation, length: int, dt: float, generator
 def _pierson_moskowitz_density(excitation: Excitation, frequency: Floats, _length: int, _dt: float) -> Floats:
     """``5 level f_p^4 f^-5 exp(-5/4 (f_p/f)^4)``, whose integral over all frequencies is ``level``.
 
-    The significant level, four root mean squares, is ``4 sqrt(level)``. What lies above the cut-off is
-    left out and not made up for.
+    The significant level, four root mean squares, is ``4 sqrt(level)``. What lies above the cut-off is omitted.
     """
     inside = (frequency > 0.0) & (frequency <= excitation.cutoff * (1.0 + ROUNDING))
     f = np.where(inside, frequency, excitation.cutoff)

@@ -1,8 +1,8 @@
 """Band-limited values between the samples.
 
-A measured force is known at its samples only. Holding it, or joining the samples by straight lines,
-adds harmonics and a delay that an integrator with several steps a sample would take for real. The
-band-limited interpolation is exact for a record without content above its Nyquist frequency.
+A measured force is known at its samples only. A hold or linear interpolation would add harmonics and a delay, which
+an integrator with several steps a sample would respond to. Band-limited interpolation is exact for a record without
+content above its Nyquist frequency.
 """
 
 import numpy as np
@@ -15,22 +15,11 @@ CLOSES = 10.0  # a record that does not close has many times the energy there of
 
 
 def between_samples(values: Floats, factor: int) -> Floats:
-    """Values on a grid ``factor`` times as fine.
+    """Values on a grid ``factor`` times as fine, shape (factor (n - 1) + 1,); every ``factor``-th is the sample itself.
 
-    Parameters
-    ----------
-    values : array, shape (n,)
-        Samples. A record that closes on itself is taken as periodic, which is exact for a periodic
-        excitation; otherwise its ends are continued by point reflection and faded, which confines the
-        error to the first and last few samples. A jump from the last sample to the first has power up
-        to the Nyquist frequency, and that is how it is recognised.
-    factor : int
-        Grid points for each sample.
-
-    Returns
-    -------
-    array, shape (factor (n - 1) + 1,)
-        Its every ``factor``-th value is the sample itself.
+    A record that closes on itself is taken as periodic, which is exact for a periodic excitation; otherwise its ends
+    are continued by point reflection and faded, which confines the error to the first and last few samples. A jump
+    from the last sample to the first is recognised by its power up to the Nyquist frequency.
     """
     n = len(values)
     if factor == 1 or n == 1:
@@ -54,7 +43,7 @@ def _top_energy(values: Floats) -> float:
 def _periodic(values: Floats, factor: int) -> Floats:
     """The samples, and between them the record shifted by one part of an interval after the other.
 
-    Transforms as long as the record, instead of one ``factor`` times as long: a tenth of the time for 1e6 samples.
+    Transforms of the record's length take a tenth of the time of one that is ``factor`` times as long, at 1e6 samples.
     """
     n = len(values)
     spectrum = np.asarray(rfft(values), dtype=np.complex128)

@@ -1,7 +1,7 @@
 """How much of a residual is noise, and how much has structure?
 
-Noise of a sensor is taken as white: its density is that of the quietest bands of the residual's
-autospectrum. What stands above it in other bands is structure that a better model could explain.
+Sensor noise is assumed to be white: its density is that of the quietest bands of the residual's
+autospectrum. The excess in other bands is structure that a better model could explain.
 """
 
 from dataclasses import dataclass
@@ -12,9 +12,9 @@ from study.records.spectra import Segments, autospectrum
 from study.support.arrays import Floats
 from study.support.errors import StudyError
 
-BANDS = 20  # or as many as there are lines
-FEWEST = 8  # lines
-QUIET = 5  # so many of the bands, the quietest, give the floor
+BANDS = 20  # bands of the spectrum, or as many as there are lines
+FEWEST = 8  # lines that show a noise floor
+QUIET = 5  # bands, the quietest, that give the floor
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Floor:
     noise : float
         Root mean square of white noise at the density of the quietest bands.
     excess : float
-        Mean square of what stands above it.
+        Mean square above it.
     excess_error : float
         Standard error of the excess if there were noise alone.
     """
@@ -60,14 +60,13 @@ def floor(residual: Floats, dt: float, low: float = 0.0) -> Floor:
             f"{FEWEST} or more show a noise floor: judge a longer part"
         )
     count = min(BANDS, len(kept))
-    some = max(1, count * QUIET // BANDS)
+    quietest = max(1, count * QUIET // BANDS)
     bands = np.array_split(kept, count)
-    means = np.array([np.mean(band) for band in bands])
-    lines = np.array([len(band) for band in bands])
+    means, lines = (np.array([measure(band) for band in bands]) for measure in (np.mean, len))
     spread = 1.0 / np.sqrt(averages * lines / segments.line_inflation())
-    quiet = np.argsort(means)[:some]
+    quiet = np.argsort(means)[:quietest]
     # The quietest of many equal bands lie below their common level by about one standard deviation.
-    level = float(np.mean(means[quiet])) * (1.0 + _selection(count, some) * float(np.mean(spread)))
+    level = float(np.mean(means[quiet])) * (1.0 + _selection(count, quietest) * float(np.mean(spread)))
     width = float(frequency[1])
     above = np.clip(means - level, 0.0, None) * lines * width
     error = float(np.sqrt(np.sum((level * spread * lines * width) ** 2)))

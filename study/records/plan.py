@@ -1,4 +1,4 @@
-"""What is fitted and what is judged of a record."""
+"""Which parts of a record are fitted and judged."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ FEWEST = 64  # samples in a part
 
 @dataclass(frozen=True)
 class Plan:
-    """What is fitted and what is judged.
+    """Which parts of a record are fitted and judged.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ def make_plan(
     judge: tuple[int, int] | None = None,
     measured: str | None = None,
 ) -> Plan:
-    """Fit the first half and judge the second, unless told otherwise; compare with what was measured.
+    """Fit the first half and judge the second by default; compare with the first motion that was measured.
 
     Raises
     ------
@@ -39,8 +39,7 @@ def make_plan(
         If the parts overlap or leave the record.
     """
     half = len(record) // 2
-    fit = fit or (0, half)
-    judge = judge or (half, len(record))
+    fit, judge = fit or (0, half), judge or (half, len(record))
     for name, (first, last) in (("fit", fit), ("judge", judge)):
         if not 0 <= first < last <= len(record) or last - first < FEWEST:
             raise StudyError(f"the part to {name}, {first}:{last}, must hold {FEWEST} samples or more of {len(record)}")

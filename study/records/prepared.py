@@ -1,4 +1,4 @@
-"""A record made ready once, at the door: everything that fits, predicts, compares or diagnoses takes it from here."""
+"""A record made ready once, for everything that fits, predicts, compares or diagnoses."""
 
 from dataclasses import dataclass, replace
 
@@ -12,7 +12,7 @@ from study.support.arrays import Floats
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A record in consistent units, with all three motions, and what is fitted and judged of it.
+    """A record in consistent units, with all three motions, and the parts of it to fit and to judge.
 
     Attributes
     ----------
@@ -21,7 +21,7 @@ class Prepared:
     plan : Plan
         The measured response, the part to fit and the part to judge.
     band : (float, float)
-        Lowest and highest frequency in hertz at which all three motions are right; judgements leave the rest out.
+        Lowest and highest frequency in hertz at which all three motions are valid; judgements are limited to it.
     edge : int
         Samples at each end that derivatives and integrals leave uncertain.
     notes : tuple of str
@@ -68,32 +68,19 @@ class Prepared:
         return replace(self, plan=replace(self.plan, fit=(first, last)))
 
     def shortened(self, samples: int) -> "Prepared":
-        """The same with no more than so many samples to fit: enough to tell candidates apart, and sooner done."""
+        """The same with no more than so many samples to fit."""
         first, last = self.plan.fit
         return self if last - first <= samples else self.with_fit(first, first + samples)
 
 
 def prepare_record(record: Record, plan: Plan | None = None, cutoff: float | None = None) -> Prepared:
-    """Bring a record into consistent units, complete its motions, and settle what is fitted and judged.
+    """Convert a record to consistent units, complete its motions, and decide what is fitted and judged.
 
-    Parameters
-    ----------
-    record : Record
-        Force and at least one motion, as read.
-    plan : Plan, optional
-        :func:`study.records.plan.make_plan` if left out.
-    cutoff : float, optional
-        Frequency in hertz above which a measured velocity or acceleration is integrated, and below which nothing is
-        judged; found from the record if left out.
-
-    Raises
-    ------
-    StudyError
-        If no motion was measured, units cannot be brought together, or the cut-off is none.
+    Defaults are those of :func:`study.records.plan.make_plan` and :func:`study.records.completion.complete`, whose
+    errors it raises.
     """
-    plan = plan or make_plan(record)
     completed = complete(record, cutoff)
-    return Prepared(completed.record, plan, completed.band, completed.edge, completed.says)
+    return Prepared(completed.record, plan or make_plan(record), completed.band, completed.edge, completed.notes)
 
 
 def whole(record: Record, response: str = "displacement") -> Prepared:

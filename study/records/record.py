@@ -12,7 +12,7 @@ MOTIONS = ("displacement", "velocity", "acceleration")
 SI_UNITS = {"time": "s", "force": "N", "displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 
 
-@dataclass(frozen=True, eq=False)  # arrays have no one truth value: a record equals itself alone
+@dataclass(frozen=True, eq=False)  # arrays have no single truth value: a record equals itself alone
 class Record:
     """Evenly sampled channels.
 
@@ -23,7 +23,7 @@ class Record:
     channels : dict of float64 arrays, shape (n,)
         ``force`` and at least one of ``displacement, velocity, acceleration``; any further ones.
     units : dict of str
-        Unit of each channel; SI where nothing else is said.
+        Unit of each channel; SI by default.
     name : str
         What it is called in tables and file names.
     start : float
@@ -72,7 +72,7 @@ class Record:
 
 
 def write_csv(record: Record, path: Path) -> None:
-    """Write time and channels with as many digits as a double has; units other than SI stand behind the names."""
+    """Write time and channels with all digits of a double; units other than SI follow the names."""
     import pandas as pd  # half a second that records in memory do not cost
 
     named = {heading(name, record.units.get(name, "")): values for name, values in record.channels.items()}

@@ -19,7 +19,7 @@ CHUNK = 64  # segments transformed at a time: they stay in the cache, and memory
 
 @dataclass(frozen=True)
 class Segments:
-    """How a record is cut.
+    """Segments of a record for spectra by Welch's method.
 
     Attributes
     ----------
@@ -60,13 +60,7 @@ class Segments:
         return np.asarray(get_window(self.window, self.length), dtype=np.float64)
 
     def count(self, samples: int) -> int:
-        """Number of whole segments in a record.
-
-        Raises
-        ------
-        StudyError
-            If the record is shorter than one segment.
-        """
+        """Number of whole segments in a record; refuses a record that is shorter than one segment."""
         if samples < self.length:
             raise StudyError(f"the record has {samples} samples, fewer than the segment length {self.length}")
         return 1 + (samples - self.length) // self.hop
@@ -133,15 +127,11 @@ def cross_spectra(channels: Sequence[Floats], dt: float, segments: Segments | No
     Parameters
     ----------
     channels : sequence of arrays, each of shape (n,)
-        Inputs first, output last, by the project's habit.
+        Inputs first, output last.
     dt : float
         Sampling interval in seconds.
     segments : Segments, optional
         Default: the report's 512-point Hann segments with half overlap.
-
-    Returns
-    -------
-    SpectralMatrix
 
     Raises
     ------
@@ -154,28 +144,9 @@ def cross_spectra(channels: Sequence[Floats], dt: float, segments: Segments | No
 def cross_spectra_in_pieces(
     pieces: Iterable[Sequence[Floats]], dt: float, segments: Segments | None = None
 ) -> SpectralMatrix:
-    """Cross-spectral density matrix of a record that comes piece by piece and is never whole in memory.
+    """:func:`cross_spectra` of a record that is read in consecutive pieces of any length, each with all channels.
 
-    Segments reach across the joints: the result is that of :func:`cross_spectra` for the pieces end to end, to
-    rounding. Memory is that of one piece.
-
-    Parameters
-    ----------
-    pieces : iterable of sequences of arrays
-        Consecutive pieces, each a sequence of all channels, shape (samples of the piece,), of any length.
-    dt : float
-        Sampling interval in seconds.
-    segments : Segments, optional
-        Default: the report's 512-point Hann segments with half overlap.
-
-    Returns
-    -------
-    SpectralMatrix
-
-    Raises
-    ------
-    StudyError
-        If channels differ in length, pieces in the number of channels, or all together are shorter than a segment.
+    Segments reach across the joints: the result is that for the whole record, to rounding. Memory is that of one piece.
     """
     cut = segments or Segments()
     total, left, samples = np.zeros((cut.length // 2 + 1, 0, 0), dtype=np.complex128), list[Floats](), 0
@@ -185,10 +156,10 @@ def cross_spectra_in_pieces(
             total = np.zeros((len(total), len(piece), len(piece)), dtype=np.complex128)
         elif len(piece) != len(left):
             raise StudyError(f"a piece has {len(piece)} channels; the pieces before it have {len(left)}")
-        joined = [np.concatenate(pair) for pair in zip(left, piece, strict=True)] if left else piece
-        count = max(0, 1 + (len(joined[0]) - cut.length) // cut.hop)
-        _add_products(total, joined, count, cut)
-        left = [channel[count * cut.hop :].copy() for channel in joined]
+        channels = [np.concatenate(pair) for pair in zip(left, piece, strict=True)] if left else piece
+        count = max(0, 1 + (len(channels[0]) - cut.length) // cut.hop)
+        _add_products(total, channels, count, cut)
+        left = [channel[count * cut.hop :].copy() for channel in channels]
     scale = np.full(len(total), 2.0 * dt / (cut.count(samples) * np.sum(cut.taper() ** 2)))
     scale[0] /= 2.0
     if cut.length % 2 == 0:
@@ -211,7 +182,7 @@ def _add_products(total: Complexes, channels: Sequence[Floats], count: int, cut:
         return
     taper = cut.taper()
     views = [np.lib.stride_tricks.sliding_window_view(c, cut.length)[:: cut.hop] for c in channels]
-    room = np.empty((len(views), CHUNK, cut.length))  # used again and again: fresh memory costs as much as a transform
+    room = np.empty((len(views), CHUNK, cut.length))  # reused: fresh memory costs as much as a transform
     transformed = np.empty((len(views), CHUNK, len(total)), dtype=np.complex128)
     turned = np.empty((len(total), len(views), CHUNK), dtype=np.complex128)
     mirrored = np.empty_like(turned)

@@ -1,4 +1,4 @@
-"""Displacement and velocity at some instants, as a record shows them, and how fast its motion is."""
+"""Displacement and velocity at some instants of a record, and the angular rate of its motion."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -8,7 +8,7 @@ import numpy as np
 from study.records.record import Record
 from study.support.arrays import Floats
 
-REACH = 0.2  # of a period: half width of the cubic that smooths a displacement into a state
+REACH = 0.2  # half width, in periods, of the cubic that smooths a displacement into a state
 
 
 def angular_rate(values: Floats, dt: float) -> float:
@@ -18,10 +18,10 @@ def angular_rate(values: Floats, dt: float) -> float:
 
 
 def starting_states(record: Record, response: str, samples: Sequence[int], reach: float = REACH) -> Floats:
-    """Displacement and velocity at some samples, as well as the record shows them, shape (samples, 2).
+    """Displacement and velocity at some samples, shape (samples, 2).
 
-    A displacement is smoothed by a cubic over a part of its period, which yields the velocity too; what
-    neither it nor a channel of the record shows is taken as zero.
+    A displacement is smoothed by a cubic over a part of its period, which yields the velocity too; what neither it
+    nor a channel of the record shows is zero.
     """
     if response != "displacement":
         columns = [

@@ -8,9 +8,9 @@ from study.support.arrays import Floats
 
 
 def least_squares(columns: Floats, target: Floats, cutoff: float = 1e-12) -> Floats:
-    """Amounts of the columns that come nearest to the target, shape (columns,).
+    """Amounts of the columns that approximate the target best, shape (columns,).
 
-    Columns are scaled to unit length first; what is then weaker than ``cutoff`` counts as absent.
+    Columns are scaled to unit length first; singular values below ``cutoff`` of the largest then count as zero.
     """
     scale = np.linalg.norm(columns, axis=0)
     scale = np.where(scale > 0.0, scale, 1.0)

@@ -1,7 +1,7 @@
-"""How much better is one fit than another, and how sure is that? Everything by blocks of time.
+"""How much better one fit is than another, with its uncertainty, from blocks of time.
 
-A residual that is not white noise makes every formula for independent samples too sure of itself.
-Sums of squares over blocks much longer than the response's memory are independent for all purposes.
+Where a residual is not white noise, formulas for independent samples give errors that are too small. Sums of squares
+over blocks much longer than the response's memory are practically independent.
 """
 
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ from scipy.stats import wilcoxon
 from study.support.arrays import Floats
 
 BLOCKS = 24
-TESTED = 48  # blocks of a test that ranks them: with 24 it could not be sure of what is plain
+TESTED = 48  # blocks of a test that ranks them: with 24 it lacks power
 SHORTEST = 16  # samples in a block
 
 
 @dataclass(frozen=True)
 class Gain:
-    """What one fit explains of what another left.
+    """How much of one fit's residual another explains.
 
     Attributes
     ----------
@@ -46,9 +46,9 @@ def block_powers(residual: Floats, count: int = BLOCKS) -> Floats:
 def gain(before: Floats, after: Floats) -> Gain:
     """What ``after`` explains of ``before``; residuals of the same samples.
 
-    ``before - after`` is the change of the prediction, fitted elsewhere. If it is of no use, its product with
-    ``before`` is of either sign: that is tested, block by block. Whether the residual's power falls would be
-    a test of half the sharpness, as the change must then earn its own power as well.
+    ``before - after`` is the change of the prediction, fitted elsewhere. If it is useless, its product with
+    ``before`` is of either sign: that is tested, block by block. A test of whether the residual's power falls
+    would be half as sensitive, as the change adds its own power to the residual.
     """
     a, b = block_powers(before), block_powers(after)
     total = float(np.sum(a))
@@ -62,16 +62,16 @@ def gain(before: Floats, after: Floats) -> Gain:
     return Gain(explained, error, _p_value(products[0] + products[1] - products[2]))
 
 
-def difference(one: Floats, other: Floats) -> float:
-    """Mean difference of two residuals' block powers in its own standard errors; positive if ``one`` is larger."""
-    d = block_powers(one) - block_powers(other)
+def difference(first: Floats, second: Floats) -> float:
+    """Mean difference of two residuals' block powers in its own standard errors; positive if the first is larger."""
+    d = block_powers(first) - block_powers(second)
     spread = float(np.std(d, ddof=1) / np.sqrt(len(d)))
     mean = float(np.mean(d))
     return mean / spread if spread > 0.0 else float(np.sign(mean)) * np.inf if mean else 0.0
 
 
 def _p_value(products: Floats) -> float:
-    """Signed-rank test (Wilcoxon, 1945): a few strong blocks, as of a growing excitation, decide nothing alone."""
+    """Signed-rank test (Wilcoxon, 1945), so that a few strong blocks do not decide alone."""
     if not np.any(products):
         return 1.0
     return float(wilcoxon(products, alternative="greater").pvalue)

@@ -134,13 +134,13 @@ def test_every_other_set_of_channels(measured: tuple[str, ...]) -> None:
             truth = record[motion]
         assert error(done.record[motion], truth, max(done.edge, 8)) < 0.02
     assert (done.band[0] > 0.0) == ("displacement" not in measured)
-    assert len(done.says) == 3 - len(measured)
+    assert len(done.notes) == 3 - len(measured)
 
 
 def test_complete_leaves_a_complete_record_alone() -> None:
     record = simulated("linear")
     done = complete(record)
-    assert done.says == ()
+    assert done.notes == ()
     assert done.edge == 0
     for channel in record.channels:
         np.testing.assert_array_equal(done.record[channel], record[channel])
@@ -169,7 +169,7 @@ def test_the_suggested_cutoff_follows_the_noise() -> None:
 @pytest.mark.parametrize("cutoff", [0.0, -1.0, 25.0, 1e9, float("nan")])
 def test_impossible_cutoff(cutoff: float) -> None:
     record = only(simulated("linear"), "acceleration")
-    with pytest.raises(StudyError, match=r"rig: the cut-off is .* below 25 Hz is right"):
+    with pytest.raises(StudyError, match=r"rig: the cut-off is .*; expected it above 0 and below 25 Hz"):
         complete(record, cutoff)
 
 
@@ -187,7 +187,7 @@ def test_motions_are_brought_to_one_set_of_units() -> None:
     assert done.record.units["force"] == "kN"
     np.testing.assert_allclose(done.record["acceleration"], 1e3 * record["acceleration"], rtol=1e-12)
     assert error(done.record["velocity"], 1e3 * record["velocity"], done.edge) < 1e-3
-    assert "acceleration is converted from g to mm/s^2" in done.says
+    assert "acceleration is converted from g to mm/s^2" in done.notes
 
 
 @pytest.mark.parametrize(
