@@ -36,13 +36,7 @@ class ExpressionError(StudyError):
 
 
 def parse(text: str) -> ast.expr:
-    """Check the outer form of a formula and return its syntax tree.
-
-    Raises
-    ------
-    ExpressionError
-        If the text is too long, nested too deeply or no formula at all.
-    """
+    """Check the outer form of a formula and return its syntax tree."""
     if len(text) > LONGEST:
         raise ExpressionError(f"the expression has {len(text)} characters; at most {LONGEST} are read")
     if not text.isascii() or "\x00" in text:
@@ -73,13 +67,7 @@ def names(text: str) -> list[str]:
 
 
 def build(graph: Graph, text: str, known: Mapping[str, int]) -> int:
-    """Add a formula to a graph; ``known`` has the node of each name it may use. Returns the node of its value.
-
-    Raises
-    ------
-    ExpressionError
-        At the first part that is not on the whitelist, naming it.
-    """
+    """Add a formula to a graph; ``known`` has the node of each name it may use. Returns the node of its value."""
     return _Builder(graph, text, known).node(parse(text))
 
 

@@ -125,13 +125,7 @@ class Model:
         return " + ".join(parts) + " = F(t)"
 
     def numbers(self) -> dict[str, float]:
-        """Every value, all known.
-
-        Raises
-        ------
-        StudyError
-            If one is still to be estimated, or there is no positive mass.
-        """
+        """Every value; all must be known, and the mass positive."""
         known = {key: value for key, value in self.values.items() if value is not None}
         missing = [key for key in self.values if key not in known]
         if missing:
@@ -165,11 +159,6 @@ def forward_graph(model: Model, channels: tuple[str, ...] = ()) -> ForwardGraph:
     """The equation of motion of a model as nodes; coefficients and shape parameters are inputs of the graph.
 
     ``channels`` are those of the user's own terms (:func:`named_channels`), in the order of the drive.
-
-    Raises
-    ------
-    StudyError
-        If the model has no inertia, or a formula uses a name it may not.
     """
     if "inertia" not in model:
         raise StudyError(f"model {model.name!r} has no inertia; a free run needs it")

@@ -108,11 +108,6 @@ def revised(text: str, source: str, model: Model) -> str:
 
     The model has the terms of the file in their order, values held or freed, and perhaps further terms. ``source`` is
     named in messages.
-
-    Raises
-    ------
-    StudyError
-        If the layout of the text leaves no clear place for a change.
     """
     before = parse_model(text, Path(source)).terms
     for number, entry in enumerate(model.terms):

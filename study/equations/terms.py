@@ -203,13 +203,7 @@ LIBRARY: dict[str, Term] = {term.name: term for term in _TERMS}
 
 
 def get(name: str) -> Term:
-    """The library's term of this name.
-
-    Raises
-    ------
-    StudyError
-        If there is none, naming the nearest.
-    """
+    """The library's term of this name."""
     if name not in LIBRARY:
         near = get_close_matches(name, LIBRARY, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else f"; known are {', '.join(LIBRARY)}"
@@ -222,11 +216,6 @@ def custom(name: str, force: str) -> Term:
 
     u, v, t and pi are displacement, velocity, time and the number, even where a channel is called so. The term has no
     state: z is a channel like any other.
-
-    Raises
-    ------
-    StudyError
-        If the name is taken by the library or is no plain name, or the formula is refused.
     """
     if name in LIBRARY:
         raise StudyError(f"the name {name!r} belongs to the library; give your own term another name")

@@ -234,11 +234,6 @@ def consistent(record: Record) -> tuple[Record, tuple[str, ...]]:
 
     Returned beside a sentence on each conversion. The unit of length is that of the first of displacement, velocity
     and acceleration that was measured (metres for an acceleration in g).
-
-    Raises
-    ------
-    StudyError
-        If a unit is unknown, or calibrated and uncalibrated (volts) motions are mixed.
     """
     measured = [m for m in MOTIONS if m in record]
     units = {m: role_unit(m, record.units.get(m) or SI_UNITS[m]) for m in measured}

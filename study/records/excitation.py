@@ -108,11 +108,6 @@ def force(excitation: Excitation, samples: int, dt: float, seed: int) -> Floats:
     """A force history in newtons, shape (samples,); ``samples`` is a multiple of ``excitation.periods``.
 
     The same seed gives the same bytes. A swept sine is not random and is the same for all.
-
-    Raises
-    ------
-    StudyError
-        If the force reaches above the Nyquist frequency or does not fit into the record.
     """
     length = _checked_period(excitation, samples, dt)
     period = _HISTORIES[excitation.kind](excitation, length, dt, _generator(seed, FORCE_STREAM))

@@ -42,13 +42,7 @@ class Floor:
 
 
 def floor(residual: Floats, dt: float, low: float = 0.0) -> Floor:
-    """Split a residual into noise floor and structure, both above the frequency ``low`` (hertz).
-
-    Raises
-    ------
-    StudyError
-        If too few lines of the spectrum lie above it.
-    """
+    """Split a residual into noise floor and structure, both above the frequency ``low`` (hertz)."""
     length = max(32, min(1024, 2 ** int(np.log2(len(residual) / 8))))
     segments = Segments(length=length)
     frequency, density = autospectrum(residual, dt, segments)

@@ -31,13 +31,7 @@ def make_plan(
     judge: tuple[int, int] | None = None,
     measured: str | None = None,
 ) -> Plan:
-    """Fit the first half and judge the second by default; compare with the first motion that was measured.
-
-    Raises
-    ------
-    StudyError
-        If the parts overlap or leave the record.
-    """
+    """Fit the first half and judge the second by default; compare with the first motion that was measured."""
     half = len(record) // 2
     fit, judge = fit or (0, half), judge or (half, len(record))
     for name, (first, last) in (("fit", fit), ("judge", judge)):

@@ -132,11 +132,6 @@ def cross_spectra(channels: Sequence[Floats], dt: float, segments: Segments | No
         Sampling interval in seconds.
     segments : Segments, optional
         Default: the report's 512-point Hann segments with half overlap.
-
-    Raises
-    ------
-    StudyError
-        If channels differ in length or are shorter than a segment.
     """
     return cross_spectra_in_pieces([channels], dt, segments)
 

@@ -23,13 +23,7 @@ ESTIMATORS = {
 
 
 def get(name: str) -> "Estimator":
-    """The estimator of this name, its module imported only now.
-
-    Raises
-    ------
-    StudyError
-        If there is none.
-    """
+    """The estimator of this name, its module imported only now."""
     if name not in ESTIMATORS:
         raise StudyError(f"there is no estimator {name!r}; known are {', '.join(ESTIMATORS)}")
     return cast("Estimator", import_module(ESTIMATORS[name]).identify)

@@ -45,11 +45,6 @@ def fit(model: Model, record: Record) -> FreeRunFit:
     """The fit in free run behind the estimate; cached, as the instruments use the same one.
 
     Coefficients of the model are left open, shape parameters that it gives are held.
-
-    Raises
-    ------
-    StudyError
-        If the model cannot be fitted, as where force and displacement have nothing in common.
     """
     opened = model.with_values({key: None for key in model.values if "." not in key})
     return with_step_error(fit_model(opened, whole(record)), record, opened.held_keys)

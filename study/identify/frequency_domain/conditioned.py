@@ -58,10 +58,7 @@ class MisoResult(Responses):
 def analyse(matrix: SpectralMatrix) -> MisoResult:
     """Analyse a spectral matrix whose last channel is the output, all others inputs.
 
-    Raises
-    ------
-    StudyError
-        If there are not more effective averages than inputs (every coherence would be one).
+    There must be more effective averages than inputs, else every coherence would be one.
     """
     inputs = matrix.density.shape[1] - 1
     if matrix.averages <= inputs:

@@ -64,13 +64,7 @@ class Input:
 
 
 def reverse_inputs(model: Model) -> tuple[Input, ...]:
-    """Inputs of a model, in the order in which its terms first need them.
-
-    Raises
-    ------
-    StudyError
-        If a shape parameter is still unknown.
-    """
+    """Inputs of a model, in the order in which its terms first need them."""
     inputs: dict[tuple[object, ...], Input] = {}
     for entry in model.terms:
         parameters = _known_parameters(entry)

@@ -36,11 +36,6 @@ def fit(lines: Lines, inputs: Sequence[Input], band: tuple[float, float], settin
     """Coefficients of all inputs that have power from the first to the second frequency of ``band`` (Hz).
 
     Local bands are widened until few lines are left over.
-
-    Raises
-    ------
-    StudyError
-        If there are fewer lines than one local band needs.
     """
     settings.check(len(inputs))
     index = _bands(lines, band, settings)

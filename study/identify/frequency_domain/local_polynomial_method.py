@@ -103,11 +103,6 @@ def responses(lines: Lines, settings: LocalPolynomial) -> Responses:
 
     Bands stand half of their half width apart. Estimates of neighbouring ones share lines and so are
     correlated; the covariance is that of each by itself.
-
-    Raises
-    ------
-    StudyError
-        If the record has fewer lines than a band, or a band too few for so many inputs.
     """
     settings.check(len(lines.inputs))
     if len(lines.frequency) < settings.width:

@@ -37,13 +37,7 @@ DIFFERENT = 0.5  # share of a force's power that may differ between periods
 
 
 def steady(record: Record, settle: int) -> Record:
-    """The whole periods of a record, counted back from its end, less the first ``settle``.
-
-    Raises
-    ------
-    StudyError
-        If the record has no period, holds too few, or its force does not repeat.
-    """
+    """The whole periods of a record, counted back from its end, less the first ``settle``."""
     period = record.period
     if period is None:
         raise StudyError(f"{record.name} has no period; errors_in_variables needs the samples of one period")
@@ -72,11 +66,6 @@ def fit(record: Record, inputs: Sequence[Input], band: tuple[float, float]) -> E
     """Coefficients of all inputs that have power in the band (Hz), from the periods that :func:`steady` gives.
 
     The covariance has as many degrees of freedom as there are periods, less one.
-
-    Raises
-    ------
-    StudyError
-        If there are too few periods or lines, or an input is not the same in every period.
     """
     periods = Periods.of(record, inputs, band)
     count = len(periods.force)

@@ -25,13 +25,7 @@ LONGEST, SHORTEST, PARTS = 1024, 64, 12  # samples in a segment, and how many of
 
 
 def linear_start(model: Model, prepared: Prepared) -> dict[str, float]:
-    """Mass, damping and stiffness of the best linear approximation; zero for everything else.
-
-    Raises
-    ------
-    StudyError
-        If force and response have nothing in common.
-    """
+    """Mass, damping and stiffness of the best linear approximation; zero for everything else."""
     record, response = prepared.record, prepared.response
     part = record.part(*prepared.plan.fit)
     length = min(1024, 2 ** int(np.log2(max(len(part) // 8, 16))))
