@@ -17,7 +17,7 @@ MODELS = sorted({f"models/{name.split('.')[1]}.yaml" for name in _reported.state
 ENSEMBLE_CODE = sorted(
     {*CODE["record"], *CODE["identify"], "study/reproduction/ensemble.py", "study/reproduction/claims/evidence.py", "study/reproduction/claims/sample.py"}
 )
-CLAIM_CODE = sorted({*ENSEMBLE_CODE, "study/reproduction/preliminary.py", *(str(p) for p in Path("study/reproduction/claims").glob("*.py"))})
+CLAIM_CODE = sorted({*ENSEMBLE_CODE, "study/reproduction/preliminary.py", "study/support/numbers.py", *(str(p) for p in Path("study/reproduction/claims").glob("*.py"))})
 CLAIM_SETTINGS = {
     key: STUDY.settings[key]
     for key in "sampling noise_seed integrator segments fit_band tolerances ensembles".split()
