@@ -20,23 +20,14 @@ OWN = "this run"
 
 
 def errors(estimates: pd.DataFrame) -> pd.DataFrame:
-    """Errors by case, estimator and parameter.
+    """Errors by case, estimator and parameter, from :func:`study.reproduction.ensemble.estimates` of one or more cases.
 
-    Parameters
-    ----------
-    estimates : DataFrame
-        As :func:`study.reproduction.ensemble.estimates` gives it, of one case or several.
-
-    Returns
-    -------
-    DataFrame
-        Columns ``COLUMNS``. Errors are relative where the true value is not zero (``kind``), otherwise in the
-        parameter's own unit. ``median_error`` is the median over the seeds of the size of the error; a seed
-        that gives no estimate is farther off than any other. ``standard_error`` is that of the median, whatever
-        the distribution. ``gain`` is the median error of MI/SO over this one. ``bias`` and ``scatter`` are
-        mean and standard deviation of the signed error. ``found`` of ``seeds`` give an estimate, ``noted`` of
-        them with a note, such as that the search did not converge. ``first_error`` is the median over the
-        first ``FIRST`` seeds alone, ``source`` where the other numbers come from.
+    Errors are relative where the true value is not zero (``kind``), otherwise in the parameter's own unit.
+    ``median_error`` is the median over the seeds of the size of the error; a seed that gives no estimate is farther
+    off than any other. ``standard_error`` is that of the median, whatever the distribution. ``gain`` is the median
+    error of MI/SO over this one. ``bias`` and ``scatter`` are mean and standard deviation of the signed error.
+    ``found`` of ``seeds`` give an estimate, ``noted`` of them with a note, such as that the search did not converge.
+    ``first_error`` is the median over the first ``FIRST`` seeds alone, ``source`` where the other numbers come from.
     """
     seeds = {str(case): sorted(group["seed"].unique()) for case, group in estimates.groupby("case")}
     rows: list[dict[str, Any]] = []
@@ -68,22 +59,11 @@ def errors(estimates: pd.DataFrame) -> pd.DataFrame:
 
 
 def with_more_seeds(own: pd.DataFrame, kept: pd.DataFrame, source: str) -> pd.DataFrame:
-    """The errors of a run, and in place of its few seeds a kept table's many, where the two are of the same study.
+    """The errors of a run, with those of a kept table over more seeds where the two are of the same study.
 
     A case's rows give way if the kept table has each of them over more seeds, and its first seeds came out the
-    same, to ``ALIKE`` in every parameter of every estimator: other settings and other code would show there.
-
-    Parameters
-    ----------
-    own, kept : DataFrame
-        As :func:`errors` gives them.
-    source : str
-        Where ``kept`` lies, for the column of that name.
-
-    Returns
-    -------
-    DataFrame
-        The rows of ``own``, in its order; ``first_error`` is always that of ``own``.
+    same, to ``ALIKE`` in every parameter of every estimator: other settings and other code would show there. The
+    rows keep the order and the ``first_error`` of ``own``; ``source`` says where ``kept`` lies.
     """
     keys = ["case", "estimator", "parameter"]
     many = kept.set_index(keys).reindex(pd.MultiIndex.from_frame(own[keys])).reset_index()[COLUMNS]
@@ -122,32 +102,21 @@ def with_gains(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def by_case(table: pd.DataFrame) -> pd.DataFrame:
-    """Medians over a case's parameters with a true value other than zero.
-
-    Returns
-    -------
-    DataFrame
-        Columns ``case, estimator, median_error, gain, noted``: the middle one of the parameters' errors and of
-        their gains, and the share of seeds with a note.
-    """
-    kept = table[table["kind"] == "relative"].assign(noted=table["noted"] / table["seeds"])
-    columns = ["median_error", "gain", "noted"]
-    return kept.groupby(["case", "estimator"], sort=False)[columns].median().reset_index()
+    """By case and estimator, medians over the parameters with a true value other than zero: of errors and of gains."""
+    relative = table[table["kind"] == "relative"]
+    return relative.groupby(["case", "estimator"], sort=False)[["median_error", "gain"]].median().reset_index()
 
 
 def worst_bias(table: pd.DataFrame) -> pd.DataFrame:
-    """By case and estimator the parameter whose bias is the largest part of its scatter.
+    """By case and estimator the parameter with the largest ``ratio`` of bias to scatter.
 
-    Returns
-    -------
-    DataFrame
-        Columns ``case, estimator, parameter, ratio, ratio_error``; ``ratio_error`` is what chance alone brings.
+    ``ratio_error`` is the ratio that chance alone brings.
     """
     scattered = table[table["scatter"] > 0.0]
     ratio = scattered["bias"].abs() / scattered["scatter"]
-    found = scattered.assign(ratio=ratio, ratio_error=1.0 / np.sqrt(scattered["found"]))
-    highest = found.groupby(["case", "estimator"], sort=False)["ratio"].idxmax()
-    return found.loc[highest, ["case", "estimator", "parameter", "ratio", "ratio_error"]].reset_index(drop=True)
+    ratios = scattered.assign(ratio=ratio, ratio_error=1.0 / np.sqrt(scattered["found"]))
+    highest = ratios.groupby(["case", "estimator"], sort=False)["ratio"].idxmax()
+    return ratios.loc[highest, ["case", "estimator", "parameter", "ratio", "ratio_error"]].reset_index(drop=True)
 
 
 def estimators(table: pd.DataFrame) -> Sequence[str]:

@@ -90,7 +90,7 @@ def coherences(estimates: Mapping[str, Identified]) -> pd.DataFrame:
 
 
 def noise_spectra(estimates: Mapping[str, Identified]) -> pd.DataFrame:
-    """G_nn of each estimator that has it, what its inputs leave of the force (4.44), in N^2/Hz, in long form."""
+    """G_nn (4.44), the autospectrum of the residual force of each estimator that has one, in N^2/Hz, in long form."""
     results = {estimator: identified.responses for estimator, identified in estimates.items()}
     return _stacked(NOISE_COLUMNS, [(r.frequency, name, r.noise) for name, r in results.items() if r is not None])
 

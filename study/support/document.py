@@ -63,7 +63,7 @@ Block = Heading | Text | Bullets | Table | Image
 
 
 def table(heading: Sequence[str], rows: Sequence[Sequence[object]]) -> Block:
-    """A table, or a word that says that there is nothing."""
+    """A table, or the word "None." where there are no rows."""
     if not rows:
         return Text("None.")
     return Table(tuple(heading), tuple(tuple(str(cell) for cell in row) for row in rows))
@@ -105,7 +105,7 @@ def put(path: Path, mark: str, blocks: Sequence[Block]) -> None:
     """
     place = re.compile(rf"(<!-- {mark} -->\n).*?(<!-- /{mark} -->)", re.DOTALL)
     block = markdown(blocks)
-    text, count = place.subn(lambda found: found[1] + block + found[2], path.read_text(encoding="utf-8"))
+    text, count = place.subn(lambda match: match[1] + block + match[2], path.read_text(encoding="utf-8"))
     if count != 1:
         raise StudyError(f"{path} has no place for {mark}: a line '<!-- {mark} -->' and one '<!-- /{mark} -->'")
     replace_file(path, text.encode())
@@ -139,6 +139,6 @@ def _html(block: Block) -> str:
 def _inline(text: str) -> str:
     """Marks within a line; links lead out of a self-contained page and become plain words."""
     text = html.escape(text, quote=False)
-    for pattern, put in ((BOLD, r"<strong>\1</strong>"), (CODE, r"<code>\1</code>"), (LINK, r"\1")):
-        text = re.sub(pattern, put, text)
+    for pattern, replacement in ((BOLD, r"<strong>\1</strong>"), (CODE, r"<code>\1</code>"), (LINK, r"\1")):
+        text = re.sub(pattern, replacement, text)
     return text

@@ -44,31 +44,25 @@ def _added(evidence: Evidence, noise: float, label: str) -> list[Condition]:
     return conditions
 
 
-def siso_stiffness(evidence: Evidence, reported: Reported) -> list[Condition]:
-    """k = 500."""
-    stated, ensemble = reported.value("siso_stiffness"), evidence.at("duffing")
-    read = ensemble.hand_read("k")
+def _siso_curve(evidence: Evidence, name: str, stated: float, why: str = "") -> list[Condition]:
+    """The SI/SO curve gives a parameter that the report states, read by hand and fitted."""
+    read, fitted = evidence.at("duffing").hand_read(name), evidence.at("duffing").siso(name)
     return [
-        close("hand-read k", read, stated, common.READ_OFF),
-        one_record("hand-read k", read, stated),
-        close("fitted k", ensemble.siso("k"), stated, common.READ_OFF),
+        close(f"hand-read {name}", read, stated, common.READ_OFF, why),
+        one_record(f"hand-read {name}", read, stated, why),
+        close(f"fitted {name}", fitted, stated, common.READ_OFF, why),
     ]
 
 
 def siso_frequency(evidence: Evidence, reported: Reported) -> list[Condition]:
     """f_n = 3.6 Hz."""
-    stated, ensemble = reported.value("siso_frequency"), evidence.at("duffing")
-    read, fitted = ensemble.hand_read("f_n"), ensemble.siso("f_n")
+    fitted = evidence.at("duffing").siso("f_n")
     lower = evidence.at("duffing", common.levels(reported)[1]).hand_read("f_n")
     why = (
         f"the best linear fit lies at {fitted.mean:.2f} Hz; at half the variance it is read at {lower.mean:.2f} Hz, so "
         "that the report's force seems to have been weaker"
     )
-    return [
-        close("hand-read f_n", read, stated, common.READ_OFF, why),
-        one_record("hand-read f_n", read, stated, why),
-        close("fitted f_n", fitted, stated, common.READ_OFF, why),
-    ]
+    return _siso_curve(evidence, "f_n", reported.value("siso_frequency"), why)
 
 
 def siso_wrong(evidence: Evidence, reported: Reported) -> list[Condition]:
@@ -120,7 +114,8 @@ def duffing_histogram(evidence: Evidence, _: Reported) -> list[Condition]:
 
 
 CLAIMS = claims(
-    added_terms, siso_stiffness, siso_frequency, siso_wrong, duffing_cubic, duffing_share, duffing_histogram,
+    added_terms, siso_frequency, siso_wrong, duffing_cubic, duffing_share, duffing_histogram,
+    siso_stiffness=lambda e, r: _siso_curve(e, "k", r.value("siso_stiffness")),
     duffing_linear=lambda e, r: common.recovered(e, r, e.at("duffing"), common.LINEAR_PARTS),
     siso_varies=lambda e, r: common.rising("SI/SO k", {v: e.at("duffing", v).siso("k") for v in common.levels(r)}),
     duffing_coherence=lambda e, _: common.near_unity(e.at("duffing")),

@@ -179,7 +179,7 @@ def noise_cubic(evidence: Evidence, reported: Reported) -> list[Condition]:
     conditions: list[Condition] = []
     for name, part in (("k3", "real"), ("c3", "imaginary")):
         bias, scatter = f"bias of {name}", f"scatter of a line of the {part} part"
-        sizes = {noise: abs(found[name].mean) for noise, found in biases.items()}
+        sizes = {noise: abs(by_name[name].mean) for noise, by_name in biases.items()}
         spreads = {noise: _line_scatter(e, part == "imaginary", reported) for noise, e in ensembles.items()}
         conditions += [
             _rises(label, values, label, f"{label} (relative)") for label, values in ((bias, sizes), (scatter, spreads))

@@ -100,13 +100,11 @@ def overlap(evidence: Evidence, reported: Reported) -> list[Condition]:
     ratio = float(np.exp(np.mean(logarithms)))
     inflation = evidence.segments.line_inflation()
     spread = ratio * float(np.std(logarithms, ddof=1)) * math.sqrt(inflation / len(logarithms))
-    return [
-        Condition(
-            "scatter of a line of A_1 with overlap over that without below 1 by two standard errors",
-            f"{ratio:.3g} +- {spread:.1g} (geometric mean over the band)", ratio + 2.0 * spread < 1.0,
-            f"the ratio {ratio:.3g} +- {spread:.1g} is not clearly below one",
-        )
-    ]  # fmt: skip
+    return [Condition(
+        "scatter of a line of A_1 with overlap over that without below 1 by two standard errors",
+        f"{ratio:.3g} +- {spread:.1g} (geometric mean over the band)", ratio + 2.0 * spread < 1.0,
+        f"the ratio {ratio:.3g} +- {spread:.1g} is not clearly below one",
+    )]  # fmt: skip
 
 
 def linear_same(evidence: Evidence, _: Reported) -> list[Condition]:

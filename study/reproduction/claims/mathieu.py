@@ -80,15 +80,13 @@ def mathieu_histogram(evidence: Evidence, _: Reported) -> list[Condition]:
     """Figure 36: fewer values near zero than a Gaussian has."""
     central, shape = evidence.of_channel("mathieu", central_share), evidence.of_channel("mathieu", kurtosis)
     flat_records = average([v < GAUSSIAN_CENTRAL_SHARE for v in central.values])
-    return [
-        Condition(
-            f"share of values within half a standard deviation below the Gaussian's {GAUSSIAN_CENTRAL_SHARE:.3f} "
-            "by three standard errors",
-            f"share {central}; kurtosis {shape}", central.mean < GAUSSIAN_CENTRAL_SHARE - 3.0 * central.error,
-            f"the varying stiffness gives heavy tails (kurtosis {shape.mean:.2f}) and a peaked top; single records "
-            f"look flat by chance ({percent(flat_records, '.0f')} of them)",
-        )
-    ]  # fmt: skip
+    return [Condition(
+        f"share of values within half a standard deviation below the Gaussian's {GAUSSIAN_CENTRAL_SHARE:.3f} "
+        "by three standard errors",
+        f"share {central}; kurtosis {shape}", central.mean < GAUSSIAN_CENTRAL_SHARE - 3.0 * central.error,
+        f"the varying stiffness gives heavy tails (kurtosis {shape.mean:.2f}) and a peaked top; single records "
+        f"look flat by chance ({percent(flat_records, '.0f')} of them)",
+    )]  # fmt: skip
 
 
 CLAIMS = claims(

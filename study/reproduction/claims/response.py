@@ -36,7 +36,7 @@ def narrow_band(evidence: Evidence, reported: Reported) -> list[Condition]:
 
 
 def share_of_power(density: Floats, keep: NDArray[np.bool_]) -> Sample:
-    """Of each record's autospectrum, shape (records, lines): how much of it the kept lines hold."""
+    """Share of the power of each record's autospectrum, shape (records, lines), that lies in the kept lines."""
     return Sample.own_first(float(np.sum(d[keep]) / np.sum(d)) for d in density)
 
 
@@ -50,7 +50,7 @@ def harmonics(evidence: Evidence, _: Reported) -> list[Condition]:
 
 
 def _excess(density: Floats, linear: Floats, keep: NDArray[np.bool_]) -> Sample:
-    """Record by record, what the kept lines of one autospectrum hold beyond those of another, as a share."""
+    """Power of each record in the kept lines, over that of another system's record, less one."""
     return Sample.own_first(
         float(np.sum(d[keep]) / np.sum(b[keep]) - 1.0) for d, b in zip(density, linear, strict=True)
     )  # fmt: skip

@@ -33,13 +33,11 @@ def system_stiffness_gap(evidence: Evidence, reported: Reported) -> list[Conditi
     at_rest = model_restoring_force(evidence.model(Drive("dead_band")), u, np.zeros_like(u), np.zeros_like(u))
     worst = float(np.max(np.abs(at_rest - k * (u - np.clip(u, -gap, gap)))))
     allowed = 1e-6 * k * gap
-    return [
-        Condition(
-            f"restoring force at rest within {allowed:.2g} N of k (u - u_g sgn u), zero within the gap",
-            f"largest difference {worst:.2g} N", worst <= allowed,
-            f"the model's restoring force differs by up to {worst:.2g} N from what Table 1's k and u_g give",
-        )
-    ]  # fmt: skip
+    return [Condition(
+        f"restoring force at rest within {allowed:.2g} N of k (u - u_g sgn u), zero within the gap",
+        f"largest difference {worst:.2g} N", worst <= allowed,
+        f"the model's restoring force differs by up to {worst:.2g} N from what Table 1's k and u_g give",
+    )]  # fmt: skip
 
 
 def amplitude_nonlinear(evidence: Evidence, _: Reported) -> list[Condition]:
@@ -92,7 +90,7 @@ def force_gaussian(evidence: Evidence, _: Reported) -> list[Condition]:
 
 
 def _rarely_refused(refusals: Sample, before: str = "", after: str = "") -> Condition:
-    """A Gaussian is refused hardly more often than the level of the test says; the words go about what is measured."""
+    """A Gaussian is refused hardly more often than the level of the test allows."""
     return Condition(
         f"a 5 % test refuses a Gaussian for at most {TESTS_WRONG:g} of the records",
         f"{before}refused {refusals.mean:.2g}{after}", refusals.mean <= TESTS_WRONG,
@@ -199,14 +197,12 @@ def exact_stiffness(evidence: Evidence, reported: Reported) -> list[Condition]:
     stated, table = reported.value("exact_stiffness"), reported.table_1("linear", "k")
     model = evidence.model(Drive("linear")).values["k"] or 0.0
     modal = reported.table_1("linear", "m") * (2.0 * math.pi * reported.table_1("linear", "f_n")) ** 2
-    return [
-        Condition(
-            "the exact stiffness equals that of Table 1 and of (2 pi f_n)^2 m to four digits",
-            f"Table 1 {table:g}, (2 pi f_n)^2 m {modal:.1f}, model {model:g} N/m",
-            all(math.isclose(stated, x, rel_tol=1e-4) for x in (table, modal, model)),
-            f"Section 5.2.1 says {stated:g} where Table 1 says {table:g}, which (2 pi f_n)^2 m = {modal:.1f} confirms",
-        )
-    ]
+    return [Condition(
+        "the exact stiffness equals that of Table 1 and of (2 pi f_n)^2 m to four digits",
+        f"Table 1 {table:g}, (2 pi f_n)^2 m {modal:.1f}, model {model:g} N/m",
+        all(math.isclose(stated, x, rel_tol=1e-4) for x in (table, modal, model)),
+        f"Section 5.2.1 says {stated:g} where Table 1 says {table:g}, which (2 pi f_n)^2 m = {modal:.1f} confirms",
+    )]  # fmt: skip
 
 
 CLAIMS = claims(
