@@ -1,5 +1,7 @@
 """Section 6: the conclusions."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -102,13 +104,11 @@ def conclusion_5_noise(evidence: Evidence, reported: Reported) -> list[Condition
     return explained("noise on u biases the reverse estimate, most where the response is weak", conditions)
 
 
-def conclusion_6(evidence: Evidence, reported: Reported) -> list[Condition]:
+def conclusion_6(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """The lowest level of Section 5.3."""
     ensemble = evidence.at(COMBINED, levels(reported)[0])
-    return [
-        at_least("linear coherence at the lowest level", ensemble.linear_coherence(), 0.95),
-        *recovered(evidence, reported, ensemble, ("k3", "c3")),
-    ]
+    yield at_least("linear coherence at the lowest level", ensemble.linear_coherence(), 0.95)
+    yield from recovered(evidence, reported, ensemble, ("k3", "c3"))
 
 
 def conclusion_7(evidence: Evidence, reported: Reported) -> list[Condition]:

@@ -1,6 +1,7 @@
 """Sections 5.2.6 and 5.2.7: the Dead-Band and the Extreme system."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from study.reproduction.claims.judgement import (
 )
 from study.reproduction.claims.linear_system import longer_segments_help
 from study.reproduction.claims.reported import Reported
-from study.reproduction.claims.sample import Sample, relative_distance, share
+from study.reproduction.claims.sample import Sample, how_often, relative_distance
 from study.support.numbers import percent
 
 SYSTEM = "dead_band"
@@ -29,7 +30,7 @@ AS_DUFFING = Assumed(plus=("cubic_stiffness",), minus=("dead_band",))
 SAME_ORDER = 3.0  # dead band and root mean square response within a factor of this
 
 
-def dead_band_as_duffing(evidence: Evidence, reported: Reported) -> list[Condition]:
+def dead_band_as_duffing(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """A cubic stiffness in place of the dead band."""
     ensemble = evidence.ensemble(Drive(SYSTEM), AS_DUFFING)
     linear, whole = ensemble.linear_coherence(), ensemble.multiple_coherence()
@@ -37,92 +38,77 @@ def dead_band_as_duffing(evidence: Evidence, reported: Reported) -> list[Conditi
     where, lowest = ensemble.lowest(lambda o: -o.miso.cumulative[-1])
     gap = reported.table_1(SYSTEM, "u_g")
     size = evidence.of_channel(SYSTEM, lambda displacement: float(np.std(displacement)) / gap)
-    return [
-        Condition(
-            f"dead band and response of the same order (within a factor of {SAME_ORDER:g})",
-            f"root mean square response {size} of u_g", 1.0 / SAME_ORDER <= size.mean <= SAME_ORDER,
-        ),
-        significant("k3", ensemble.miso("k3")),
-        at_least("share of the linear fit's failure that the cubic term removes", gain, 0.5,
-                 f"the cubic term takes the coherence from {linear.mean:.3f} to {whole.mean:.3f} only"),
-        at_most("multiple coherence over the fit band", whole, common.NEAR_UNITY_LOWEST,
-                f"it reaches {whole.mean:.3f} on average: a cubic imitates the gap well"),
-        Condition(
-            "no line's mean multiple coherence above 0.99", f"highest line {-lowest:.4f} at {where:.2f} Hz",
-            -lowest <= 0.99,
-            f"at {where:.1f} Hz it reaches {-lowest:.4f}: there the mass takes nearly all of the force",
-        ),
-    ]  # fmt: skip
+    yield Condition(
+        f"dead band and response of the same order (within a factor of {SAME_ORDER:g})",
+        f"root mean square response {size} of u_g", 1.0 / SAME_ORDER <= size.mean <= SAME_ORDER,
+    )  # fmt: skip
+    yield significant("k3", ensemble.miso("k3"))
+    why = f"the cubic term takes the coherence from {linear.mean:.3f} to {whole.mean:.3f} only"
+    yield at_least("share of the linear fit's failure that the cubic term removes", gain, 0.5, why)
+    why = f"it reaches {whole.mean:.3f} on average: a cubic imitates the gap well"
+    yield at_most("multiple coherence over the fit band", whole, common.NEAR_UNITY_LOWEST, why)
+    yield Condition(
+        "no line's mean multiple coherence above 0.99", f"highest line {-lowest:.4f} at {where:.2f} Hz",
+        -lowest <= 0.99,
+        f"at {where:.1f} Hz it reaches {-lowest:.4f}: there the mass takes nearly all of the force",
+    )  # fmt: skip
 
 
-def dead_band_not_invariant(evidence: Evidence, reported: Reported) -> list[Condition]:
+def dead_band_not_invariant(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """k and k3 of the Duffing system put in its place, at the lowest and the highest level of Section 5.3."""
     lowest, *_, highest = common.levels(reported)
     low, high = (evidence.ensemble(Drive(SYSTEM, level), AS_DUFFING) for level in (lowest, highest))
-    conditions: list[Condition] = []
     for name in ("k", "k3"):
         before, after = low.miso(name), high.miso(name)
         least = max(0.1 * abs(before.mean), 5.0 * math.hypot(before.error, after.error))
-        conditions.append(
-            Condition(
-                f"{name} changes by more than 10 % and 5 standard errors from variance {lowest:g} to {highest:g}",
-                f"{name} {before} and {after}", abs(after.mean - before.mean) > least,
-            )
+        yield Condition(
+            f"{name} changes by more than 10 % and 5 standard errors from variance {lowest:g} to {highest:g}",
+            f"{name} {before} and {after}", abs(after.mean - before.mean) > least,
         )  # fmt: skip
-    return conditions
 
 
-def dead_band_linear(evidence: Evidence, reported: Reported) -> list[Condition]:
+def dead_band_linear(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """SI/SO's natural frequency, MI/SO's A_1."""
     ensemble, f_n = evidence.at(SYSTEM), reported.table_1(SYSTEM, "f_n")
-    return [
-        at_most("SI/SO f_n, hand-read", ensemble.hand_read("f_n"), 0.9 * f_n),
-        at_most("SI/SO f_n, fitted", ensemble.sample(lambda o: o.siso.values.get("f_n", 0.0)), 0.9 * f_n),
-        *common.recovered(evidence, reported, ensemble, common.LINEAR_PARTS),
-    ]
+    yield at_most("SI/SO f_n, hand-read", ensemble.hand_read("f_n"), 0.9 * f_n)
+    yield at_most("SI/SO f_n, fitted", ensemble.sample(lambda o: o.siso.values.get("f_n", 0.0)), 0.9 * f_n)
+    yield from common.recovered(evidence, reported, ensemble, common.LINEAR_PARTS)
 
 
-def dead_band_stiffness(evidence: Evidence, reported: Reported) -> list[Condition]:
+def dead_band_stiffness(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """-A_2 fitted, and its largest error outside the 2- to 3-Hz band."""
     ensemble, stated = evidence.at(SYSTEM), reported.value("dead_band_stiffness")
     low, high = common.band(reported, "dead_band_error")
     outside = ~ensemble.between(low, high)
     worst = ensemble.sample(lambda o: float(np.max(line_errors(o, stated)[outside])))
-    return [
-        close("fitted A_2", ensemble.miso("k_dead_band").scaled(-1.0), stated,
-              evidence.tolerance(SYSTEM, "k_dead_band")),
-        at_most(f"largest error of a line outside {low:g} to {high:g} Hz", worst, reported.value("dead_band_error"),
-                f"outside the band the worst line of a record errs by {percent(worst.mean, '.0f')}"),
-    ]  # fmt: skip
+    limit, allowed = reported.value("dead_band_error"), evidence.tolerance(SYSTEM, "k_dead_band")
+    why = f"outside the band the worst line of a record errs by {percent(worst.mean, '.0f')}"
+    yield close("fitted A_2", ensemble.miso("k_dead_band").scaled(-1.0), stated, allowed)
+    yield at_most(f"largest error of a line outside {low:g} to {high:g} Hz", worst, limit, why)
 
 
-def dead_band_error(evidence: Evidence, reported: Reported) -> list[Condition]:
+def dead_band_error(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """The 7 percent, and where the largest error is."""
     ensemble, stated = evidence.at(SYSTEM), reported.value("dead_band_error")
     low, high = common.band(reported, "dead_band_error")
     inside, true = ensemble.between(low, high), -reported.table_1(SYSTEM, "k")
     error = largest_error(ensemble, reported)
-    there = share(bool(inside[np.argmax(line_errors(o, true))]) for o in ensemble.seeds)
+    there = how_often(bool(inside[np.argmax(line_errors(o, true))]) for o in ensemble.seeds)
     longer = Assumed(segments=(("length", 2 * evidence.segments.length),))
     finer = largest_error(evidence.ensemble(Drive(SYSTEM), longer), reported)
     why = (
         f"the worst line of a record errs by {percent(error.mean, '.0f')} (scatter {percent(error.scatter, '.0f')}), "
         f"which is leakage: segments twice as long leave {percent(finer.mean, '.0f')}"
     )
-    return [
-        close(f"largest error from {low:g} to {high:g} Hz", error, stated, 0.5, why),
-        one_record(f"largest error from {low:g} to {high:g} Hz", error, stated, why),
-        at_least("share of records whose largest error lies in that band", there, 0.5,
-                 f"the largest error lies in that band in {percent(there.mean, '.0f')} of the records only"),
-    ]  # fmt: skip
+    yield close(f"largest error from {low:g} to {high:g} Hz", error, stated, 0.5, why)
+    yield one_record(f"largest error from {low:g} to {high:g} Hz", error, stated, why)
+    why = f"the largest error lies in that band in {percent(there.mean, '.0f')} of the records only"
+    yield at_least("share of records whose largest error lies in that band", there, 0.5, why)
 
 
-def dead_band_share(evidence: Evidence, reported: Reported) -> list[Condition]:
+def dead_band_share(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """About 65 percent, under both readings of unit variance."""
     stated, chosen = reported.value("dead_band_share"), evidence.settings["excitations"]["report"]["reading"]
-    shares = {
-        r: evidence.ensemble(Drive(SYSTEM, excitation=(("reading", r),))).linear_coherence() for r in READINGS
-    }  # fmt: skip
     by_level = {level: evidence.at(SYSTEM, level).linear_coherence() for level in (0.05, 0.1, *common.levels(reported))}
     lowest = min(by_level, key=lambda level: by_level[level].mean)
     where, bottom = evidence.at(SYSTEM, lowest).lowest(lambda o: o.miso.cumulative[0])
@@ -131,22 +117,22 @@ def dead_band_share(evidence: Evidence, reported: Reported) -> list[Condition]:
         f"no level gives it over the fit band (by variance of the {chosen} force the mean is {text}); at {lowest:g} "
         f"single lines fall to {bottom:.2f} at {where:.1f} Hz"
     )
-    return [near(f"linear coherence, unit variance {r}", shares[r], stated, 0.05, why) for r in READINGS]
+    for reading in READINGS:
+        share = evidence.ensemble(Drive(SYSTEM, excitation=(("reading", reading),))).linear_coherence()
+        yield near(f"linear coherence, unit variance {reading}", share, stated, 0.05, why)
 
 
-def dead_band_coherence(evidence: Evidence, reported: Reported) -> list[Condition]:
+def dead_band_coherence(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Approaches unity; the dip is leakage."""
     ensemble, f_n = evidence.at(SYSTEM), reported.table_1(SYSTEM, "f_n")
     where, lowest = ensemble.lowest(lambda o: o.miso.cumulative[-1])
     apparent = ensemble.hand_read("f_n").mean
-    return [
-        at_least("multiple coherence over the fit band", ensemble.multiple_coherence(), common.NEAR_UNITY_LOWEST),
-        Condition(
-            f"lowest coherence between the apparent resonance {apparent:.2f} Hz and {f_n:g} Hz, or 0.5 Hz about it",
-            f"lowest line {lowest:.3f} at {where:.2f} Hz", apparent - 0.5 <= where <= f_n + 0.5,
-        ),
-        longer_segments_help(evidence, SYSTEM, where, "there"),
-    ]  # fmt: skip
+    yield at_least("multiple coherence over the fit band", ensemble.multiple_coherence(), common.NEAR_UNITY_LOWEST)
+    yield Condition(
+        f"lowest coherence between the apparent resonance {apparent:.2f} Hz and {f_n:g} Hz, or 0.5 Hz about it",
+        f"lowest line {lowest:.3f} at {where:.2f} Hz", apparent - 0.5 <= where <= f_n + 0.5,
+    )  # fmt: skip
+    yield longer_segments_help(evidence, SYSTEM, where, "there")
 
 
 def linear_dominates(evidence: Evidence, _: Reported) -> list[Condition]:
@@ -154,38 +140,35 @@ def linear_dominates(evidence: Evidence, _: Reported) -> list[Condition]:
     return [at_least(f"{s}: linear coherence", evidence.at(s).linear_coherence(), 0.5) for s in common.SYSTEMS[1:-1]]
 
 
-def extreme_siso(evidence: Evidence, reported: Reported) -> list[Condition]:
+def extreme_siso(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """A false natural frequency, wrong mass and stiffness."""
     ensemble, m = evidence.at("extreme"), reported.table_1("extreme", "m")
     lowest, _ = ensemble.lowest(lambda o: np.abs(o.siso.response[0]))
     mass = ensemble.siso("m")
-    return [
-        at_least("SI/SO f_n (exact 0)", ensemble.sample(lambda o: o.siso.values.get("f_n", 0.0)), 0.5),
-        Condition(
-            "the averaged SI/SO |A_1| has its minimum inside the band", f"minimum at {lowest:.2f} Hz",
-            ensemble.frequency[0] < lowest < ensemble.frequency[-1],
-        ),
-        significant("SI/SO k (exact 0)", ensemble.siso("k")),
-        far("SI/SO m", mass, m, 0.05,
-            f"SI/SO's m is {percent(mass.mean / m - 1.0, '+.1f')} off, hardly a serious error"),
-    ]  # fmt: skip
+    yield at_least("SI/SO f_n (exact 0)", ensemble.sample(lambda o: o.siso.values.get("f_n", 0.0)), 0.5)
+    yield Condition(
+        "the averaged SI/SO |A_1| has its minimum inside the band", f"minimum at {lowest:.2f} Hz",
+        ensemble.frequency[0] < lowest < ensemble.frequency[-1],
+    )  # fmt: skip
+    yield significant("SI/SO k (exact 0)", ensemble.siso("k"))
+    why = f"SI/SO's m is {percent(mass.mean / m - 1.0, '+.1f')} off, hardly a serious error"
+    yield far("SI/SO m", mass, m, 0.05, why)
 
 
-def extreme_linear(evidence: Evidence, reported: Reported) -> list[Condition]:
+def extreme_linear(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """A_1 = -(2 pi f)^2 m."""
     ensemble, m = evidence.at("extreme"), reported.table_1("extreme", "m")
     exact = -((2.0 * math.pi * ensemble.frequency) ** 2) * m
     off = ensemble.sample(lambda o: relative_distance(o.miso.response[0], exact))
-    return [
-        at_most("departure of A_1 (root mean square over the band, relative)", off, 0.02),
-        *common.recovered(evidence, reported, ensemble, ("m", "c", "k")),
-    ]
+    yield at_most("departure of A_1 (root mean square over the band, relative)", off, 0.02)
+    yield from common.recovered(evidence, reported, ensemble, ("m", "c", "k"))
 
 
-def extreme_cubic(evidence: Evidence, reported: Reported) -> list[Condition]:
+def extreme_cubic(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """k3 and c3, confirmed by the coherence."""
     ensemble = evidence.at("extreme")
-    return [*common.recovered(evidence, reported, ensemble, ("k3", "c3")), *common.near_unity(ensemble)]
+    yield from common.recovered(evidence, reported, ensemble, ("k3", "c3"))
+    yield from common.near_unity(ensemble)
 
 
 CLAIMS = claims(

@@ -1,5 +1,7 @@
 """Sections 4.5 and 5.2.2: the Duffing system."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from study.reproduction.claims import common
@@ -65,35 +67,29 @@ def siso_frequency(evidence: Evidence, reported: Reported) -> list[Condition]:
     return _siso_curve(evidence, "f_n", reported.value("siso_frequency"), why)
 
 
-def siso_wrong(evidence: Evidence, reported: Reported) -> list[Condition]:
+def siso_wrong(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """SI/SO k and m at every level, against the study's tolerances."""
-    conditions: list[Condition] = []
     for level in common.levels(reported):
         for name in ("k", "m"):
             true, sample = reported.table_1("duffing", name), evidence.at("duffing", level).siso(name)
             allowed = evidence.tolerance("duffing", name)
-            conditions.append(
-                Condition(
-                    f"variance {level:g}: mean SI/SO {name} more than {percent(allowed)} off",
-                    f"variance {level:g}: {name} {sample}", abs(sample.mean - true) > allowed * true,
-                )
+            yield Condition(
+                f"variance {level:g}: mean SI/SO {name} more than {percent(allowed)} off",
+                f"variance {level:g}: {name} {sample}", abs(sample.mean - true) > allowed * true,
             )  # fmt: skip
-    return conditions
 
 
-def duffing_cubic(evidence: Evidence, reported: Reported) -> list[Condition]:
+def duffing_cubic(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Re A_2 = k3, Im A_2 = 0."""
     ensemble, k3 = evidence.at("duffing"), reported.value("duffing_cubic")
     imaginary = ensemble.sample(lambda o: average(o.miso.response[1].imag) / k3)
     lines = ensemble.sample(lambda o: float(np.median(np.abs(o.miso.response[1].imag))) / k3)
-    return [
-        close("k3", ensemble.miso("k3"), k3, evidence.tolerance("duffing", "k3")),
-        near("Im A_2 / k3 averaged over the band", imaginary, 0.0, 0.01),
-        at_most("median |Im A_2| / k3 of a line", lines, common.READ_OFF),
-    ]
+    yield close("k3", ensemble.miso("k3"), k3, evidence.tolerance("duffing", "k3"))
+    yield near("Im A_2 / k3 averaged over the band", imaginary, 0.0, 0.01)
+    yield at_most("median |Im A_2| / k3 of a line", lines, common.READ_OFF)
 
 
-def duffing_share(evidence: Evidence, reported: Reported) -> list[Condition]:
+def duffing_share(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Figure 23, lower curve: approximately 90 percent."""
     stated, share = reported.value("duffing_share"), evidence.at("duffing").linear_coherence()
     lower = evidence.at("duffing", common.levels(reported)[1]).linear_coherence()
@@ -101,16 +97,14 @@ def duffing_share(evidence: Evidence, reported: Reported) -> list[Condition]:
         f"on average {share.mean:.3f} passes through L_1; {stated:g} would be met by a weaker force ({lower.mean:.3f} "
         "at half the variance)"
     )
-    return [near("linear coherence over the fit band", share, stated, 0.05, why)]
+    yield near("linear coherence over the fit band", share, stated, 0.05, why)
 
 
-def duffing_histogram(evidence: Evidence, _: Reported) -> list[Condition]:
+def duffing_histogram(evidence: Evidence, _: Reported) -> Iterator[Condition]:
     """Figure 24: a histogram would not tell, and tells less than Van der Pol's."""
     why = "a flat top and short tails: a record of this length is long enough to refuse the Gaussian"
-    return [
-        common.looks_gaussian(evidence, "duffing", 0.5, why),
-        common.less_distorted(evidence, "duffing", "van_der_pol"),
-    ]
+    yield common.looks_gaussian(evidence, "duffing", 0.5, why)
+    yield common.less_distorted(evidence, "duffing", "van_der_pol")
 
 
 CLAIMS = claims(

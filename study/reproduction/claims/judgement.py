@@ -47,7 +47,7 @@ class Claim:
     why: str
 
 
-Conditions = Callable[[Evidence, Reported], list[Condition]]
+Conditions = Callable[[Evidence, Reported], Iterable[Condition]]
 
 
 def claims(*functions: Conditions, **short: Conditions) -> dict[str, Conditions]:

@@ -1,7 +1,7 @@
 """Sections 5.3 and 5.4: the combined system at other levels and under noise."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
 
 import numpy as np
@@ -90,7 +90,7 @@ def _shift(name: str, shift: Sample) -> Condition:
     return Condition(f"mean shift of {name} within 3 standard errors of zero", measured, met, measured)
 
 
-def noise_output(evidence: Evidence, reported: Reported) -> list[Condition]:
+def noise_output(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Noise on the force, the reverse system's output."""
     noise, drive = noises(reported)[1], Drive(COMBINED)
     model, (_, *records) = evidence.model(drive), evidence.records(drive)
@@ -101,23 +101,19 @@ def noise_output(evidence: Evidence, reported: Reported) -> list[Condition]:
         return evidence.analyse(model, records[index].with_channels({"force": noisy})).miso
 
     analyses = threaded(analysis, range(len(records)))
-    conditions: list[Condition] = []
     for name in PARTS:
         true, allowed = reported.table_1(COMBINED, name), evidence.tolerance(COMBINED, name)
         bias = Sample(tuple(a.values[name] / true - 1.0 for a in analyses))
         ratio = average([a.errors[name] for a in analyses]) / (bias.scatter * true)
         spread = ratio / math.sqrt(2.0 * (len(analyses) - 1))
-        conditions += [
-            Condition(
-                f"mean {name} within its tolerance of {percent(allowed)} or 3 standard errors",
-                f"{name} {percent(bias.mean, '+.2g', bias.error)}", abs(bias.mean) <= max(allowed, 3.0 * bias.error),
-            ),
-            Condition(
-                f"predicted standard error of {name} within 25 % of its scatter",
-                f"{name} predicted over observed {ratio:.2f} +- {spread:.2f}", abs(ratio - 1.0) <= 0.25,
-            ),
-        ]  # fmt: skip
-    return conditions
+        yield Condition(
+            f"mean {name} within its tolerance of {percent(allowed)} or 3 standard errors",
+            f"{name} {percent(bias.mean, '+.2g', bias.error)}", abs(bias.mean) <= max(allowed, 3.0 * bias.error),
+        )  # fmt: skip
+        yield Condition(
+            f"predicted standard error of {name} within 25 % of its scatter",
+            f"{name} predicted over observed {ratio:.2f} +- {spread:.2f}", abs(ratio - 1.0) <= 0.25,
+        )  # fmt: skip
 
 
 def _with_noise(evidence: Evidence, reported: Reported) -> dict[float, Ensemble]:
@@ -172,23 +168,22 @@ def _bias(name: str, off: float) -> Condition:
     return Condition(f"bias of {name} within {percent(SIGNIFICANT_BIAS)}", text, abs(off) <= SIGNIFICANT_BIAS, text)
 
 
-def noise_cubic(evidence: Evidence, reported: Reported) -> list[Condition]:
+def noise_cubic(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Random and bias errors of k3 and c3, and which is hurt more."""
     ensembles = _with_noise(evidence, reported)
     biases = {noise: _biases(e, reported, ("k3", "c3")) for noise, e in ensembles.items()}
-    conditions: list[Condition] = []
     for name, part in (("k3", "real"), ("c3", "imaginary")):
         bias, scatter = f"bias of {name}", f"scatter of a line of the {part} part"
         sizes = {noise: abs(by_name[name].mean) for noise, by_name in biases.items()}
         spreads = {noise: _line_scatter(e, part == "imaginary", reported) for noise, e in ensembles.items()}
-        conditions += [
+        yield from [
             _rises(label, values, label, f"{label} (relative)") for label, values in ((bias, sizes), (scatter, spreads))
         ]
     worst = noises(reported)[-1]
     k3, c3 = biases[worst]["k3"].mean, biases[worst]["c3"].mean
     measured = f"k3 {percent(k3, '+.3g')}, c3 {percent(c3, '+.3g')}"
     larger = Condition(f"at {percent(worst)} noise the bias of c3 is the larger", measured, abs(c3) > abs(k3))
-    return [*conditions, larger]
+    yield larger
 
 
 def _line_scatter(ensemble: Ensemble, imaginary: bool, reported: Reported) -> float:
@@ -199,7 +194,7 @@ def _line_scatter(ensemble: Ensemble, imaginary: bool, reported: Reported) -> fl
     return float(np.median(np.std(stacked, axis=0, ddof=1) / exact))
 
 
-def noise_coherence(evidence: Evidence, reported: Reported) -> list[Condition]:
+def noise_coherence(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Multiple coherence over the fit band."""
     ensembles = _with_noise(evidence, reported)
     coherences = {noise: ensemble.multiple_coherence() for noise, ensemble in ensembles.items()}
@@ -212,14 +207,12 @@ def noise_coherence(evidence: Evidence, reported: Reported) -> list[Condition]:
         "white noise exceeds the response"
     )
     falls = all(a.mean > b.mean for a, b in pairwise(coherences.values()))
-    return [
-        Condition("mean multiple coherence falls with every noise level", text, falls),
-        *(
-            Condition(f"loss at {percent(n)} noise at most {SLIGHT:g}", text, clean.mean - c.mean <= SLIGHT, why)
-            for n, c in noisy
-        ),
-        at_least(f"multiple coherence at {percent(worst)} noise", lowest, 0.9, why),
-    ]
+    yield Condition("mean multiple coherence falls with every noise level", text, falls)
+    yield from (
+        Condition(f"loss at {percent(n)} noise at most {SLIGHT:g}", text, clean.mean - c.mean <= SLIGHT, why)
+        for n, c in noisy
+    )
+    yield at_least(f"multiple coherence at {percent(worst)} noise", lowest, 0.9, why)
 
 
 CLAIMS = claims(

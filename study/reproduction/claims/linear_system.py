@@ -1,6 +1,7 @@
 """Sections 4.4, 5.2 and 5.2.1: spectra and the linear system."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,33 +19,31 @@ Floats = NDArray[np.float64]
 NEARBY = 0.5  # hertz about a resonance
 
 
-def coherence_forms(evidence: Evidence, _: Reported) -> list[Condition]:
+def coherence_forms(evidence: Evidence, _: Reported) -> Iterator[Condition]:
     """(4.38) and (4.39) on the Duffing system's own record."""
     drive = Drive("duffing")
     result = miso.identify(evidence.model(drive), evidence.records(drive)[0], evidence.estimator_settings()).responses
     assert isinstance(result, MisoResult)
     product = 1.0 - np.prod(1.0 - result.partial, axis=0)
     worst = float(np.max(np.abs(product - np.sum(result.contribution, axis=0))))
-    return [Condition("both forms equal to 1e-9 on every line", f"largest difference {worst:.1g}", worst < 1e-9)]
+    yield Condition("both forms equal to 1e-9 on every line", f"largest difference {worst:.1g}", worst < 1e-9)
 
 
-def averages(evidence: Evidence, reported: Reported) -> list[Condition]:
+def averages(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Segments end to end, and what the overlapped ones are worth."""
     segments, samples = evidence.segments, evidence.settings["sampling"]["samples"]
     stated, apart, worth = reported.value("averages"), samples // segments.length, segments.effective_averages(samples)
     count = segments.count(samples)
-    return [
-        Condition(f"{stated:g} segments end to end", f"{apart} segments end to end", apart == stated),
-        Condition(
-            f"effective averages under the stated overlap within 10 % of {stated:g}",
-            f"{worth:.1f} effective of {count} overlapped", abs(worth - stated) <= 0.1 * stated,
-            f"the stated overlap makes {count} segments, which the Hann window leaves worth {worth:.1f} averages; "
-            f"{stated:g} counts them end to end",
-        ),
-    ]  # fmt: skip
+    yield Condition(f"{stated:g} segments end to end", f"{apart} segments end to end", apart == stated)
+    yield Condition(
+        f"effective averages under the stated overlap within 10 % of {stated:g}",
+        f"{worth:.1f} effective of {count} overlapped", abs(worth - stated) <= 0.1 * stated,
+        f"the stated overlap makes {count} segments, which the Hann window leaves worth {worth:.1f} averages; "
+        f"{stated:g} counts them end to end",
+    )  # fmt: skip
 
 
-def resolution(evidence: Evidence, reported: Reported) -> list[Condition]:
+def resolution(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Line spacing and lengths in seconds."""
     samples, dt = evidence.settings["sampling"]["samples"], evidence.settings["sampling"]["dt"]
     length = evidence.segments.length
@@ -53,11 +52,9 @@ def resolution(evidence: Evidence, reported: Reported) -> list[Condition]:
         "resolution.length": (length, 0.0), "resolution.samples": (samples, 0.0),
         "resolution.total": (samples * dt, 1e-9),
     }  # fmt: skip
-    conditions: list[Condition] = []
     for name, (value, rounding) in values.items():
         row, same = reported[name], math.isclose(value, reported.value(name), rel_tol=rounding)
-        conditions.append(Condition(f"{row.what} equals {row}", f"{value:.5g} {row.unit}", same))
-    return conditions
+        yield Condition(f"{row.what} equals {row}", f"{value:.5g} {row.unit}", same)
 
 
 def deficit(evidence: Evidence, system: str, centre: float, **segments: object) -> Sample:
@@ -84,14 +81,14 @@ def longer_segments_help(evidence: Evidence, system: str, centre: float, where: 
     )
 
 
-def hanning(evidence: Evidence, reported: Reported) -> list[Condition]:
+def hanning(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Leakage at the linear system's resonance with and without the window."""
     f_n = reported.table_1("linear", "f_n")
     more = deficit(evidence, "linear", f_n, window="boxcar").minus(deficit(evidence, "linear", f_n))
-    return [significant("1 - coherence near resonance without window less that with it", more)]
+    yield significant("1 - coherence near resonance without window less that with it", more)
 
 
-def overlap(evidence: Evidence, reported: Reported) -> list[Condition]:
+def overlap(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Scatter of the lines of A_1 under noise with and without the overlap."""
     drive = Drive("duffing_van_der_pol", noise=reported.value("noise_random_only.low"))
     ensembles = [evidence.ensemble(drive), evidence.ensemble(drive, Assumed(segments=(("overlap", 0.0),)))]
@@ -100,32 +97,28 @@ def overlap(evidence: Evidence, reported: Reported) -> list[Condition]:
     ratio = float(np.exp(np.mean(logarithms)))
     inflation = evidence.segments.line_inflation()
     spread = ratio * float(np.std(logarithms, ddof=1)) * math.sqrt(inflation / len(logarithms))
-    return [Condition(
+    yield Condition(
         "scatter of a line of A_1 with overlap over that without below 1 by two standard errors",
         f"{ratio:.3g} +- {spread:.1g} (geometric mean over the band)", ratio + 2.0 * spread < 1.0,
         f"the ratio {ratio:.3g} +- {spread:.1g} is not clearly below one",
-    )]  # fmt: skip
+    )  # fmt: skip
 
 
-def linear_same(evidence: Evidence, _: Reported) -> list[Condition]:
+def linear_same(evidence: Evidence, _: Reported) -> Iterator[Condition]:
     """Both curves of the linear system, the MI/SO one assuming a Duffing system."""
     ensemble = evidence.ensemble(Drive("linear"), Assumed(plus=("cubic_stiffness",)))
     apart = ensemble.sample(lambda o: relative_distance(o.miso.response[0], o.siso.response[0]))
-    return [
-        at_most("difference of the curves (root mean square over the band, relative)", apart, 0.02),
-        *(close(f"MI/SO {n}", ensemble.miso(n), ensemble.siso(n).mean, 0.01) for n in ("m", "c", "k")),
-    ]
+    yield at_most("difference of the curves (root mean square over the band, relative)", apart, 0.02)
+    yield from (close(f"MI/SO {n}", ensemble.miso(n), ensemble.siso(n).mean, 0.01) for n in ("m", "c", "k"))
 
 
-def linear_leakage(evidence: Evidence, reported: Reported) -> list[Condition]:
+def linear_leakage(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """The dip stands at resonance and falls with longer segments."""
     f_n = reported.table_1("linear", "f_n")
     lowest, _ = evidence.at("linear").lowest(lambda o: o.miso.cumulative[-1])
     at_resonance = abs(lowest - f_n) <= NEARBY
-    return [
-        Condition(f"lowest coherence within {NEARBY:g} Hz of {f_n:g} Hz", f"lowest at {lowest:.2f} Hz", at_resonance),
-        longer_segments_help(evidence, "linear", f_n, "near resonance"),
-    ]
+    yield Condition(f"lowest coherence within {NEARBY:g} Hz of {f_n:g} Hz", f"lowest at {lowest:.2f} Hz", at_resonance)
+    yield longer_segments_help(evidence, "linear", f_n, "near resonance")
 
 
 def hand_read(evidence: Evidence, reported: Reported) -> list[Condition]:

@@ -1,6 +1,7 @@
 """Section 3.2: restoring force over displacement."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,23 +53,19 @@ def read_dead_band(record: Record, mass: float) -> float:
     return float(tried[int(np.argmin(left))])
 
 
-def oval_width(evidence: Evidence, reported: Reported) -> list[Condition]:
+def oval_width(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """The width gives the value: the branches stand at +-(2 pi f_0) c U, (3.2), whatever c, U and f_0 are."""
     model, size = evidence.model(Drive("linear")), 1e-3
     c, f_0 = reported.table_1("linear", "c"), reported.table_1("linear", "f_n")
-    conditions: list[Condition] = []
     for label, *times in OVALS:
         damped = model.with_values({"c": times[0] * model.numbers()["c"]})
         half = 0.5 * _width(damped, times[1] * size, times[2] * f_0)
         stated = math.prod(times) * 2.0 * math.pi * f_0 * c * size
-        conditions.append(
-            Condition(
-                f"{label}: half the width at u = 0 within 0.1 % of (2 pi f_0) c U",
-                f"{label}: half the width {half:.5g} N, (2 pi f_0) c U {stated:.5g} N",
-                math.isclose(half, stated, rel_tol=1e-3),
-            )
+        yield Condition(
+            f"{label}: half the width at u = 0 within 0.1 % of (2 pi f_0) c U",
+            f"{label}: half the width {half:.5g} N, (2 pi f_0) c U {stated:.5g} N",
+            math.isclose(half, stated, rel_tol=1e-3),
         )
-    return conditions
 
 
 def _width(model: Model, amplitude: float, frequency: float) -> float:
@@ -77,9 +74,8 @@ def _width(model: Model, amplitude: float, frequency: float) -> float:
     return float(np.ptp(pattern.force[np.abs(pattern.displacement) < 1e-9 * amplitude]))
 
 
-def patterns_alike(evidence: Evidence, reported: Reported) -> list[Condition]:
+def patterns_alike(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Random patterns fill the harmonic envelope of their largest displacement and stay within it."""
-    conditions: list[Condition] = []
     for system in SYSTEMS[:-1]:  # the Extreme system has no natural frequency to swing at
         inside, filled = _envelopes(evidence, system, reported.table_1(system, "m"))
         why = (
@@ -87,11 +83,8 @@ def patterns_alike(evidence: Evidence, reported: Reported) -> list[Condition]:
             f"damping force at u = 0, which grows with the speed, and the random motion swings at "
             f"{_pace(evidence, system):.2f} Hz on average, the harmonic one of Figures 2 to 7 at f_n"
         )
-        conditions += [
-            at_least(f"{system}: share of points within the envelope", inside, 0.95),
-            near(f"{system}: widest random over harmonic width at u = 0", filled, 1.0, 0.3, why),
-        ]
-    return conditions
+        yield at_least(f"{system}: share of points within the envelope", inside, 0.95)
+        yield near(f"{system}: widest random over harmonic width at u = 0", filled, 1.0, 0.3, why)
 
 
 def _envelopes(evidence: Evidence, system: str, mass: float) -> tuple[Sample, Sample]:
@@ -148,7 +141,7 @@ def _bulbous(evidence: Evidence, reported: Reported, system: str) -> Condition:
     return at_least(f"{system}: damping at large over that at small displacement", ratio, 1.5)
 
 
-def van_der_pol_pattern(evidence: Evidence, reported: Reported) -> list[Condition]:
+def van_der_pol_pattern(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Constant mean slope, damping that grows outwards; the linear pattern's does not."""
     system, m = "van_der_pol", reported.table_1("van_der_pol", "m")
 
@@ -157,12 +150,10 @@ def van_der_pol_pattern(evidence: Evidence, reported: Reported) -> list[Conditio
         return b * (2.0 * float(np.std(record["displacement"]))) ** 2 / a
 
     bend, straight = evidence.each(Drive(system), cubic_over_linear), _damping_ratio(evidence, reported, "linear")
-    return [
-        _slope(evidence, reported, system, READ_OFF, "mean slope"),
-        near("cubic over linear part of the mean at two standard deviations", bend, 0.0, READ_OFF),
-        _bulbous(evidence, reported, system),
-        near("linear: damping at large over that at small displacement", straight, 1.0, BY_EYE),
-    ]
+    yield _slope(evidence, reported, system, READ_OFF, "mean slope")
+    yield near("cubic over linear part of the mean at two standard deviations", bend, 0.0, READ_OFF)
+    yield _bulbous(evidence, reported, system)
+    yield near("linear: damping at large over that at small displacement", straight, 1.0, BY_EYE)
 
 
 def mathieu_pattern(evidence: Evidence, reported: Reported) -> list[Condition]:
@@ -182,14 +173,12 @@ def mathieu_pattern(evidence: Evidence, reported: Reported) -> list[Condition]:
     ]
 
 
-def dead_band_pattern(evidence: Evidence, reported: Reported) -> list[Condition]:
+def dead_band_pattern(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """The gap read off the pattern."""
     m, gap = reported.table_1("dead_band", "m"), reported.value("dead_band_pattern")
-    return [
-        close(
-            "gap read off the pattern", evidence.each(Drive("dead_band"), lambda r: read_dead_band(r, m)), gap, BY_EYE
-        )
-    ]
+    yield close(
+        "gap read off the pattern", evidence.each(Drive("dead_band"), lambda r: read_dead_band(r, m)), gap, BY_EYE
+    )
 
 
 CLAIMS = claims(

@@ -1,6 +1,7 @@
 """Sections 3.1 and 3.3: distribution and autospectrum of the response."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,23 +17,21 @@ Floats = NDArray[np.float64]
 MAXIMUM = "maximum of the averaged autospectrum"
 
 
-def nonlinear_is_not(evidence: Evidence, _: Reported) -> list[Condition]:
+def nonlinear_is_not(evidence: Evidence, _: Reported) -> Iterator[Condition]:
     """Mean kurtosis of each nonlinear system against that of the linear one under the same forces."""
     straight = evidence.of_channel("linear", kurtosis)
-    conditions: list[Condition] = []
     for system in common.SYSTEMS[1:]:
         off = evidence.of_channel(system, kurtosis).minus(straight)
         criterion = f"{system}: mean kurtosis differs from the linear system's by 3 standard errors"
-        conditions.append(Condition(criterion, f"{system} {off}", abs(off.mean) > 3.0 * off.error))
-    return conditions
+        yield Condition(criterion, f"{system} {off}", abs(off.mean) > 3.0 * off.error)
 
 
-def narrow_band(evidence: Evidence, reported: Reported) -> list[Condition]:
+def narrow_band(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Share of the power within a fifth of the natural frequency about it."""
     f_n = reported.table_1("linear", "f_n")
     frequency, density = evidence.spectra(Drive("linear"))
     share = share_of_power(density, np.abs(frequency - f_n) <= 0.2 * f_n)
-    return [at_least("share of the power within 20 % of f_n", share, 0.5)]
+    yield at_least("share of the power within 20 % of f_n", share, 0.5)
 
 
 def share_of_power(density: Floats, keep: NDArray[np.bool_]) -> Sample:
@@ -40,13 +39,13 @@ def share_of_power(density: Floats, keep: NDArray[np.bool_]) -> Sample:
     return Sample.own_first(float(np.sum(d[keep]) / np.sum(d)) for d in density)
 
 
-def harmonics(evidence: Evidence, _: Reported) -> list[Condition]:
+def harmonics(evidence: Evidence, _: Reported) -> Iterator[Condition]:
     """Duffing over linear response three times above the resonance, where both are governed by the mass."""
     frequency, linear = evidence.spectra(Drive("linear"))
     duffing = evidence.spectra(Drive("duffing"))[1]
     peak = float(frequency[np.argmax(np.mean(duffing[1:], axis=0))])
     excess = _excess(duffing, linear, np.abs(frequency - 3.0 * peak) <= 0.2 * 3.0 * peak)
-    return [significant(f"excess over the linear response about three times the peak at {peak:.2f} Hz", excess)]
+    yield significant(f"excess over the linear response about three times the peak at {peak:.2f} Hz", excess)
 
 
 def _excess(density: Floats, linear: Floats, keep: NDArray[np.bool_]) -> Sample:
@@ -56,21 +55,19 @@ def _excess(density: Floats, linear: Floats, keep: NDArray[np.bool_]) -> Sample:
     )  # fmt: skip
 
 
-def mathieu_spectrum(evidence: Evidence, reported: Reported) -> list[Condition]:
+def mathieu_spectrum(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Local maxima of the response autospectrum, Figure 8."""
     f_n, f_m = reported.value("mathieu_lines.f_n"), reported.value("mathieu_lines.f_m")
     frequency, density = evidence.spectra(Drive("mathieu"))
     maxima = common.local_maxima(frequency, np.mean(density[1:], axis=0))
     lower, middle, upper = mathieu_lines(f_n, f_m).values()
     spacing = 0.5 * (common.nearest(maxima, upper) - common.nearest(maxima, lower))
-    return [
-        common.has_line(MAXIMUM, maxima, middle),
-        Condition(
-            f"half the distance of the outer maxima within 0.1 Hz of f_m = {f_m:g} Hz",
-            f"half the distance of the outer maxima {spacing:.2f} Hz", math.isclose(spacing, f_m, abs_tol=0.1),
-        ),
-        *(common.has_line(MAXIMUM, maxima, outer) for outer in (lower, upper)),
-    ]  # fmt: skip
+    yield common.has_line(MAXIMUM, maxima, middle)
+    yield Condition(
+        f"half the distance of the outer maxima within 0.1 Hz of f_m = {f_m:g} Hz",
+        f"half the distance of the outer maxima {spacing:.2f} Hz", math.isclose(spacing, f_m, abs_tol=0.1),
+    )  # fmt: skip
+    yield from (common.has_line(MAXIMUM, maxima, outer) for outer in (lower, upper))
 
 
 def mathieu_fast(evidence: Evidence, reported: Reported) -> list[Condition]:

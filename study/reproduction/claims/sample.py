@@ -72,7 +72,7 @@ def average(values: Floats | NDArray[np.bool_] | Sequence[float]) -> float:
     return float(np.mean(np.asarray(values, dtype=np.float64)))
 
 
-def share(flags: Iterable[bool]) -> Sample:
+def how_often(flags: Iterable[bool]) -> Sample:
     """How often something holds."""
     return Sample(tuple(float(flag) for flag in flags))
 

@@ -1,7 +1,7 @@
 """Section 2 and Table 1: systems, force, integration, noise."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,15 @@ from study.reproduction.claims.evidence import Drive, Evidence
 from study.reproduction.claims.judgement import Condition, at_least, claims, explained
 from study.reproduction.claims.reported import Reported
 from study.reproduction.claims.response import share_of_power
-from study.reproduction.claims.sample import Sample, average, departure, gaussian_score, is_gaussian, kurtosis, share
+from study.reproduction.claims.sample import (
+    Sample,
+    average,
+    departure,
+    gaussian_score,
+    how_often,
+    is_gaussian,
+    kurtosis,
+)
 from study.reproduction.preliminary import model_restoring_force
 from study.support.numbers import percent
 
@@ -26,45 +34,41 @@ ERROR_FREE = 0.01  # "relatively error free": the integrator moves no parameter 
 ROUNDED = 0.005  # Table 1 rounds f_n and zeta to two digits
 
 
-def system_stiffness_gap(evidence: Evidence, reported: Reported) -> list[Condition]:
+def system_stiffness_gap(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """(2.8): no stiffness within the gap, k beyond it."""
     gap, k = reported.table_1("dead_band", "u_g"), reported.table_1("dead_band", "k")
     u = np.linspace(-3.0 * gap, 3.0 * gap, 601)
     at_rest = model_restoring_force(evidence.model(Drive("dead_band")), u, np.zeros_like(u), np.zeros_like(u))
     worst = float(np.max(np.abs(at_rest - k * (u - np.clip(u, -gap, gap)))))
     allowed = 1e-6 * k * gap
-    return [Condition(
+    yield Condition(
         f"restoring force at rest within {allowed:.2g} N of k (u - u_g sgn u), zero within the gap",
         f"largest difference {worst:.2g} N", worst <= allowed,
         f"the model's restoring force differs by up to {worst:.2g} N from what Table 1's k and u_g give",
-    )]  # fmt: skip
+    )  # fmt: skip
 
 
-def amplitude_nonlinear(evidence: Evidence, _: Reported) -> list[Condition]:
+def amplitude_nonlinear(evidence: Evidence, _: Reported) -> Iterator[Condition]:
     """Doubling the force doubles the response of a system that is linear, the Mathieu included."""
     dt, integrator = evidence.settings["sampling"]["dt"], Integrator(**evidence.settings["integrator"])
-    conditions: list[Condition] = []
     for system in SYSTEMS:
         record, linear = evidence.records(Drive(system))[0], system in LINEAR_IN_FORCE
         doubled: Floats = 2.0 * record["displacement"]
         twice = simulate(evidence.model(Drive(system)), 2.0 * record["force"], dt, integrator)["displacement"]
         departs = float(np.sqrt(np.mean((twice - doubled) ** 2) / np.mean(doubled**2)))
         criterion = f"{system}: departure from superposition {'below 1e-9' if linear else 'above 1 %'}"
-        conditions.append(Condition(criterion, f"{system} {departs:.2g}", departs < 1e-9 if linear else departs > 0.01))
-    return conditions
+        yield Condition(criterion, f"{system} {departs:.2g}", departs < 1e-9 if linear else departs > 0.01)
 
 
-def nyquist(evidence: Evidence, reported: Reported) -> list[Condition]:
+def nyquist(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Half the sampling rate of the study and of the report."""
     dt, stated, step = evidence.settings["sampling"]["dt"], reported.value("nyquist"), reported.value("nyquist.dt")
     highest = 0.5 / dt
-    return [
-        Condition(f"1 / (2 dt) equals {stated:g} Hz", f"{highest:g} Hz", math.isclose(highest, stated, rel_tol=1e-9)),
-        Condition(f"dt equals {step:g} s", f"{dt:g} s", math.isclose(dt, step, rel_tol=1e-9)),
-    ]
+    yield Condition(f"1 / (2 dt) equals {stated:g} Hz", f"{highest:g} Hz", math.isclose(highest, stated, rel_tol=1e-9))
+    yield Condition(f"dt equals {step:g} s", f"{dt:g} s", math.isclose(dt, step, rel_tol=1e-9))
 
 
-def lowpass(evidence: Evidence, reported: Reported) -> list[Condition]:
+def lowpass(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Averaged autospectrum of the force."""
     cutoff = reported.value("lowpass")
     frequency, density = evidence.spectra(Drive("linear"), "force")
@@ -73,20 +77,18 @@ def lowpass(evidence: Evidence, reported: Reported) -> list[Condition]:
     inside = (frequency > width) & (frequency < cutoff - width)
     largest = departure(density[1:, inside])
     above = float(np.sum(mean[frequency > cutoff + width]) / np.sum(mean))
-    return [
-        Condition(
-            f"no line up to {cutoff:g} Hz off the mean by more than chance's {largest.allowed:.2g} standard errors",
-            f"{average(mean[inside]):.4g} N^2/Hz, {largest}", largest.uniform,
-        ),
-        Condition(f"less than 1 % of the power above {cutoff:g} Hz", f"{above:.1g} of the power above", above < 0.01),
-    ]  # fmt: skip
+    yield Condition(
+        f"no line up to {cutoff:g} Hz off the mean by more than chance's {largest.allowed:.2g} standard errors",
+        f"{average(mean[inside]):.4g} N^2/Hz, {largest}", largest.uniform,
+    )  # fmt: skip
+    yield Condition(f"less than 1 % of the power above {cutoff:g} Hz", f"{above:.1g} of the power above", above < 0.01)
 
 
-def force_gaussian(evidence: Evidence, _: Reported) -> list[Condition]:
+def force_gaussian(evidence: Evidence, _: Reported) -> Iterator[Condition]:
     """Kurtosis of the force."""
     shape, score = (evidence.of_channel("linear", number, "force") for number in (kurtosis, gaussian_score))
     words = f"; own record {score.own:+.2g} standard errors from 3"
-    return [_rarely_refused(refused(evidence, "linear", "force"), f"kurtosis {shape}; ", words)]
+    yield _rarely_refused(refused(evidence, "linear", "force"), f"kurtosis {shape}; ", words)
 
 
 def _rarely_refused(refusals: Sample, before: str = "", after: str = "") -> Condition:
@@ -97,15 +99,13 @@ def _rarely_refused(refusals: Sample, before: str = "", after: str = "") -> Cond
     )  # fmt: skip
 
 
-def below_10_hz(evidence: Evidence, reported: Reported) -> list[Condition]:
+def below_10_hz(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Share of the response's power below 10 Hz."""
     limit = reported.value("below_10_hz")
-    conditions: list[Condition] = []
     for system in SYSTEMS:
         frequency, density = evidence.spectra(Drive(system))
         below = share_of_power(density, frequency <= limit)
-        conditions.append(at_least(f"{system}: share of the displacement's power below {limit:g} Hz", below, 0.99))
-    return conditions
+        yield at_least(f"{system}: share of the displacement's power below {limit:g} Hz", below, 0.99)
 
 
 def error_free(evidence: Evidence, _: Reported) -> list[Condition]:
@@ -145,7 +145,7 @@ def _diverged(rows: Sequence[Mapping[str, Any]]) -> list[Condition]:
     return [Condition("no run diverges", text, False, text) for text in texts]
 
 
-def noise_uncorrelated(evidence: Evidence, reported: Reported) -> list[Condition]:
+def noise_uncorrelated(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Correlation of force and noise, whiteness and shape of the noise."""
     records, fraction = evidence.records(Drive(COMBINED))[1:], reported.value("noise_random_only.middle")
     noises = [displacement_noise(r["displacement"], fraction, s) for r, s in zip(records, evidence.seeds, strict=True)]
@@ -153,31 +153,25 @@ def noise_uncorrelated(evidence: Evidence, reported: Reported) -> list[Condition
     correlation = Sample(tuple(float(np.corrcoef(r["force"], n)[0, 1]) for r, n in pairs))
     spectra = [autospectrum(n / np.std(n), r.dt, evidence.segments)[1][2:-2] for r, n in pairs]
     largest = departure(np.array(spectra))
-    return [
-        Condition(
-            "mean correlation with the force within 3 standard errors of zero", f"correlation {correlation}",
-            abs(correlation.mean) <= 3.0 * correlation.error,
-        ),
-        Condition(
-            f"no line of the spectrum off the mean by more than chance's {largest.allowed:.2g} standard errors",
-            str(largest), largest.uniform,
-        ),
-        _rarely_refused(share(not is_gaussian(n) for n in noises)),
-    ]  # fmt: skip
+    yield Condition(
+        "mean correlation with the force within 3 standard errors of zero", f"correlation {correlation}",
+        abs(correlation.mean) <= 3.0 * correlation.error,
+    )  # fmt: skip
+    yield Condition(
+        f"no line of the spectrum off the mean by more than chance's {largest.allowed:.2g} standard errors",
+        str(largest), largest.uniform,
+    )  # fmt: skip
+    yield _rarely_refused(how_often(not is_gaussian(n) for n in noises))
 
 
-def table_1(evidence: Evidence, reported: Reported) -> list[Condition]:
+def table_1(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """The model files hold Table 1, and its f_n and zeta follow from its k and c."""
-    conditions: list[Condition] = []
     for system in SYSTEMS:
         wrong = ", ".join(_wrong(true_parameters(evidence.model(Drive(system)).values), reported, system))
-        conditions.append(
-            Condition(
-                f"{system}: k, c and nonlinear parameters equal, f_n and zeta within {percent(ROUNDED)}",
-                f"{system}: {wrong or 'equal'}", not wrong, f"models/{system}.yaml differs from Table 1 in {wrong}",
-            )
+        yield Condition(
+            f"{system}: k, c and nonlinear parameters equal, f_n and zeta within {percent(ROUNDED)}",
+            f"{system}: {wrong or 'equal'}", not wrong, f"models/{system}.yaml differs from Table 1 in {wrong}",
         )  # fmt: skip
-    return conditions
 
 
 def _wrong(values: Mapping[str, float], reported: Reported, system: str) -> list[str]:
@@ -192,17 +186,17 @@ def _wrong(values: Mapping[str, float], reported: Reported, system: str) -> list
     return wrong
 
 
-def exact_stiffness(evidence: Evidence, reported: Reported) -> list[Condition]:
+def exact_stiffness(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Section 5.2.1 names another exact stiffness than Table 1."""
     stated, table = reported.value("exact_stiffness"), reported.table_1("linear", "k")
     model = evidence.model(Drive("linear")).values["k"] or 0.0
     modal = reported.table_1("linear", "m") * (2.0 * math.pi * reported.table_1("linear", "f_n")) ** 2
-    return [Condition(
+    yield Condition(
         "the exact stiffness equals that of Table 1 and of (2 pi f_n)^2 m to four digits",
         f"Table 1 {table:g}, (2 pi f_n)^2 m {modal:.1f}, model {model:g} N/m",
         all(math.isclose(stated, x, rel_tol=1e-4) for x in (table, modal, model)),
         f"Section 5.2.1 says {stated:g} where Table 1 says {table:g}, which (2 pi f_n)^2 m = {modal:.1f} confirms",
-    )]  # fmt: skip
+    )  # fmt: skip
 
 
 CLAIMS = claims(
