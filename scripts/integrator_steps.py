@@ -5,8 +5,8 @@ from typing import Any
 
 from study.records.excitation import READINGS
 from study.reproduction import integrator_study, tables
+from study.reproduction.claims.common import SYSTEMS
 from study.reproduction.claims.evidence import Drive, models_of, record_settings
-from study.reproduction.claims.simulation import SYSTEMS
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
 
