@@ -81,7 +81,7 @@ def rows_for(entries: int) -> int:
 def legend(figure: Figure, axes: Sequence[Axes], columns: int | None = None, *, bands: bool = False) -> None:
     """One legend for all panels, between the title and the first of them; equal labels stand once.
 
-    With ``bands`` it says what a shade about a curve means.
+    With ``bands`` it explains the shade about a curve.
     """
     entries = legend_entries(axes)
     if bands:
@@ -93,7 +93,7 @@ def legend(figure: Figure, axes: Sequence[Axes], columns: int | None = None, *, 
         ncols=columns or -(-len(entries) // rows_for(len(entries))), borderaxespad=0.0, borderpad=0.0, labelspacing=0.3,
     )  # fmt: skip
     for line in shown.get_lines():
-        line.set_linewidth(max(line.get_linewidth(), 1.0))  # a hair of a line is not found in a legend
+        line.set_linewidth(max(line.get_linewidth(), 1.0))  # a hairline would be lost in a legend
 
 
 def legend_entries(axes: Sequence[Axes]) -> dict[str, Artist]:

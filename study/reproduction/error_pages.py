@@ -21,7 +21,7 @@ LARGE = 9950.0  # from here on a number is shown with a power of ten
 
 
 def opening(errors: pd.DataFrame, noise: Mapping[str, float]) -> list[Block]:
-    """Who is how far off: in sentences, then every case and parameter, then bias and scatter under noise."""
+    """How far each estimator is off: in sentences, by case and parameter, then bias and scatter under noise."""
     note = (
         f"Median over {int(errors['seeds'].max())} seeds of the error in %, every estimator on the very same records; "
         "in brackets the gain, the error of MI/SO over this one. Where the true value is zero the error is in the "
@@ -36,7 +36,7 @@ def opening(errors: pd.DataFrame, noise: Mapping[str, float]) -> list[Block]:
 
 
 def origin(errors: pd.DataFrame) -> str:
-    """Where the numbers come from: kept ones that this run's first seeds agree with, or this run alone."""
+    """Where the numbers come from: a kept table that the first seeds of this run agree with, or this run alone."""
     own, anew = errors[errors["source"] == estimator_errors.OWN], "`make estimators` runs all of them anew."
     kept = sorted(set(errors["source"]) - {estimator_errors.OWN})
     if not kept:
@@ -67,7 +67,7 @@ def sentences(errors: pd.DataFrame, noise: Mapping[str, float]) -> tuple[str, ..
 
 
 def about(errors: pd.DataFrame) -> str:
-    """What the numbers of :func:`overview` are, and of how many records."""
+    """What the numbers of :func:`overview` are, and from how many records they come."""
     seeds, noted = int(errors["seeds"].max()), errors[errors["noted"] > 0].groupby(["case", "estimator"])["noted"].max()
     trouble = f"{int(noted.sum())} searches did not converge" if len(noted) else "every search converged"
     return (

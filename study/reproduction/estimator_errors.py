@@ -14,8 +14,8 @@ COLUMNS = [
     "case", "estimator", "parameter", "true", "kind", "median_error", "standard_error", "gain",
     "bias", "bias_error", "scatter", "seeds", "found", "noted", "first_error", "source",
 ]  # fmt: skip
-FIRST = 2  # seeds whose median stands apart: by it a later run shows that it gives the same errors
-ALIKE = 0.01  # of a median error: further apart, two runs are not the same
+FIRST = 2  # seeds whose median has a column of its own: by it a later run shows that it gives the same errors
+ALIKE = 0.01  # share of a median error by which two runs of the same study may differ
 OWN = "this run"
 
 

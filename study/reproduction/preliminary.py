@@ -50,9 +50,9 @@ def restoring_force(record: Record, mass: float) -> Floats:
         If the record holds no acceleration or the mass is not above zero.
     """
     if "acceleration" not in record:
-        raise StudyError(f"{record.name} has no channel 'acceleration'; the restoring force F - m a needs one")
+        raise StudyError(f"{record.name} has no channel 'acceleration'; expected one for the restoring force F - m a")
     if not mass > 0.0:
-        raise StudyError(f"the mass is {mass:g}; the restoring force F - m a needs one above zero")
+        raise StudyError(f"the mass is {mass:g}; expected one above zero for the restoring force F - m a")
     return record["force"] - mass * record["acceleration"]
 
 
@@ -65,7 +65,7 @@ def random_pattern(record: Record, mass: float) -> Pattern:
         As :func:`restoring_force`, or if the record holds no displacement.
     """
     if "displacement" not in record:
-        raise StudyError(f"{record.name} has no channel 'displacement'; a force/displacement pattern needs one")
+        raise StudyError(f"{record.name} has no channel 'displacement'; expected one for a force/displacement pattern")
     return Pattern(record["displacement"], restoring_force(record, mass))
 
 
@@ -113,7 +113,7 @@ def harmonic_pattern(model: Model, amplitude: float, frequency: float, cycles: i
     """
     for name, value in (("amplitude", amplitude), ("frequency", frequency)):
         if not value > 0.0:
-            raise StudyError(f"expected the {name} of the harmonic motion to be above zero; it is {value:g}")
+            raise StudyError(f"the {name} of the harmonic motion is {value:g}; expected a value above zero")
     time = np.arange(cycles * POINTS_A_CYCLE + 1) / (POINTS_A_CYCLE * frequency)
     omega = 2.0 * math.pi * frequency
     displacement = amplitude * np.sin(omega * time)
@@ -147,7 +147,7 @@ def natural_frequency(values: Mapping[str, float | None]) -> float:
     """
     mass, stiffness = values.get("m"), values.get("k")
     if mass is None or stiffness is None or not mass > 0.0 or not stiffness > 0.0:
-        raise StudyError(f"m = {mass} and k = {stiffness} give no natural frequency; expected both to be above zero")
+        raise StudyError(f"m = {mass} and k = {stiffness} give no natural frequency; expected both above zero")
     return math.sqrt(stiffness / mass) / (2.0 * math.pi)
 
 
@@ -169,7 +169,7 @@ def histogram(values: Floats, bins: int = 51) -> Histogram:
     """
     mean, deviation = float(np.mean(values)), float(np.std(values))
     if not deviation > 0.0:
-        raise StudyError(f"all {len(values)} values are {mean:g}; a histogram needs values that differ")
+        raise StudyError(f"all {len(values)} values are {mean:g}; expected values that differ, for a histogram")
     reach = float(np.abs(values - mean).max())
     density, edges = np.histogram(values, bins=bins, range=(mean - reach, mean + reach), density=True)
     points = np.linspace(mean - max(reach, 3.5 * deviation), mean + max(reach, 3.5 * deviation), 201)

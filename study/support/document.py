@@ -107,7 +107,9 @@ def put(path: Path, mark: str, blocks: Sequence[Block]) -> None:
     block = markdown(blocks)
     text, count = place.subn(lambda match: match[1] + block + match[2], path.read_text(encoding="utf-8"))
     if count != 1:
-        raise StudyError(f"{path} has no place for {mark}: a line '<!-- {mark} -->' and one '<!-- /{mark} -->'")
+        raise StudyError(
+            f"{path} has no place for {mark}: expected a line '<!-- {mark} -->' and one '<!-- /{mark} -->'"
+        )
     replace_file(path, text.encode())
 
 
