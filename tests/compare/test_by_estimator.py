@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from study import cli
+from study.compare.by_estimator import FREE_RUN
 from study.compare.comparison import CHAOTIC, Comparison, compare
 from study.compare.comparison_report import document, summary
 from study.compare.fitted_coefficients import Coefficient
@@ -44,8 +45,8 @@ def off(comparison: Comparison) -> dict[str, float]:
     return {c.key: (c.value - VALUES[c.key]) / (c.error or np.nan) for c in comparison.coefficients}
 
 
-def compared(believed: Model, made: Record, **options: str) -> Comparison:
-    return compare(believed, prepare_record(made), **options)
+def compared(believed: Model, made: Record, *, estimator: str = FREE_RUN) -> Comparison:
+    return compare(believed, prepare_record(made), estimator=estimator)
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,6 @@
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,7 +31,7 @@ def all_but(*names: str) -> tuple[str, ...]:
     return tuple(name for name in LIBRARY if name not in names)
 
 
-def diagnosed(believed: Model, record: Record, **options: object) -> Diagnosis:
+def diagnosed(believed: Model, record: Record, **options: Any) -> Diagnosis:
     return diagnose(compare(believed, prepare_record(record)), **options)
 
 
