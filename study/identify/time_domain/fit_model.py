@@ -159,19 +159,26 @@ def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     if not lost(fit, prepared.fitted):
         return fit
     held = tuple(key for key in fit.model.values if key not in fit.keys)
-    if not magnifies(fit, prepared):
-        return _better(fit, _from_segments(fit.model, prepared, held, fit.steps_per_sample)) or fit
+    best = begin = fit
+    if not magnifies(fit, prepared):  # which a fit at wrong values may not, where the true system does
+        near = _from_segments(fit.model, prepared, held, fit.steps_per_sample)
+        best = _better(fit, near) or fit
+        if near is None or not (lost(best, prepared.fitted) and magnifies(near, prepared)):
+            return best
+        begin = near
     try:
         apart = fit_in_pieces(
-            fit.model, prepared.record, held=held, response=prepared.response, span=prepared.plan.fit,
+            begin.model, prepared.record, held=held, response=prepared.response, span=prepared.plan.fit,
             steps_per_sample=fit.steps_per_sample,
         )  # fmt: skip
         together = fit_part(
             apart.model, prepared, held, steps=fit.steps_per_sample, initial=np.atleast_2d(apart.initial)[:1]
         )
     except DivergenceError:  # where segments fail as well, the one free run is what there is
-        return fit
-    return apart if lost(together, prepared.fitted) else together
+        return best
+    if not lost(together, prepared.fitted):
+        return together
+    return apart if begin is fit or apart.converged else best
 
 
 def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
