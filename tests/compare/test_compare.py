@@ -342,3 +342,13 @@ def test_models_that_cannot_run_are_refused_in_one_sentence() -> None:
     )
     with pytest.raises(StudyError):
         compared(unstable, record)
+
+
+def test_a_model_that_runs_away_is_compared_all_the_same() -> None:
+    made = make_trial(7_000_122, ("displacement_damping", "quadratic_damping"), 0.0, "acceleration")
+    comparison = compared(made.believed, made.record)
+    assert comparison.prediction.diverged
+    assert comparison.prediction.error == pytest.approx(1.0)
+    assert "mean nothing" in says(comparison)
+    assert "100 %" in summary([comparison])
+    assert all(b"nan" not in content for content in tables([comparison]).values())
