@@ -134,11 +134,11 @@ def best_fit(
     first = [_tried(model, prepared, (*held, *shapes), start, TRIED) for start in starts]
     best = min((fit for fit in first if fit is not None), key=lambda fit: fit.rms, default=None)
     if best is not None and (shapes or not best.converged):
-        best = _better(best, _tried(best.model, prepared, held, best.model.numbers(), KEPT)) or best
+        best = _freed(best, prepared, held)
     if best is None or not best.converged:
         apart = _from_segments(best.model if best else model, prepared, (*held, *shapes))
         if apart is not None and shapes:
-            apart = _better(apart, _tried(apart.model, prepared, held, apart.model.numbers(), KEPT))
+            apart = _freed(apart, prepared, held)
         best = _better(best, apart)
     if best is None:
         raise StudyError(f"{model.name!r} has no finite response to the force of {prepared.record.name!r}")
@@ -205,14 +205,24 @@ def _rough(model: Model, prepared: Prepared, start: Values) -> int:
     return max(STEPS, needed_steps(model.with_values(start), prepared.record, prepared.response).rough)
 
 
-def _tried(model: Model, prepared: Prepared, held: Sequence[str], start: Values, runs: int) -> FreeRunFit | None:
+def _tried(
+    model: Model, prepared: Prepared, held: Sequence[str], start: Values, runs: int, initial: Floats | None = None
+) -> FreeRunFit | None:  # fmt: skip
     """A fit from one start; None where the model has no finite response there."""
     begun = model.with_values(start)
     try:
         steps = _rough(begun, prepared, start)
-        return fit_part(begun, prepared, held, steps=steps, max_iterations=runs, offset=NEAR)
+        return fit_part(begun, prepared, held, steps=steps, max_iterations=runs, initial=initial, offset=NEAR)
     except StudyError:
         return None
+
+
+def _freed(fit: FreeRunFit, prepared: Prepared, held: Sequence[str]) -> FreeRunFit | None:
+    """A fit with all free that is not held, from where one stands that held more: its state too, or it could be worse.
+
+    Whoever took the other then, for its smaller residual, would hold what the model leaves open.
+    """
+    return _tried(fit.model, prepared, held, fit.model.numbers(), KEPT, np.atleast_2d(fit.initial))
 
 
 def _better(one: FreeRunFit | None, other: FreeRunFit | None) -> FreeRunFit | None:
