@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from study.equations.model import free
+from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
 from study.identify.time_domain import fit_model as fits
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.fit_model import continued, fit_model, with_term
 from study.identify.time_domain.multiple_shooting import lost, magnifies
 from study.identify.time_domain.part_fit import fit_part
-from study.records.excitation import displacement_noise
+from study.records.excitation import Excitation, displacement_noise, force
 from study.records.prepared import prepare_record, whole
 
 
@@ -83,3 +84,13 @@ def test_a_fit_of_the_beginning_goes_on_to_the_whole_fitting_part(systems, recor
     longer = continued(fit, prepared)
     assert len(longer.residual) == len(prepared.fitted)
     assert np.all(np.diag(longer.covariance) < np.diag(fit.covariance))
+
+
+def test_an_open_shape_is_fitted_where_the_search_before_ends_in_the_wrong_place(systems):
+    """A chaotic record on which no free run arrives: none with the width held may stand for one that has it open."""
+    made = simulate(systems["dead_band"], force(Excitation(), 8192, 0.02, 6007), 0.02, Integrator("abm4", 16))
+    fit = fit_model(opened(systems["dead_band"]), whole(noisy(made, 6007, 0.05)))
+    assert set(fit.keys) == set(systems["dead_band"].values)
+    assert fit.restarts
+    assert abs(fit.estimate["dead_band.u_g"] - 0.0025) < 4.0 * fit.estimate.error("dead_band.u_g")
+    assert fit.estimate["dead_band.u_g"] == pytest.approx(0.0025, rel=0.02)
