@@ -35,8 +35,8 @@ FIRST = 9001
 
 def one(noise: float, seed: int) -> list[dict[str, object]]:
     """Error, standard error and Cramer-Rao bound of each coefficient by each estimator for one record."""
-    sampling = load(ROOT / "config").settings["sampling"]
-    made = simulate(MODEL, force(Excitation(), sampling["samples"], sampling["dt"], seed), sampling["dt"], Integrator())
+    sampling = load(ROOT / "config").settings.sampling
+    made = simulate(MODEL, force(Excitation(), sampling.samples, sampling.dt, seed), sampling.dt, Integrator())
     added = displacement_noise(
         made["displacement"], noise, round(1000.0 * noise) * FIRST + seed
     )  # another at each level

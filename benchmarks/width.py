@@ -27,14 +27,14 @@ def main() -> None:
     options.add_argument("--seeds", type=int, default=40)
     options.add_argument("--noise", type=float, default=0.05, help="mean square over that of the displacement")
     told = options.parse_args()
-    model, sampling = read_model(ROOT / "models" / "dead_band.yaml"), load(ROOT / "config").settings["sampling"]
+    model, sampling = read_model(ROOT / "models" / "dead_band.yaml"), load(ROOT / "config").settings.sampling
     true = model.numbers()["dead_band.u_g"]
     unknown = tuple(replace(t, parameters=(None,)) if t.name == "dead_band" else t for t in model.terms)
     asked = replace(model, terms=unknown)
     error, standard, seconds, notes = [], [], [], []
     for seed in range(FIRST, FIRST + told.seeds):
-        values = force(Excitation(), sampling["samples"], sampling["dt"], seed)
-        record = simulate(model, values, sampling["dt"], Integrator("abm4", 16))
+        values = force(Excitation(), sampling.samples, sampling.dt, seed)
+        record = simulate(model, values, sampling.dt, Integrator("abm4", 16))
         noise = displacement_noise(record["displacement"], told.noise, seed)
         record = record.with_channels({"displacement": record["displacement"] + noise})
         begun = time.perf_counter()

@@ -42,14 +42,14 @@ for _case in STUDY.cases:
                 f"draw_preliminary.{_case}"
             input:
                 record=f"results/{_case}/record.csv",
-                model=STUDY.cases[_case].model,
+                model=STUDY.cases[_case].model_file,
                 style=STYLE,
                 code=CODE["preliminary"],
             output:
                 **figures_of(_case, PRELIMINARY, DESCRIBED),
             params:
                 title=STUDY.cases[_case].title,
-                segments=STUDY.settings["segments"],
+                segments=STUDY.settings.segments.plain(),
             benchmark:
                 f"results/benchmarks/draw_preliminary.{_case}.tsv"
             script:

@@ -4,11 +4,11 @@
 from study.reproduction.claims.reported import check_complete, check_systems
 from study.reproduction.claims.reported import load as load_reported
 
-STATEMENTS = {"statements": "config/reported.tsv", "schema": "config/schemas/reported.schema.yaml"}
+STATEMENTS = "config/reported.tsv"
 
 with one_sentence():
-    _reported = load_reported(*(Path(path) for path in STATEMENTS.values()))
-    check_complete(_reported, *(Path(path) for path in STATEMENTS.values()))
+    _reported = load_reported(Path(STATEMENTS))
+    check_complete(_reported, Path(STATEMENTS))
     check_systems(_reported, Path("models"))
 
 # The systems of Table 1: another model in the folder is none of the claims' business.
@@ -19,10 +19,10 @@ ENSEMBLE_CODE = sorted(
 )
 CLAIM_CODE = sorted({*ENSEMBLE_CODE, "study/reproduction/preliminary.py", *(str(p) for p in Path("study/reproduction/claims").glob("*.py"))})
 CLAIM_SETTINGS = {
-    key: STUDY.settings[key]
+    key: STUDY.settings.plain()[key]
     for key in "sampling noise_seed integrator segments fit_band tolerances ensembles".split()
 }
-CLAIM_SETTINGS["excitations"] = {key: value for key, value in STUDY.settings["excitations"].items() if key == "report"}
+CLAIM_SETTINGS["excitations"] = {"report": STUDY.settings.excitations["report"].plain()}
 WITHOUT_NOISE = {key: value for key, value in CLAIM_SETTINGS.items() if key != "noise_seed"}
 CLAIM_RESULTS = [
     f"results/{name}"
@@ -32,7 +32,7 @@ CLAIM_RESULTS = [
 
 rule excitation_reading:
     input:
-        **STATEMENTS,
+        statements=STATEMENTS,
         models=MODELS,
         code=[*ENSEMBLE_CODE, "study/reproduction/claims/excitation_reading.py", "study/reproduction/claims/reported.py"],
     output:
@@ -76,7 +76,7 @@ rule integrator_steps:
 
 rule claims:
     input:
-        **STATEMENTS,
+        statements=STATEMENTS,
         steps="results/integrator_steps.csv",
         models=MODELS,
         code=[*CLAIM_CODE, "study/reproduction/claims/excitation_reading.py"],

@@ -18,40 +18,33 @@ CODE = {
     "table_page": rests_on(Path("scripts/table_page.py")),
     "summary": rests_on(Path("scripts/summary.py")),
 }
-NOISE = {name: case.noise for name, case in STUDY.cases.items()}
 STYLE = "study/figures/study.mplstyle"
 ENDINGS = ("png", "svg")
 IDENTIFIED_FILES = ("frequency_response.csv", "coherence.csv", "noise.csv", "parameters.csv")
 
 
 def record_settings(wildcards):
-    return STUDY.record_settings(wildcards.case)
+    return STUDY.record_settings(wildcards.case).plain()
 
 
 def ensemble_settings(wildcards):
-    return STUDY.ensemble_settings(wildcards.case)
+    return STUDY.record_settings(wildcards.case).without_seeds().plain()
 
 
 def identification_settings(wildcards):
-    return STUDY.identification_settings(wildcards.case)
+    return STUDY.identification_settings(wildcards.case).plain()
 
 
 def monte_carlo_settings(wildcards):
-    names = STUDY.settings["monte_carlo"]["estimators"]
-    return [STUDY.identification_settings(wildcards.case) | {"estimators": names}]
+    return [STUDY.identification_settings(wildcards.case, STUDY.settings.monte_carlo.estimators).plain()]
 
 
 def compared_settings(case):
-    names = STUDY.settings["estimator_errors"]["estimators"]
-    return STUDY.identification_settings(case) | {"estimators": names}
+    return STUDY.identification_settings(case, STUDY.settings.estimator_errors.estimators).plain()
 
 
 def model_of(wildcards):
-    return STUDY.cases[wildcards.case].model
-
-
-def title_of(wildcards):
-    return STUDY.cases[wildcards.case].title
+    return STUDY.cases[wildcards.case].model_file
 
 
 def pictures(stem):

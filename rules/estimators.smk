@@ -1,18 +1,16 @@
 # How far each estimator is from the truth on the same records. `snakemake -j2 estimators` takes many seeds, a job a
-# case, ten minutes; docs/estimators.* is written of them. Within `all` one job, which begins early as it waits for
-# nothing, takes a few seeds of all cases, and where these come out as the first of the kept ones did, it gives those.
-COMPARED = STUDY.settings["estimator_errors"]
-MANY = f"estimators_{COMPARED['many']}"
-ERRORS = {"judged": "errors", "first_seed": COMPARED["first_seed"]}
-KEPT = [path for path in ("docs/estimators.csv",) if Path(path).is_file()]
+# case, ten minutes; `make estimators` writes docs/estimators.* of them. Within `all` one job, which begins early as it
+# waits for nothing, takes a few seeds of all cases.
+COMPARED = STUDY.settings.estimator_errors
+MANY = f"estimators_{COMPARED.many}"
+ERRORS = {"judged": "errors", "first_seed": COMPARED.first_seed}
 ERROR_RESULTS = ["results/estimators.csv", *pictures("estimators")]
 
 
 rule estimator_errors:
     priority: 1
     input:
-        models=[case.model for case in STUDY.cases.values()],
-        kept=KEPT,
+        models=[case.model_file for case in STUDY.cases.values()],
         code=CODE["monte_carlo"],
     output:
         table=report(
@@ -23,9 +21,9 @@ rule estimator_errors:
         ),
     params:
         **ERRORS,
-        records=[STUDY.ensemble_settings(case) for case in STUDY.cases],
+        records=[STUDY.record_settings(case).without_seeds().plain() for case in STUDY.cases],
         identifications=[compared_settings(case) for case in STUDY.cases],
-        seeds=COMPARED["seeds"],
+        seeds=COMPARED.seeds,
     benchmark:
         "results/benchmarks/estimator_errors.tsv"
     script:
@@ -39,7 +37,7 @@ use rule ensemble as many_errors with:
         **ERRORS,
         records=lambda wildcards: [ensemble_settings(wildcards)],
         identifications=lambda wildcards: [compared_settings(wildcards.case)],
-        seeds=COMPARED["many"],
+        seeds=COMPARED.many,
     benchmark:
         "results/benchmarks/many_errors.{case}.tsv"
 

@@ -3,15 +3,13 @@
 #   snakemake -j2 results/silverbox/diagnosis.json     which effect is missing
 #   snakemake -j2 silverbox_climb                      diagnose, add, and again; the ladder, and climb.html to step through it
 #   snakemake -j2 gallery                              all of that, with pictures, for every record
-from dataclasses import asdict
-
 from study.commands import measurements
 
 with one_sentence():
     MEASUREMENTS = measurements.load(Path("config"), STUDY.cases)
 
 CODE["measured"] = rests_on(Path("scripts/measured.py"))
-CODE["measured"] += [f"study/explore/html_page.{ending}" for ending in ("html", "css", "js")]
+CODE["measured"] += [f"study/explore/page.{ending}" for ending in ("html", "css", "js")]
 SEEN = {
     "comparison": ("response", "force_error", "missing_force", "error_in_time"),
     "diagnosis": ("candidates", "constancy"),
@@ -37,7 +35,7 @@ for _name, _row in MEASUREMENTS.items():
                 [f"results/{_name}/{stem}.{ending}" for stem in SEEN[_file] for ending in ENDINGS],
             params:
                 what=_what,
-                row=asdict(_row),
+                row=_row.plain(),
             threads: 2
             benchmark:
                 f"results/benchmarks/{_what}.{_name}.tsv"
@@ -57,7 +55,7 @@ for _name, _row in MEASUREMENTS.items():
             page=f"results/{_name}/climb.html",
         params:
             what="climb",
-            row=asdict(_row),
+            row=_row.plain(),
         threads: 2
         benchmark:
             f"results/benchmarks/climb.{_name}.tsv"

@@ -9,8 +9,8 @@ rule ensemble:
         records=lambda wildcards: [ensemble_settings(wildcards)],
         identifications=monte_carlo_settings,
         judged="rates",
-        seeds=STUDY.settings["monte_carlo"]["seeds"],
-        first_seed=STUDY.settings["monte_carlo"]["first_seed"],
+        seeds=STUDY.settings.monte_carlo.seeds,
+        first_seed=STUDY.settings.monte_carlo.first_seed,
     benchmark:
         "results/benchmarks/ensemble.{case}.tsv"
     script:
@@ -34,6 +34,6 @@ rule monte_carlo:
     output:
         page="results/monte_carlo.md",
     params:
-        noise=NOISE,
+        noise=STUDY.noise,
     script:
         "../scripts/rates.py"

@@ -48,7 +48,7 @@ rule summary:
             labels={"page": "The report, run again"},
         ),
     params:
-        told={"noise": NOISE, "setting": STUDY.settings["excitations"]["report"].get("reading", "raw")},
+        told={"noise": STUDY.noise, "setting": STUDY.settings.excitations["report"].reading},
     script:
         "../scripts/summary.py"
 

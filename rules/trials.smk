@@ -1,6 +1,5 @@
 # Trials with hidden effects, the proof of diagnose: `snakemake -j2 trials`, not part of `all`.
-TRIALS = STUDY.settings["trials"]
-TRIAL_SETTINGS = {key: value for key, value in TRIALS.items() if key != "wanted"}
+TRIALS = STUDY.settings.trials
 TRIAL_CODE = {name: rests_on(Path(f"scripts/{name}.py")) for name in ("trials", "trial_summary")}
 
 
@@ -10,7 +9,7 @@ rule trial_runs:
     output:
         table="results/trials/part_{part}.csv",
     params:
-        settings=TRIAL_SETTINGS,
+        settings={key: value for key, value in TRIALS.plain().items() if key != "wanted"},
     wildcard_constraints:
         part="[0-9]+",
     benchmark:
@@ -21,7 +20,7 @@ rule trial_runs:
 
 rule trials:
     input:
-        parts=[f"results/trials/part_{part}.csv" for part in range(TRIALS["jobs"])],
+        parts=[f"results/trials/part_{part}.csv" for part in range(TRIALS.jobs)],
         style=STYLE,
         code=TRIAL_CODE["trial_summary"],
     output:
@@ -32,6 +31,6 @@ rule trials:
         confusion_figure=pictures("trials_confusion"),
         ladder_figure=pictures("trials_ladder"),
     params:
-        wanted=TRIALS["wanted"],
+        wanted=TRIALS.wanted.plain(),
     script:
         "../scripts/trial_summary.py"

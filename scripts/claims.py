@@ -13,10 +13,10 @@ from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
 
 
-def main(models: str, statements: str, schema: str, steps: str, settings: dict[str, Any], csv: str, page: str) -> None:
+def main(models: str, statements: str, steps: str, settings: dict[str, Any], csv: str, page: str) -> None:
     rows = cast(list[dict[str, Any]], pd.read_csv(steps).to_dict("records"))
     found = evidence.gather(settings, evidence.models_of(Path(models)), rows)
-    stated = reported.load(Path(statements), Path(schema))
+    stated = reported.load(Path(statements))
 
     def progress(number: int, claim: Claim) -> None:
         print(f"{number} of {len(claims_table.CLAIMS)}: {claim.id}: {claim.verdict}", file=sys.stderr, flush=True)
@@ -30,6 +30,6 @@ if "snakemake" in globals():
     step = globals()["snakemake"]
     with one_sentence():
         main(
-            step.params.models, step.input.statements, step.input.schema, step.input.steps, step.params.settings,
+            step.params.models, step.input.statements, step.input.steps, step.params.settings,
             step.output.csv, step.output.page,
         )  # fmt: skip

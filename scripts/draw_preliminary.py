@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from matplotlib import style as styles
 from matplotlib.figure import Figure
@@ -14,6 +13,7 @@ from study.records import spectra
 from study.records.record import read_csv
 from study.reproduction import preliminary
 from study.reproduction.pictures import distribution, force_patterns
+from study.reproduction.settings import SegmentSettings
 from study.support.errors import StudyError
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
@@ -81,7 +81,7 @@ def force_histogram(source: Source) -> Figure:
     return figure
 
 
-def draw(source: Source, outputs: Mapping[str, Sequence[Path]], *, style: Path, segments: Mapping[str, Any]) -> None:
+def draw(source: Source, outputs: Mapping[str, Sequence[Path]], *, style: Path, segments: spectra.Segments) -> None:
     """Draw figures of the preliminary analysis of a case.
 
     Parameters
@@ -93,19 +93,18 @@ def draw(source: Source, outputs: Mapping[str, Sequence[Path]], *, style: Path, 
         write, PNG or SVG.
     style : Path
         The style sheet.
-    segments : mapping
-        Length, overlap and window of the spectra.
+    segments : Segments
+        Of the spectra.
 
     Raises
     ------
     StudyError
         If a kind of picture is asked for that there is not.
     """
-    cut = spectra.Segments(**segments)
     kinds = {
         "pattern": lambda: pattern(source),
-        "autospectrum": lambda: periodic_lines(source, cut),
-        "force_history": lambda: force_history(source, cut),
+        "autospectrum": lambda: periodic_lines(source, segments),
+        "force_history": lambda: force_history(source, segments),
         "force_histogram": lambda: force_histogram(source),
     }
     with styles.context(style):
@@ -123,5 +122,5 @@ if "snakemake" in globals():
         draw(
             Source(Path(step.input.record), Path(step.input.model), step.params.title),
             {kind: [Path(p) for p in paths] for kind, paths in step.output.items()},
-            style=Path(step.input.style), segments=step.params.segments,
+            style=Path(step.input.style), segments=SegmentSettings.model_validate(step.params.segments).segments(),
         )  # fmt: skip

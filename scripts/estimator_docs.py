@@ -31,8 +31,8 @@ def main(page: Path, table: Path, picture: Path, noise: dict[str, float]) -> Non
 if __name__ == "__main__":
     with one_sentence():
         study = load(Path("config"))
-        stem = f"estimators_{study.settings['estimator_errors']['many']}"
+        stem = f"estimators_{study.settings.estimator_errors.many}"
         main(
             Path("docs/estimators.md"), Path(f"results/{stem}.csv"), Path(f"figures/{stem}.png"),
-            {name: case.noise for name, case in study.cases.items()},
+            study.noise,
         )  # fmt: skip

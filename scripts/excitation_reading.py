@@ -8,13 +8,13 @@ from study.reproduction.claims import evidence, excitation_reading, reported
 from study.support.workflow_step import one_sentence
 
 
-def main(models: str, statements: str, schema: str, settings: dict[str, Any], output: str) -> None:
+def main(models: str, statements: str, settings: dict[str, Any], output: str) -> None:
     found = evidence.gather(settings, evidence.models_of(Path(models)), [])
-    stated = reported.load(Path(statements), Path(schema))
+    stated = reported.load(Path(statements))
     tables.write_csv(excitation_reading.study(found, stated), Path(output))
 
 
 if "snakemake" in globals():
     step = globals()["snakemake"]
     with one_sentence():
-        main(step.params.models, step.input.statements, step.input.schema, step.params.settings, step.output.table)
+        main(step.params.models, step.input.statements, step.params.settings, step.output.table)

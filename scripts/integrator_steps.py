@@ -3,10 +3,13 @@
 from pathlib import Path
 from typing import Any
 
+from study.identify.estimators.base import Settings
 from study.records.excitation import READINGS
+from study.records.spectra import Segments
 from study.reproduction import integrator_study, tables
 from study.reproduction.claims.evidence import Drive, models_of, record_settings
 from study.reproduction.claims.simulation import SYSTEMS
+from study.reproduction.settings import RecordSettings
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
 
@@ -15,13 +18,14 @@ SHARE = 5  # differences on the same forces scatter little: a fifth of the ensem
 
 def main(models: str, settings: dict[str, Any], csv: str, page: str) -> None:
     first, count = settings["ensembles"]["first_seed"], max(2, settings["ensembles"]["seeds"] // SHARE)
-    record = record_settings(settings, Drive(SYSTEMS[0]))
-    own = record["excitation"].get("reading", READINGS[0])
+    record = RecordSettings.model_validate(record_settings(settings, Drive(SYSTEMS[0])))
+    low, high = settings["fit_band"]
+    own = record.excitation.reading or READINGS[0]
     readings = [own, *(r for r in READINGS if r != own)]
     known = models_of(Path(models))
     table = integrator_study.study(
         {name: known[name] for name in SYSTEMS if name in known},
-        record, settings, range(first, first + count), readings,
+        record, Settings(Segments(**settings["segments"]), (low, high)), range(first, first + count), readings,
     )  # fmt: skip
     tables.write_csv(table, Path(csv))
     replace_file(Path(page), integrator_study.page(table).encode())

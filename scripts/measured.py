@@ -23,11 +23,11 @@ def main(what: str, row: Measurement, output: Any) -> None:
     target = Path(output.history)
     steps = climb(record, model, row.options, row.steps, target.parent)
     if len(steps) < 2:
-        raise StudyError(f"{row.name}: nothing was added to {model}; {target.parent}/climb/step_0 says why")
+        raise StudyError(f"{row.record}: nothing was added to {model}; {target.parent}/climb/step_0 says why")
     replace_file(Path(output.reached), (target.parent / "climb" / model.name).read_bytes())
 
 
 if "snakemake" in globals():
     step = globals()["snakemake"]
     with one_sentence():
-        main(step.params.what, Measurement(**step.params.row), step.output)
+        main(step.params.what, Measurement.model_validate(step.params.row), step.output)

@@ -2,19 +2,19 @@
 
 import sys
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
 from study.reproduction import tables
+from study.reproduction.settings import TrialSettings
 from study.support.workflow_step import one_sentence
 from study.trials import runs
 
 EVERY = 5  # trials between two signs of life
 
 
-def main(settings: dict[str, Any], number: int, output: str) -> None:
-    orders = runs.chunk(runs.orders(settings), number, settings["jobs"])
+def main(settings: TrialSettings, number: int, output: str) -> None:
+    orders = runs.chunk(runs.orders(settings), number, settings.jobs)
     rows: list[runs.Row] = []
     for done, order in enumerate(orders, start=1):
         rows.append(runs.run(order))
@@ -26,4 +26,4 @@ def main(settings: dict[str, Any], number: int, output: str) -> None:
 if "snakemake" in globals():
     step = globals()["snakemake"]
     with one_sentence():
-        main(step.params.settings, int(step.wildcards.part), step.output.table)
+        main(TrialSettings.model_validate(step.params.settings), int(step.wildcards.part), step.output.table)

@@ -2,11 +2,16 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from study.commands.command import Command
 from study.commands.record_arguments import add_record_arguments, out_folder, prepared_of, read_records
 from study.identify.estimators import ESTIMATORS
 
+if TYPE_CHECKING:
+    from study.compare.comparison import Comparison
+
+PAGE = "explore.html"
 WITHOUT = ("siso", "miso_hand_read")  # estimators that do not find all coefficients of a model, or not together
 QUIET = 2.0  # seconds of work before progress is shown
 
@@ -29,8 +34,7 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.compare.comparison_pictures import level_pictures, pictures
     from study.compare.comparison_report import as_json, document, summary, tables
     from study.equations.model_file import read_model
-    from study.explore.saved import of_comparison
-    from study.explore.saved_files import PAGE
+    from study.support.extras import lacking
     from study.support.file_sets import check_folder, write_files
 
     folder = out_folder(arguments)
@@ -38,7 +42,7 @@ def _run(arguments: argparse.Namespace) -> None:
     model = read_model(arguments.model)
     records = read_records(arguments)
     prepared = [prepared_of(arguments, record) for record in records]
-    many = len(records) > 1
+    many, unpaged = len(records) > 1, lacking("bokeh", PAGE, "explore")
     files: dict[str, bytes] = {}
     with tqdm(total=(STEPS + 1) * len(records), delay=QUIET, leave=False, unit="step") as bar:
 
@@ -51,16 +55,23 @@ def _run(arguments: argparse.Namespace) -> None:
             told("pictures")
             prefix = f"{one.record.name}_" if many else ""
             files |= {prefix + name: content for name, content in pictures(one).items()}
-            files[prefix + PAGE] = of_comparison(one)
+            if not unpaged:
+                files |= _page(one, prefix)
     moving = across(found)
     files |= level_pictures(moving, found[0].record.units.get("force", "N"))
     files |= {f"{name}.csv": content for name, content in tables(found, moving).items()}
     files["comparison.json"] = as_json(document(found, moving))
     write_files(folder, files)
     print(summary(found, moving))
-    page = "a page for each record" if many else PAGE
     what = f"{_count(files, '.csv')} tables, {_count(files, '.png')} pictures (PNG and SVG)"
+    page = f"no page ({unpaged})" if unpaged else "a page for each record" if many else PAGE
     print(f"\n{folder}: {page}, comparison.json, {what}")
+
+
+def _page(comparison: "Comparison", prefix: str) -> dict[str, bytes]:
+    from study.explore.saved import of_comparison
+
+    return {prefix + PAGE: of_comparison(comparison)}
 
 
 def _count(files: dict[str, bytes], kind: str) -> int:

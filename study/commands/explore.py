@@ -19,6 +19,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
+    from study.support.extras import needed
+
+    needed("bokeh", "'study explore'", "explore")
     from tqdm import tqdm
 
     from study.compare import history

@@ -3,46 +3,61 @@
 import os
 import shlex
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+from pydantic import BeforeValidator, Field
 
 from study.commands.parser import parser
-from study.support.errors import StudyError
-from study.support.schema import numbered_rows
+from study.support.config_files import Row, Text, read_rows
+from study.support.errors import StudyError, at, expect
 
-VARIABLE = "$STUDY_DATA"
-BESIDE = Path("../shared/data")  # where data lie that no variable points to
+VARIABLE = "$STUDY_DATA"  # at the beginning of a path: the folder that this environment variable names
 TAKEN = ("--out", "--model", "-h", "--help")
 
 
-@dataclass(frozen=True)
-class Measurement:
+def _words(text: object) -> object:
+    """The words of the options, read once by the command's own parser so that no job has to refuse them."""
+    if not isinstance(text, str):
+        return text
+    try:
+        words = tuple(shlex.split(text))
+    except ValueError as error:
+        raise StudyError(f"options {text!r} cannot be split into words: {error}") from None
+    for word in words:
+        expect(word.partition("=")[0] not in TAKEN, f"options name {word}, which the workflow gives; leave it out")
+    with at("options"):
+        parser().parse_args(["compare", "record", "--model", "model", *words])
+    return words
+
+
+class Measurement(Row):
     """One row of ``config/measurements.tsv``.
 
     Attributes
     ----------
-    name : str
+    record : str
         As targets and folders name it.
     path : str
         The data file.
     model : str
-        The model file that is compared, and from which a climb begins.
+        The model that is compared, and from which a climb begins: its name below ``models/``, or its file.
     steps : int
         Effects that a climb may add.
     options : tuple of str
         How the record is read, fitted and judged: options of ``study compare``.
     """
 
-    name: str
-    path: str
-    model: str
-    steps: int
-    options: tuple[str, ...]
-
-
-def data_folder() -> Path:
-    """The folder that ``STUDY_DATA`` names; ``../shared/data`` if it is not set."""
-    return Path(os.environ.get(VARIABLE[1:]) or BESIDE)
+    record: Annotated[
+        str,
+        Field(
+            pattern=r"^[a-z][a-z0-9_]*\Z", max_length=64, description="up to 64 of a to z, 0 to 9 and _, a letter first"
+        ),
+    ]
+    path: Text
+    model: Text
+    steps: Annotated[int, Field(ge=1, le=20)]
+    options: Annotated[tuple[str, ...], BeforeValidator(_words)]
 
 
 def load(folder: Path, cases: Collection[str] = ()) -> Mapping[str, Measurement]:
@@ -60,37 +75,20 @@ def load(folder: Path, cases: Collection[str] = ()) -> Mapping[str, Measurement]
     StudyError
         At the first fault, naming file, row and value.
     """
-    found: dict[str, Measurement] = {}
-    for where, row in numbered_rows(folder / "measurements.tsv", folder / "schemas" / "measurements.schema.yaml"):
-        if row["record"] in found:
-            raise StudyError(f"{where}: the record stands twice; each name may be used once")
-        for name in (row["record"], f"{row['record']}_climb"):
-            if name in cases:
-                raise StudyError(f"{where}: {name!r} is a case of cases.tsv; give the record or the case another name")
-        model = folder.parent / "models" / f"{row['model']}.yaml"
-        if not model.is_file():
-            known = ", ".join(sorted(p.stem for p in (folder.parent / "models").rglob("*.yaml")))
-            raise StudyError(f"{where}: there is no model {row['model']!r}; models/ holds {known}")
-        path = row["path"].replace(VARIABLE, str(data_folder()), 1)
-        options = _options(row["options"], where)
-        found[row["record"]] = Measurement(row["record"], path, str(model), row["steps"], options)
-    return found
-
-
-def _options(text: str, where: str) -> tuple[str, ...]:
-    """The words of the options, read once by the command's own parser so that no job has to refuse them."""
-    try:
-        words = tuple(shlex.split(text))
-    except ValueError as error:
-        raise StudyError(f"{where}: options {text!r} cannot be split into words: {error}") from None
-    for word in words:
-        if word.partition("=")[0] in TAKEN:
-            raise StudyError(f"{where}: options name {word}, which the workflow gives; leave it out")
-    try:
-        parser().parse_args(["compare", "record", "--model", "model", *words])
-    except StudyError as error:
-        raise StudyError(f"{where}: options: {error}") from None
-    return words
+    measurements: dict[str, Measurement] = {}
+    models = folder.parent / "models"
+    known = ", ".join(sorted(path.stem for path in models.rglob("*.yaml")))
+    for where, row in read_rows(folder / "measurements.tsv", Measurement):
+        model = models / f"{row.model}.yaml"
+        with at(where):
+            expect(row.record not in measurements, "the record stands twice; expected each name once")
+            for name in (row.record, f"{row.record}_climb"):
+                case = f"{name!r} is a case of cases.tsv; give the record or the case another name"
+                expect(name not in cases, case)
+            expect(model.is_file(), f"there is no model {row.model!r}; models/ holds {known}")
+        path = row.path.replace(VARIABLE, os.environ.get(VARIABLE[1:]) or VARIABLE, 1)
+        measurements[row.record] = row.model_copy(update={"path": path, "model": str(model)})
+    return measurements
 
 
 def check_present(path: Path) -> None:
@@ -99,9 +97,9 @@ def check_present(path: Path) -> None:
     Raises
     ------
     StudyError
-        If not.
+        If not, or if no folder of data is named.
     """
-    if not path.is_file():
-        raise StudyError(
-            f"{path} is not there; the project holds no data: set {VARIABLE[1:]} to the folder that holds them"
-        )
+    named = VARIABLE[1:]
+    if VARIABLE in path.parts:
+        raise StudyError(f"{path}: {named} is not set; expected the folder that holds {path.relative_to(VARIABLE)}")
+    expect(path.is_file(), f"{path} is not there; the project holds no data: set {named} to the folder that holds them")

@@ -18,7 +18,7 @@ from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from study.compare.noise import Noise
 from study.compare.prediction import Prediction
 from study.equations import kernels
-from study.equations.model import Model, forward_graph, with_registers
+from study.equations.model import Model, forward_graph, named_channels, with_registers
 from study.identify.frequency_domain.inputs import history, reverse_inputs
 from study.identify.frequency_domain.starting_values import oscillator
 from study.records.completion import SETTLED, derivative
@@ -149,27 +149,27 @@ def unbalanced_force(model: Model, keys: Sequence[str], record: Record) -> Float
         If the model is incomplete, or names a channel that the record lacks.
     """
     values = model.numbers()
-    forward = forward_graph(model, record.extra)
+    channels = named_channels(model, record.extra)
+    forward = forward_graph(model, channels)
     graph = forward.graph
     slope = forward.slopes[0]
     program = with_registers(
         graph.program([slope, *(graph.derivative(slope, graph.input(key)) for key in keys)]), values
     )
-    columns = {"u": record["displacement"], "v": record["velocity"], "t": record.time, "force": record["force"]}
-    columns |= {name: record[name] for name in record.extra} | _states(model, record)
-    positions = np.array([program.inputs[name] for name in columns], dtype=np.int64)
+    columns = [record["displacement"], record["velocity"], record.time, record["force"]]  # as the registers begin
+    columns += [record[name] for name in channels] + _states(model, record)
     out = np.empty((len(record), 1 + len(keys)))
     kernels.evaluate(
-        program.code, program.first, program.registers.copy(), positions,
-        np.column_stack(list(columns.values())), program.outputs, out,
+        program.code, program.first, program.registers.copy(), np.arange(len(columns)),
+        np.column_stack(columns), program.outputs, out,
     )  # fmt: skip
     out[:, 0] -= record["acceleration"]
     return out * values["m"]
 
 
-def _states(model: Model, record: Record) -> dict[str, Floats]:
+def _states(model: Model, record: Record) -> list[Floats]:
     """The memories of the terms along the record's motion."""
-    return {f"z:{i.terms[0]}": history(i, record) for i in reverse_inputs(model) if i.state is not None}
+    return [history(item, record) for item in reverse_inputs(model) if item.state is not None]
 
 
 def _weight(prepared: Prepared, frequency: Floats) -> Floats:

@@ -39,6 +39,11 @@ class Candidate:
     fit: FreeRunFit
     prediction: Prediction
 
+    @property
+    def unphysical(self) -> bool:
+        """Whether it is fitted outside of what makes it physical."""
+        return bool(self.term.physical(self.fit.model.values))
+
 
 def candidate_terms(base: Baseline, extra: Sequence[Term] = (), without: Sequence[str] = ()) -> list[Term]:
     """The library's terms and the user's own that are not in the model already."""

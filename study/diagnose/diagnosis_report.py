@@ -78,6 +78,7 @@ def _candidate(row: Ranked) -> dict[str, Any]:
             "amplitude": _finite(row.steadiness.spread()) if row.steadiness else None,
         },
         "tied_with": list(row.tied_with),
+        "unphysical": row.unphysical,
         "converged": row.fit.converged,
     }
 

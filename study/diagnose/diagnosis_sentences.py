@@ -43,6 +43,8 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
         said.append(f"It does not explain all: of all candidates, {term_names(second)} beside it explains most.")
     elif diagnosis.left > 0.0:
         said.append(f"Structure of {_percent(diagnosis.left)} of the response is left beside it.")
+    if first.unphysical:
+        said.append(f"As fitted it is no physical effect: {first.unphysical}.")
     if first.tied_with:
         said.append(f"This record cannot tell it from {', '.join(term_names(n) for n in first.tied_with)}.")
     return said

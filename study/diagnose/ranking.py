@@ -88,6 +88,11 @@ class Ranked:
         return self.prediction.error
 
     @property
+    def unphysical(self) -> str:
+        """Why it is no physical effect as fitted, in a sentence; empty if it is one."""
+        return self.term.physical(self.fit.model.values)
+
+    @property
     def interval(self) -> tuple[float, float]:
         """95 % confidence interval of the coefficient."""
         return self.coefficient - 1.96 * self.error, self.coefficient + 1.96 * self.error
@@ -112,7 +117,7 @@ def rank(candidates: Sequence[Candidate], before: Floats, prepared: Prepared) ->
     """
     rows = [_row(candidate, before, len(candidates), prepared) for candidate in candidates]
     rows.sort(key=lambda r: float(r.residual @ r.residual))
-    rows = _ties_by_simplicity(rows)
+    rows = _physical_first(_ties_by_simplicity(rows))
     rows = [_examined(row, prepared) if i < EXAMINED else row for i, row in enumerate(rows)]
     rows = _simple_first(_constant_first(rows))
     return [replace(row, tied_with=_tied(row, rows)) for row in rows]
@@ -184,6 +189,18 @@ def _ties_by_simplicity(rows: list[Ranked]) -> list[Ranked]:
     first = min(level, key=_misfit)
     first = min((r for r in level if _alike(r, first)), key=lambda r: (_unknowns(r), _misfit(r)), default=first)
     return [first] + [r for r in rows if r is not first]
+
+
+def _physical_first(rows: list[Ranked]) -> list[Ranked]:
+    """Put what is fitted outside of what makes it physical behind a physical effect that explains nearly as much.
+
+    A Bouc-Wen element of negative stiffness, say, is a hardening spring in disguise.
+    """
+    if not rows or not rows[0].unphysical:
+        return rows
+    enough = NEARLY * rows[0].gain.explained
+    physical = [r for r in rows if not r.unphysical and r.gain.explained >= enough]
+    return physical[:1] + [r for r in rows if r is not physical[0]] if physical else rows
 
 
 def _constant_first(rows: list[Ranked]) -> list[Ranked]:

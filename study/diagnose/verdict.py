@@ -114,7 +114,7 @@ def _at_search_steps(fit: FreeRunFit, look: Prepared) -> FreeRunFit:
 
 def with_best_settled(tried: Sequence[Candidate], prepared: Prepared) -> list[Candidate]:
     """The best candidates fitted as they would be if they were added, then the others."""
-    ordered = sorted(tried, key=lambda c: float(c.prediction.residual @ c.prediction.residual))
+    ordered = sorted(tried, key=lambda c: (c.unphysical, float(c.prediction.residual @ c.prediction.residual)))
     return candidates.all_settled(ordered[:SETTLED], prepared) + ordered[SETTLED:]
 
 

@@ -28,7 +28,7 @@ FUNCTIONS = {
     "max": (Op.MAX, 2),
     "min": (Op.MIN, 2),
 }
-VARIABLES = ("u", "v", "t", "z", "w", "pi")
+VARIABLES = ("u", "v", "t")  # what these name in a formula is never a column of a record, nor is pi
 
 
 class ExpressionError(StudyError):

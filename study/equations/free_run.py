@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from study.equations import kernels
 from study.equations.graph import Op, Program
-from study.equations.model import Model, forward_graph, with_registers
+from study.equations.model import Model, forward_graph, named_channels, with_registers
 from study.records.interpolation import between_samples
 from study.records.record import MOTIONS, Record
 from study.support.errors import DivergenceError, StudyError
@@ -42,8 +42,8 @@ class FreeRun:
         Register that stands for sgn v, -1 if no force of the model jumps with it.
     keys : tuple of str
         The coefficients and shape parameters to differentiate by.
-    drive : array, shape (2 steps (samples - 1) + 3, 1 + extra channels)
-        Force and extra channels at every half step.
+    drive : array, shape (2 steps (samples - 1) + 3, 1 + channels)
+        Force, and the channels that the model's formulas name, at every half step.
     dt : float
         Sampling interval in seconds.
     steps : int
@@ -213,10 +213,11 @@ def prepare(
         raise StudyError(f"there is no response {response!r}; a free run yields {', '.join(MOTIONS)}")
     if steps_per_sample < 1:
         raise StudyError(f"steps_per_sample is {steps_per_sample}; at least 1 is needed")
-    program, slots, side = _differentiated(model, record.extra, tuple(keys))
+    channels = named_channels(model, record.extra)
+    program, slots, side = _differentiated(model, channels, tuple(keys))
     factor = 2 * steps_per_sample
     part = slice(factor * first, factor * (last - 1) + 1)
-    drive = np.column_stack([_between(record[name].tobytes(), factor)[part] for name in ("force", *record.extra)])
+    drive = np.column_stack([_between(record[name].tobytes(), factor)[part] for name in ("force", *channels)])
     return FreeRun(
         program, slots, side, tuple(keys), drive, record.dt, steps_per_sample,
         record.start + first * record.dt, last - first, MOTIONS.index(response), tuple(r - first for r in restarts),

@@ -4,7 +4,7 @@ The equation of motion is ``sum over terms = F(t)``. A coefficient or shape para
 None where it is to be estimated. Models are immutable; ``with_term`` and ``with_values`` give new ones.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from study.equations import formulas
 from study.equations.graph import Graph, Program
-from study.equations.terms import Component, Term
+from study.equations.term import Component, Term
 from study.support.errors import StudyError
 
-FIXED_INPUTS = ("u", "v", "t", "force")  # the registers that every forward program begins with
+FIXED_INPUTS = (*formulas.VARIABLES, "force")  # the registers that every forward program begins with
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class ModelTerm:
     @property
     def keys(self) -> tuple[str, ...]:
         """Names of its coefficients, then of its shape parameters as ``term.parameter``."""
-        return self.term.symbols + tuple(f"{self.name}.{p.name}" for p in self.term.parameters)
+        return self.term.keys
 
     @property
     def values(self) -> dict[str, float | None]:
@@ -105,6 +105,11 @@ class Model:
         """The terms that carry a state of their own."""
         return tuple(t for t in self.terms if t.term.state is not None)
 
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The measured channels that its formulas name, in alphabetical order."""
+        return tuple(sorted({name for t in self.terms for name in t.term.channels}))
+
     def with_term(self, term: Term | ModelTerm) -> "Model":
         """The model and one term more."""
         return replace(self, terms=(*self.terms, term if isinstance(term, ModelTerm) else free(term)))
@@ -146,7 +151,8 @@ class ForwardGraph:
     Attributes
     ----------
     graph : Graph
-        The nodes; inputs are ``u, v, t, force``, extra channels, states ``z:term``, then every key.
+        The nodes; inputs are ``u, v, t, force``, channels (``channel:temperature``), states
+        ``z:term``, then every key.
     slopes : tuple of int
         Nodes of the acceleration and of each state's derivative.
     states : tuple of int
@@ -166,7 +172,7 @@ def forward_graph(model: Model, channels: tuple[str, ...] = ()) -> ForwardGraph:
     model : Model
         Its values need not be known: coefficients and shape parameters are inputs of the graph.
     channels : tuple of str
-        Extra measured channels which the user's own terms may name.
+        Extra measured channels for the user's own terms (:func:`named_channels`), in the order of the drive.
 
     Raises
     ------
@@ -176,12 +182,14 @@ def forward_graph(model: Model, channels: tuple[str, ...] = ()) -> ForwardGraph:
     if "inertia" not in model:
         raise StudyError(f"model {model.name!r} has no inertia; a free run needs it")
     graph = Graph()
-    fixed = {name: graph.input(name) for name in (*FIXED_INPUTS, *channels)}
+    fixed = {name: graph.input(name) for name in FIXED_INPUTS}
+    measured = {name: graph.input(f"channel:{name}") for name in channels}
     states = {t.name: graph.input(f"z:{t.name}") for t in model.states}
     keys = {key: graph.input(key) for key in model.values}
     force, rates = graph.const(0.0), list[int]()
     for entry in model.terms:
-        names = {n: fixed[n] for n in ("u", "v", "t", *channels)}
+        names = {n: fixed[n] for n in formulas.VARIABLES}
+        names |= {n: measured[n] for n in entry.term.channels if n in measured}
         names |= {p.name: keys[f"{entry.name}.{p.name}"] for p in entry.term.parameters}
         rate = None
         if entry.term.state is not None:
@@ -196,13 +204,32 @@ def forward_graph(model: Model, channels: tuple[str, ...] = ()) -> ForwardGraph:
     return ForwardGraph(graph, (acceleration, *rates), (fixed["u"], fixed["v"], *states.values()))
 
 
-def unit_forces(model: Model, channels: tuple[str, ...] = ()) -> tuple[tuple[str, ...], Program]:
+def named_channels(model: Model, available: Collection[str]) -> tuple[str, ...]:
+    """The channels that the formulas of a model name: a run reads no others, whatever else a record holds.
+
+    Raises
+    ------
+    ExpressionError
+        If one is not among those available, naming these.
+    """
+    for entry in model.terms:
+        for name in entry.term.channels:
+            if name not in available:
+                known = ", ".join(sorted({*formulas.VARIABLES, *available}))
+                raise formulas.ExpressionError(
+                    f"the formula of {entry.name!r} names {name!r}; it may name {known} and pi"
+                )
+    return model.channels
+
+
+def unit_forces(model: Model) -> tuple[tuple[str, ...], Program]:
     """Force of each component with a unit coefficient, as a program, and the names of their terms.
 
-    Left out are inertia, and terms with a shape parameter or a state of their own.
+    Its registers begin with u, v, t and the model's channels. Left out are inertia, and terms with a shape parameter
+    or a state of their own.
     """
     graph = Graph()
-    inputs = {n: graph.input(n) for n in ("u", "v", "t", *channels)}
+    inputs = {n: graph.input(n) for n in (*formulas.VARIABLES, *model.channels)}
     terms = [t.term for t in model.terms if not t.term.parameters and t.term.state is None]
     pairs = [(term.name, c) for term in terms for c in term.components if c.order < 2]
     outputs = [_unit_force(graph, c, inputs, None) for _, c in pairs]

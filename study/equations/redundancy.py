@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from study.equations import formulas
 from study.equations.model import Model, unit_forces
 from study.equations.terms import LIBRARY
 
@@ -45,13 +44,11 @@ def _forces(model: Model) -> tuple[tuple[str, ...], Floats]:
     """Names of the terms, and their forces with unit coefficients at random motions, shape (points, components)."""
     from study.equations import kernels  # compiled code is loaded only where a formulas asks for it
 
-    used = {n for t in model.terms if t.name not in LIBRARY for n in formulas.names(t.term.components[0].shape)}
-    channels = tuple(sorted(used - {"u", "v", "t"}))
-    names, program = unit_forces(model, channels)
+    names, program = unit_forces(model)
     rng = np.random.default_rng(1990)
-    shape = (POINTS, 3 + len(channels))
+    shape = (POINTS, 3 + len(model.channels))
     data = rng.standard_normal(shape) * 10.0 ** rng.uniform(-DECADES, DECADES, shape)
-    positions = np.array([program.inputs[n] for n in ("u", "v", "t", *channels)], dtype=np.int64)
+    positions = np.arange(shape[1], dtype=np.int64)
     values = np.empty((POINTS, len(names)))
     kernels.evaluate(program.code, program.first, program.registers.copy(), positions, data, program.outputs, values)
     finite = np.all(np.isfinite(values), axis=1)

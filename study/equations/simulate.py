@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.equations import kernels
-from study.equations.model import Model, forward_program
+from study.equations.model import Model, forward_program, named_channels
 from study.records.interpolation import between_samples
 from study.records.record import SI_UNITS, Record
 from study.support.errors import DivergenceError, StudyError
@@ -73,7 +73,7 @@ def simulate(
     start : float
         Time of the first sample (matters to terms that depend on time).
     extra : mapping of arrays, optional
-        Further channels that the user's own terms name.
+        Further channels, for the user's own terms to name.
     units : mapping of str, optional
         Units of the channels; SI where left out.
 
@@ -91,12 +91,13 @@ def simulate(
     """
     settings = integrator or Integrator()
     extra = extra or {}
-    _check(model, {"force": force, **extra}, initial)
-    program = forward_program(model, tuple(extra))
+    channels = named_channels(model, extra)
+    _check(model, {"force": force, **{name: extra[name] for name in channels}}, initial)
+    program = forward_program(model, channels)
     factor = 2 * settings.steps_per_sample
     drive = between_samples(force, factor)[:, None]
-    if extra:  # a copy, which for a long record takes longer than the integration
-        drive = np.column_stack([drive, *(between_samples(x, factor) for x in extra.values())])
+    if channels:  # a copy, which for a long record takes longer than the integration
+        drive = np.column_stack([drive, *(between_samples(extra[name], factor) for name in channels)])
     state = np.zeros(2 + len(model.states))
     state[: len(initial)] = initial
     out = np.empty((len(force), 1 + len(state)))
@@ -106,8 +107,8 @@ def simulate(
     )  # fmt: skip
     if failed >= 0:
         _diverged(model, force, settings.steps_per_sample, start + failed * dt)
-    channels = {"force": force, "displacement": out[:, 0], "velocity": out[:, 1], "acceleration": out[:, 2]}
-    return Record(dt, {**channels, **extra}, {**SI_UNITS, **(units or {})}, model.name, start)
+    motion = {"force": force, "displacement": out[:, 0], "velocity": out[:, 1], "acceleration": out[:, 2]}
+    return Record(dt, {**motion, **extra}, {**SI_UNITS, **(units or {})}, model.name, start)
 
 
 def _check(model: Model, channels: Mapping[str, Floats], initial: Sequence[float]) -> None:

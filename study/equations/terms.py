@@ -1,143 +1,83 @@
-"""The library of terms: every physical effect the project knows, written once.
+"""The library of terms: every physical effect the project knows, written once, as ``term`` says what one is.
 
 The force of a term is ``sum over its components of coefficient * factor * (d/dt)^order shape``. One
 entry serves three times: forward (``simulate`` adds the force), reverse (components with the same
 shape form one MI/SO input whose frequency response function is
-``A(f) = sum of coefficient * factor * (j 2 pi f)^order``, the report's Figure 14), and in words.
+``A(f) = sum of coefficient * factor * (j 2 pi f)^order``, the report's Figure 14), and in words. It also says where
+its shape parameters are searched, how a trial draws it and when it is physical: no other module asks for its name.
 
 To add an effect, add one entry to ``LIBRARY`` and one row to the parametrised tests.
 """
 
-from dataclasses import dataclass, field
+import numpy as np
 
-from study.equations import dimensions, formulas
+from study.equations import formulas
 from study.equations.graph import Graph
+from study.equations.term import QUANTITIES as QUANTITIES
+from study.equations.term import Component, Condition, Parameter, Search, Term
 from study.support.errors import StudyError
-
-
-@dataclass(frozen=True)
-class Component:
-    """One coefficient's shape.
-
-    Attributes
-    ----------
-    symbol : str
-        Name of the coefficient, such as ``k3``.
-    shape : str
-        Formula of the unit-coefficient shape g(u, v, t) or of the term's state z.
-    order : int
-        How often it is differentiated with respect to time: 0, 1 or (inertia alone) 2.
-    factor : float
-        A fixed number before it: Van der Pol's damping is c3/3 d/dt u^3.
-    """
-
-    symbol: str
-    shape: str
-    order: int = 0
-    factor: float = 1.0
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A shape parameter: what it is, in which unit (``length``, ``frequency``, ``time``, ``1/length``), which sign.
-
-    ``signed`` ones may be zero or negative, all others are above zero.
-    """
-
-    name: str
-    quantity: str
-    meaning: str
-    signed: bool = False
-
-
-@dataclass(frozen=True)
-class Term:
-    """A physical effect.
-
-    Attributes
-    ----------
-    name : str
-        As models and tables name it.
-    components : tuple of Component
-        One for each coefficient (a periodic stiffness of any phase has two).
-    formula : str
-        For people: the force with a unit coefficient.
-    meaning, cause : str
-        The physics in a sentence, and where it commonly comes from.
-    parameters : tuple of Parameter
-        Shape parameters, given or estimated.
-    state : str or None
-        dz/dt for a term with a memory z of its own.
-    """
-
-    name: str
-    components: tuple[Component, ...]
-    formula: str
-    meaning: str
-    cause: str
-    parameters: tuple[Parameter, ...] = field(default=())
-    state: str | None = None
-
-    @property
-    def symbols(self) -> tuple[str, ...]:
-        """Names of the coefficients."""
-        return tuple(c.symbol for c in self.components)
-
-    def unit(self, symbol: str, force: str, length: str) -> str:
-        """Unit of one coefficient for a record with these units of force and length."""
-        component = next(c for c in self.components if c.symbol == symbol)
-        known = {p.name: QUANTITIES[p.quantity] for p in self.parameters} | {"z": STATE_DIMENSIONS}
-        powers = dimensions.dimensions(component.shape, known)
-        if powers is not None:
-            powers = (powers[0], powers[1] - component.order)
-        return dimensions.compose(force, length, powers)
-
-
-QUANTITIES = {
-    "length": dimensions.VARIABLES["u"],
-    "time": dimensions.VARIABLES["t"],
-    "frequency": (dimensions.NONE[0], dimensions.NONE[1] - 1),
-    "1/length": (dimensions.NONE[0] - 1, dimensions.NONE[1]),
-}
-STATE_DIMENSIONS = dimensions.VARIABLES["u"]  # the states of the library are internal displacements
 
 
 def _single(
     name: str, symbol: str, shape: str, *,
     formula: str | None = None, order: int = 0, factor: float = 1.0, meaning: str, cause: str,
-    parameters: tuple[Parameter, ...] = (), state: str | None = None,
+    parameters: tuple[Parameter, ...] = (), state: str | None = None, conditions: tuple[Condition, ...] = (),
+    reported: tuple[str, ...] = (), either_sign: bool = False, placeless: bool = False,
 ) -> Term:  # fmt: skip
     """An effect with one coefficient."""
     component = Component(symbol, shape, order, factor)
-    return Term(name, (component,), formula or shape, meaning, cause, parameters, state)
+    return Term(
+        name, (component,), formula or shape, meaning, cause, parameters, state, conditions, reported,
+        either_sign, placeless,
+    )  # fmt: skip
 
+
+def _even(low: float, high: float, count: int) -> tuple[float, ...]:
+    return tuple(np.linspace(low, high, count).tolist())
+
+
+def _drains(symbol: str, what: str = "damping") -> tuple[Condition, ...]:
+    """Damping that grows with velocity; Van der Pol's, which depends on displacement, may well feed energy in."""
+    return (Condition(symbol, f"{what} takes energy out, so it is zero or more", reached=True),)
+
+
+def _spring(symbol: str, owner: str) -> Condition:
+    return Condition(symbol, f"the stiffness of a {owner} is positive")
+
+
+AROUND = (-0.35, 0.0, 0.35)  # a line and a third of a line to either side: a fit finds its way from there
 
 _TERMS = (
     _single(
         "inertia", "m", "u", formula="d2u/dt2", order=2,
         meaning="mass times acceleration", cause="the moving mass, added mass of the fluid included",
+        conditions=(Condition("m", "a mass is positive", enforced=True),), placeless=True,
     ),
     _single(
         "linear_damping", "c", "u", formula="v", order=1,
         meaning="force in proportion to velocity", cause="viscous dampers, material damping, wave radiation",
+        conditions=_drains("c"), placeless=True,
     ),
     _single(
         "linear_stiffness", "k", "u",
         meaning="restoring force in proportion to displacement", cause="any elastic support, hydrostatic stiffness",
+        placeless=True,
     ),
     _single(
         "quadratic_stiffness", "k2", "u**2", formula="u^2",
         meaning="stiffness that differs between the two directions, growing with displacement",
         cause="static offset of a hardening spring, curved shells, gravity on an asymmetric structure",
+        either_sign=True, placeless=True,
     ),
     _single(
         "signed_quadratic_stiffness", "k2s", "u*abs(u)", formula="u|u|",
         meaning="stiffness that grows with the size of the displacement, the same in both directions",
-        cause="fenders and rubber mounts, Hertz-like contact",
+        cause="fenders and rubber mounts, Hertz-like contact", either_sign=True,
     ),
     _single(
         "cubic_stiffness", "k3", "u**3", formula="u^3",
         meaning="hardening (or, if negative, softening) spring", cause="stretching of a clamped beam, mooring lines",
+        either_sign=True,
     ),
     _single(
         "quintic_stiffness", "k5", "u**5", formula="u^5",
@@ -156,29 +96,45 @@ _TERMS = (
     _single(
         "quadratic_damping", "c2", "v*abs(v)", formula="v|v|",
         meaning="drag with the square of velocity", cause="flow separation (Morison drag), orifices, sloshing",
+        conditions=_drains("c2"), placeless=True,
     ),
     _single(
         "cubic_damping", "cv3", "v**3", formula="v^3",
         meaning="damping that grows with the cube of velocity", cause="shock absorbers, squeeze films",
+        conditions=_drains("cv3"), placeless=True,
     ),
     _single(
         "coulomb_friction", "fc", "sgn(v)", formula="sgn v",
         meaning="dry friction of constant size against the motion", cause="bearings, guides, bolted joints",
+        conditions=_drains("fc", "friction"), placeless=True,
     ),
     _single(
         "dead_band", "kg", "max(min(u, u_g), -u_g)", formula="u within +-u_g, u_g sgn u beyond",
         meaning="spring force that stops growing at u_g; with coefficient -k the stiffness k is absent within the gap",
         cause="clearance in joints, a slack mooring",
-        parameters=(Parameter("u_g", "length", "half width of the dead band"),),
+        parameters=(
+            Parameter(
+                "u_g", "length", "half width of the dead band",
+                Search("quantiles of |u|", _even(0.08, 0.97, 14), blunt=True), (0.3, 1.2),
+            ),
+        ),
+        reported=("k_dead_band",), either_sign=True,
     ),
     _single(
         "bilinear_stiffness", "kb", "max(u, 0)",
         meaning="extra stiffness on one side of zero", cause="a breathing crack, a spring that pushes but cannot pull",
+        either_sign=True,
     ),
     _single(
         "one_sided_contact", "kc", "max(u - gap, 0)",
         meaning="stop that is touched beyond a gap", cause="fenders, snubbers, end stops",
-        parameters=(Parameter("gap", "length", "displacement at which contact begins", signed=True),),
+        parameters=(
+            Parameter(
+                "gap", "length", "displacement at which contact begins",
+                Search("quantiles of u", _even(0.1, 0.985, 16), blunt=True), (0.3, 1.2), signed=True,
+            ),
+        ),
+        conditions=(_spring("kc", "stop"),),
     ),
     Term(
         "periodic_stiffness",
@@ -186,13 +142,24 @@ _TERMS = (
         "u cos(2 pi f_m t + phase)",
         "stiffness that varies with time at its own frequency, whatever the motion",
         "fishtailing at a single-point mooring, rotating asymmetric shafts, gear meshing",
-        (Parameter("f_m", "frequency", "frequency of the stiffness"),),
+        (
+            Parameter(
+                "f_m", "frequency", "frequency of the stiffness", Search("lines of the modulation", AROUND), (0.15, 0.9)
+            ),
+        ),
+        reported=("k_m", "phase"),
     ),
     _single(
         "relaxation", "kr", "z", formula="z, with dz/dt = v - z/tau", state="v - z/tau",
         meaning="spring and damper in series: stiff when fast, slack when slow (Maxwell element)",
         cause="viscoelastic mounts, fluid-filled bushings, soil",
-        parameters=(Parameter("tau", "time", "relaxation time"),),
+        parameters=(
+            Parameter(
+                "tau", "time", "relaxation time",
+                Search("times of the motion", tuple(np.geomspace(0.05, 20.0, 12).tolist()), blunt=True), (0.3, 3.0),
+            ),
+        ),
+        conditions=(_spring("kr", "Maxwell element"),), placeless=True,
     ),
     _single(
         "hysteresis", "kz", "z", formula="z, with dz/dt = v - beta |v| z - gamma v |z|",
@@ -200,20 +167,33 @@ _TERMS = (
         meaning="force that depends on the path by which a displacement was reached (Bouc-Wen)",
         cause="bolted and riveted joints, wire-rope isolators, yielding metal",
         parameters=(
-            Parameter("beta", "1/length", "rate at which the loop closes", signed=True),
-            Parameter("gamma", "1/length", "roundness of the loop", signed=True),
+            Parameter(
+                "beta", "1/length", "rate at which the loop closes",
+                Search("per amplitude", (0.15, 0.4, 1.0, 2.5, 6.0)), (0.5, 2.0), signed=True,
+            ),
+            Parameter(
+                "gamma", "1/length", "roundness of the loop",
+                Search("shares of the one before", (-0.9, -0.3, 0.3, 0.9)), (-0.5, 0.5), signed=True,
+            ),
         ),
+        conditions=(
+            _spring("kz", "Bouc-Wen element"),
+            Condition("beta", "a Bouc-Wen element is passive for |gamma| <= beta", over="gamma", reached=True),
+        ),
+        placeless=True,
     ),
     _single(
         "constant_force", "f0", "1",
         meaning="steady force beside the measured one", cause="offset of a sensor, gravity, steady wind or current",
+        either_sign=True, placeless=True,
     ),
     Term(
         "harmonic_force",
         (Component("fh_cos", "cos(2*pi*f*t)"), Component("fh_sin", "sin(2*pi*f*t)")),
         "cos(2 pi f t + phase)",
         "sinusoidal force that was not measured", "rotating imbalance, mains hum, a neighbouring machine",
-        (Parameter("f", "frequency", "frequency of the force"),),
+        (Parameter("f", "frequency", "frequency of the force", Search("lines of the residual", AROUND), (0.3, 2.5)),),
+        placeless=True,
     ),
 )  # fmt: skip
 
@@ -239,6 +219,9 @@ def get(name: str) -> Term:
 
 def custom(name: str, force: str) -> Term:
     """A user's own term: ``force`` is a formula of u, v, t and the names of extra measured channels.
+
+    u, v, t and pi are displacement, velocity, time and the number, even where a channel is called so. The term has no
+    state: z is a channel like any other.
 
     Raises
     ------

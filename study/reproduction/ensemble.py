@@ -1,7 +1,6 @@
 """Many seeds of one case at once, on every core."""
 
 import math
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
@@ -12,9 +11,10 @@ from study.equations.model import Model
 from study.reproduction import tables
 from study.reproduction.identify_case import identify_case
 from study.reproduction.make_record import make_record
+from study.reproduction.settings import IdentificationSettings, RecordSettings
+from study.support.cores import cores
 from study.support.errors import DivergenceError
 
-Table = Mapping[str, Any]
 T = TypeVar("T")
 S = TypeVar("S")
 WANTED = 0.99  # of the seeds, for each noise-free parameter
@@ -30,10 +30,10 @@ def threaded(
     """Results of ``work`` for each item, in order; the kernels and the FFT release the interpreter lock.
 
     ``progress`` is called with the number of items done; ``workers`` is the number of threads, as many
-    as there are cores where it is left out.
+    as there are cores for this process where it is left out.
     """
     done: list[T] = []
-    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
+    with ThreadPoolExecutor(workers or cores()) as pool:
         for result in pool.map(work, items):
             done.append(result)
             if progress is not None:
@@ -42,7 +42,7 @@ def threaded(
 
 
 def estimates(
-    model: Model, record: Table, identification: Table, seeds: Iterable[int],
+    model: Model, record: RecordSettings, identification: IdentificationSettings, seeds: Iterable[int],
     *, workers: int | None = None, progress: Callable[[int], None] | None = None,
 ) -> pd.DataFrame:  # fmt: skip
     """Every parameter of every estimator for every seed, as ``tables.parameters`` with a column ``seed``.
@@ -54,10 +54,10 @@ def estimates(
         try:
             measured = make_record(model, record, seed=seed, noise_seed=NOISE_OFFSET + seed)
         except DivergenceError as error:
-            lost = {"case": record["case"], "parameter": "diverged", "estimate": error.time}
+            lost = {"case": record.case, "parameter": "diverged", "estimate": error.time}
             return pd.DataFrame([lost], columns=tables.PARAMETER_COLUMNS).assign(seed=seed)
         found = identify_case(model, measured, identification)
-        return tables.parameters(record["case"], model, found, identification).assign(seed=seed)
+        return tables.parameters(record.case, model, found, identification).assign(seed=seed)
 
     return pd.concat([f for f in threaded(one, list(seeds), progress, workers) if len(f)], ignore_index=True)
 

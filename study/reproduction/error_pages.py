@@ -24,7 +24,7 @@ def opening(errors: pd.DataFrame, noise: Mapping[str, float]) -> list[Block]:
     note = (
         f"Median over {int(errors['seeds'].max())} seeds of the error in %, every estimator on the very same records; "
         "in brackets the gain, the error of MI/SO over this one. Where the true value is zero the error is in the "
-        f"parameter's own unit. {origin(errors)}"
+        "parameter's own unit. `snakemake -j2 estimators` does it with more seeds: `docs/estimators.md`."
     )
     noisy = errors[(errors["case"].map(noise) > 0.0) & (errors["seeds"] >= ENOUGH)]
     picture = Image("Errors of the estimators by parameter and case", "../figures/estimators.png")
@@ -32,25 +32,6 @@ def opening(errors: pd.DataFrame, noise: Mapping[str, float]) -> list[Block]:
     if len(noisy):
         found += [Text("Under noise on the displacement, bias ± scatter of one estimate, both in %:"), biases(noisy)]
     return found
-
-
-def origin(errors: pd.DataFrame) -> str:
-    """Where the numbers come from: kept ones that this run's first seeds agree with, or this run alone."""
-    own = errors[errors["source"] == estimator_errors.OWN]
-    kept, anew = sorted(set(errors["source"]) - {estimator_errors.OWN}), "`make estimators` runs all of them anew."
-    if not kept:
-        return "`snakemake -j2 estimators` does it with more seeds: `docs/estimators.md`."
-    words = (
-        f"The many seeds are kept in `{kept[0]}`: this run's own first {estimator_errors.FIRST} gave the same errors "
-        f"to {100.0 * estimator_errors.ALIKE:g} %, in each parameter of each estimator. "
-    )
-    if own.empty:
-        return words + anew
-    cases = ", ".join(dict.fromkeys(f"`{case}`" for case in own["case"]))
-    return (
-        f"{words}They did not in {cases}, which rests on {int(own['seeds'].max())} seeds of this run alone: other "
-        f"settings, other code, or a processor that rounds otherwise. {anew}"
-    )
 
 
 def sentences(errors: pd.DataFrame, noise: Mapping[str, float]) -> tuple[str, ...]:

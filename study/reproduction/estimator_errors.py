@@ -12,11 +12,10 @@ Floats = NDArray[np.float64]
 BASIS = "miso"  # the report's estimator: gains are over its errors
 COLUMNS = [
     "case", "estimator", "parameter", "true", "kind", "median_error", "standard_error", "gain",
-    "bias", "bias_error", "scatter", "seeds", "found", "noted", "first_error", "source",
+    "bias", "bias_error", "scatter", "seeds", "found", "noted", "first_error",
 ]  # fmt: skip
 FIRST = 2  # seeds whose median stands apart: by it a later run shows that it gives the same errors
 ALIKE = 0.01  # of a median error: further apart, two runs are not the same
-OWN = "this run"
 
 
 def errors(estimates: pd.DataFrame) -> pd.DataFrame:
@@ -36,7 +35,7 @@ def errors(estimates: pd.DataFrame) -> pd.DataFrame:
         the distribution. ``gain`` is the median error of MI/SO over this one. ``bias`` and ``scatter`` are
         mean and standard deviation of the signed error. ``found`` of ``seeds`` give an estimate, ``noted`` of
         them with a note, such as that the search did not converge. ``first_error`` is the median over the
-        first ``FIRST`` seeds alone, ``source`` where the other numbers come from.
+        first ``FIRST`` seeds alone.
     """
     seeds = {str(case): sorted(group["seed"].unique()) for case, group in estimates.groupby("case")}
     rows: list[dict[str, Any]] = []
@@ -61,40 +60,29 @@ def errors(estimates: pd.DataFrame) -> pd.DataFrame:
                 "found": len(group),
                 "noted": int(group["note"].astype(bool).sum()),
                 "first_error": middle(np.abs(signed[group["seed"].isin(first)]), len(first))[0],
-                "source": OWN,
             }
         )
     return with_gains(pd.DataFrame(rows, columns=COLUMNS))
 
 
-def with_more_seeds(own: pd.DataFrame, kept: pd.DataFrame, source: str) -> pd.DataFrame:
-    """The errors of a run, and in place of its few seeds a kept table's many, where the two are of the same study.
-
-    A case's rows give way if the kept table has each of them over more seeds, and its first seeds came out the
-    same, to ``ALIKE`` in every parameter of every estimator: other settings and other code would show there.
+def differing(own: pd.DataFrame, kept: pd.DataFrame) -> list[str]:
+    """Cases whose first seeds do not come out as those of a kept table did: other settings or other code show there.
 
     Parameters
     ----------
     own, kept : DataFrame
-        As :func:`errors` gives them.
-    source : str
-        Where ``kept`` lies, for the column of that name.
+        As :func:`errors` gives them; ``kept`` may have cases and estimators that ``own`` lacks.
 
     Returns
     -------
-    DataFrame
-        The rows of ``own``, in its order; ``first_error`` is always that of ``own``.
+    list of str
+        Those where a ``first_error`` is not in ``kept`` or is off by more than ``ALIKE``.
     """
     keys = ["case", "estimator", "parameter"]
-    many = kept.set_index(keys).reindex(pd.MultiIndex.from_frame(own[keys])).reset_index()[COLUMNS]
-    same = (
-        (many["seeds"].to_numpy() > own["seeds"].to_numpy())
-        & np.isclose(many["true"], own["true"], rtol=1e-9, atol=0.0)
-        & np.isclose(many["first_error"], own["first_error"], rtol=ALIKE, atol=0.0)
-    )
-    whole = pd.Series(same, index=own.index).groupby(own["case"]).transform("all")
-    many = many.set_axis(own.index).assign(first_error=own["first_error"], source=source)
-    return pd.concat([own[~whole], many[whole]]).sort_index().astype(own.dtypes.to_dict())
+    before = kept.set_index(keys).reindex(pd.MultiIndex.from_frame(own[keys])).reset_index()
+    same = np.isclose(before["true"], own["true"], rtol=1e-9, atol=0.0)
+    same &= np.isclose(before["first_error"], own["first_error"], rtol=ALIKE, atol=0.0)
+    return list(dict.fromkeys(str(case) for case in own.loc[~same, "case"]))
 
 
 def middle(sizes: Floats, count: int) -> tuple[float, float]:

@@ -16,14 +16,13 @@ from study.equations.model import Model
 from study.identify.estimators import miso
 from study.identify.estimators.base import Settings, true_parameters
 from study.reproduction.ensemble import threaded
-from study.reproduction.identify_case import estimator_settings
 from study.reproduction.make_record import make_record
+from study.reproduction.settings import IntegratorSettings, RecordSettings
 from study.support.errors import DivergenceError
 
 Table = Mapping[str, Any]
-FINE = {"method": "rk4", "steps_per_sample": 16}
-STEPS = (1, 2, 4, 8)
-METHODS = ("abm4", "rk4")
+FINE = IntegratorSettings(method="rk4", steps_per_sample=16)
+STUDIED = [IntegratorSettings(method=m, steps_per_sample=s) for m in ("abm4", "rk4") for s in (1, 2, 4, 8)]
 
 
 @dataclass(frozen=True)
@@ -72,7 +71,11 @@ class Run:
 
 
 def study(
-    models: Mapping[str, Model], record: Table, identification: Table, seeds: Sequence[int], readings: Sequence[str]
+    models: Mapping[str, Model],
+    record: RecordSettings,
+    estimation: Settings,
+    seeds: Sequence[int],
+    readings: Sequence[str],
 ) -> pd.DataFrame:
     """Every system under every setting.
 
@@ -80,35 +83,40 @@ def study(
     ----------
     models : mapping of Model
         Systems by name, every value known.
-    record, identification : mapping
-        As ``StudyConfig.record_settings`` and ``identification_settings``.
+    record : RecordSettings
+        How records are made.
+    estimation : Settings
+        How they are identified.
     seeds : sequence of int
         Of the forces.
     readings : sequence of str
         Readings of unit variance. The first is studied at every setting, the others (a force of twice
         the variance, by and large) at the report's own: Adams-Bashforth-Moulton, one step a sample.
     """
-    told = estimator_settings(identification)
     rows: list[Row] = []
     for name, model in models.items():
         for reading in readings:
-            base = {**record, "excitation": {**record["excitation"], "reading": reading}}
-            fine = _runs(model, base, FINE, told, seeds)
-            every = [{"method": m, "steps_per_sample": s} for m in METHODS for s in STEPS]
-            for integrator in every if reading == readings[0] else every[:1]:
-                runs = _runs(model, base, integrator, told, seeds)
-                about = {"system": name, "reading": reading, **integrator, "seeds": len(seeds)}
+            excitation = record.excitation.model_copy(update={"reading": reading})
+            base = record.model_copy(update={"excitation": excitation})
+            fine = _runs(model, base, FINE, estimation, seeds)
+            for integrator in STUDIED if reading == readings[0] else STUDIED[:1]:
+                runs = _runs(model, base, integrator, estimation, seeds)
+                about = {"system": name, "reading": reading, **integrator.plain(), "seeds": len(seeds)}
                 rows += _rows(about, true_parameters(model.values), fine, runs, seeds)
     return pd.DataFrame([asdict(row) for row in rows])
 
 
-def _runs(model: Model, record: Table, integrator: Table, told: Settings, seeds: Iterable[int]) -> list[Run]:
+def _runs(
+    model: Model, record: RecordSettings, integrator: IntegratorSettings, estimation: Settings, seeds: Iterable[int]
+) -> list[Run]:
+    stepped = record.model_copy(update={"integrator": integrator})
+
     def one(seed: int) -> Run:
         try:
-            made = make_record(model, {**record, "integrator": integrator}, seed=seed)
+            made = make_record(model, stepped, seed=seed)
         except DivergenceError as error:
             return Run({}, error.time)
-        return Run({p.name: p.value for p in miso.identify(model, made, told).parameters})
+        return Run({p.name: p.value for p in miso.identify(model, made, estimation).parameters})
 
     return threaded(one, list(seeds))
 
@@ -150,7 +158,7 @@ def page(table: pd.DataFrame) -> str:
         "# What the integrator's setting does to the recovered parameters",
         "",
         "Mean error of each MI/SO estimate against the same records integrated finely "
-        f"({FINE['method']}, {FINE['steps_per_sample']} steps a sample), with its standard error; "
+        f"({FINE.method}, {FINE.steps_per_sample} steps a sample), with its standard error; "
         "relative in percent, in the parameter's own unit where the true value is zero. "
         "The report's own setting is abm4 with one step a sample (Section 2.2).",
     ]

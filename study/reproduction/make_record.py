@@ -6,22 +6,28 @@ from typing import Any
 
 from study.equations.model import Model
 from study.equations.simulate import Integrator, simulate
-from study.records.excitation import Excitation, displacement_noise, force
+from study.records.excitation import displacement_noise, force
 from study.records.record import Record
-from study.support.errors import DivergenceError
+from study.reproduction.settings import RecordSettings
+from study.support.config_files import checked
+from study.support.errors import DivergenceError, StudyError
 
-Table = Mapping[str, Any]
 
-
-def make_record(model: Model, settings: Table, *, seed: int | None = None, noise_seed: int | None = None) -> Record:
+def make_record(
+    model: Model,
+    settings: RecordSettings | Mapping[str, Any],
+    *,
+    seed: int | None = None,
+    noise_seed: int | None = None,
+) -> Record:
     """Simulate a case, noise on the displacement included.
 
     Parameters
     ----------
     model : Model
         Every value known.
-    settings : mapping
-        ``StudyConfig.record_settings`` of the case, or ``ensemble_settings`` where the seeds are given.
+    settings : RecordSettings or mapping
+        Of the case, or what it is as plain data.
     seed, noise_seed : int, optional
         In place of the configured seeds, for ensembles.
 
@@ -34,18 +40,25 @@ def make_record(model: Model, settings: Table, *, seed: int | None = None, noise
     ------
     DivergenceError
         If the response leaves the range of finite numbers.
+    StudyError
+        If the settings are none, or a seed is neither given nor configured.
     """
-    sampling, described = settings["sampling"], dict(settings["excitation"])
-    own = described.pop("seed", seed)
-    excitation = Excitation(level=settings["level"], **described)
-    values = force(excitation, sampling["samples"], sampling["dt"], own if seed is None else seed)
+    settings = checked(RecordSettings, settings, "settings of a record")
+    sampling, excitation = settings.sampling, settings.excitation.at_level(settings.level)
+    values = force(excitation, sampling.samples, sampling.dt, _seed(seed, settings.excitation.seed, settings.case))
     try:
-        record = simulate(model, values, sampling["dt"], Integrator(**settings["integrator"]))
+        record = simulate(model, values, sampling.dt, Integrator(**settings.integrator.model_dump()))
     except DivergenceError as error:
-        name, level = settings["case"], settings["level"]
-        raise DivergenceError(f"case {name!r} at level {level:g}: {error}", error.time) from None
-    if settings["noise"] > 0.0:
-        stream = settings["noise_seed"] if noise_seed is None else noise_seed
-        noise = displacement_noise(record["displacement"], settings["noise"], stream)
+        raise DivergenceError(f"case {settings.case!r} at level {settings.level:g}: {error}", error.time) from None
+    if settings.noise > 0.0:
+        stream = _seed(noise_seed, settings.noise_seed, settings.case)
+        noise = displacement_noise(record["displacement"], settings.noise, stream)
         record = record.with_channels({"displacement": record["displacement"] + noise})
-    return replace(record, name=settings["case"])
+    return replace(record, name=settings.case)
+
+
+def _seed(given: int | None, configured: int | None, case: str) -> int:
+    seed = configured if given is None else given
+    if seed is None:
+        raise StudyError(f"case {case!r}: no seed is given or configured; expected a whole number of 0 or more")
+    return seed

@@ -1,58 +1,79 @@
-"""What the report's claims, the estimators and the figures ask of the settings: no job shall end in want of it."""
+"""What the jobs ask of the settings beyond the bounds of each value: none shall end in want of it."""
 
-from typing import Any
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
+from study.equations import terms
+from study.equations.model import Model, forward_graph, free
+from study.equations.model_file import read_model
 from study.identify.estimators import ESTIMATORS
-from study.records.excitation import READINGS, SETTINGS, Excitation, theoretical_autospectrum
-from study.support.errors import StudyError
+from study.identify.estimators.base import true_parameters
+from study.records.excitation import READINGS, SETTINGS, theoretical_autospectrum
+from study.reproduction.settings import ExcitationSettings, Sampling, StudySettings, Tolerances
+from study.support.errors import StudyError, at, expect
 
-Table = dict[str, Any]
 JUDGED, KIND = "report", "gaussian_lowpass"  # the force that the claims judge, Section 2.1
 CURVES = ("siso", "miso", "local_polynomial", "instrumental", "output_error")  # have some of every case to be drawn
 LOOKED_AT = (2.0, 4.0)  # hertz: where the claims read single lines, the Dead-Band's and the Mathieu's
 LONGER, INPUTS = 4, 2  # the claims cut segments this many times as long too, and tell so many inputs apart in them
-SHORTEST = 16  # samples in a segment, by the schema
+SHORTEST = 16  # samples in a segment, by its bounds
+LINES = 4  # of a segment, that the fit band spans at least
 
 
-def check_claims(settings: Table, where: str) -> None:
-    """Whether the claims can be judged under these settings.
-
-    Raises
-    ------
-    StudyError
-        At the first thing that they lack, naming the value and what would be right.
-    """
-    _check_force(settings, where)
-    _check_band(settings, where)
-    _check_segments(settings, where)
-
-
-def check_estimators(settings: Table, where: str) -> None:
-    """Whether every estimator that is named is there, MI/SO among them, and one with curves among the drawn.
+def check_settings(settings: StudySettings) -> None:
+    """Whether values fit together, and names are known.
 
     Raises
     ------
     StudyError
-        At the first that is not.
+        At the first that does not; the caller names the file.
     """
-    compared = settings["estimator_errors"]["estimators"]
-    for name in (*settings["estimators"], *settings["monte_carlo"]["estimators"], *compared):
-        if name not in ESTIMATORS:
-            raise StudyError(f"{where}: there is no estimator {name!r}; known are {', '.join(ESTIMATORS)}")
-    if "miso" not in settings["estimators"]:
-        raise StudyError(f"{where}: estimators lacks 'miso', whose coherences are drawn of every case")
-    if "miso" not in compared:
-        raise StudyError(f"{where}: estimator_errors.estimators lacks 'miso', which the others are compared with")
-    for kind, names in settings["drawn"].items():
+    samples, dt, length = settings.sampling.samples, settings.sampling.dt, settings.segments.length
+    expect(
+        length <= samples,
+        f"segments.length is {length}, longer than the record of {samples} samples; expected that many or fewer",
+    )
+    (low, high), line = settings.fit_band, settings.resolution
+    band, width = list(settings.fit_band), 2 * settings.local_polynomial.half_width + 1
+    expect(low < high <= 0.5 / dt, f"fit_band is {band}; it must rise and end below {0.5 / dt:g} Hz")
+    expect(high - low >= LINES * line, f"fit_band is {band}; it must span four lines of {line:g} Hz or more")
+    expect(
+        (high - low) * samples * dt >= width,
+        f"local_polynomial.half_width makes bands of {width} lines; fit_band {band} of {samples} samples holds fewer",
+    )
+    _check_estimators(settings)
+    for name, excitation in settings.excitations.items():
+        _check_excitation(f"excitations.{name}", excitation, settings.sampling)
+
+
+def _check_estimators(settings: StudySettings) -> None:
+    """Every estimator that is named is there, MI/SO among them, and one with curves among the drawn."""
+    own, compared = settings.estimators, settings.estimator_errors.estimators
+    for name in (*own, *settings.monte_carlo.estimators, *compared):
+        expect(name in ESTIMATORS, f"there is no estimator {name!r}; known are {', '.join(ESTIMATORS)}")
+    expect("miso" in own, "estimators lacks 'miso', whose coherences are drawn of every case")
+    expect("miso" in compared, "estimator_errors.estimators lacks 'miso', which the others are compared with")
+    drawn: dict[str, Sequence[str]] = {f"drawn.{kind}": names for kind, names in settings.drawn}
+    for kind, names in drawn.items():
         for name in names:
-            if name not in settings["estimators"]:
-                raise StudyError(f"{where}: drawn.{kind} names {name!r}, which is not among the estimators")
-    _check_drawn(settings, where)
+            expect(name in own, f"{kind} names {name!r}, which is not among the estimators")
+        without = f"{kind} is [{', '.join(names)}], of which none has curves of every case"
+        expect(set(names) & set(CURVES), f"{without}; one of {', '.join(CURVES)} is needed")
 
 
-def check_periods(excitation: Table, settings: Table) -> None:
+def _check_excitation(place: str, excitation: ExcitationSettings, sampling: Sampling) -> None:
+    own = ("kind", "seed", "periods", *SETTINGS[excitation.kind])
+    for key in excitation.plain():
+        nothing = f"{place} has {key}, which means nothing to a {excitation.kind}; it may have {', '.join(own)}"
+        expect(key in own, nothing)
+    expect(excitation.seed is not None, f"{place}: 'seed' is missing; expected a whole number of 0 or more")
+    with at(place):
+        theoretical_autospectrum(excitation.at_level(1.0), np.zeros(1), sampling.samples, sampling.dt)
+
+
+def check_periods(excitation: ExcitationSettings, settings: StudySettings) -> None:
     """Whether there are periods for those estimators that stand on them.
 
     Raises
@@ -60,15 +81,15 @@ def check_periods(excitation: Table, settings: Table) -> None:
     StudyError
         If there are too few; the caller says of which force.
     """
-    needed, periods = settings["settle_periods"] + 4, excitation.get("periods", 1)
-    if "errors_in_variables" in settings["estimators"] and periods < needed:
-        raise StudyError(
-            f"the excitation has {periods} period{'s' if periods > 1 else ''}; the estimator errors_in_variables needs "
-            f"settle_periods and four more, {needed}"
-        )
+    needed, periods = settings.settle_periods + 4, excitation.periods or 1
+    expect(
+        "errors_in_variables" not in settings.estimators or periods >= needed,
+        f"the excitation has {periods} period{'s' if periods > 1 else ''}; the estimator errors_in_variables needs "
+        f"settle_periods and four more, {needed}",
+    )
 
 
-def check_reached(excitation: Table, settings: Table) -> None:
+def check_reached(excitation: ExcitationSettings, settings: StudySettings) -> None:
     """Whether a force reaches over the lines that parameters are fitted to: beyond it there is only leakage.
 
     Raises
@@ -76,88 +97,126 @@ def check_reached(excitation: Table, settings: Table) -> None:
     StudyError
         If it does not; the caller says whose force it is.
     """
-    low, high = settings["fit_band"]
-    resolution = 1.0 / (settings["segments"]["length"] * settings["sampling"]["dt"])
-    force = Excitation(**{key: value for key, value in excitation.items() if key != "seed"})
-    if high > force.highest:
-        raise StudyError(
-            f"fit_band of config.yaml is [{low}, {high}]; the excitation has nothing above {force.highest:g} Hz, "
-            "where the band must end or before"
-        )
-    if high - force.lowest < 4.0 * resolution:
-        raise StudyError(
-            f"fit_band of config.yaml is [{low}, {high}]; the excitation begins at {force.lowest:g} Hz, "
-            f"and four lines of {resolution:g} Hz or more must lie above"
-        )
+    force, high, line = excitation.at_level(1.0), settings.fit_band[1], settings.resolution
+    begun = f"fit_band of config.yaml is {list(settings.fit_band)}; the excitation"
+    expect(high <= force.highest, f"{begun} has nothing above {force.highest:g} Hz, where the band must end or before")
+    expect(
+        high - force.lowest >= LINES * line,
+        f"{begun} begins at {force.lowest:g} Hz, and four lines of {line:g} Hz or more must lie above",
+    )
 
 
-def _check_drawn(settings: Table, where: str) -> None:
-    """Whether every case has a curve to be drawn."""
-    for kind, names in settings["drawn"].items():
-        if not set(names) & set(CURVES):
-            raise StudyError(
-                f"{where}: drawn.{kind} is [{', '.join(names)}], of which none has curves of every case; "
-                f"one of {', '.join(CURVES)} is needed"
-            )
+def check_model(path: Path, also_assumed: str, settings: StudySettings) -> Model:
+    """A case's model, which can be simulated, and whose inputs the record can tell apart with a term more.
+
+    Raises
+    ------
+    StudyError
+        If a value or a formula lacks something, or the inputs are too many.
+    """
+    from study.identify.frequency_domain.local_polynomial_method import LocalPolynomial
+
+    model = assumed = read_model(path)
+    with at(path):
+        model.numbers()
+        forward_graph(model)
+    if also_assumed:
+        term = terms.get(also_assumed)
+        for needed in term.parameters:
+            raise StudyError(f"also_assumed {also_assumed!r} needs a value for {needed.name}; take a term without")
+        assumed = model.with_term(term)
+    inputs = len({c.shape for entry in assumed.terms for c in entry.term.components})
+    cut, samples = settings.segments.segments(), settings.sampling.samples
+    count, worth = cut.count(samples), cut.effective_averages(samples)
+    begun = f"segments of config.yaml cut the record into {count}"
+    expect(count > inputs, f"{begun}; {inputs} inputs need {inputs + 1} or more")
+    expect(
+        worth > inputs,
+        f"{begun} that are worth {worth:.3g} averages, as they overlap; {inputs} inputs need more than {inputs}: "
+        "shorter segments are right",
+    )
+    LocalPolynomial(**settings.local_polynomial.model_dump()).check(inputs)
+    return model
 
 
-def _check_force(settings: Table, where: str) -> None:
-    if JUDGED not in settings["excitations"]:
-        known = ", ".join(settings["excitations"])
-        raise StudyError(
-            f"{where}: excitations names {known}, not {JUDGED!r}; the claims judge a force of this name, a {KIND}"
-        )
-    force, sampling = settings["excitations"][JUDGED], settings["sampling"]
-    if force["kind"] != KIND:
-        raise StudyError(
-            f"{where}: excitations.{JUDGED}.kind is {force['kind']!r}; the claims judge a {KIND} there, "
-            "and a force of another kind needs a name of its own"
-        )
-    if "reading" not in force:
-        raise StudyError(
-            f"{where}: excitations.{JUDGED} has no reading, which the claims name; "
-            f"it may be {' or '.join(READINGS)}, what unit variance refers to"
-        )
+def check_tolerances(tolerances: Tolerances, models: Path, cases: Sequence[str]) -> None:
+    """Whether tolerances are of parameters that there are, and of cases or systems.
+
+    Raises
+    ------
+    StudyError
+        At the first that is of neither; the caller names the file.
+    """
+    systems = [path.stem for path in sorted(models.glob("*.yaml"))]
+    for name in tolerances.of_case:
+        neither = f"tolerances.of_case names {name!r}, which is neither a case nor a system"
+        expect(name in cases or name in systems, neither)
+    keys = [key for term in terms.LIBRARY.values() for key in free(term).keys]
+    keys += [key for name in systems for key in read_model(models / f"{name}.yaml").values]
+    known = sorted(true_parameters(dict.fromkeys(keys, 1.0)))  # as tables name them
+    groups = {"relative": tolerances.relative, "absolute": tolerances.absolute}
+    groups |= {f"of_case.{name}": own for name, own in tolerances.of_case.items()}
+    for group, names in groups.items():
+        for name in names:
+            unknown = f"tolerances.{group} names {name!r}, which is no parameter; known are {', '.join(known)}"
+            expect(name in known, unknown)
+
+
+def check_claims(settings: StudySettings) -> None:
+    """Whether the claims can be judged under these settings.
+
+    Raises
+    ------
+    StudyError
+        At the first thing that they lack, naming the value and what would be right; the caller names the file.
+    """
+    known, force = ", ".join(settings.excitations), settings.excitations.get(JUDGED)
+    if force is None:
+        raise StudyError(f"excitations names {known}, not {JUDGED!r}; the claims judge a force of this name, a {KIND}")
+    _check_force(force, settings.sampling)
+    with at(f"excitations.{JUDGED}"):
+        check_reached(force, settings)
+    (low, high), (first, last) = settings.fit_band, LOOKED_AT
+    below = first - settings.resolution  # the lowest line has a neighbour
+    expect(
+        low <= below and high >= last,
+        f"fit_band is {list(settings.fit_band)}; the claims look at lines from {first:g} to {last:g} Hz, so that "
+        f"it must begin at {below:.4g} Hz or below and end at {last:g} Hz or above",
+    )
+    _check_segments(settings)
+
+
+def _check_force(force: ExcitationSettings, sampling: Sampling) -> None:
+    expect(
+        force.kind == KIND,
+        f"excitations.{JUDGED}.kind is {force.kind!r}; the claims judge a {KIND} there, "
+        "and a force of another kind needs a name of its own",
+    )
+    expect(
+        force.reading,
+        f"excitations.{JUDGED} has no reading, which the claims name; "
+        f"it may be {' or '.join(READINGS)}, what unit variance refers to",
+    )
     for kind in SETTINGS:  # Section 6 holds for any spectrum: the claims put each in its place
-        asked: Table = {key: value for key, value in force.items() if key != "seed"} | {"kind": kind}
-        try:
-            theoretical_autospectrum(Excitation(**asked), np.zeros(1), sampling["samples"], sampling["dt"])
-        except StudyError as error:
-            raise StudyError(f"{where}: the claims put a {kind} in place of excitations.{JUDGED}: {error}") from None
+        other = force.model_copy(update={"kind": kind})
+        with at(f"the claims put a {kind} in place of excitations.{JUDGED}"):
+            theoretical_autospectrum(other.at_level(1.0), np.zeros(1), sampling.samples, sampling.dt)
 
 
-def _check_band(settings: Table, where: str) -> None:
-    """The lines that the claims look at lie in the fit band, the lowest one with a neighbour below."""
-    try:
-        check_reached(settings["excitations"][JUDGED], settings)
-    except StudyError as error:
-        raise StudyError(f"{where}: excitations.{JUDGED}: {error}") from None
-    (low, high), (first, last) = settings["fit_band"], LOOKED_AT
-    resolution = 1.0 / (settings["segments"]["length"] * settings["sampling"]["dt"])
-    if low > first - resolution or high < last:
-        raise StudyError(
-            f"{where}: fit_band is [{low}, {high}]; the claims look at lines from {first:g} to {last:g} Hz, so that "
-            f"it must begin at {first - resolution:.4g} Hz or below and end at {last:g} Hz or above"
-        )
-
-
-def _check_segments(settings: Table, where: str) -> None:
-    from study.records.spectra import Segments  # SciPy, for those alone who load a configuration
-
-    told, samples = settings["segments"], settings["sampling"]["samples"]
+def _check_segments(settings: StudySettings) -> None:
+    length, samples = settings.segments.length, settings.sampling.samples
 
     def enough(length: int) -> bool:
-        longer: Table = {**told, "length": LONGER * length}
-        cut = Segments(**longer)
+        cut = settings.segments.model_copy(update={"length": length}).segments(LONGER)
         return samples >= cut.length and cut.effective_averages(samples) > INPUTS
 
-    if enough(told["length"]):
+    if enough(length):
         return
-    right = told["length"] // 2
+    right = length // 2
     while right >= SHORTEST and not enough(right):
         right //= 2
     advice = f"{right} is right" if right >= SHORTEST else "a longer record is right"
     raise StudyError(
-        f"{where}: segments.length is {told['length']}; the claims cut segments of {LONGER} times that too, which a "
+        f"segments.length is {length}; the claims cut segments of {LONGER} times that too, which a "
         f"record of {samples} samples must hold for more than {INPUTS} averages: {advice}"
     )

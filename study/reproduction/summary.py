@@ -13,8 +13,7 @@ from study.support.document import Block, Bullets, Heading, Text, table
 INTRODUCTION = (
     "Bendat, Palo and Coppolino identify nonlinear systems with one degree of freedom from force and response: "
     "reverse the two, and every term of the equation of motion is a linear path of its own (reverse dynamic MI/SO). "
-    "This page sets what their report states beside what this study finds. Every number on it is computed by this run, "
-    "but for errors over many seeds, which say where they come from."
+    "This page sets what their report states beside what this study finds. Every number on it is computed by this run."
 )
 FILES = (
     ("`results/<case>/record.csv`", "the record: time, force, displacement, velocity, acceleration"),

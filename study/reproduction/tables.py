@@ -12,9 +12,9 @@ from study.equations.model import Model
 from study.identify.estimators.base import Identified, true_parameters
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.identify.frequency_domain.inputs import Input
+from study.reproduction.settings import IdentificationSettings
 from study.support.files import replacing
 
-Table = Mapping[str, Any]
 PARAMETER_COLUMNS = [
     "case", "estimator", "parameter", "true", "estimate", "standard_error",
     "relative_error", "tolerance", "within_tolerance", "note",
@@ -29,7 +29,9 @@ COHERENCE_COLUMNS = [
 NOISE_COLUMNS = ["frequency", "estimator", "noise"]
 
 
-def parameters(case: str, model: Model, found: Mapping[str, Identified], settings: Table) -> pd.DataFrame:
+def parameters(
+    case: str, model: Model, found: Mapping[str, Identified], settings: IdentificationSettings
+) -> pd.DataFrame:
     """Every parameter of every estimator, one row each (``PARAMETER_COLUMNS``).
 
     ``tolerance`` is relative where the true value is not zero; where it is zero there is no relative
@@ -51,12 +53,12 @@ def parameters(case: str, model: Model, found: Mapping[str, Identified], setting
     return pd.DataFrame(rows, columns=PARAMETER_COLUMNS)
 
 
-def judge(name: str, true: float, estimate: float, settings: Table) -> dict[str, Any]:
+def judge(name: str, true: float, estimate: float, settings: IdentificationSettings) -> dict[str, Any]:
     """Relative error, tolerance and verdict of one estimate."""
     if true != 0.0:
-        error, tolerance = (estimate - true) / true, settings["relative"].get(name, math.nan)
+        error, tolerance = (estimate - true) / true, settings.relative.get(name, math.nan)
         return {"relative_error": error, "tolerance": tolerance, "within_tolerance": abs(error) <= tolerance}
-    tolerance = settings["absolute"].get(name, math.nan)
+    tolerance = settings.absolute.get(name, math.nan)
     return {"relative_error": math.nan, "tolerance": tolerance, "within_tolerance": abs(estimate) <= tolerance}
 
 

@@ -1,1 +1,1 @@
-"""What knows nothing of vibration: files, documents, schemas, units, least squares, statistics."""
+"""What knows nothing of vibration: files, configuration, documents, units, least squares, statistics."""

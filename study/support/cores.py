@@ -1,8 +1,10 @@
-"""How many cores the process may use."""
+"""How much may run at once."""
 
 import os
 
 
 def cores() -> int:
-    """Number of processors that this process may run on."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    """Cores that this process may use, which a batch system or a container may hold below those of the machine."""
+    if hasattr(os, "sched_getaffinity"):  # Linux alone tells
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from study.equations.free_run import predict
 from study.equations.model import Model, ModelTerm, free
 from study.equations.simulate import Integrator, simulate
-from study.equations.terms import LIBRARY, Term, get
+from study.equations.term import Parameter, Term
+from study.equations.terms import LIBRARY, get
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.record import MOTIONS, Record
 from study.support.errors import DivergenceError, StudyError
@@ -18,14 +19,6 @@ from study.trials.strength import SHARE, grown, share_of
 Floats = NDArray[np.float64]
 LINEAR = ("inertia", "linear_damping", "linear_stiffness")  # what a linear model has: it cannot be hidden behind one
 HIDDEN = tuple(name for name in LIBRARY if name not in LINEAR)
-EITHER_WAY = (  # effects that occur with either sign: an opening or a closing gap, hardening or softening
-    "quadratic_stiffness", "signed_quadratic_stiffness", "cubic_stiffness", "dead_band", "bilinear_stiffness",
-    "constant_force",
-)  # fmt: skip
-PLACELESS = (  # effects that are the same wherever the system rests, u^2 but for another linear stiffness
-    "quadratic_stiffness", "quadratic_damping", "cubic_damping", "coulomb_friction", "relaxation", "hysteresis",
-    "harmonic_force",
-)  # fmt: skip
 NOISES = (0.0, 0.01, 0.05, 0.10)
 KNOWN = ("none", "none", "cubic_stiffness", "van_der_pol_damping")  # of which one is drawn
 KNOWN_SHARE = 0.15
@@ -149,10 +142,10 @@ def _unseen(base: Model, hidden: tuple[str, ...], response: str) -> bool:
 
     Linear stiffness does not count: it is the same everywhere.
     """
-    if "constant_force" not in hidden or response == "displacement":
+    effects = [get(name) for name in hidden]
+    if response == "displacement" or not any(term.steady for term in effects):
         return False
-    others = {t.name for t in base.terms} | set(hidden)
-    return others <= {*LINEAR, *PLACELESS, "constant_force"}
+    return all(term.placeless for term in (*effects, *(entry.term for entry in base.terms)))
 
 
 def _measured(truth: Model, record: Record, response: str) -> Floats | None:
@@ -217,22 +210,25 @@ def _drawn(rng: np.random.Generator, term: Term, quiet: Record) -> ModelTerm:
     """Shape parameters in the range where the effect shows, in the units of the system."""
     scale = float(np.std(quiet["displacement"]))
     omega = float(np.std(quiet["velocity"])) / scale
-    match term.name:
-        case "dead_band" | "one_sided_contact":
-            values = (float(rng.uniform(0.3, 1.2)) * scale,)
-        case "periodic_stiffness":
-            values = (float(rng.uniform(0.15, 0.9)) * omega / (2.0 * np.pi),)
-        case "harmonic_force":
-            values = (float(rng.uniform(0.3, 2.5)) * omega / (2.0 * np.pi),)
-        case "relaxation":
-            values = (float(rng.uniform(0.3, 3.0)) / omega,)
-        case "hysteresis":
-            beta = float(rng.uniform(0.5, 2.0)) / scale
-            values = (beta, float(rng.uniform(-0.5, 0.5)) * beta)
-        case _:
-            values = ()
+    values: list[float] = []
+    for parameter in term.parameters:
+        share = float(rng.uniform(*parameter.drawn))
+        values.append(share * values[-1] if parameter.relative else _scaled(share, parameter, scale, omega))
     entry = free(term)
     angle = float(rng.uniform(0.0, 2.0 * np.pi))
-    sign = -1.0 if term.name in EITHER_WAY and angle > np.pi else 1.0
+    sign = -1.0 if term.either_sign and angle > np.pi else 1.0
     shape = (np.cos(angle), np.sin(angle)) if len(term.components) == 2 else (sign,)
-    return replace(entry, coefficients=tuple(float(s) for s in shape), parameters=values)
+    return replace(entry, coefficients=tuple(float(s) for s in shape), parameters=tuple(values))
+
+
+def _scaled(value: float, parameter: Parameter, scale: float, omega: float) -> float:
+    """A value in the unit of its quantity, from one in units of rms displacement and angular rate (rad/s)."""
+    match parameter.quantity:
+        case "length":
+            return value * scale
+        case "1/length":
+            return value / scale
+        case "time":
+            return value / omega
+        case _:
+            return value * omega / (2.0 * np.pi)

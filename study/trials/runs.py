@@ -5,7 +5,7 @@ effect hidden and taken out of the library (``removed``).
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -18,6 +18,7 @@ from study.diagnose.adding import added
 from study.diagnose.verdict import MISSING, Diagnosis, diagnose
 from study.identify.time_domain.part_fit import fit_part
 from study.records.prepared import Prepared, prepare_record
+from study.reproduction.settings import TrialSettings
 from study.support.errors import StudyError
 from study.trials.draw import HIDDEN, Trial, make_trial
 
@@ -56,26 +57,25 @@ class Order:
     response: str
 
 
-def orders(settings: Mapping[str, Any]) -> list[Order]:
+def orders(settings: TrialSettings) -> list[Order]:
     """Every trial of the published run: all effects at all noises and responses, each with a seed of its own.
 
     Parameters
     ----------
-    settings : mapping
+    settings : TrialSettings
         ``trials`` of the configuration: ``first_seed``, ``noises``, how many ``rounds`` of single effects and
         of ``none`` at each noise and response, and how many ``pairs`` and ``removed`` trials of each effect.
     """
-    noises: list[float] = settings["noises"]
-    grid = [(noise, response) for noise in noises for response in RESPONSES]
+    grid = [(noise, response) for noise in settings.noises for response in RESPONSES]
     wanted: list[tuple[str, tuple[str, ...], tuple[float, str]]] = []
-    wanted += [(SINGLE, (name,), place) for _ in range(settings["rounds"]) for place in grid for name in HIDDEN]
-    wanted += [(NONE, (), place) for _ in range(settings["none"]) for place in grid]
+    wanted += [(SINGLE, (name,), place) for _ in range(settings.rounds) for place in grid for name in HIDDEN]
+    wanted += [(NONE, (), place) for _ in range(settings.none) for place in grid]
     couples = list(combinations(HIDDEN, 2))
-    drawn = np.random.default_rng(settings["first_seed"]).permutation(len(couples))[: settings["pairs"]]
+    drawn = np.random.default_rng(settings.first_seed).permutation(len(couples))[: settings.pairs]
     wanted += [(PAIR, couples[j], grid[i % len(grid)]) for i, j in enumerate(drawn)]
-    removed = [name for _ in range(settings["removed"]) for name in HIDDEN]
+    removed = [name for _ in range(settings.removed) for name in HIDDEN]
     wanted += [(REMOVED, (name,), grid[i % len(grid)]) for i, name in enumerate(removed)]
-    first = settings["first_seed"]
+    first = settings.first_seed
     return [Order(kind, first + i, hidden, *place) for i, (kind, hidden, place) in enumerate(wanted)]
 
 

@@ -26,7 +26,9 @@ from study.support.errors import StudyError
 
 DUFFING = str(Path(__file__).parents[2] / "models" / "duffing.yaml")
 STUDY = [sys.executable, "-m", "study"]
-HEAVY = {"numpy", "scipy", "pandas", "numba", "matplotlib", "ruamel", "tabulate", "h5py", "bokeh", "snakemake"}
+HEAVY = {
+    "numpy", "scipy", "pandas", "numba", "matplotlib", "ruamel", "pydantic", "tabulate", "h5py", "bokeh", "snakemake",
+}  # fmt: skip
 
 
 def _run(*words: str) -> subprocess.CompletedProcess[str]:

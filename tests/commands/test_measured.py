@@ -1,11 +1,15 @@
 """Measured and public records; they are found beside the project or where STUDY_DATA says (see the README)."""
 
+import os
+import shutil
+from pathlib import Path
+
 import h5py
 import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from study.commands.measurements import data_folder
+from study.commands import measurements
 from study.compare.comparison import compare
 from study.compare.prediction import predict
 from study.diagnose.verdict import MISSING, diagnose
@@ -15,21 +19,26 @@ from study.identify.time_domain.fit_model import fit_model
 from study.records.plan import make_plan
 from study.records.prepared import prepare_record
 from study.records.record import Record
+from study.support.errors import StudyError
 
 LINEAR = Model("linear", tuple(free(get(n)) for n in ("inertia", "linear_damping", "linear_stiffness")))
 RIVALS = {"cubic_stiffness", "hysteresis", "quadratic_stiffness", "quadratic_damping", "dead_band", "constant_force"}
 OTHERS = [name for name in LIBRARY if name not in RIVALS and name not in LINEAR]
-PRESENT = (data_folder() / "silverbox").is_dir()
-pytestmark = pytest.mark.skipif(not PRESENT, reason="the public records are not here; see the README")
+ROOT = Path(__file__).parents[2]
+DATA = Path(os.environ.get("STUDY_DATA", ROOT.parent / "shared" / "data"))
+present = pytest.mark.skipif(
+    not (DATA / "silverbox").is_dir(), reason="the public records are not here; see the README"
+)
 
 
 @pytest.fixture(scope="module")
 def silverbox() -> Record:
-    data = loadmat(data_folder() / "silverbox" / "SNLS80mV.mat")
+    data = loadmat(DATA / "silverbox" / "SNLS80mV.mat")
     channels = {"force": data["V1"].ravel().astype(float), "displacement": data["V2"].ravel().astype(float)}
     return Record(2**14 / 1e7, channels, name="silverbox")
 
 
+@present
 def test_the_silverbox_is_first_of_all_a_duffing_oscillator(silverbox):
     """With the offset of V1 in the model; without it, hysteresis with its free state competes on a short stretch."""
     prepared = prepare_record(silverbox, make_plan(silverbox, (40650, 48842), (20000, 28192)))
@@ -38,6 +47,7 @@ def test_the_silverbox_is_first_of_all_a_duffing_oscillator(silverbox):
     assert diagnosis.candidates[0].name == "cubic_stiffness"
 
 
+@present
 def test_the_silverbox_hides_a_damping_effect(silverbox):
     """The climb's last rung on the arrow, in millivolts: published physical models stop at 0.39."""
     names = ("cubic_stiffness", "constant_force", "quadratic_stiffness", "quadratic_damping")
@@ -54,8 +64,9 @@ def test_the_silverbox_hides_a_damping_effect(silverbox):
     assert rms[1] < 0.33
 
 
+@present
 def test_the_bouc_wen_benchmark_is_hysteresis_and_no_cubic_stiffness():
-    with h5py.File(data_folder() / "boucwen" / "train.h5") as file:
+    with h5py.File(DATA / "boucwen" / "train.h5") as file:
         force, motion = (np.ravel(file[f"multisine/{name}"][()])[:12288] for name in ("u", "y"))
     record = Record(1 / 750, {"force": force, "displacement": motion}, name="boucwen")
     diagnosis = diagnose(compare(LINEAR, prepare_record(record)), without=OTHERS)
@@ -64,3 +75,48 @@ def test_the_bouc_wen_benchmark_is_hysteresis_and_no_cubic_stiffness():
     assert first.coefficient == pytest.approx(5e4, rel=0.02)
     assert first.parameters["beta"] == pytest.approx(800.0, rel=0.05)
     assert first.parameters["gamma"] == pytest.approx(-1100.0, rel=0.05)
+
+
+def test_data_come_from_the_folder_that_the_variable_names(monkeypatch):
+    monkeypatch.setenv("STUDY_DATA", "/data")
+    row = measurements.load(ROOT / "config")["silverbox"]
+    assert row.path == "/data/silverbox/SNLS80mV.mat"
+    assert row.model == str(ROOT / "models" / "believed" / "oscillator.yaml")
+    assert row.options[:2] == ("--column", "force=V1")
+    assert measurements.Measurement.model_validate(row.plain()) == row
+    with pytest.raises(StudyError, match=r"/data/silverbox/SNLS80mV\.mat is not there; the project holds no data: set"):
+        measurements.check_present(Path(row.path))
+
+
+def test_without_the_variable_a_job_says_what_to_set(monkeypatch):
+    """The workflow itself needs no data: the table is read all the same."""
+    monkeypatch.delenv("STUDY_DATA", raising=False)
+    row = measurements.load(ROOT / "config")["silverbox"]
+    says = r"STUDY_DATA is not set; expected the folder that holds silverbox/SNLS80mV\.mat"
+    with pytest.raises(StudyError, match=says):
+        measurements.check_present(Path(row.path))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("silverbox\t$", "Silverbox\t$", "record is 'Silverbox'; expected up to 64 of a to z, 0 to 9 and _, a letter"),
+        ("oscillator\t6", "oscillator\t21", "(record 'silverbox'): steps is '21'; expected 20 or less"),
+        ("oscillator\t6", "oscillator\tsix", "(record 'silverbox'): steps is 'six'; expected a whole number"),
+        ("believed/oscillator\t6", "oscilator\t6", "there is no model 'oscilator'; models/ holds dead_band, duffing"),
+        ("--column force=V1", "--out a", "options name --out, which the workflow gives; leave it out"),
+        ("--column force=V1", "--column 'force", "cannot be split into words: No closing quotation"),
+        ("--fs 610.3515625", "--fs fast", "(record 'silverbox'): options: "),
+        ("bouc_wen\t", "silverbox\t", "row 3 (record 'silverbox'): the record stands twice; expected each name once"),
+    ],
+)
+def test_faults_of_a_row(tmp_path, old, new, says):
+    shutil.copytree(ROOT / "models", tmp_path / "models")
+    (tmp_path / "config").mkdir()
+    text = (ROOT / "config" / "measurements.tsv").read_text()
+    assert old in text
+    (tmp_path / "config" / "measurements.tsv").write_text(text.replace(old, new, 1))
+    with pytest.raises(StudyError) as caught:
+        measurements.load(tmp_path / "config")
+    assert str(caught.value).startswith(f"{tmp_path / 'config' / 'measurements.tsv'}, row ")
+    assert says in str(caught.value)

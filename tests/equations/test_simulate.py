@@ -186,7 +186,7 @@ def test_the_example_of_the_first_page_stays_at_the_studys_level(seed: int, tmp_
     (tmp_path / "softening.yaml").write_text(textwrap.dedent(block[1]), encoding="utf-8")
     model = read_model(tmp_path / "softening.yaml")
     study = load(ROOT / "config")
-    told = {**study.ensemble_settings("duffing"), "case": model.name, "level": 1.0}
+    told = study.record_settings("duffing").model_copy(update={"case": model.name, "level": 1.0})
     made = make_record(model, told, seed=seed)
     assert len(made["displacement"]) == 8192
     hold = np.sqrt(model.numbers()["k"] / -model.numbers()["k3"])  # beyond it the cubic spring pushes outwards

@@ -3,8 +3,10 @@
 A new term needs one row in ``ROWS``; ``test_every_term_has_a_row`` says so when it is missing.
 """
 
+import ast
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +16,8 @@ from study.equations import formulas, kernels
 from study.equations.graph import Graph
 from study.equations.model import Model, forward_graph, free, with_registers
 from study.equations.simulate import Integrator, simulate
-from study.equations.terms import LIBRARY, Component, Term, custom, get
+from study.equations.term import Component, Term
+from study.equations.terms import LIBRARY, custom, get
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
 from study.records.excitation import Excitation, force
 from study.support.errors import StudyError
@@ -225,3 +228,78 @@ def test_a_users_term_is_a_term_like_any_other() -> None:
     assert term.symbols == ("q_bracket",)
     assert term.unit("q_bracket", "N", "m") == "N per unit of the formula"
     assert custom("drag", "v*abs(v)").unit("q_drag", "N", "m") == "N s^2/m^2"
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_values_of_the_rows_are_physical(name: str) -> None:
+    assert get(name).physical(ROWS[name].values) == ""
+    assert get(name).physical(dict.fromkeys(get(name).keys)) == "", "what is not known is not judged"
+
+
+UNPHYSICAL: tuple[tuple[str, dict[str, float], str], ...] = (
+    ("inertia", {"m": 0.0}, "m is 0; a mass is positive"),
+    ("linear_damping", {"c": -0.1}, "c is -0.1; damping takes energy out, so it is zero or more"),
+    ("quadratic_damping", {"c2": -3.0}, "c2 is -3; damping takes energy out, so it is zero or more"),
+    ("cubic_damping", {"cv3": -1e-9}, "cv3 is -1e-09; damping takes energy out, so it is zero or more"),
+    ("coulomb_friction", {"fc": -1.0}, "fc is -1; friction takes energy out, so it is zero or more"),
+    ("dead_band", {"dead_band.u_g": 0.0}, "u_g is 0; the half width of the dead band is above zero"),
+    ("one_sided_contact", {"kc": 0.0, "one_sided_contact.gap": -1.0}, "kc is 0; the stiffness of a stop is positive"),
+    ("periodic_stiffness", {"periodic_stiffness.f_m": -2.0}, "f_m is -2; the frequency of the stiffness is above zero"),
+    ("relaxation", {"kr": -1.0, "relaxation.tau": 1.0}, "kr is -1; the stiffness of a Maxwell element is positive"),
+    ("relaxation", {"kr": 1.0, "relaxation.tau": 0.0}, "tau is 0; the relaxation time is above zero"),
+    ("hysteresis", {"kz": 0.0}, "kz is 0; the stiffness of a Bouc-Wen element is positive"),
+    (
+        "hysteresis",
+        {"kz": 1.0, "hysteresis.beta": 1.0, "hysteresis.gamma": -1.5},
+        "beta is 1 and gamma is -1.5; a Bouc-Wen element is passive for |gamma| <= beta",
+    ),
+    ("harmonic_force", {"harmonic_force.f": 0.0}, "f is 0; the frequency of the force is above zero"),
+)
+
+
+@pytest.mark.parametrize(("name", "values", "said"), UNPHYSICAL)
+def test_what_is_not_physical_is_said_in_a_sentence(name: str, values: dict[str, float], said: str) -> None:
+    assert get(name).physical(values) == said
+    assert get(name).physical({**values, "q_other": -1.0}) == said
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("linear_damping", {"c": 0.0}),
+        ("cubic_stiffness", {"k3": -2e6}),
+        ("linear_stiffness", {"k": -10.0}),
+        ("van_der_pol_damping", {"c3": -1.0}),
+        ("dead_band", {"kg": -355.3, "dead_band.u_g": 1e-9}),
+        ("one_sided_contact", {"kc": 1.0, "one_sided_contact.gap": -0.1}),
+        ("hysteresis", {"kz": 1.0, "hysteresis.beta": 1.0, "hysteresis.gamma": -1.0}),
+        ("constant_force", {"f0": -1.0}),
+    ],
+)
+def test_softening_self_excitation_and_a_preload_are_physical(name: str, values: dict[str, float]) -> None:
+    assert get(name).physical(values) == ""
+
+
+def test_a_fit_keeps_the_mass_and_what_has_no_sign_above_zero() -> None:
+    kept = tuple(key for term in LIBRARY.values() for key in term.positive)
+    assert kept == ("m", "dead_band.u_g", "periodic_stiffness.f_m", "relaxation.tau", "harmonic_force.f")
+    assert custom("own", "u**2").positive == ()
+
+
+def test_only_a_steady_force_moves_the_place_of_rest() -> None:
+    assert [term.name for term in LIBRARY.values() if term.steady] == ["constant_force"]
+
+
+def test_no_other_module_asks_for_a_term_by_its_name() -> None:
+    """All about a term stands in its entry; left out are the oscillator's own, and the report's systems."""
+    study = Path(formulas.__file__).parents[1]
+    asked = {
+        f"{path.name}:{node.lineno}"
+        for path in study.rglob("*.py")
+        if path.name != "terms.py" and "reproduction" not in path.parts
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Compare | ast.MatchValue)
+        for leaf in ast.walk(node)
+        if isinstance(leaf, ast.Constant) and leaf.value in set(LIBRARY) - set(LINEAR)
+    }
+    assert not asked

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from study.identify.frequency_domain.periodic import Periods, fit, steady
 from study.records.excitation import Excitation, force
 from study.records.record import Record
 from study.records.spectra import Segments
+from study.reproduction.config import load
 from study.reproduction.identify_case import identify_case
 from study.support.errors import StudyError
 
@@ -111,9 +113,8 @@ def test_units_change_nothing(systems):
 
 def test_a_case_tells_the_period_that_its_table_has_lost(systems):
     record = replace(periodic(systems["linear"], 5), period=None)
-    settings = {
-        "also_assumed": "", "estimators": ["errors_in_variables"], "segments": {}, "fit_band": BAND, "period": SAMPLES,
-    }  # fmt: skip
+    known = load(Path(__file__).parents[2] / "config").identification_settings("linear", ("errors_in_variables",))
+    settings = known.model_copy(update={"also_assumed": "", "fit_band": BAND, "period": SAMPLES})
     found = identify_case(systems["linear"], record, settings)["errors_in_variables"]
     assert found.responses is None
     assert {p.name for p in found.parameters} == {"m", "c", "k", "f_n", "zeta"}

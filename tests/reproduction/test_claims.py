@@ -13,7 +13,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from study.equations.model_file import read_model
+from study.identify.estimators.base import Settings
 from study.records.record import Record
+from study.records.spectra import Segments
 from study.reproduction import config, integrator_study
 from study.reproduction.claims import (
     claims_table,
@@ -34,6 +36,7 @@ from study.reproduction.claims.judgement import Condition
 from study.reproduction.claims.reported import Reported, Statement
 from study.reproduction.claims.sample import Sample, departure
 from study.reproduction.preliminary import model_restoring_force, natural_frequency
+from study.reproduction.settings import RecordSettings
 
 ROOT = Path(__file__).parents[2]
 SEEDS = 6
@@ -42,20 +45,21 @@ MET, MISSED = Condition("c", "m", True), Condition("x above 2", "x 1", False)
 
 @pytest.fixture(scope="module")
 def settings() -> dict[str, Any]:
-    return {**config.load(ROOT / "config").settings, "ensembles": {"seeds": SEEDS, "first_seed": 5001}}
+    return {**config.load(ROOT / "config").settings.plain(), "ensembles": {"seeds": SEEDS, "first_seed": 5001}}
 
 
 @pytest.fixture(scope="module")
 def report() -> Reported:
-    return stated.load(ROOT / "config" / "reported.tsv", ROOT / "config" / "schemas" / "reported.schema.yaml")
+    return stated.load(ROOT / "config" / "reported.tsv")
 
 
 @pytest.fixture(scope="module")
 def steps(settings: dict[str, Any]) -> pd.DataFrame:
     models = evidence.models_of(ROOT / "models")
-    record = evidence.record_settings(settings, evidence.Drive("linear"))
+    record = RecordSettings.model_validate(evidence.record_settings(settings, evidence.Drive("linear", level=4.0)))
+    told = Settings(Segments(**settings["segments"]), tuple(settings["fit_band"]))
     chosen = {name: models[name] for name in ("linear", "van_der_pol")}
-    return integrator_study.study(chosen, {**record, "level": 4.0}, settings, range(5001, 5004), ["raw", "filtered"])
+    return integrator_study.study(chosen, record, told, range(5001, 5004), ["raw", "filtered"])
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +87,7 @@ def test_verdict_counts_conditions(met: list[bool], said: str) -> None:
 
 
 def one_statement() -> Reported:
-    return Reported({"a": Statement("a", "p. 1", "it is so", 3.0, "Hz")})
+    return Reported({"a": Statement(id="a", where="p. 1", what="it is so", value=3.0, unit="Hz")})
 
 
 def test_a_claim_that_holds_needs_no_reason() -> None:
@@ -221,7 +225,7 @@ def test_a_changed_coefficient_changes_the_verdicts(
 
 def test_a_changed_statement_changes_the_verdict(found: evidence.Evidence, report: Reported) -> None:
     rows = dict(report.statements)
-    rows["siso_stiffness"] = Statement("siso_stiffness", "Section 5.2.2", "k", 400.0, "N/m")
+    rows["siso_stiffness"] = Statement(id="siso_stiffness", where="Section 5.2.2", what="k", value=400.0, unit="N/m")
     assert duffing.siso_stiffness(found, Reported(rows)).verdict == "not reproduced"
 
 

@@ -1,7 +1,9 @@
 """The configuration: what the jobs are told, and one sentence for every fault before any of them starts."""
 
+import json
 import re
 import shutil
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,8 +19,9 @@ from study.records.excitation import Excitation, force
 from study.records.spectra import Segments
 from study.reproduction.config import load
 from study.reproduction.preconditions import CURVES
+from study.reproduction.settings import StudySettings
+from study.support.config_files import Row, read_rows, read_yaml
 from study.support.errors import StudyError
-from study.support.schema import read_table, read_yaml
 
 ROOT = Path(__file__).parents[2]
 ROW = "duffing\tduffing\treport\t1.0\t0\t\t21\t22\t23\t24\t3\t\t\t\tDuffing system"
@@ -62,16 +65,18 @@ def test_every_case_of_the_report_is_there():
 def test_settings_of_a_case():
     study = load(ROOT / "config")
     record = study.record_settings("noise_10")
-    assert record["noise"] == 0.1
-    assert record["noise_seed"] == study.settings["noise_seed"]
-    assert "noise_seed" not in study.record_settings("linear"), "the noise's seed is no business of a case without"
-    assert study.drawn("noise_10") == study.settings["drawn"]["with_noise"]
-    assert study.drawn("linear") == study.settings["drawn"]["without_noise"]
-    assert record["excitation"]["seed"] == study.settings["excitations"]["report"]["seed"]
-    assert "seed" not in str(study.ensemble_settings("noise_10")), "an ensemble brings seeds of its own"
-    assert study.identification_settings("dead_band")["relative"]["c"] == 0.05, "a case's own tolerance holds"
-    assert study.identification_settings("duffing")["relative"]["c"] == 0.02
-    assert study.identification_settings("linear")["also_assumed"] == "cubic_stiffness"
+    assert record.noise == 0.1
+    assert record.noise_seed == study.settings.noise_seed
+    assert "noise_seed" not in study.record_settings("linear").plain(), (
+        "the noise's seed is no business of a case without"
+    )
+    assert study.drawn("noise_10") == list(study.settings.drawn.with_noise)
+    assert study.drawn("linear") == list(study.settings.drawn.without_noise)
+    assert record.excitation.seed == study.settings.excitations["report"].seed
+    assert "seed" not in str(record.without_seeds().plain()), "an ensemble brings seeds of its own"
+    assert study.identification_settings("dead_band").relative["c"] == 0.05, "a case's own tolerance holds"
+    assert study.identification_settings("duffing").relative["c"] == 0.02
+    assert study.identification_settings("linear").also_assumed == "cubic_stiffness"
 
 
 def test_figures_without_a_number_are_named_after_the_case(folder):
@@ -85,14 +90,14 @@ def test_figures_without_a_number_are_named_after_the_case(folder):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("samples: 8192", "samples: -5", "sampling.samples is not right: -5 is less than the minimum of 64"),
-        ("samples: 8192", "samples: many", "sampling.samples is not right: 'many' is not of type 'integer'"),
-        ("samples: 8192", "sample: 8192", "sampling: unknown key 'sample'; known are samples, dt"),
-        ("dt: 0.02 ", "dt: .nan ", "sampling.dt is nan; a finite number is right"),
+        ("samples: 8192", "samples: -5", "sampling.samples is -5; expected 64 or more"),
+        ("samples: 8192", "samples: many", "sampling.samples is 'many'; expected a whole number"),
+        ("samples: 8192", "sample: 8192", "sampling: unknown key 'sample'; expected samples, dt"),
+        ("dt: 0.02 ", "dt: .nan ", "sampling.dt is nan; expected a finite number"),
         ("dt: 0.02 ", "dt: 0.2 ", "fit_band is [0.3, 10.0]; it must rise and end below 2.5 Hz"),
         ("length: 512", "length: 8193", "segments.length is 8193, longer than the record of 8192 samples"),
-        ("overlap: 0.5", "overlap: 1.5", "segments.overlap is not right"),
-        ("window: hann", "window: han", "segments.window is not right: 'han' is not one of"),
+        ("overlap: 0.5", "overlap: 1.5", "segments.overlap is 1.5; expected 0.95 or less"),
+        ("window: hann", "window: han", "segments.window is 'han'; expected 'hann', 'hamming'"),
         ("fit_band: [0.3, 10.0]", "fit_band: [0.3, 0.5]", "it must span four lines of 0.0976562 Hz or more"),
         ("[siso, miso,", "[siso, mios,", "there is no estimator 'mios'; known are siso, miso"),
         ("[siso, miso, miso_hand_read", "[siso, miso_hand_read", "estimators lacks 'miso', whose coherences are drawn"),
@@ -107,8 +112,12 @@ def test_figures_without_a_number_are_named_after_the_case(folder):
             "estimators: [siso, local_polynomial]",
             "estimator_errors.estimators lacks 'miso', which the others are compared with",
         ),
-        ("degree: 2", "degree: 2.5", "local_polynomial.degree is not right"),
-        ("kind: gaussian_lowpass", "kind: gaussian", "excitations.report.kind is not right"),
+        ("degree: 2", "degree: 2.5", "local_polynomial.degree is 2.5; expected a whole number"),
+        (
+            "kind: gaussian_lowpass",
+            "kind: gaussian",
+            "excitations.report.kind is 'gaussian'; expected 'gaussian_lowpass', ",
+        ),
         ("cutoff: 12.5", "cutoff: 125", "excitations.report: the excitation reaches 125 Hz"),
         ("cutoff: 12.5", "periods: 7", "excitations.report: 8192 samples do not hold 7 whole periods"),
         ("cutoff: 12.5", "peak_frequency: 2.0", "excitations.report has peak_frequency, which means nothing to a"),
@@ -118,12 +127,12 @@ def test_figures_without_a_number_are_named_after_the_case(folder):
             "tolerances.relative names 'k_3', which is no parameter; known",
         ),
         ("{k: 0.01,", "{kk: 0.01,", "tolerances.of_case.dead_band names 'kk', which is no parameter"),
-        ("seed: 1990", "seed: -1", "excitations.report.seed is not right: -1 is less than the minimum of 0"),
-        ("method: abm4", "method: abm5", "integrator.method is not right: 'abm5' is not one of"),
+        ("seed: 1990", "seed: -1", "excitations.report.seed is -1; expected 0 or more"),
+        ("method: abm4", "method: abm5", "integrator.method is 'abm5'; expected 'abm4' or 'rk4'"),
         ("dead_band: {k", "deadband: {k", "of_case names 'deadband', which is neither a case nor a system"),
-        ("sampling:\n", "sampling: [\n", "config.yaml is not valid YAML"),
-        ("fit_band: [0.3, 10.0]", "", "'fit_band' is a required property"),
-        ("samples: 8192", "samples: 8192000000000", "8192000000000 is greater than the maximum of 100000000"),
+        ("sampling:\n", "sampling: [\n", "config.yaml is not YAML (expected"),
+        ("fit_band: [0.3, 10.0]", "", "config.yaml: 'fit_band' is missing; expected sampling, excitations,"),
+        ("samples: 8192", "samples: 8192000000000", "sampling.samples is 8192000000000; expected 100000000 or less"),
     ],
 )
 def test_faults_of_the_settings(folder, old, new, says):
@@ -138,11 +147,11 @@ def test_faults_of_the_settings(folder, old, new, says):
     [
         (ROW.replace("duffing\treport", "dufing\treport"), "there is no system 'dufing'; models/ holds dead_band"),
         (ROW.replace("report", "reprot"), "there is no excitation 'reprot'; config.yaml names report"),
-        (ROW.replace("1.0", "-1.0"), "level is not right: -1.0 is less than or equal to the minimum of 0"),
-        (ROW.replace("1.0", "one"), "level is 'one', which is not a number"),
-        (ROW.replace("1.0", "nan"), "level is 'nan', which is not a number"),
-        (ROW.replace("\t0\t", "\t-0.1\t"), "noise is not right: -0.1 is less than the minimum of 0"),
-        (ROW.replace("\t21\t", "\t21.5\t"), "linear is not right: 21.5 is not"),
+        (ROW.replace("1.0", "-1.0"), "level is '-1.0'; expected a number above 0"),
+        (ROW.replace("1.0", "one"), "level is 'one'; expected a number"),
+        (ROW.replace("1.0", "nan"), "level is 'nan'; expected a finite number"),
+        (ROW.replace("\t0\t", "\t-0.1\t"), "noise is '-0.1'; expected 0 or more"),
+        (ROW.replace("\t21\t", "\t21.5\t"), "linear is '21.5'; expected a whole number"),
         (ROW.replace("\t21\t", "\t18\t"), "linear is 18, a number that linear of the case 'linear' has already"),
         (ROW.replace("\t22\t", "\t21\t"), "nonlinear is 21, a number that linear of the case 'duffing' has already"),
         (ROW.replace("\t0\t\t", "\t0\tcubic\t"), "there is no term 'cubic'"),
@@ -152,9 +161,9 @@ def test_faults_of_the_settings(folder, old, new, says):
         (ROW.replace("\t3\t", "\t"), "has 14 cells where the heading has 15"),
         (
             ROW.replace("duffing\tduffing", "Duffing\tduffing"),
-            "case is not right: 'Duffing'; right are up to 64 of a to z",
+            "case is 'Duffing'; expected up to 64 of a to z",
         ),
-        (ROW.replace("duffing\tduffing", "../up\tduffing"), "case is not right: '../up'; right are up to 64 of a to z"),
+        (ROW.replace("duffing\tduffing", "../up\tduffing"), "case is '../up'; expected up to 64 of a to z"),
         (ROW + "\n" + ROW, "row 4 (case 'duffing'): the case stands twice"),
     ],
 )
@@ -183,9 +192,9 @@ def test_faults_of_a_row(folder, new, says):
             "kind: pierson_moskowitz",
             "excitations.report.kind is 'pierson_moskowitz'; the claims judge a gaussian_lowpass there",
         ),
-        ("    k3: 0.005\n", "", "tolerances.relative is not right: 'k3' is a required property"),
-        ("    f_n: 0.003\n", "", "tolerances.relative is not right: 'f_n' is a required property"),
-        ("    k: 1.78 ", "    # ", "tolerances.absolute is not right: 'k' is a required property"),
+        ("    k3: 0.005\n", "", "tolerances.relative lacks 'k3'; expected at least m, f_n, k, k3"),
+        ("    f_n: 0.003\n", "", "tolerances.relative lacks 'f_n'; expected at least m, f_n, k, k3"),
+        ("    k: 1.78 ", "    # ", "tolerances.absolute lacks 'k'; expected at least k, c, k3, phase"),
         (
             "fit_band: [0.3, 10.0]",
             "fit_band: [5.0, 10.0]",
@@ -224,7 +233,9 @@ def test_claims_put_every_kind_of_force_in_place_of_the_reports(folder):
 def test_a_band_beyond_the_force(folder):
     spoil(folder / "config.yaml", "fit_band: [0.3, 10.0]", "fit_band: [13, 24]")
     sentence = refused(folder)
-    assert "row 2 (case 'linear'): fit_band of config.yaml is [13, 24]; the excitation has nothing above" in sentence
+    assert (
+        "row 2 (case 'linear'): fit_band of config.yaml is [13.0, 24.0]; the excitation has nothing above" in sentence
+    )
     assert "12.5 Hz, where the band must end" in sentence
 
 
@@ -268,7 +279,7 @@ def test_names_that_no_file_or_rule_may_have(folder, name):
     spoil(folder / "cases.tsv", "\nduffing\t", f"\n{name}\t")
     sentence = refused(folder)
     assert "cases.tsv, row 3 (case '" in sentence
-    assert f"case is not right: '{name[:64]}" in sentence
+    assert f"case is '{name[:56]}" in sentence
     assert sentence.endswith("a dot between two digits alone")
 
 
@@ -346,19 +357,64 @@ def test_an_estimator_that_needs_periods(folder):
     )
     spoil(folder / "config.yaml", "kind: gaussian_lowpass", "kind: gaussian_lowpass\n    periods: 8")
     study = load(folder)
-    assert study.identification_settings("linear")["period"] == 1024
-    assert load(ROOT / "config").identification_settings("linear")["period"] is None
+    assert study.identification_settings("linear").period == 1024
+    assert load(ROOT / "config").identification_settings("linear").period is None
+
+
+class Pair(Row):
+    a: str
+    b: float
 
 
 def test_quotes_are_plain_text(tmp_path):
-    (tmp_path / "schema.yaml").write_text("type: object\nproperties: {a: {type: string}, b: {type: number}}\n")
     (tmp_path / "table.tsv").write_text('a\tb\n"open\t1\nshut"\t2\n')
-    rows = read_table(tmp_path / "table.tsv", tmp_path / "schema.yaml")
-    assert [row["a"] for row in rows] == ['"open', 'shut"']
+    assert [row.a for _, row in read_rows(tmp_path / "table.tsv", Pair)] == ['"open', 'shut"']
 
 
 def test_yaml_is_read_without_executing_anything(tmp_path):
     (tmp_path / "a.yaml").write_text("a: !!python/object/apply:os.system ['touch done']\n")
-    with pytest.raises(StudyError, match="is not valid YAML"):
-        read_yaml(tmp_path / "a.yaml")
+    with pytest.raises(StudyError, match=r"uses the YAML tag .* in line 1"):
+        read_yaml(tmp_path / "a.yaml", StudySettings)
     assert not (tmp_path / "done").exists()
+
+
+def test_a_yaml_bomb_is_refused_at_once(folder):
+    """Nine levels of nine aliases each: built, they would be as many entries as the memory holds, and more."""
+    levels = ["&a0 [1, 1, 1, 1, 1, 1, 1, 1, 1]"]
+    levels += [f"&a{n} [{', '.join([f'*a{n - 1}'] * 9)}]" for n in range(1, 10)]
+    bomb = "noises: [" + ", ".join(levels) + "]"
+    spoil(folder / "config.yaml", "noises: [0.0, 0.01, 0.05, 0.10]", bomb)
+    begun = time.monotonic()
+    sentence = refused(folder)
+    assert time.monotonic() - begun < 1.0
+    assert "config.yaml uses the YAML anchor or alias 'a0' in line " in sentence
+
+
+@pytest.mark.parametrize("case", ["linear", "noise_10"])
+def test_what_a_job_is_told_survives_as_plain_data(case):
+    """Snakemake keeps settings as text: a job reads the same values from it."""
+    study = load(ROOT / "config")
+    record, identification = study.record_settings(case), study.identification_settings(case)
+    for settings in (record, record.without_seeds(), identification):
+        told = json.loads(json.dumps(settings.plain()))
+        assert type(settings).model_validate(told) == settings
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("fit_band: [0.3, 10.0]", "fit_band: [0.3]", "fit_band is [0.3]; expected 2 entries or more"),
+        ("fit_band: [0.3, 10.0]", "fit_band: 0.3", "fit_band is 0.3; expected a list"),
+        ("fit_band: [0.3, 10.0]", "fit_band: [low, 10]", "fit_band.0 is 'low'; expected a number"),
+        ("estimators: [siso, miso, miso_hand", "estimators: [siso, siso, miso_hand", "expected each entry once"),
+        ("samples: 8192", "samples: true", "sampling.samples is True; expected a whole number"),
+        ("samples: 8192", "samples: '8192'", "sampling.samples is '8192'; expected a whole number"),
+        ("    seed: 1990 ", "    # ", "excitations.report: 'seed' is missing; expected a whole number of 0 or more"),
+        ("pairs: 40", "pairs: 137", "trials.pairs is 137; expected 136 or less"),
+        ("wanted:  ", "wanted: 1\n  # ", "is not YAML"),
+        ("k3: 1.0e+5", "k3: -1", "tolerances.absolute.k3 is -1; expected a number above 0"),
+    ],
+)
+def test_more_faults_of_the_settings(folder, old, new, says):
+    spoil(folder / "config.yaml", old, new)
+    assert says in refused(folder)

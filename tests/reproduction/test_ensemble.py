@@ -10,12 +10,13 @@ import pytest
 
 from study.reproduction import ensemble
 from study.reproduction.config import load
+from study.reproduction.settings import IntegratorSettings
 
 CONFIG = load(Path(__file__).parents[2] / "config")
 
 
 def told(case, **record):
-    return {**CONFIG.record_settings(case), **record}, CONFIG.identification_settings(case)
+    return CONFIG.record_settings(case).model_copy(update=record), CONFIG.identification_settings(case)
 
 
 def rows(*within, parameter="k", estimate=355.0):
@@ -80,7 +81,9 @@ def test_a_seed_without_an_estimate_does_not_meet_the_tolerance():
 
 def test_a_run_that_diverges_counts_as_missed(systems):
     """The report's own setting, one step a sample, at a level where some of the Van der Pol runs diverge."""
-    record, identification = told("van_der_pol", level=2.0, integrator={"method": "abm4", "steps_per_sample": 1})
+    record, identification = told(
+        "van_der_pol", level=2.0, integrator=IntegratorSettings(method="abm4", steps_per_sample=1)
+    )
     table = ensemble.estimates(systems["van_der_pol"], record, identification, range(1, 9))
     lost = table[table["parameter"] == "diverged"]
     assert 0 < len(lost) < 8, "some diverge, not all"

@@ -416,7 +416,7 @@ def test_preliminary_figures(draw_preliminary, products, tmp_path, system, kind,
     seen, real = [], page.rendered
     monkeypatch.setattr(page, "rendered", lambda figure, ending: seen.append(figure) or real(figure, ending))
     output = tmp_path / "a.svg"
-    draw_preliminary.draw(source, {kind: [output]}, style=SHEET, segments={"length": 256})
+    draw_preliminary.draw(source, {kind: [output]}, style=SHEET, segments=Segments(256))
     assert b"</svg>" in output.read_bytes()
     check_layout(seen[0])
 

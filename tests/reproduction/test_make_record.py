@@ -17,14 +17,14 @@ CONFIG = load(Path(__file__).parents[2] / "config")
 
 
 def settings(case, **changed):
-    return {**CONFIG.record_settings(case), **changed}
+    return CONFIG.record_settings(case).model_copy(update=changed)
 
 
 def test_the_record_is_the_models_response_to_the_configured_force(systems):
     told = settings("duffing")
     record = make_record(systems["duffing"], told)
     assert record.name == "duffing"
-    assert len(record) == told["sampling"]["samples"]
+    assert len(record) == told.sampling.samples
     u, v, a = (record[c] for c in ("displacement", "velocity", "acceleration"))
     np.testing.assert_allclose(a + 3.77 * v + 355.3 * u + 2e7 * u**3, record["force"], atol=1e-9)
 
@@ -56,17 +56,17 @@ def test_a_run_that_diverges_yields_no_record(systems):
 
 def test_a_term_may_be_assumed_beside_the_models_own(systems):
     linear = systems["linear"]
-    assert assumed_model(linear, {"also_assumed": ""}) is linear
-    assert "cubic_stiffness" in assumed_model(linear, {"also_assumed": "cubic_stiffness"})
+    assert assumed_model(linear, "") is linear
+    assert "cubic_stiffness" in assumed_model(linear, "cubic_stiffness")
     with pytest.raises(StudyError, match="there is no term 'cubic'"):
-        assumed_model(linear, {"also_assumed": "cubic"})
+        assumed_model(linear, "cubic")
 
 
 def test_every_configured_estimator_is_asked(systems, records):
     told = CONFIG.identification_settings("linear")
-    assert estimator_settings(told).segments.length == told["segments"]["length"]
+    assert estimator_settings(told).segments.length == told.segments.length
     found = identify_case(systems["linear"], records["linear"], told)
-    assert list(found) == told["estimators"]
+    assert list(found) == list(told.estimators)
     assert [len(found[name].inputs) for name in ("siso", "miso")] == [1, 2], "the assumed cubic stiffness is an input"
 
 
@@ -76,7 +76,7 @@ def test_an_estimator_whose_model_diverges_leaves_the_others_alone(systems, reco
 
     monkeypatch.setitem(ESTIMATORS, "output_error", __name__)
     monkeypatch.setattr(sys.modules[__name__], "identify", diverges, raising=False)
-    told = CONFIG.identification_settings("linear") | {"estimators": ["miso", "output_error"]}
+    told = CONFIG.identification_settings("linear", ("miso", "output_error"))
     found = identify_case(systems["linear"], records["linear"], told)
     assert found["output_error"].note.startswith("output_error finds nothing in linear: the free run diverges")
     assert found["output_error"].parameters == ()
@@ -90,9 +90,8 @@ def test_every_estimator_but_miso_tells_a_relaxation_from_the_spring(make_model)
     shape = {"relaxation": {"kr": 100.0, "relaxation.tau": 0.1}}
     model = make_model("r", {"inertia": {"m": 1.0}, **effects, **shape})
     record = make_record(model, settings("linear"))
-    told = CONFIG.identification_settings("linear") | {
-        "estimators": ["miso", "output_error", "instrumental"], "also_assumed": "",
-    }  # fmt: skip
+    told = CONFIG.identification_settings("linear", ("miso", "output_error", "instrumental"))
+    told = told.model_copy(update={"also_assumed": ""})
     found = identify_case(model, record, told)
     assert found["miso"].estimate["m"] < 0.0
     for name, share in (("output_error", 1e-4), ("instrumental", 0.02)):

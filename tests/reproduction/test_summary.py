@@ -33,10 +33,10 @@ READING = pd.DataFrame(
 )  # fmt: skip
 ERRORS = pd.DataFrame(
     [
-        ("quiet", "miso", "k", "relative", 0.02, 1.0, 0.01, 0.02, 4, "this run"),
-        ("quiet", "output_error", "k", "relative", 0.0004, 50.0, 0.0, 0.001, 4, "this run"),
+        ("quiet", "miso", "k", "relative", 0.02, 1.0, 0.01, 0.02, 4),
+        ("quiet", "output_error", "k", "relative", 0.0004, 50.0, 0.0, 0.001, 4),
     ],
-    columns=["case", "estimator", "parameter", "kind", "median_error", "gain", "bias", "scatter", "seeds", "source"],
+    columns=["case", "estimator", "parameter", "kind", "median_error", "gain", "bias", "scatter", "seeds"],
 )
 TIMES = pd.DataFrame(
     [("record", "quiet", 1.0), ("record", "noisy", 2.0), ("claims", "", 4.0)], columns=["stage", "case", "seconds"]

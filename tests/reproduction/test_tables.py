@@ -15,7 +15,7 @@ from study.reproduction.identify_case import identify_case
 from study.support.errors import StudyError
 
 CONFIG = load(Path(__file__).parents[2] / "config")
-JUDGED = {"relative": {"k": 0.01}, "absolute": {"k": 2.0}}
+JUDGED = CONFIG.identification_settings("duffing").model_copy(update={"relative": {"k": 0.01}, "absolute": {"k": 2.0}})
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def test_parameters_in_long_form(systems, found):
         "case", "estimator", "parameter", "true", "estimate", "standard_error",
         "relative_error", "tolerance", "within_tolerance", "note",
     ]  # fmt: skip
-    others = [name for name in settings()["estimators"] if name != "miso_free_shape"]  # this system has no such thing
+    others = [name for name in settings().estimators if name != "miso_free_shape"]  # this system has no such thing
     assert list(table["estimator"].unique()) == others
     own = table[table["estimator"] == "miso"].set_index("parameter")
     assert list(own.index) == ["m", "c", "k", "f_n", "zeta", "k3", "c3"]
@@ -73,7 +73,7 @@ def test_a_system_without_stiffness_has_no_row_for_its_frequency(systems):
 
 def test_frequency_responses_stand_beside_the_exact_function(systems, found):
     table = tables.frequency_responses(systems["duffing_van_der_pol"], found)
-    assert {"siso", "miso"} <= set(table["estimator"]) <= set(settings()["estimators"]) - {"miso_hand_read"}
+    assert {"siso", "miso"} <= set(table["estimator"]) <= set(settings().estimators) - {"miso_hand_read"}
     second = table[(table["estimator"] == "miso") & (table["input"] == 2)]
     exact = 2e7 + 2e6 / 3.0 * 2j * np.pi * second["frequency"].to_numpy()
     np.testing.assert_allclose(second["exact_real"] + 1j * second["exact_imag"], exact)

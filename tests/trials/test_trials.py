@@ -16,11 +16,12 @@ from study.equations.terms import LIBRARY
 from study.identify.time_domain.fit_model import fit_model
 from study.records.prepared import prepare_record
 from study.records.readers import read_record
+from study.reproduction.settings import TrialSettings
 from study.support.errors import StudyError
 from study.trials import HIDDEN, SHARE, make_trial, reach, runs, sealed, share_of
 from study.trials.runs import COLUMNS, Order, Row
 
-SETTINGS = {"first_seed": 100, "noises": [0.0, 0.05], "rounds": 1, "none": 2, "pairs": 4, "removed": 1, "jobs": 3}
+SETTINGS = TrialSettings(first_seed=100, noises=(0.0, 0.05), rounds=1, none=2, pairs=4, removed=1, jobs=3)
 
 
 @pytest.mark.parametrize("name", HIDDEN)
@@ -32,6 +33,7 @@ def test_every_effect_can_be_hidden_at_its_share(name: str) -> None:
     again = simulate(trial.truth, trial.record["force"], trial.record.dt, Integrator("rk4", 8))
     assert share_of(trial.truth, name, again) == pytest.approx(trial.shares[0], rel=1e-12)
     assert SHARE[0] <= trial.shares[0] <= SHARE[1]
+    assert [t.term.physical(t.values) for t in trial.truth.terms if t.term.physical(t.values)] == []
 
 
 @pytest.mark.parametrize("seed", range(820, 824))

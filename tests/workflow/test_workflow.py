@@ -187,6 +187,15 @@ def test_targets_by_name_and_by_number(built):
     assert planned(built, "monte_carlo", "estimators") == {**monte_carlo, **estimators}
 
 
+def test_measured_records_are_planned_without_their_data_and_ask_for_them_by_name(built, monkeypatch):
+    monkeypatch.delenv("STUDY_DATA", raising=False)
+    jobs = planned(built, "gallery")
+    assert {"climb.silverbox", "compare.bouc_wen", "diagnose.silverbox", "gallery"} <= set(jobs)
+    said = run(built, "-j1", "results/silverbox/comparison.json", code=1)
+    assert "study: $STUDY_DATA/silverbox/SNLS80mV.mat: STUDY_DATA is not set; expected the folder that holds" in said
+    assert "Traceback" not in said
+
+
 def test_killed_at_work_and_finished_on_one_core_gives_the_same_bytes(built, tmp_path):
     folder = project(tmp_path, DUFFING, NOISY)
     targets = ["results/duffing/parameters.csv", "results/excitation_reading.csv"]

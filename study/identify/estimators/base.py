@@ -8,6 +8,8 @@ from typing import Protocol
 import numpy as np
 
 from study.equations.model import Model
+from study.equations.term import Term
+from study.equations.terms import LIBRARY
 from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.identify.frequency_domain.inputs import Input
@@ -99,12 +101,10 @@ def named_parameters(estimate: Estimate) -> tuple[Parameter, ...]:
     found = {s: plain.pop(s) for s in ("m", "c", "k") if s in plain}
     if {"m", "c", "k"} <= set(found) and found["k"].value > 0.0 and found["m"].value > 0.0:
         found |= {p.name: p for p in _modal(estimate)}
-    if "km_cos" in plain:
-        found |= {p.name: p for p in _periodic(estimate)}
-        del plain["km_cos"], plain["km_sin"]
-    if "kg" in plain:
-        kg = plain.pop("kg")
-        found["k_dead_band"] = Parameter("k_dead_band", -kg.value, kg.error)
+    for term in (t for t in LIBRARY.values() if t.reported and t.symbols[0] in plain):
+        own = [plain.pop(symbol) for symbol in term.symbols]
+        turned = (Parameter(term.reported[0], -own[0].value, own[0].error),)
+        found |= {p.name: p for p in (turned if len(own) == 1 else _phasor(estimate, term))}
     return (*found.values(), *plain.values())
 
 
@@ -124,11 +124,13 @@ def _modal(e: Estimate) -> tuple[Parameter, Parameter]:
     return Parameter("f_n", f_n, f_n_error), Parameter("zeta", zeta, zeta_error)
 
 
-def _periodic(e: Estimate) -> tuple[Parameter, Parameter]:
-    a, b = e["km_cos"], e["km_sin"]
+def _phasor(e: Estimate, term: Term) -> tuple[Parameter, Parameter]:
+    """Amplitude and phase of a cosine and a sine."""
+    (cosine, sine), (amplitude, phase) = term.symbols, term.reported
+    a, b = e[cosine], e[sine]
     size = math.hypot(a, b)
     if size == 0.0:
-        return Parameter("k_m", 0.0, e.error("km_cos")), Parameter("phase", 0.0, math.inf)
-    amplitude = Parameter("k_m", size, e.derived_error({"km_cos": a / size, "km_sin": b / size}))
-    turn = e.derived_error({"km_cos": b / size**2, "km_sin": -a / size**2})
-    return amplitude, Parameter("phase", math.atan2(0.0 - b, a), turn)  # 0 - 0, not -0
+        return Parameter(amplitude, 0.0, e.error(cosine)), Parameter(phase, 0.0, math.inf)
+    length = e.derived_error({cosine: a / size, sine: b / size})
+    turn = e.derived_error({cosine: b / size**2, sine: -a / size**2})
+    return Parameter(amplitude, size, length), Parameter(phase, math.atan2(0.0 - b, a), turn)  # 0 - 0, not -0

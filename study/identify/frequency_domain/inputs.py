@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from study.equations import formulas, kernels
 from study.equations.graph import Graph
 from study.equations.model import Model, ModelTerm, with_registers
-from study.equations.terms import Component
+from study.equations.term import Component
 from study.records.interpolation import between_samples
 from study.records.record import Record
 from study.support.errors import StudyError
@@ -120,10 +120,11 @@ def history(item: Input, record: Record) -> Floats:
         As :func:`histories`.
     """
     formula = item.shape if item.state is None else item.state
-    wanted = [n for n in formulas.names(formula) if n not in dict(item.parameters) and n != "z"]
+    own = (*dict(item.parameters), *(("z",) if item.state is not None else ()))  # without a state, z is a channel
+    wanted = [n for n in formulas.names(formula) if n not in own]
     data = _columns(wanted, formula, record)
     graph = Graph()
-    known = {name: graph.input(name) for name in (*wanted, *dict(item.parameters), "z")}
+    known = {name: graph.input(name) for name in (*wanted, *own)}
     program = with_registers(graph.program([formulas.build(graph, formula, known)]), dict(item.parameters))
     positions = np.array([program.inputs[n] for n in wanted], dtype=np.int64)
     registers, output = program.registers.copy(), program.outputs
@@ -150,12 +151,15 @@ def _finite(values: Floats, item: Input, record: Record) -> Floats:
 
 
 def _columns(wanted: Sequence[str], formula: str, record: Record) -> list[Floats]:
-    """The channels that a formula names."""
-    columns = {"u": "displacement", "v": "velocity"}
+    """Motion, time and channels that a formula names; u, v and t are no channels, even where one is called so."""
+    motion = {"u": "displacement", "v": "velocity"}
     data: list[Floats] = []
     for name in wanted:
-        channel = columns.get(name, name)
-        if name != "t" and channel not in record:
-            raise StudyError(f"the formula {formula!r} needs the channel {channel!r}, which {record.name} lacks")
+        channel = motion.get(name, name)
+        if name != "t" and channel not in (record if name in motion else record.extra):
+            beside = "" if name in motion else " beside force and motion"
+            raise StudyError(
+                f"the formula {formula!r} needs the channel {channel!r}, which {record.name} lacks{beside}"
+            )
         data.append(record.time if name == "t" else record[channel])
     return data

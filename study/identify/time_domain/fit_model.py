@@ -6,6 +6,7 @@ and the sum of squares has local minima there; so every search has several start
 them brings to a minimum is begun anew from multiple shooting, within whose segments nothing drifts far.
 """
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
@@ -36,6 +37,8 @@ SHORTEST, LONGEST = 512, 2048  # samples in that stretch
 TRIED, KEPT = 15, 40  # free runs of a fit that tries a start, and of one that is kept
 NEAR = 0.01  # standard errors: as near a minimum as the fit of a search has to come
 SHIFT = 0.3  # standard errors by which the integration may shift a coefficient
+ORDER = 4  # of the integrator: what it shifts falls with this power of the steps
+FAR = 1e6  # times the shift that would matter: more asks for no more steps than this
 MOST_STEPS = 8  # in a sampling interval, unless the model's own rates ask for more
 
 
@@ -150,7 +153,7 @@ def continued(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     if len(fit.residual) == len(prepared.fitted):
         return fit
     held = tuple(key for key in fit.model.values if key not in fit.keys)
-    return fit_part(fit.model, prepared, held, fit.model.numbers(), steps=fit.steps_per_sample)
+    return fit_part(fit.model, prepared, held, steps=fit.steps_per_sample, max_iterations=KEPT)
 
 
 def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
@@ -190,13 +193,14 @@ def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
         coarse, fine = (run_of(fit, prepared, finer=n).respond({}, fit.initial)[0] for n in (1, 2))
         moved = least_squares(jacobian, np.subtract(coarse, fine), 1e-12)
         deviations = np.sqrt(np.diag(clustered_covariance(jacobian, fit.residual)))
-        if np.all(np.abs(moved) <= SHIFT * deviations):
+        excess = float(np.max(np.abs(moved) / np.maximum(SHIFT * deviations, np.finfo(float).tiny)))
+        if excess <= 1.0:
             break
-        finer = fit_part(
-            fit.model, prepared, held, fit.model.numbers(), steps=2 * fit.steps_per_sample,
+        times = 2 ** max(1, math.ceil(math.log2(min(excess, FAR)) / ORDER))
+        fit = fit_part(
+            fit.model, prepared, held, steps=min(times * fit.steps_per_sample, most),
             initial=np.atleast_2d(fit.initial),
         )  # fmt: skip
-        fit = finer
     return fit
 
 

@@ -22,7 +22,6 @@ from study.support.errors import DivergenceError, StudyError
 from study.support.levenberg_marquardt import OFFSET, End, Point, minimise, point_at
 
 Floats = NDArray[np.float64]
-POSITIVE = ("m", "u_g", "tau", "f_m", "f")  # coefficients and shape parameters without meaning below zero
 
 
 @dataclass(frozen=True)
@@ -158,7 +157,8 @@ def fit_free_run(
     elif free:
         states[:, :2] = starting_states(record, response, (first, *restarts))
     measured = record[response][first : first + run.samples]
-    problem = _Problem(run, measured, free, _weights(tie, measured, states))
+    positive = tuple(key for entry in model.terms for key in entry.term.positive if key in begin)
+    problem = _Problem(run, measured, free, _weights(tie, measured, states), positive)
     end = problem.search(np.array([*begin.values(), *states.ravel()]), max_iterations, offset)
     return replace(_result(model, problem, end), restarts=tuple(restarts), steps_per_sample=steps_per_sample)
 
@@ -194,6 +194,7 @@ class _Problem:
     measured: Floats
     free_states: int
     weights: Floats | None
+    positive: tuple[str, ...]
 
     def states(self, x: Floats) -> Floats:
         """Initial states in the variables, shape (pieces, states)."""
@@ -204,7 +205,7 @@ class _Problem:
     def linearise(self, x: Floats) -> Point | None:
         """Residual and Jacobian at x; None where the model has no finite response there."""
         values = dict(zip(self.run.keys, (float(v) for v in x), strict=False))
-        if any(v <= 0.0 and key.rpartition(".")[2] in POSITIVE for key, v in values.items()):
+        if any(values[key] <= 0.0 for key in self.positive):
             return None
         try:
             states = self.states(x)

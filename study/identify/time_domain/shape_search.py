@@ -6,14 +6,13 @@ could do has been taken out. One free run a point; the best few points start a f
 """
 
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, rfft, rfftfreq
 
 from study.equations.model import ModelTerm
-from study.equations.terms import Term
+from study.equations.term import Parameter, Term
 from study.identify.frequency_domain.starting_values import linear_start, oscillator
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import linearise, run_of
@@ -94,7 +93,7 @@ def starts(term: Term, base: Baseline, prepared: Prepared) -> list[Start]:
         if point is not None:
             tried.append(point)
     best = sorted(tried, key=lambda s: -s.share)
-    if term.name in ("periodic_stiffness", "harmonic_force", "hysteresis"):
+    if not any(p.search.blunt for p in term.parameters):
         return best[:STARTS]
     step = max(1, (len(tried) - 1) // (SPREAD - 1))
     return best[:1] + [point for point in tried[::step] if point is not best[0]]
@@ -134,25 +133,31 @@ def _try(
 
 def grid(term: Term, base: Baseline) -> list[tuple[float, ...]]:
     """Points to try: amplitudes from the motion, times from the resonance, frequencies from spectra."""
-    if not term.parameters:
-        return [()]
-    match term.name:
-        case "dead_band":
-            return [(float(x),) for x in np.quantile(np.abs(base.displacement), np.linspace(0.08, 0.97, 14))]
-        case "one_sided_contact":
-            return [(float(x),) for x in np.quantile(base.displacement, np.linspace(0.1, 0.985, 16))]
-        case "relaxation":
-            return [(float(x) / _rate(base),) for x in np.geomspace(0.05, 20.0, 12)]
-        case "hysteresis":
-            size = 1.0 / float(np.std(base.displacement))
-            betas = size * np.array([0.15, 0.4, 1.0, 2.5, 6.0])
-            return [(float(b), float(b * g)) for b, g in product(betas, (-0.9, -0.3, 0.3, 0.9))]
-        case "periodic_stiffness":
-            return _around(modulation_lines(base), base)
-        case "harmonic_force":
-            return _around(residual_lines(base), base)
-        case _:
-            raise StudyError(f"there is no search for the shape parameters of {term.name!r}")
+    points: list[tuple[float, ...]] = [()]
+    for parameter in term.parameters:
+        points = [(*point, x) for point in points for x in _places(parameter, point, base)]
+    return points
+
+
+def _places(parameter: Parameter, point: tuple[float, ...], base: Baseline) -> list[float]:
+    """Values of one shape parameter to try beside those of the parameters before it."""
+    places, u = np.array(parameter.search.places), base.displacement
+    match parameter.search.kind:
+        case "quantiles of |u|":
+            tried = np.quantile(np.abs(u), places)
+        case "quantiles of u":
+            tried = np.quantile(u, places)
+        case "times of the motion":
+            tried = places / _rate(base)
+        case "per amplitude":
+            tried = places * (1.0 / float(np.std(u)))
+        case "shares of the one before":
+            tried = places * point[-1]
+        case "lines of the modulation":
+            tried = _around(modulation_lines(base), places, base)
+        case "lines of the residual":
+            tried = _around(residual_lines(base), places, base)
+    return [float(x) for x in tried]
 
 
 def _rate(base: Baseline) -> float:
@@ -208,7 +213,7 @@ def _top(three: Floats) -> float:
     return 0.5 * float(three[0] - three[2]) / bend if bend < 0.0 else 0.0
 
 
-def _around(lines: list[float], base: Baseline) -> list[tuple[float, ...]]:
-    """Each line, and a third of a line to either side: a fit finds its way from there."""
+def _around(lines: list[float], shifts: Floats, base: Baseline) -> Floats:
+    """Frequencies so many lines to either side of each line, in hertz, shape (lines * shifts,)."""
     resolution = 1.0 / (len(base.fit.residual) * base.dt)
-    return [((line + shift) * resolution,) for line in lines for shift in (-0.35, 0.0, 0.35)]
+    return np.add.outer(np.array(lines), shifts).ravel() * resolution

@@ -1,6 +1,5 @@
 """HDF5, and MATLAB 7.3 which is HDF5: every dataset of numbers, by its path in the file."""
 
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +7,7 @@ import numpy as np
 
 from study.records.readers.table import Table, from_arrays
 from study.support.errors import StudyError
+from study.support.extras import needed
 
 UNIT_KEYS = ("units", "unit", "Units", "Unit")
 
@@ -20,7 +20,7 @@ def read(path: Path, group: str | None) -> Table:
     StudyError
         If the group is not there.
     """
-    h5py: Any = import_module("h5py")
+    h5py: Any = needed("h5py", f"{path}: reading HDF5", "formats")
     arrays: dict[str, object] = {}
     units: dict[str, str] = {}
     with h5py.File(path, "r") as file:

@@ -1,17 +1,17 @@
 """Parquet: columns by name."""
 
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from study.records.readers.table import NONE, Column, Table, split_unit
+from study.support.extras import needed
 
 
 def read(path: Path) -> Table:
     """Read every column; moments in time become seconds from the first."""
-    parquet: Any = import_module("pyarrow.parquet")
+    parquet: Any = needed("pyarrow.parquet", f"{path}: reading Parquet", "formats")
     table: Any = parquet.ParquetFile(path).read()  # one file, with nothing inferred from the folder's name
     return Table(tuple(_column(str(name), data) for name, data in zip(table.column_names, table.columns, strict=True)))
 

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Mapping
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 from study.records.readers.sampling import shortest_decimal
 from study.records.readers.table import Column, Table
 from study.support.errors import StudyError
+from study.support.extras import needed
 
 ROUNDING = 5e-6  # the interval stands in the file with six digits
 MARK = re.compile(rb"^ {4}-1 *\r?$", re.MULTILINE)  # before and behind each dataset
@@ -29,7 +29,7 @@ def read(path: Path) -> Table:
     """
     if len(MARK.findall(path.read_bytes())) % 2:
         raise StudyError(f"{path}: its last dataset is cut short; a line '-1' at the end is right")
-    pyuff: Any = import_module("pyuff")
+    pyuff: Any = needed("pyuff", f"{path}: reading UFF", "formats")
     file: Any = pyuff.UFF(str(path))
     types: list[int] = [int(t) for t in file.get_set_types()]
     found: list[Mapping[str, Any]] = [file.read_sets(k) for k, t in enumerate(types) if t == 58]

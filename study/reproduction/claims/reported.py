@@ -1,19 +1,60 @@
 """What the report states: ``config/reported.tsv``."""
 
 import difflib
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
+from typing import Annotated, Self
 
+from pydantic import BeforeValidator, Field, model_validator
+
+from study.support.config_files import Row, Text, read_rows
 from study.support.errors import StudyError
-from study.support.schema import read_table, read_yaml
 
 MANY = 8  # numbers that still read well in one cell
 
 
-@dataclass(frozen=True)
-class Statement:
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(text.split())
+
+
+# Every row that the claims ask for, so that one deleted or misspelt is named before any job starts. A claim of your
+# own joins one of the two lists.
+WITH_A_VALUE = _names("""
+    table_1.m table_1.linear.k table_1.linear.c table_1.linear.f_n table_1.linear.zeta table_1.duffing.k
+    table_1.duffing.c table_1.duffing.f_n table_1.duffing.zeta table_1.duffing.k3 table_1.duffing.c3
+    table_1.van_der_pol.k table_1.van_der_pol.c table_1.van_der_pol.f_n table_1.van_der_pol.zeta
+    table_1.van_der_pol.k3 table_1.van_der_pol.c3 table_1.duffing_van_der_pol.k table_1.duffing_van_der_pol.c
+    table_1.duffing_van_der_pol.f_n table_1.duffing_van_der_pol.zeta table_1.duffing_van_der_pol.k3
+    table_1.duffing_van_der_pol.c3 table_1.mathieu.k table_1.mathieu.c table_1.mathieu.f_n table_1.mathieu.zeta
+    table_1.mathieu.k_m table_1.mathieu.f_m table_1.dead_band.k table_1.dead_band.c table_1.dead_band.f_n
+    table_1.dead_band.zeta table_1.dead_band.u_g table_1.extreme.k table_1.extreme.c table_1.extreme.f_n
+    table_1.extreme.zeta table_1.extreme.k3 table_1.extreme.c3 nyquist nyquist.dt lowpass below_10_hz error_free
+    dead_band_pattern mathieu_lines.f_n mathieu_lines.f_m mathieu_fast.f_m mathieu_fast.low mathieu_fast.middle
+    mathieu_fast.high averages resolution resolution.length resolution.seconds resolution.samples resolution.total
+    overlap exact_stiffness siso_stiffness siso_frequency duffing_cubic duffing_share van_der_pol_damping
+    van_der_pol_share mathieu_side_resonances.low mathieu_side_resonances.high mathieu_stiffness dead_band_stiffness
+    dead_band_error dead_band_error.low dead_band_error.high dead_band_share levels_invariant.lowest
+    levels_invariant.second levels_invariant.third levels_invariant.highest noise_random_only.low
+    noise_random_only.middle noise_random_only.high
+""")
+IN_WORDS = _names("""
+    system_stiffness_gap amplitude_nonlinear force_gaussian noise_uncorrelated table_1 linear_is_gaussian
+    nonlinear_is_not narrow_band harmonics oval_width oval_slope patterns_alike duffing_pattern van_der_pol_pattern
+    combined_pattern mathieu_pattern mathieu_lines mathieu_fast coherence_forms added_terms hanning linear_same
+    linear_coherence linear_leakage linear_histogram hand_read duffing_linear siso_wrong siso_varies duffing_coherence
+    duffing_histogram van_der_pol_linear van_der_pol_coherence van_der_pol_histogram combined_linear combined_cubic
+    combined_histogram combined_nearly_linear mathieu_third mathieu_side_resonances mathieu_siso_coherence
+    mathieu_linear mathieu_coherence mathieu_share mathieu_histogram dead_band_as_duffing dead_band_not_invariant
+    dead_band_linear dead_band_coherence dead_band_histogram linear_dominates extreme_siso extreme_linear
+    extreme_cubic levels_invariant levels_siso levels_similar levels_coherence noise_random_only noise_output
+    noise_random noise_linear noise_cubic noise_coherence noise_instruments conclusion_3 conclusion_4
+    conclusion_5_level conclusion_5_noise conclusion_6 conclusion_7
+""")
+
+
+class Statement(Row):
     """One row: a statement, with its number where it has one.
 
     Attributes
@@ -30,11 +71,29 @@ class Statement:
         Its unit.
     """
 
-    id: str
-    where: str
-    what: str
-    value: float | None
+    id: Annotated[
+        str,
+        Field(pattern=r"^[a-z0-9_]+([.][a-z0-9_]+)*\Z", description="names of a to z, 0 to 9 and _ with dots between"),
+    ]
+    where: Text
+    what: Text
+    value: Annotated[float | None, BeforeValidator(lambda cell: None if cell == "" else cell)]
     unit: str
+
+    @model_validator(mode="after")
+    def _bounded(self) -> Self:
+        """What a number means bounds it: by its unit, and a share, an error or a noise, which have none, by the id."""
+        value = 0.5 if self.value is None else self.value  # which no bound refuses
+        if not self.unit and re.search("_(share|error)$|^noise_", self.id):
+            holds, expected = 0.0 < value < 1.0, "a number above 0 and below 1"
+        elif self.unit in ("kg", "m", "s", "samples", "N^2"):
+            holds, expected = value > 0.0, "a number above 0"
+        else:
+            holds, expected = value >= 0.0, "0 or more"
+            holds |= self.unit != "Hz" and not re.search("[.]zeta$|^averages$", self.id)
+        if not holds:
+            raise ValueError(f"value is {value:g}; expected {expected}")
+        return self
 
     def __str__(self) -> str:
         """The number with its unit."""
@@ -87,29 +146,26 @@ class Reported:
         return "as tabulated" if len(found) > MANY else ", ".join(found) or "as stated"
 
 
-def check_complete(reported: Reported, path: Path, schema: Path) -> None:
-    """Whether the rows are those that the claims ask for, by the two lists of ``schema``.
+def check_complete(reported: Reported, path: Path) -> None:
+    """Whether the rows are those that the claims ask for, ``WITH_A_VALUE`` and ``IN_WORDS``.
 
     Raises
     ------
     StudyError
         At the first row that no claim asks for, that lacks its value, or that is not there.
     """
-    lists = cast(dict[str, list[str]], read_yaml(schema)["statements"])
-    known = [*lists["with_a_value"], *lists["in_words"]]
+    known = [*WITH_A_VALUE, *IN_WORDS]
     for name in reported.statements:
         if name not in known:
             near = difflib.get_close_matches(name, known, n=1)
-            raise StudyError(
-                f"{path}: no claim asks for {name!r}"
-                + (f"; {near[0]!r} is near it" if near else f"; a new claim's row is listed in {schema}")
-            )
+            expected = f"{near[0]!r} is near it" if near else f"a new claim's row is listed in {__name__}"
+            raise StudyError(f"{path}: no claim asks for {name!r}; {expected}")
     for name in known:
         if name not in reported.statements:
             raise StudyError(f"{path} has no row {name!r}, which the claims ask for")
-    for name in lists["with_a_value"]:
+    for name in WITH_A_VALUE:
         if reported[name].value is None:
-            raise StudyError(f"{path}: {name!r} has no value; the number that the report states is needed")
+            raise StudyError(f"{path}: {name!r} has no value; expected the number that the report states")
 
 
 def check_systems(reported: Reported, models: Path) -> None:
@@ -127,7 +183,7 @@ def check_systems(reported: Reported, models: Path) -> None:
             raise StudyError(f"config/reported.tsv: {name!r} names a system that is not in {models.name}/")
 
 
-def load(path: Path, schema: Path) -> Reported:
+def load(path: Path) -> Reported:
     """Read and check the table.
 
     Raises
@@ -135,10 +191,9 @@ def load(path: Path, schema: Path) -> Reported:
     StudyError
         At the first fault, naming row and value.
     """
-    found: dict[str, Statement] = {}
-    for row in read_table(path, schema):
-        statement = Statement(**row)
-        if statement.id in found:
-            raise StudyError(f"{path}: the id {statement.id!r} stands twice; each may be used once")
-        found[statement.id] = statement
-    return Reported(found)
+    statements: dict[str, Statement] = {}
+    for _, statement in read_rows(path, Statement):
+        if statement.id in statements:
+            raise StudyError(f"{path}: the id {statement.id!r} stands twice; expected each once")
+        statements[statement.id] = statement
+    return Reported(statements)

@@ -1,0 +1,237 @@
+"""What a term is: the forces of a physical effect, its shape parameters, and when it is physical."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+from study.equations import dimensions, formulas
+
+
+@dataclass(frozen=True)
+class Component:
+    """One coefficient's shape.
+
+    Attributes
+    ----------
+    symbol : str
+        Name of the coefficient, such as ``k3``.
+    shape : str
+        Formula of the unit-coefficient shape g(u, v, t) or of the term's state z.
+    order : int
+        How often it is differentiated with respect to time: 0, 1 or (inertia alone) 2.
+    factor : float
+        A fixed number before it: Van der Pol's damping is c3/3 d/dt u^3.
+    """
+
+    symbol: str
+    shape: str
+    order: int = 0
+    factor: float = 1.0
+
+
+Places = Literal[
+    "quantiles of |u|", "quantiles of u", "times of the motion", "per amplitude", "shares of the one before",
+    "lines of the modulation", "lines of the residual",
+]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Search:
+    """Where a shape parameter is looked for along the motion of a model that lacks the term.
+
+    Attributes
+    ----------
+    kind : str
+        What ``places`` are: quantiles of a displacement; multiples of the time in which the motion turns by one
+        radian, of one over its rms displacement, or of the parameter before; or distances, in lines of the spectrum,
+        from where a stiffness that varies with time would explain most or where the residual stands out.
+    places : tuple of float
+        The points to try.
+    blunt : bool
+        Whether a place tells little about where a fit from it ends: then fits start all over the range.
+    """
+
+    kind: Places
+    places: tuple[float, ...]
+    blunt: bool = False
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A shape parameter.
+
+    Attributes
+    ----------
+    name, meaning : str
+        What formulas and people call it.
+    quantity : str
+        Its unit: ``length``, ``frequency``, ``time`` or ``1/length``.
+    search : Search
+        Where a fit looks for it.
+    drawn : pair of float
+        Range from which a trial draws it, in the units that rms displacement and rms velocity make up; of the
+        parameter before where its search is in shares of that.
+    signed : bool
+        Whether it may be zero or negative; all others are above zero.
+    """
+
+    name: str
+    quantity: str
+    meaning: str
+    search: Search
+    drawn: tuple[float, float]
+    signed: bool = False
+
+    @property
+    def relative(self) -> bool:
+        """Whether it is searched and drawn as a share of the parameter before it."""
+        return self.search.kind == "shares of the one before"
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What makes a term physical: a coefficient or shape parameter above a bound.
+
+    Attributes
+    ----------
+    name : str
+        The coefficient or shape parameter.
+    words : str
+        Why, as a clause.
+    over : str or None
+        Name of another one whose size is the bound; zero is, if left out.
+    reached : bool
+        Whether the bound itself will do.
+    enforced : bool
+        Whether no fit goes beyond it.
+    """
+
+    name: str
+    words: str
+    over: str | None = None
+    reached: bool = False
+    enforced: bool = False
+
+    def broken(self, values: Mapping[str, float]) -> str:
+        """A sentence on values by name that break it; empty if they do not, or are not all known."""
+        names = (self.name,) if self.over is None else (self.name, self.over)
+        if not set(names) <= set(values):
+            return ""
+        value, bound = values[self.name], 0.0 if self.over is None else abs(values[self.over])
+        if value > bound or (self.reached and value == bound):
+            return ""
+        return f"{' and '.join(f'{name} is {values[name]:g}' for name in names)}; {self.words}"
+
+
+@dataclass(frozen=True)
+class Term:
+    """A physical effect.
+
+    Attributes
+    ----------
+    name : str
+        As models and tables name it.
+    components : tuple of Component
+        One for each coefficient (a periodic stiffness of any phase has two).
+    formula : str
+        For people: the force with a unit coefficient.
+    meaning, cause : str
+        The physics in a sentence, and where it commonly comes from.
+    parameters : tuple of Parameter
+        Shape parameters, given or estimated.
+    state : str or None
+        dz/dt for a term with a memory z of its own.
+    conditions : tuple of Condition
+        When it is physical, beside that parameters without a sign are above zero.
+    reported : tuple of str
+        What the report gives in place of the coefficients: amplitude and phase of a cosine and a sine, or the negative
+        of a single one.
+    either_sign : bool
+        Whether it occurs with either sign, as hardening and softening do: a trial then draws it.
+    placeless : bool
+        Whether it is the same wherever the system rests, but for another linear stiffness.
+    """
+
+    name: str
+    components: tuple[Component, ...]
+    formula: str
+    meaning: str
+    cause: str
+    parameters: tuple[Parameter, ...] = ()
+    state: str | None = None
+    conditions: tuple[Condition, ...] = ()
+    reported: tuple[str, ...] = ()
+    either_sign: bool = False
+    placeless: bool = False
+
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        """Names of the coefficients."""
+        return tuple(c.symbol for c in self.components)
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Names of the coefficients, then of the shape parameters as ``term.parameter``."""
+        return self.symbols + tuple(f"{self.name}.{p.name}" for p in self.parameters)
+
+    @property
+    def bounds(self) -> tuple[Condition, ...]:
+        """Its conditions, and that parameters without a sign are above zero."""
+        own = (
+            Condition(p.name, f"the {p.meaning} is above zero", enforced=True) for p in self.parameters if not p.signed
+        )
+        return (*self.conditions, *own)
+
+    @property
+    def positive(self) -> tuple[str, ...]:
+        """Keys that have no meaning at or below zero, where no fit goes."""
+        enforced = {c.name for c in self.bounds if c.enforced}
+        return tuple(key for key in self.keys if key.rpartition(".")[2] in enforced)
+
+    def physical(self, values: Mapping[str, float | None]) -> str:
+        """Why this is no physical effect, in a sentence; empty if it is one.
+
+        Parameters
+        ----------
+        values : mapping of float or None
+            Coefficients and shape parameters by key; what is not known is not judged.
+        """
+        found = {key.rpartition(".")[2]: values.get(key) for key in self.keys}
+        known = {name: value for name, value in found.items() if value is not None}
+        return next((said for condition in self.bounds if (said := condition.broken(known))), "")
+
+    @property
+    def steady(self) -> bool:
+        """Whether nothing changes its force: it moves the system to another place of rest."""
+        return not any(formulas.names(c.shape) for c in self.components)
+
+    @cached_property  # a diagnosis prepares hundreds of runs
+    def channels(self) -> tuple[str, ...]:
+        """Measured channels that its formulas name, in alphabetical order.
+
+        A channel is whatever is not u, v, t or pi, a parameter, or z where the term has a state of its own: what a
+        record happens to call so is never meant.
+        """
+        own = {*formulas.VARIABLES, *(p.name for p in self.parameters), *(("z",) if self.state else ())}
+        texts = (*(c.shape for c in self.components), *((self.state,) if self.state else ()))
+        return tuple(sorted({name for text in texts for name in formulas.names(text)} - own))
+
+    def unit(self, symbol: str, force: str, length: str) -> str:
+        """Unit of one coefficient for a record with these units of force and length."""
+        component = next(c for c in self.components if c.symbol == symbol)
+        known = {p.name: QUANTITIES[p.quantity] for p in self.parameters}
+        known |= {"z": STATE_DIMENSIONS} if self.state else {}
+        powers = dimensions.dimensions(component.shape, known)
+        if powers is not None:
+            powers = (powers[0], powers[1] - component.order)
+        return dimensions.compose(force, length, powers)
+
+
+QUANTITIES = {
+    "length": dimensions.VARIABLES["u"],
+    "time": dimensions.VARIABLES["t"],
+    "frequency": (dimensions.NONE[0], dimensions.NONE[1] - 1),
+    "1/length": (dimensions.NONE[0] - 1, dimensions.NONE[1]),
+}
+STATE_DIMENSIONS = dimensions.VARIABLES["u"]  # the states of the library are internal displacements

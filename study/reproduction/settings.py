@@ -1,0 +1,207 @@
+"""The study's settings as typed, frozen values: the sections of ``config/config.yaml``, and what its jobs are given."""
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field
+
+from study.records.excitation import Excitation
+from study.records.spectra import Segments
+from study.support.config_files import Section
+
+
+def _each_once(names: tuple[object, ...]) -> tuple[object, ...]:
+    if len(set(names)) < len(names):
+        raise ValueError(f"is {list(names)}; expected each entry once")
+    return names
+
+
+def _with(*needed: str) -> AfterValidator:
+    """Refuses a mapping that lacks one of the names that the claims and the tables judge."""
+
+    def check(values: dict[str, float]) -> dict[str, float]:
+        if lacking := [name for name in needed if name not in values]:
+            raise ValueError(f"lacks {lacking[0]!r}; expected at least {', '.join(needed)}")
+        return values
+
+    return AfterValidator(check)
+
+
+Count = Annotated[int, Field(ge=1)]
+Seed = Annotated[int, Field(ge=0)]
+Seeds = Annotated[int, Field(ge=2)]
+Positive = Annotated[float, Field(gt=0.0)]
+Rate = Annotated[float, Field(ge=0.0, le=1.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Names = Annotated[tuple[str, ...], Field(min_length=1, strict=False), AfterValidator(_each_once)]
+Band = Annotated[tuple[NotNegative, ...], Field(min_length=2, max_length=2, strict=False)]
+Limits = dict[str, Positive]
+
+
+class Sampling(Section):
+    """Samples of a record, as many as memory holds, and seconds from one to the next."""
+
+    samples: Annotated[int, Field(ge=64, le=100_000_000)]
+    dt: Positive
+
+
+class ExcitationSettings(Section):
+    """A force history; what is left out is as :class:`Excitation` has it, and the seed as the job brings it."""
+
+    kind: Literal["gaussian_lowpass", "pierson_moskowitz", "random_phase_multisine", "swept_sine"]
+    reading: Literal["raw", "filtered"] | None = None
+    cutoff: Positive | None = None
+    peak_frequency: Positive | None = None
+    start_frequency: Positive | None = None
+    stop_frequency: Positive | None = None
+    odd_only: bool | None = None
+    sweep: Literal["linear", "logarithmic"] | None = None
+    periods: Count | None = None
+    seed: Seed | None = None
+
+    def at_level(self, level: float) -> Excitation:
+        """The excitation with this mean square."""
+        return Excitation(level=level, **self.model_dump(exclude_none=True, exclude={"seed"}))
+
+
+class IntegratorSettings(Section):
+    """How motion is simulated."""
+
+    method: Literal["abm4", "rk4"]
+    steps_per_sample: Annotated[int, Field(ge=1, le=1000)]
+
+
+class SegmentSettings(Section):
+    """How records are cut."""
+
+    length: Annotated[int, Field(ge=16)]
+    overlap: Annotated[float, Field(ge=0.0, le=0.95)]
+    window: Literal["hann", "hamming", "blackman", "boxcar", "flattop", "blackmanharris"]
+
+    def segments(self, times: int = 1) -> Segments:
+        """As the estimators want them, so many times as long."""
+        return Segments(times * self.length, self.overlap, self.window)
+
+
+class LocalPolynomialSettings(Section):
+    """Bands of the local polynomial estimator."""
+
+    degree: Annotated[int, Field(ge=0, le=6)]
+    half_width: Count
+
+
+class Drawn(Section):
+    """Estimators that the figures show."""
+
+    without_noise: Names
+    with_noise: Names
+
+
+class Tolerances(Section):
+    """What an estimate may be off: relative, absolute where the true value is zero, and those of single cases."""
+
+    relative: Annotated[Limits, _with("m", "f_n", "k", "k3", "k_m", "k_dead_band", "u_g", "f_m", "c3", "c", "zeta")]
+    absolute: Annotated[Limits, _with("k", "c", "k3", "phase")]
+    of_case: dict[str, Limits] = Field(default_factory=dict[str, Limits])
+
+
+class Ensembles(Section):
+    """Seeds, from the first one on."""
+
+    seeds: Seeds
+    first_seed: Seed
+
+
+class MonteCarlo(Ensembles):
+    """Seeds and estimators of the rates at which tolerances are met."""
+
+    estimators: Names
+
+
+class EstimatorErrors(MonteCarlo):
+    """The same for the errors of the estimators, and of ``many`` seeds as a target of its own."""
+
+    many: Seeds
+
+
+class Wanted(Section):
+    """Rates that the trials are to reach."""
+
+    first: Rate
+    nothing: Rate
+    both: Rate
+    removed: Rate
+
+
+class TrialSettings(Section):
+    """Trials with hidden effects; there are 136 pairs of effects."""
+
+    first_seed: Seed
+    noises: Annotated[tuple[NotNegative, ...], Field(min_length=1, strict=False), AfterValidator(_each_once)]
+    rounds: Count
+    none: Count
+    pairs: Annotated[int, Field(ge=1, le=136)]
+    removed: Count
+    jobs: Count
+
+
+class Trials(TrialSettings):
+    """The same with the rates that they are to reach."""
+
+    wanted: Wanted
+
+
+class StudySettings(Section):
+    """``config/config.yaml``; the comments there say what each section is for."""
+
+    sampling: Sampling
+    excitations: Annotated[dict[str, ExcitationSettings], Field(min_length=1)]
+    noise_seed: Seed
+    integrator: IntegratorSettings
+    segments: SegmentSettings
+    fit_band: Band
+    local_polynomial: LocalPolynomialSettings
+    settle_periods: Seed
+    estimators: Names
+    drawn: Drawn
+    tolerances: Tolerances
+    monte_carlo: MonteCarlo
+    estimator_errors: EstimatorErrors
+    ensembles: Ensembles
+    trials: Trials
+
+    @property
+    def resolution(self) -> float:
+        """Hertz from one line of a segment to the next."""
+        return 1.0 / (self.segments.length * self.sampling.dt)
+
+
+class RecordSettings(Section):
+    """What a case's record depends on; its seeds are left out where a job brings its own."""
+
+    case: str
+    excitation: ExcitationSettings
+    level: float
+    noise: float
+    noise_seed: Seed | None = None
+    sampling: Sampling
+    integrator: IntegratorSettings
+
+    def without_seeds(self) -> "RecordSettings":
+        """The same for a job that brings seeds of its own: it does not re-run when those of the study change."""
+        excitation = self.excitation.model_copy(update={"seed": None})
+        return self.model_copy(update={"excitation": excitation, "noise_seed": None})
+
+
+class IdentificationSettings(Section):
+    """What a case's identification depends on beside its record; ``period`` counts samples, if the force repeats."""
+
+    case: str
+    also_assumed: str
+    estimators: Names
+    segments: SegmentSettings
+    fit_band: Band
+    local_polynomial: LocalPolynomialSettings
+    settle_periods: Seed
+    period: Count | None = None
+    relative: Limits
+    absolute: Limits

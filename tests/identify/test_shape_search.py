@@ -1,0 +1,57 @@
+"""Points at which a search tries a candidate's shape parameters, written out a second time."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from study.equations.terms import LIBRARY, get
+from study.identify.time_domain import shape_search
+from study.records.plan import make_plan
+from study.records.record import Record
+
+DT, N = 0.02, 4096
+TIME = DT * np.arange(N)
+U = np.random.default_rng(3).standard_normal(N)
+U = 0.004 * np.convolve(U, np.hanning(25), "same") + 0.001
+SIZE, RATE = float(np.std(U)), float(np.std(np.gradient(U, DT)) / np.std(U))
+LINES = (60.0, 210.5)  # of the spectrum of N samples, what the residual holds
+
+
+@pytest.fixture(scope="module")
+def search() -> tuple[object, Record, object]:
+    """A motion, and a residual of two sines."""
+    residual = sum(np.sin(2 * np.pi * line * np.arange(N) / N) for line in LINES)
+    residual = residual + 1e-3 * np.random.default_rng(4).standard_normal(N)
+    base = SimpleNamespace(displacement=U, found=SimpleNamespace(residual=residual), dt=DT)
+    record = Record(DT, {"force": np.zeros(2 * N), "displacement": np.zeros(2 * N)})
+    return base, record, make_plan(record, (0, N), (N, 2 * N))
+
+
+POINTS = {
+    "dead_band": np.quantile(np.abs(U), np.linspace(0.08, 0.97, 14))[:, None],
+    "one_sided_contact": np.quantile(U, np.linspace(0.1, 0.985, 16))[:, None],
+    "relaxation": np.geomspace(0.05, 20.0, 12)[:, None] / RATE,
+    "hysteresis": np.array([(b, b * g) for b in (0.15, 0.4, 1.0, 2.5, 6.0) for g in (-0.9, -0.3, 0.3, 0.9)]) / SIZE,
+}
+
+
+@pytest.mark.parametrize("name", POINTS)
+def test_amplitudes_and_times_come_from_the_motion(name: str, search: tuple) -> None:
+    found = shape_search.grid(get(name), *search)
+    np.testing.assert_allclose(found, POINTS[name], rtol=1e-12)
+    keys = get(name).keys[1:]
+    assert all(not get(name).physical(dict(zip(keys, point, strict=True))) for point in found)
+
+
+def test_frequencies_come_from_the_lines_of_the_residual(search: tuple) -> None:
+    found = np.array(shape_search.grid(get("harmonic_force"), *search))[:, 0] * N * DT
+    for line in LINES:
+        for shift in (-0.35, 0.0, 0.35):
+            assert np.min(np.abs(found - line - shift)) < 0.05
+    assert len(found) % 3 == 0
+
+
+@pytest.mark.parametrize("name", [name for name, term in LIBRARY.items() if not term.parameters])
+def test_a_term_without_shape_parameters_is_tried_once(name: str, search: tuple) -> None:
+    assert shape_search.grid(get(name), *search) == [()]
