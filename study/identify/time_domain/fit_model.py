@@ -20,7 +20,7 @@ from study.identify.frequency_domain.inputs import history, reverse_inputs
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.multiple_shooting import fit_in_pieces, lost, magnifies
+from study.identify.time_domain.multiple_shooting import POOR, fit_in_pieces, lost, magnifies
 from study.identify.time_domain.part_fit import STEPS, fit_part, linearise, run_of
 from study.identify.time_domain.shape_search import Baseline
 from study.records.prepared import Prepared
@@ -159,14 +159,14 @@ def continued(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
 def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit at its minimum with enough steps; in segments where a chaotic system loses the motion in one run."""
     fit = with_enough_steps(fit, prepared)
-    if not lost(fit, prepared.fitted):
+    if _stands(fit, prepared):
         return fit
     held = tuple(key for key in fit.model.values if key not in fit.keys)
     best = begin = fit
     if not magnifies(fit, prepared):  # which a fit at wrong values may not, where the true system does
         near = _from_segments(fit.model, prepared, held, fit.steps_per_sample)
         best = _better(fit, near) or fit
-        if near is None or not (lost(best, prepared.fitted) and magnifies(near, prepared)):
+        if near is None or _stands(best, prepared) or not magnifies(near, prepared):
             return best
         begin = near
     try:
@@ -179,9 +179,20 @@ def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
         )
     except DivergenceError:  # where segments fail as well, the one free run is what there is
         return best
-    if not lost(together, prepared.fitted):
+    if _stands(together, prepared):
         return together
-    return apart if begin is fit or apart.converged else best
+    return apart if apart.converged or (begin is fit and lost(fit, prepared.fitted)) else best
+
+
+def _stands(fit: FreeRunFit, prepared: Prepared) -> bool:
+    """Whether one free run may be believed: at a minimum, and at none of the many that a chaotic system has.
+
+    What leaves next to nothing has no rival; what leaves more may be any of them, and the sharp curvature of one tells
+    an error far below the distance to the next.
+    """
+    if lost(fit, prepared.fitted):
+        return False
+    return fit.rms < POOR * prepared.spread or not magnifies(fit, prepared)
 
 
 def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
