@@ -1,6 +1,7 @@
 """Shape parameters that a model leaves open are found in the record; the estimators that rest on it."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -144,7 +145,8 @@ def test_a_search_that_does_not_arrive_says_so(systems, records, monkeypatch):
     record = noisy(records["duffing"], 0.05, 1)
     found = estimators.identify("output_error", systems["duffing"], record, TOLD)
     assert found.note == "still falling after 1 free runs, the most allowed"
-    table = tables.parameters("x", systems["duffing"], {"output_error": found}, {"relative": {}, "absolute": {}})
+    tolerances = SimpleNamespace(relative={}, absolute={})
+    table = tables.parameters("x", systems["duffing"], {"output_error": found}, tolerances)
     assert set(table["note"]) == {found.note}
 
 
