@@ -91,29 +91,40 @@ def _check_duplicates(path: Path, table: Table) -> None:
 
 def _guessed(path: Path, table: Table, columns: Sequence[Column], known: set[str]) -> dict[str, Column]:
     """Roles that names, and where these say nothing units, leave no doubt about."""
-    found: dict[str, Column] = {}
-    for role in NAMES:
-        if role in known:
-            continue
+    possible: dict[str, list[Column]] = {}
+    for role in (r for r in NAMES if r not in known):
         exact = [c for c in columns if c.name == role]
-        candidates = exact or [c for c in columns if _role_of(c) == role]
+        possible[role] = exact or [c for c in columns if _role_of(c) == role]
+    motions = [role for role in MOTIONS if role in possible]
+    if any(_spelt_out(c, role) for role in motions for c in possible[role]):
+        for role in motions:  # beside a motion that is spelt out, a column called v or a may be anything
+            possible[role] = [c for c in possible[role] if _spelt_out(c, role)]
+    for role, candidates in possible.items():
         if len(candidates) > 1:
             names = " and ".join(repr(c.name) for c in candidates)
             raise _ask(path, table, f"{names} could each be the {role}")
-        if candidates:
-            found[role] = candidates[0]
-    return found
+    return {role: candidates[0] for role, candidates in possible.items() if candidates}
+
+
+def _spelt_out(column: Column, role: str) -> bool:
+    """Whether more than a single letter says what a column is."""
+    return len(_last(column)) > 1 or _unit_role(column.unit) == role
 
 
 def _role_of(column: Column) -> str:
     """What a column is by what the file says, its name, or its unit; empty if these do not tell."""
     if column.role:
         return column.role
-    name = column.name.rsplit("/", 1)[-1]
+    name = _last(column)
     suffixed = SUFFIX.fullmatch(name)
     if suffixed and _plain_role(suffixed[1]) and _unit_role(suffixed[2]) == _plain_role(suffixed[1]):
         return _plain_role(suffixed[1])
     return _plain_role(name) or _unit_role(column.unit)
+
+
+def _last(column: Column) -> str:
+    """A column's name without the folders of its path."""
+    return column.name.rsplit("/", 1)[-1]
 
 
 def _plain_role(name: str) -> str:
@@ -131,7 +142,7 @@ def _unit_role(unit: str) -> str:
 
 def own_unit(column: Column, role: str) -> str:
     """The unit that a file gives for a column, behind its name (``disp_mm``) or in a row of its own."""
-    suffixed = SUFFIX.fullmatch(column.name.rsplit("/", 1)[-1])
+    suffixed = SUFFIX.fullmatch(_last(column))
     if not column.unit and suffixed and _unit_role(suffixed[2]) == role == _plain_role(suffixed[1]):
         return suffixed[2]
     return column.unit
