@@ -116,7 +116,7 @@ def test_where_pieces_fail_too_the_free_run_stands(
         raise DivergenceError("nothing in common", 0.0)
 
     where = "study.identify.time_domain.fit_model"
-    monkeypatch.setattr(f"{where}.lost", lambda *_: True)
+    monkeypatch.setattr(f"{where}.is_poor", lambda *_: True)
     monkeypatch.setattr(f"{where}.is_chaotic", lambda *_: chaotic)
     monkeypatch.setattr(f"{where}.fit_in_segments", fails)
     comparison = compared(OPEN, local.record)
