@@ -380,7 +380,7 @@ def integrate_variation(
 ) -> int:  # fmt: skip
     """A free run with its exact derivatives by Runge-Kutta; ``y`` is the state beside its sensitivities.
 
-    It is left as it stands at the last sample. ``out`` gets response ``row`` (0 displacement, 1 velocity,
+    It becomes that at the last sample. ``out`` gets response ``row`` (0 displacement, 1 velocity,
     2 acceleration) of each sample beside its derivatives. ``side`` is the register that stands for sgn v, -1 if
     the model has none. Other arguments and result as in :func:`integrate_rk4` and :func:`_variation`.
     """

@@ -1,4 +1,4 @@
-"""A model: terms and how much of each.
+"""A model: terms with their coefficients and shape parameters.
 
 The equation of motion is ``sum over terms = F(t)``. A coefficient or shape parameter is a number, or
 None where it is to be estimated. Models are immutable; ``with_term`` and ``with_values`` give new ones.

@@ -7,8 +7,8 @@ from study.equations.terms import LIBRARY
 from study.support.arrays import Floats
 
 POINTS, FEWEST = 512, 32  # random motions at which formulas are compared, and how many of them must be finite
-DECADES = 6.0  # the range of sizes of the random motions, on either side of one: a record's unit of length is unknown
-NOTHING = 1e-150  # a force below cannot be told from zero
+DECADES = 6.0  # range of the random motions' sizes on either side of one: a record's unit of length is unknown
+NOTHING = 1e-150  # a force below counts as zero
 SAME = 1e-10  # share of a formula that others do not account for, at most: rounding
 TAKES_PART = 1e-6  # share of a formula that another accounts for, at least
 

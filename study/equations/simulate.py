@@ -1,7 +1,7 @@
 """Model and force in, record out.
 
 The report integrates with an Adams-Bashforth predictor-corrector of order 4 at one step a sample
-(Section 2.2). Here the steps per sample are a setting, a classical Runge-Kutta stands beside it, and
+(Section 2.2). Here the steps per sample are a setting, a classical Runge-Kutta is the alternative, and
 the force between the samples is its band-limited interpolation.
 """
 
@@ -90,7 +90,7 @@ def simulate(
     program = forward_program(model, channels)
     factor = 2 * settings.steps_per_sample
     drive = between_samples(force, factor)[:, None]
-    if channels:  # a copy, which for a long record takes longer than the integration
+    if channels:  # copying a long record takes longer than the integration
         drive = np.column_stack([drive, *(between_samples(extra[name], factor) for name in channels)])
     state = np.zeros(2 + len(model.states))
     state[: len(initial)] = initial
@@ -117,7 +117,7 @@ def _check(model: Model, channels: Mapping[str, Floats], initial: Sequence[float
 
 
 def _diverged(model: Model, force: Floats, steps: int, time: float) -> None:
-    """Say what would help: more steps where there are few; with many it is the system that runs away."""
+    """Raise with advice: more steps where there are few; with many the system itself diverges."""
     level = float(np.mean(force**2))
     if steps < PLENTY:
         advice = f"take more steps per sample than {steps}, a lower level, or check the signs of the coefficients"

@@ -49,7 +49,7 @@ class Search:
     places : tuple of float
         The points to try.
     blunt : bool
-        Whether a place tells little about where a fit from it ends: then fits start all over the range.
+        Whether a place predicts poorly where a fit from it ends: then fits start all over the range.
     """
 
     kind: Places
@@ -97,7 +97,7 @@ class Condition:
     ----------
     name : str
         The coefficient or shape parameter.
-    words : str
+    reason : str
         Why, as a clause.
     over : str or None
         Name of another one whose size is the bound; zero is, if left out.
@@ -108,7 +108,7 @@ class Condition:
     """
 
     name: str
-    words: str
+    reason: str
     over: str | None = None
     reached: bool = False
     enforced: bool = False
@@ -121,7 +121,7 @@ class Condition:
         value, bound = values[self.name], 0.0 if self.over is None else abs(values[self.over])
         if value > bound or (self.reached and value == bound):
             return ""
-        return f"{' and '.join(f'{name} is {values[name]:g}' for name in names)}; {self.words}"
+        return f"{' and '.join(f'{name} is {values[name]:g}' for name in names)}; {self.reason}"
 
 
 @dataclass(frozen=True)
@@ -200,7 +200,7 @@ class Term:
         """Whether nothing changes its force: it moves the system to another place of rest."""
         return not any(formulas.names(c.shape) for c in self.components)
 
-    @cached_property  # a diagnosis prepares hundreds of runs
+    @cached_property  # cached: a diagnosis prepares hundreds of runs
     def channels(self) -> tuple[str, ...]:
         """Measured channels that its formulas name, in alphabetical order.
 

@@ -1,4 +1,4 @@
-"""The library of terms: every physical effect the project knows, written once, as ``term`` says what one is.
+"""The library of terms: every physical effect the project knows, written once, in the form that ``term`` defines.
 
 The force of a term is ``sum over its components of coefficient * factor * (d/dt)^order shape``. One
 entry serves three times: forward (``simulate`` adds the force), reverse (components with the same
@@ -222,5 +222,5 @@ def custom(name: str, force: str) -> Term:
     if not name.isidentifier() or not name.isascii():
         raise StudyError(f"{name!r} is not a name for a term; use letters, digits and underscores")
     graph = Graph()
-    formulas.build(graph, force, {n: graph.input(n) for n in formulas.names(force)})  # refuses all but a formula
+    formulas.build(graph, force, {n: graph.input(n) for n in formulas.names(force)})  # raises unless it is a formula
     return _single(name, f"q_{name}", force, meaning=f"the user's own force {force}", cause="as the user knows")

@@ -112,7 +112,7 @@ def _edge(record: Record, cutoff: float) -> int:
 
 
 def _blended(record: Record, cutoff: float, notes: tuple[str, ...]) -> CompletedRecord:
-    """Velocity from both sides: what integration loses below the cut-off, the derivative supplies."""
+    """Velocity from both: the integral above the cut-off, the derivative below it."""
     slow = derivative(record["displacement"], record.dt, 1)
     fast = derivative(record["acceleration"], record.dt, -1, cutoff)
     below = slow - derivative(record["displacement"], record.dt, 1, cutoff)

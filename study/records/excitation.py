@@ -17,7 +17,7 @@ from study.support.errors import StudyError
 FORCE_STREAM, NOISE_STREAM = 0, 1
 READINGS = ("raw", "filtered")
 SWEEPS = ("linear", "logarithmic")
-SETTINGS = {  # of each kind, beside kind, level and periods
+SETTINGS = {  # settings of each kind, beside kind, level and periods
     "gaussian_lowpass": ("reading", "cutoff"),
     "pierson_moskowitz": ("peak_frequency", "cutoff"),
     "random_phase_multisine": ("start_frequency", "stop_frequency", "odd_only"),

@@ -73,7 +73,7 @@ class Record:
 
 def write_csv(record: Record, path: Path) -> None:
     """Write time and channels with all digits of a double; units other than SI follow the names."""
-    import pandas as pd  # half a second that records in memory do not cost
+    import pandas as pd  # half a second, which records in memory are spared
 
     named = {heading(name, record.units.get(name, "")): values for name, values in record.channels.items()}
     columns: dict[str, Floats] = {"time": record.time, **named}
@@ -89,7 +89,7 @@ def read_csv(path: Path) -> Record:
     """Read what :func:`write_csv` wrote of a record in SI units. ``readers`` reads all others."""
     import pandas as pd
 
-    table = pd.read_csv(path)  # from pandas 3.1 on, the default parser returns the very doubles that were written
+    table = pd.read_csv(path)  # from pandas 3.1 on, the default parser returns exactly the doubles that were written
     time = table["time"].to_numpy(dtype=np.float64)
     dt = round(float(time[-1] - time[0]) / (len(time) - 1), 15)
     channels = {str(c): table[c].to_numpy(dtype=np.float64) for c in table.columns if c != "time"}

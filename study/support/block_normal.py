@@ -49,7 +49,7 @@ class Normal:
         if self.links is not None:
             return _tridiagonal(self.own, self.links, damping, right)
         values, vectors = np.linalg.eigh(self.own)
-        known = values + damping > INDISTINCT  # a segment may not show every direction
+        known = values + damping > INDISTINCT  # a segment may not determine every direction
         inverse = np.where(known, 1.0 / np.where(known, values + damping, 1.0), 0.0)
         solved = (vectors * inverse[:, None, :]) @ (vectors.transpose(0, 2, 1) @ right)
         return np.asarray(solved, dtype=np.float64)
@@ -168,7 +168,7 @@ def normal_equations(
     links = None
     if continuity is not None:
         turned = continuity.jacobian.transpose(0, 2, 1)
-        after = -continuity.weight[:, None] * continuity.jacobian  # rows: the state after
+        after = -continuity.weight[:, None] * continuity.jacobian  # by the next segment's state (rows)
         grams[:-1] += turned @ continuity.jacobian
         grams[1:, shared:, :shared] += after[:, :, :shared]
         grams[1:, :shared, shared:] += after[:, :, :shared].transpose(0, 2, 1)

@@ -13,7 +13,7 @@ def least_squares(columns: Floats, target: Floats, cutoff: float = 1e-12) -> Flo
     Columns are scaled to unit length first; singular values below ``cutoff`` of the largest then count as zero.
     """
     peak = np.max(np.abs(columns), axis=0, initial=0.0)
-    peak = np.where(peak > 0.0, peak, 1.0)  # first of all, so that no square overflows
+    peak = np.where(peak > 0.0, peak, 1.0)  # first, so that no square overflows
     length = np.linalg.norm(columns / peak, axis=0)
     scale = peak * np.where(length > 0.0, length, 1.0)
     solve = cast(Any, np.linalg.lstsq)  # its annotation leaves the element type open

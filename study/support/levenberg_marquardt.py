@@ -112,7 +112,7 @@ def minimise(
     freedom = max(len(point.residual) - count, 1)
     damping, growth, costs = 1e-3, 2.0, list[float]()
     for iteration in range(1, max_iterations + 1):
-        unit = count * point.cost / freedom  # what a step of one standard error brings
+        unit = count * point.cost / freedom  # fall of the error in a step of one standard error
         fall = point.normal.decrement()
         if fall <= offset**2 * unit or fall <= (ROUNDING * size) ** 2:
             return End(point, True, iteration, f"converged after {iteration} free runs")
@@ -132,7 +132,7 @@ def minimise(
 
 
 def _stalled(point: Point, iteration: int, offset: float) -> End:
-    """The end of a search in a kink of the sum of squares, such as friction and stops make; it may be the minimum."""
+    """The end of a search in a kink of the sum of squares, as friction and stops cause; it may be the minimum."""
     if offset <= 1.0:
         return End(point, True, iteration, f"converged after {iteration} free runs to where no step lowers the error")
     why = f"no step lowers the error, though one of {offset:.2g} standard errors should"

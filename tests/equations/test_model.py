@@ -85,7 +85,9 @@ def test_registers_of_the_kernels_stand_first(make_model: Callable[..., Model]) 
     """The integrators write into registers by position; this is the layout they rely on."""
     relaxing = {"inertia": {"m": 2.0}, "relaxation": {"kr": 1.0, "relaxation.tau": 0.5}}
     program = forward_program(make_model("maxwell", relaxing), ("a", "b"))
-    assert [program.inputs[n] for n in ("u", "v", "t", "force", "a", "b", "z:relaxation")] == list(range(7))
+    assert [program.inputs[n] for n in ("u", "v", "t", "force", "channel:a", "channel:b", "z:relaxation")] == list(
+        range(7)
+    )
     assert program.registers[program.inputs["m"]] == 2.0
     assert np.count_nonzero(program.registers[:7]) == 0
 

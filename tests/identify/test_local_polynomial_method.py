@@ -204,7 +204,9 @@ def test_memory_does_not_grow_with_bands_times_inputs():
 def test_records_that_are_too_short(systems, records):
     inputs, record = reverse_inputs(systems["duffing"]), records["duffing"].part(0, 256)
     lines = transform([*histories(inputs, record), record["force"]], record.dt)
-    says = "the record of 256 samples has 50 lines from 0.3 to 10 Hz; local_polynomial needs 81: a longer record"
+    says = (
+        "the record of 256 samples has 50 lines from 0.3 to 10 Hz; local_polynomial needs 81; expected a longer record"
+    )
     with pytest.raises(StudyError, match=re.escape(says)):
         fit(lines, inputs, BAND, LocalPolynomial())
     with pytest.raises(StudyError, match="the record of 256 samples has 127 lines, fewer than the 161 of a band"):

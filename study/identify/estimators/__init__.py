@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, cast
 
 from study.support.errors import StudyError
 
-if TYPE_CHECKING:  # who only asks which estimators there are waits for none of their modules
+if TYPE_CHECKING:  # a list of the estimators needs none of their modules
     from study.equations.model import Model
     from study.identify.estimators.base import Estimator, Identified, Settings
     from study.records.record import Record

@@ -1,4 +1,4 @@
-"""Instruments from a free run: A_j(f) line by line, without the bias that noise on the response brings."""
+"""Instruments from a free run: A_j(f) line by line, without the bias from noise on the response."""
 
 from study.equations.free_run import prepare
 from study.equations.model import Model

@@ -19,7 +19,7 @@ from study.records.prepared import whole
 from study.records.record import Record
 from study.support.errors import DivergenceError
 
-KEPT = 4  # fits: those of the records that the threads are working on
+KEPT = 4  # cached fits: those of the records that the threads are working on
 REFINED = 12  # free runs in which a fit follows a change of steps
 
 

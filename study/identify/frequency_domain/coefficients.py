@@ -73,7 +73,7 @@ def fit(result: Responses, inputs: Sequence[Input], band: tuple[float, float], l
 
 
 def _weights(variance: Floats, response: Complexes) -> Floats:
-    """Inverse variances, to a common factor; zero where the input brings nothing and the response is exactly zero."""
+    """Inverse variances, to a common factor; zero where the input is silent and the response exactly zero."""
     divisor = floored(variance)
     return np.where(response == 0.0, 0.0, np.max(divisor, initial=0.0) / divisor)
 

@@ -14,8 +14,8 @@ from study.records.spectra import SpectralMatrix
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
-COLLINEAR = 1e-13  # an input of which less than this share is left after conditioning brings nothing new
-SILENT = 1e-13  # a line below this fraction of an input's largest amplitude is the rounding of the others
+COLLINEAR = 1e-13  # an input of which less than this share is left after conditioning depends on the others
+SILENT = 1e-13  # a line below this share of an input's largest amplitude is the rounding of the others
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,8 @@ from study.records.record import Record
 from study.records.spectra import Segments, SpectralMatrix
 from study.support.arrays import Complexes, Floats
 
-NODES = 15  # of the Gauss-Hermite rule: exact for shapes up to the power 29, close for kinked ones
-NOISY = {"u": "displacement", "v": "velocity"}  # what a formula calls the channels that carry noise
+NODES = 15  # nodes of the Gauss-Hermite rule: exact for shapes up to the power 29, close for kinked ones
+NOISY = {"u": "displacement", "v": "velocity"}  # channels with noise, by their names in a formula
 TINY = float(np.finfo(np.float64).tiny)
 _pinv = cast(Any, np.linalg.pinv)  # its annotation leaves the element type open
 STRETCHES, FEWEST = 16, 8  # parts of the record, at most and at least, whose scatter gives the errors of coefficients

@@ -47,14 +47,14 @@ def fit(lines: Lines, inputs: Sequence[Input], band: tuple[float, float], settin
     design = np.stack([c.ravel() for c in columns], axis=1)
     target = (_clean(lines.output[index], basis) * weight).ravel()
     size = np.linalg.norm(design, axis=0)
-    heard, size = size > 0.0, size[size > 0.0]
-    design = design[:, heard] / size
+    driven, size = size > 0.0, size[size > 0.0]
+    design = design[:, driven] / size
     inverse = _inverse(design)
     values = (inverse.conj() @ target).real
     each = np.broadcast_to(weight, index.shape).ravel()
     residual = (target - design @ values) / each
     covariance = _scatter(inverse * each, design.T / each, residual, index.ravel(), lines.samples)
-    symbols = tuple(p.symbol for (_, p), known in zip(parts, heard, strict=True) if known)
+    symbols = tuple(p.symbol for (_, p), known in zip(parts, driven, strict=True) if known)
     return Estimate(symbols, values / size, covariance / np.outer(size, size), STRETCHES - 1.0)
 
 
@@ -90,8 +90,8 @@ def _scatter(
     """Covariance of ``Re(conj(influence) . noise)`` by leaving out one stretch of time after the other, (p, p).
 
     Over a stretch, influence times residual sums to s and influence times design to H; all H sum to the
-    identity. Without the stretch the coefficients would be ``(1 - H)^-1 s`` away: H stands for the share of the
-    stretch's own noise that they have followed, much where a single burst of motion tells most of a coefficient.
+    identity. Without the stretch the coefficients would shift by ``(1 - H)^-1 s``: H is the share of the stretch's own
+    noise that they have followed, which is large where a single burst of motion determines most of a coefficient.
     """
     count = len(influence)
     spectra = np.zeros((2 * count + 1, samples // 2 + 1), dtype=np.complex128)

@@ -4,7 +4,7 @@ In a narrow band of lines the spectrum of the output is, line by line,
 ``Y(k) = sum_j A_j(f_k) X_j(k) + T(f_k) + N(k)``. ``T`` is the leakage of a record that does not close on
 itself: by partial integration, ``u'`` has the transform ``j 2 pi f U`` and the jump from the last sample to
 the first, which is smooth in f whatever the input. So A_j and T are polynomials of low degree across the
-band, and least squares tells them apart (Pintelon and Schoukens, System Identification, 2012, chapter 7).
+band, and least squares separates them (Pintelon and Schoukens, System Identification, 2012, chapter 7).
 A window would smear both. In reverse A_j is a polynomial everywhere: m (j 2 pi f)^2 + c j 2 pi f + k.
 """
 
@@ -19,14 +19,14 @@ from study.support.arrays import Complexes, Floats, Ints
 from study.support.errors import StudyError
 
 CHUNK = 256  # bands solved at a time: memory does not grow with bands times inputs
-SPARE = 8  # lines in a band beyond the unknowns, for the noise to be seen in
+SPARE = 8  # lines in a band beyond the unknowns, to estimate the noise from
 EXACT = 1e-12  # singular values and variances below this share of the largest are rounding
-SILENT = 1e-13  # an input below this share of its largest line is the rounding of its others
+SILENT = 1e-13  # a line below this share of an input's largest is the rounding of the others
 
 
 @dataclass(frozen=True)
 class LocalPolynomial:
-    """How wide a band is and how bent a function may be in it.
+    """Width of the local bands, and degree of the polynomials in them.
 
     Attributes
     ----------

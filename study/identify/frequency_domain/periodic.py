@@ -7,7 +7,7 @@ Three things follow for the reverse system ``Y = sum_j A_j X_j``, none of which 
 - Products of two different periods have the mean of the products without noise (least squares of noisy inputs is
   biased by the products of a period's noise with itself). So one half of the periods, averaged, gives the equations
   and the other half their instruments; then they change places.
-- A shape of an average of n periods, ``g(u + noise)``, has a bias of ``b / n``: a cube brings ``3 sigma^2 u / n``.
+- A shape of an average of n periods, ``g(u + noise)``, has a bias of ``b / n``: for a cube ``3 sigma^2 u / n``.
   The same shape of averages that leave out one period each has the bias ``b / (n - 1)``, and that of
   ``n g_n - (n - 1) g_(n-1)`` is of the next order; for powers up to the third it is zero (Quenouille,
   Biometrika 43, 1956).
@@ -30,9 +30,9 @@ from study.support.arrays import Complexes, Floats, Ints
 from study.support.errors import StudyError
 
 Chosen = tuple[int, ...]
-MOST = 12  # periods that are told apart; of more, neighbours are averaged first
+MOST = 12  # periods that are treated one by one; of more, neighbours are averaged first
 NEIGHBOURS = 10  # lines on either side that a variance is averaged over: its own line would correlate with the weight
-PASSES = 4  # of weights and coefficients
+PASSES = 4  # iterations of weights and coefficients
 DIFFERENT = 0.5  # share of a force's power that may differ between periods
 
 
@@ -72,18 +72,18 @@ def fit(record: Record, inputs: Sequence[Input], band: tuple[float, float]) -> E
     _check(inputs, count, record.name)
     own = np.stack([periods.columns((p,)) for p in range(count)])
     size = np.linalg.norm(own, axis=(0, 1))
-    heard = size > 0.0
-    scale = size[heard]
+    driven = size > 0.0
+    scale = size[driven]
     equations = [
         _Equation(
-            periods.unbiased(a)[:, heard] / scale, periods.unbiased(b)[:, heard] / scale,
+            periods.unbiased(a)[:, driven] / scale, periods.unbiased(b)[:, driven] / scale,
             np.mean(periods.force[list(a)], axis=0),
         )
         for a, b in _halves(count)
     ]  # fmt: skip
-    values, covariance = _solve(equations, own[:, :, heard] / scale, periods.force)
+    values, covariance = _solve(equations, own[:, :, driven] / scale, periods.force)
     symbols = [p.symbol for item in inputs for p in item.parts]
-    known = tuple(s for s, h in zip(symbols, heard, strict=True) if h)
+    known = tuple(s for s, d in zip(symbols, driven, strict=True) if d)
     return Estimate(known, values / scale, covariance / np.outer(scale, scale), count - 1.0)
 
 
@@ -141,7 +141,7 @@ class Periods:
 
 def _grouped(record: Record) -> dict[str, Floats]:
     """Channels by period, (periods, samples); of many periods, averages of neighbours."""
-    assert record.period is not None, "steady() has seen to it"
+    assert record.period is not None, "checked by steady()"
     periods = len(record) // record.period
     each = -(-periods // MOST)
     count = periods // each

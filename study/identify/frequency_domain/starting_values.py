@@ -19,16 +19,16 @@ from study.support.least_squares import least_squares
 
 LINEAR_ORDERS = {"k": 0, "c": 1, "m": 2}
 FAINT = 1e-3  # share of the strongest line's force below which a line is leakage
-SHORT = 512  # samples below which missing coherence may be the record's own shortness
-CHANCE = 0.01  # the linear start uses lines whose coherence noise alone would reach this rarely
-LONGEST, SHORTEST, PARTS = 1024, 64, 12  # samples in a segment, and how many of them at least
+SHORT = 512  # samples below which coherence may be missing because the record is short
+CHANCE = 0.01  # probability that noise alone reaches the coherence of a line that the linear start uses
+LONGEST, SHORTEST, PARTS = 1024, 64, 12  # samples in a segment, at most and at least, and its share of the record
 
 
 def linear_start(model: Model, prepared: Prepared) -> dict[str, float]:
     """Mass, damping and stiffness of the best linear approximation; zero for everything else."""
     record, response = prepared.record, prepared.response
     part = record.part(*prepared.plan.fit)
-    length = min(1024, 2 ** int(np.log2(max(len(part) // 8, 16))))
+    length = min(LONGEST, 2 ** int(np.log2(max(len(part) // 8, 16))))
     force, motion = (part[name] - np.mean(part[name]) for name in ("force", response))
     matrix = cross_spectra([force, motion], part.dt, Segments(length=length))
     g, f = matrix.density[1:-1], matrix.frequency[1:-1]

@@ -18,7 +18,7 @@ from study.support.errors import DivergenceError
 ROUNDS = 2  # attempts at one continuous motion
 LOOSE = 12  # free runs of the first fit, whose segments are independent
 SOFT, SOFTLY = (0.3, 1.0, 3.0), 5  # continuity weights that lead coefficients near the truth, and free runs with each
-FIRM, FIRMLY = 30.0, 12  # continuity weight at which segments share most of what the noise allows, and free runs
+FIRM, FIRMLY = 30.0, 12  # continuity weight at which gaps are within the noise of the states, and free runs
 TIGHT, TIGHTLY = 100.0, 30  # continuity weight at which the segments are one motion, and free runs
 CLEAN = 0.01  # of the response's standard deviation: a residual to which long steps of the integrator may add
 POOR = 0.05  # of the response's standard deviation: a residual that may hide a motion
@@ -54,7 +54,7 @@ def fit_in_segments(
     rough = replace(segments, steps_per_sample=needed_steps(begun, record, response, steps_per_sample).rough)
     runs = min(LOOSE, max_iterations)
     loose = fit_segments(begun, rough, rough.first_states(begun), held, runs)
-    if loose.rms < CLEAN * segments.spread:  # long steps would show
+    if loose.rms < CLEAN * segments.spread:  # errors of long steps would matter
         loose = fit_segments(loose.model, segments, loose.initial, held, runs)
     states = np.atleast_2d(loose.initial)
     if not needed_restarts(loose.model, record, states, whole, segments.restarts, steps_per_sample):
