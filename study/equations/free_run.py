@@ -120,7 +120,7 @@ class FreeRun:
         program = with_registers(self.program, {key: values[key] for key in self.keys})
         first_free = 1 + len(self.keys)
         out = np.empty((self.samples, first_free + free_states))
-        state = np.zeros((len(states), len(self.slots) + 1, out.shape[1]))  # one array a segment would take longer
+        state = np.zeros((len(states), len(self.slots) + 1, out.shape[1]))  # one array for all segments is faster
         state[:, : states.shape[1], 0] = states
         state[:, range(free_states), range(first_free, out.shape[1])] = 1.0
         if len(states) == 1 or self.samples * self.steps < SHARED:

@@ -163,7 +163,7 @@ class Graph:
         return self.mul(square, a) if n % 2 else square
 
     def derivative(self, node: int, wrt: int) -> int:
-        """The exact partial derivative of a node by an input; that of ``sgn`` is zero but at the jump."""
+        """The exact partial derivative of a node by an input; that of ``sgn`` is taken as zero."""
         if node == wrt:
             return self.const(1.0)
         key = (node, wrt)

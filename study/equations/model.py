@@ -25,9 +25,9 @@ class ModelTerm:
     term : Term
         The physical effect.
     coefficients : tuple of float or None
-        One a component, in the order of ``term.symbols``; None where it is to be fitted.
+        One for each component, in the order of ``term.symbols``; None where it is to be fitted.
     parameters : tuple of float or None
-        One a shape parameter; None where it is to be estimated.
+        One for each shape parameter; None where it is to be estimated.
     """
 
     term: Term

@@ -1,1 +1,1 @@
-"""What was measured or simulated, and what can be said of it without a model."""
+"""Records, measured or simulated, and what can be derived from them without a model."""

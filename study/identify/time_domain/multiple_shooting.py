@@ -45,8 +45,8 @@ def fit_in_segments(
     increasing continuity constraints turn all segments into one motion. Where that fails, it is tried again with the
     coefficients of the longest segments that held.
 
-    Parameters, result and errors are those of :func:`free_run_fit.fit_free_run`; ``initial`` of the
-    result has one row a segment.
+    Parameters, result and errors are those of :func:`free_run_fit.fit_free_run`; ``initial`` of the result has a row
+    for each segment.
     """
     whole = span or (0, len(record))
     segments = ShootingSegments(record, response, whole, even_restarts(record, response, whole), steps_per_sample)
