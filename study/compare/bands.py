@@ -39,8 +39,8 @@ def bands(noise: Noise, force: ForceError, low: float) -> tuple[Band, ...]:
     response = np.where(noise.residual > noise.density * (1.0 + spread), noise.residual - noise.density, 0.0)
     response[noise.frequency < low] = 0.0
     left = np.where(force.band & (force.unexplained > force.noise), force.unexplained - force.noise, 0.0) * force.force
-    found = (narrowest("response", noise.frequency, response), narrowest("force", force.frequency, left))
-    return tuple(band for band in found if band is not None)
+    widest = (narrowest("response", noise.frequency, response), narrowest("force", force.frequency, left))
+    return tuple(band for band in widest if band is not None)
 
 
 def narrowest(of: str, frequency: Floats, power: Floats, most: float = MOST) -> Band | None:

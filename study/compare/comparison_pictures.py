@@ -13,25 +13,25 @@ from numpy.typing import NDArray
 from study.compare import panels
 from study.compare.across_levels import Level
 from study.compare.comparison import Comparison
-from study.compare.comparison_sentences import percent
 from study.compare.force_map import curve, surface
 from study.figures import coherence, page
 from study.figures.curves import InputCoherence
 from study.figures.sheet import in_style
+from study.support.numbers import percent
 
 Floats = NDArray[np.float64]
 KINDS = ("png", "svg")
 WIDE = 7.2  # inches
 
 
-def pictures(found: Comparison) -> dict[str, bytes]:
+def pictures(comparison: Comparison) -> dict[str, bytes]:
     """Every picture of one record by file name."""
     drawn: Mapping[str, Callable[[Comparison], Figure]] = {
         "response": response, "force_error": force_error, "missing_force": missing_force,
         "error_in_time": error_in_time,
     }  # fmt: skip
     with in_style():
-        return _bytes({name: draw(found) for name, draw in drawn.items()})
+        return _bytes({name: draw(comparison) for name, draw in drawn.items()})
 
 
 def level_pictures(moving: Sequence[Level], force_unit: str) -> dict[str, bytes]:
@@ -46,16 +46,16 @@ def _bytes(figures: Mapping[str, Figure]) -> dict[str, bytes]:
     return {f"{name}.{kind}": page.rendered(figure, kind) for name, figure in figures.items() for kind in KINDS}
 
 
-def response(found: Comparison) -> Figure:
+def response(comparison: Comparison) -> Figure:
     """Measured and predicted response, their difference, and a close-up where that is largest."""
-    prediction, unit = found.prediction, found.record.units.get(found.plan.response, "")
+    prediction, unit = comparison.prediction, comparison.record.units.get(comparison.plan.response, "")
     about = f"error {percent(prediction.error)} of the rms response, noise floor {percent(prediction.floor)}"
     figure, axes = page.page(
-        f"{found.record.name}: {found.plan.response}", f"model {found.model.name}; {about}", rows=3, width=WIDE,
-        panel=1.8, legend_rows=2, share=False,
+        f"{comparison.record.name}: {comparison.plan.response}", f"model {comparison.model.name}; {about}",
+        rows=3, width=WIDE, panel=1.8, legend_rows=2, share=False,
     )  # fmt: skip
     panels.response(axes[0], prediction.time, prediction.measured, prediction.predicted, unit)
-    panels.residual(axes[1], prediction.time, prediction.residual, found.prediction.noise.rms, unit)
+    panels.residual(axes[1], prediction.time, prediction.residual, comparison.prediction.noise.rms, unit)
     near = prediction.closeup
     panels.response(axes[2], prediction.time[near], prediction.measured[near], prediction.predicted[near], unit)
     page.letter(axes, ("all that is prediction", "the difference", "close-up of (a) where the difference is largest"))
@@ -63,15 +63,15 @@ def response(found: Comparison) -> Figure:
     return figure
 
 
-def force_error(found: Comparison) -> Figure:
+def force_error(comparison: Comparison) -> Figure:
     """Unexplained share of the force by frequency, and what each input explains."""
-    force = found.force
+    force = comparison.force
     highest = force.highest
     low, high = force.frequency[force.band][[0, -1]]
     about = f"{percent(force.total)} of its power from {low:.3g} to {high:.3g} Hz"
     figure, axes = page.page(
-        f"{found.record.name}: error of the force", f"model {found.model.name}; unexplained is {about}", rows=2,
-        width=WIDE, panel=2.3, legend_rows=2, share=False,
+        f"{comparison.record.name}: error of the force", f"model {comparison.model.name}; unexplained is {about}",
+        rows=2, width=WIDE, panel=2.3, legend_rows=2, share=False,
     )  # fmt: skip
     panels.force_error(axes[0], force, highest)
     keep = (force.frequency > 0.0) & (force.frequency <= highest)
@@ -87,13 +87,13 @@ def force_error(found: Comparison) -> Figure:
     return figure
 
 
-def missing_force(found: Comparison) -> Figure:
+def missing_force(comparison: Comparison) -> Figure:
     """The force that the model lacks over the (u, v) plane and against each of them."""
-    lacking, unit = found.missing_force, dict(found.record.units)
+    lacking, unit = comparison.missing_force, dict(comparison.record.units)
     band = lacking.frequency[lacking.gate]
     about = "the difference is noise" if not len(band) else f"seen in bands from {band[0]:.3g} to {band[-1]:.3g} Hz"
     figure, axes = page.page(
-        f"{found.record.name}: the force that the model lacks", f"model {found.model.name}; {about}", rows=3,
+        f"{comparison.record.name}: the force that the model lacks", f"model {comparison.model.name}; {about}", rows=3,
         width=WIDE, panel=2.3, share=False,
     )  # fmt: skip
     u, v, force = (x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force))
@@ -105,15 +105,15 @@ def missing_force(found: Comparison) -> Figure:
     return figure
 
 
-def error_in_time(found: Comparison) -> Figure:
+def error_in_time(comparison: Comparison) -> Figure:
     """Error along the judging part."""
+    chance = f"differences between stretches of equal level: p = {comparison.time.p_value:.2g}"
     figure, axes = page.page(
-        f"{found.record.name}: error along the record",
-        f"model {found.model.name}; differences between stretches of equal level: p = {found.time.p_value:.2g}",
+        f"{comparison.record.name}: error along the record", f"model {comparison.model.name}; {chance}",
         rows=2, width=WIDE, panel=2.0, share=False,
     )  # fmt: skip
-    panels.error_in_time(axes[0], found.time, found.prediction.floor)
-    panels.error_beyond_level(axes[1], found.time)
+    panels.error_in_time(axes[0], comparison.time, comparison.prediction.floor)
+    panels.error_beyond_level(axes[1], comparison.time)
     page.letter(axes, ("error and response", "beyond what the level accounts for"))
     page.legend(figure, axes[:1])
     return figure

@@ -9,6 +9,7 @@ from study.compare.along_time import AlongTime
 from study.compare.comparison import Comparison
 from study.compare.growth import Growth, Growths
 from study.compare.noise import SCATTER
+from study.support.numbers import percent
 
 NEGLIGIBLE = 2e-3  # of the rms response: structure below this is no evidence that something is missing
 CHANCE = 0.01  # p value below which a change along the record is no chance
@@ -23,22 +24,18 @@ NAMES = {0: "constant size", 2: "square", 3: "cube", 4: "fourth power", 5: "fift
 PARITY = {"odd": "odd in it", "even": "even in it"}
 
 
-def says(found: Comparison) -> str:
+def says(comparison: Comparison) -> str:
     """What a user should know of one record, in two or three sentences."""
-    sentences = [_how_good(found)]
-    if found.prediction.error >= HOPELESS:
+    sentences = [_how_good(comparison)]
+    if comparison.prediction.error >= HOPELESS:
         sentences.append("Mass, damping and stiffness are the least that a model needs")
-    elif found.prediction.structure > NEGLIGIBLE:
-        sentences.append(_where(found))
-    if not found.fit.converged:
-        sentences.append(f"The fit did not arrive at a minimum ({found.fit.message}), so this may be the fit's fault")
+    elif comparison.prediction.structure > NEGLIGIBLE:
+        sentences.append(_where(comparison))
+    if not comparison.fit.converged:
+        sentences.append(
+            f"The fit did not arrive at a minimum ({comparison.fit.message}), so this may be the fit's fault"
+        )
     return ". ".join(s[0].upper() + s[1:] for s in sentences) + "."
-
-
-def percent(share: float) -> str:
-    """A share in per cent, two digits: ``38 %``, ``1.2 %``, ``0.034 %``."""
-    value = 100.0 * share
-    return f"{value:.0f} %" if value >= 9.95 else f"{value:.2g} %"
 
 
 def _plain(number: float) -> str:
@@ -46,44 +43,44 @@ def _plain(number: float) -> str:
     return np.format_float_positional(float(f"{number:.2g}"), trim="-")
 
 
-def _how_good(found: Comparison) -> str:
-    error, floor = percent(found.prediction.error), percent(found.prediction.floor)
+def _how_good(comparison: Comparison) -> str:
+    error, floor = percent(comparison.prediction.error), percent(comparison.prediction.floor)
     start = f"the model misses the response by {error} of its rms"
-    if found.prediction.error >= HOPELESS:
+    if comparison.prediction.error >= HOPELESS:
         return (
             f"{start}, as one without any motion would: it cannot follow this record, and its fitted coefficients "
             "mean nothing"
         )
-    if found.prediction.noise.alone:
-        how = " (from the scatter between periods)" if found.prediction.noise.source == SCATTER else ""
-        doubt = "" if how else "; 'study diagnose' looks closer"
-        return f"{start}, and that is noise{how}: nothing stands above the noise floor of {floor}{doubt}"
-    if found.prediction.structure <= NEGLIGIBLE:
+    if comparison.prediction.noise.alone:
+        source = " (from the scatter between periods)" if comparison.prediction.noise.source == SCATTER else ""
+        doubt = "" if source else "; 'study diagnose' looks closer"
+        return f"{start}, and that is noise{source}: nothing stands above the noise floor of {floor}{doubt}"
+    if comparison.prediction.structure <= NEGLIGIBLE:
         return (
-            f"{start}; what stands above the noise floor of {floor} is {percent(found.prediction.structure)} of the "
-            "response, too little to call anything missing"
+            f"{start}; what stands above the noise floor of {floor} is {percent(comparison.prediction.structure)} of "
+            "the response, too little to call anything missing"
         )
     return f"{start}, where noise alone would leave {floor}"
 
 
-def _where(found: Comparison) -> str:
-    response = next((b for b in found.bands if b.of == "response"), None)
+def _where(comparison: Comparison) -> str:
+    response = next((b for b in comparison.bands if b.of == "response"), None)
     band = ""
     if response is not None:
         band = (
             f"{percent(response.share)} of what is unexplained lies between "
             f"{_plain(response.low)} and {_plain(response.high)} Hz; "
         )
-    return band + f"{_grows(found.growths)}; {_along(found.time)}"
+    return band + f"{_grows(comparison.growths)}; {_along(comparison.time)}"
 
 
-def _grows(found: Growths | None) -> str:
+def _grows(growths: Growths | None) -> str:
     """The best power, as far as it stands out."""
-    if found is None or found.ways[0].share < EXPLAINS:
-        best = "" if found is None else f" (the best explains {percent(max(found.ways[0].share, 0.0))})"
+    if growths is None or growths.ways[0].share < EXPLAINS:
+        best = "" if growths is None else f" (the best explains {percent(max(growths.ways[0].share, 0.0))})"
         return f"no power of displacement or velocity accounts for it{best}"
-    best = found.ways[0]
-    rivals = [w for w, margin in zip(found.ways[1:], found.margins[1:], strict=True) if margin < TOLD_APART]
+    best = growths.ways[0]
+    rivals = [w for w, margin in zip(growths.ways[1:], growths.margins[1:], strict=True) if margin < TOLD_APART]
     rivals = [w for w in rivals if w.share > EXPLAINS]
     share = "" if best.share > 0.95 else f", which accounts for {percent(best.share)} of it"
     if not rivals:
@@ -133,26 +130,26 @@ def _power(way: Growth, whole: int | None) -> str:
     return f"the {NAMES[whole]}" if whole in NAMES else f"about the power {way.power:.1f}"
 
 
-def _along(found: AlongTime) -> str:
-    if found.p_value >= CHANCE:
-        return f"it does not change along the record (p = {found.p_value:.2g})"
-    if found.confounded:
+def _along(along: AlongTime) -> str:
+    if along.p_value >= CHANCE:
+        return f"it does not change along the record (p = {along.p_value:.2g})"
+    if along.confounded:
         return "it changes along the record, but so does the level, and the two cannot be told apart here"
-    worst = max(found.stretches, key=lambda s: s.ratio)
+    worst = max(along.stretches, key=lambda s: s.ratio)
     return (
-        f"it changes along the record (p = {found.p_value:.1g}) and is largest from {worst.begin:.4g} to "
+        f"it changes along the record (p = {along.p_value:.1g}) and is largest from {worst.begin:.4g} to "
         f"{worst.end:.4g} s, {worst.ratio:.2g} times the power that is usual at that level"
     )
 
 
-def says_of_all(found: Sequence[Comparison], moving: Sequence[Level]) -> str:
+def says_of_all(comparisons: Sequence[Comparison], moving: Sequence[Level]) -> str:
     """The same of several records: the worst of them, and whether the coefficients move between levels."""
-    if len(found) == 1:
-        return says(found[0])
-    worst = max(found, key=lambda c: c.prediction.structure)
+    if len(comparisons) == 1:
+        return says(comparisons[0])
+    worst = max(comparisons, key=lambda c: c.prediction.structure)
     moved = [level for level in moving if level.moves]
     names = ", ".join(f"{level.key} by {percent(level.change)}" for level in moved)
     levels = f"coefficients move with the level: {names}" if moved else "no coefficient moves with the level"
     if not moving:
         levels = "no coefficient was fitted"
-    return f"{worst.record.name} (the worst of {len(found)}): {says(worst)} {levels[0].upper() + levels[1:]}."
+    return f"{worst.record.name} (the worst of {len(comparisons)}): {says(worst)} {levels[0].upper() + levels[1:]}."

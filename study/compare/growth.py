@@ -67,24 +67,24 @@ class Growths:
     margins: tuple[float, ...]
 
 
-def growths(found: MissingForce) -> Growths | None:
+def growths(lacking: MissingForce) -> Growths | None:
     """Hold the missing force against powers of displacement and velocity; None if there is nothing to explain.
 
     Parameters
     ----------
-    found : MissingForce
+    lacking : MissingForce
         The missing force.
     """
-    keep = found.inner
-    wanted = found.weighted(found.force)[keep]
-    basis = _basis([found.weighted(column)[keep] for column in found.free.T], len(wanted))
+    keep = lacking.inner
+    wanted = lacking.weighted(lacking.force)[keep]
+    basis = _basis([lacking.weighted(column)[keep] for column in lacking.free.T], len(wanted))
     wanted = wanted - basis @ (basis.T @ wanted)
     power = float(wanted @ wanted)
     if not power > 0.0:
         return None
-    noise = min(found.noise * len(wanted), NOISE_AT_MOST * power)
-    u, v = (x / max(float(np.std(x)), 1e-300) for x in (found.displacement, found.velocity))
-    rows = [_way(name, found, u, v, keep, basis, wanted, power - noise) for name in WAYS]
+    noise = min(lacking.noise * len(wanted), NOISE_AT_MOST * power)
+    u, v = (x / max(float(np.std(x)), 1e-300) for x in (lacking.displacement, lacking.velocity))
+    rows = [_way(name, lacking, u, v, keep, basis, wanted, power - noise) for name in WAYS]
     ranked = sorted((r for r in rows if r is not None), key=lambda r: -r[0].share)
     if not ranked:
         return None
@@ -102,13 +102,13 @@ def _basis(columns: list[Floats], samples: int) -> Floats:
 
 
 def _way(
-    name: tuple[str, str], found: MissingForce, u: Floats, v: Floats, keep: slice, basis: Floats, wanted: Floats,
+    name: tuple[str, str], lacking: MissingForce, u: Floats, v: Floats, keep: slice, basis: Floats, wanted: Floats,
     explicable: float,
 ) -> tuple[Growth, Floats] | None:  # fmt: skip
     """One way with its best power, and its shares with each block left out."""
     cross, own, tried = list[Floats](), list[Floats](), list[float]()
     for power in POWERS[1:] if name == ("velocity", "even") else POWERS:  # a constant once is enough
-        shape = found.weighted(WAYS[name](u, v, float(power)))[keep]
+        shape = lacking.weighted(WAYS[name](u, v, float(power)))[keep]
         rest = shape - basis @ (basis.T @ shape)
         if np.sum(rest**2) > VISIBLE**2 * np.sum(shape**2):
             cross.append(_blocks(rest * wanted))

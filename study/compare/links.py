@@ -64,17 +64,17 @@ class Links:
     cells: Floats
 
 
-def links(found: Comparison) -> Links:
+def links(comparison: Comparison) -> Links:
     """Tie the stretches, bands and amplitudes of a comparison to each other."""
-    n = len(found.prediction.residual)
+    n = len(comparison.prediction.residual)
     count = int(np.clip(n // SHORTEST, 1, BLOCKS))
     bounds = np.linspace(0, n, count + 1).round().astype(np.int64)
-    lacking = found.missing_force
+    lacking = comparison.missing_force
     block = np.searchsorted(bounds, np.arange(n), side="right") - 1
     place = block[lacking.inner]
     u, v, force = (x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force))
-    frequency, power = _spectra(found.prediction.residual, found.prediction.dt, bounds)
-    times = np.asarray(float(found.prediction.time[0]) + bounds * found.prediction.dt, dtype=np.float64)
+    frequency, power = _spectra(comparison.prediction.residual, comparison.prediction.dt, bounds)
+    times = np.asarray(float(comparison.prediction.time[0]) + bounds * comparison.prediction.dt, dtype=np.float64)
     return Links(
         times, frequency, power, _classes(u, force, place, count),
         _classes(v, force, place, count), _cells(u, v, place, count),

@@ -69,29 +69,29 @@ def _time_axis(axes: Axes, time: Floats, label: str) -> Axes:
     return axes
 
 
-def force_error(axes: Axes, found: ForceError, highest: float) -> Axes:
+def force_error(axes: Axes, error: ForceError, highest: float) -> Axes:
     """Unexplained share of the force, line by line; shaded where the motion stands above its noise."""
-    keep = (found.frequency > 0.0) & (found.frequency <= highest)
-    f = found.frequency[keep]
+    keep = (error.frequency > 0.0) & (error.frequency <= highest)
+    f = error.frequency[keep]
     axes.fill_between(
-        f, 0.0, 1.0, where=found.band[keep].tolist(), transform=axes.get_xaxis_transform(), color="0.93", linewidth=0.0,
+        f, 0.0, 1.0, where=error.band[keep].tolist(), transform=axes.get_xaxis_transform(), color="0.93", linewidth=0.0,
         label="motion above its noise", zorder=0.5,
     )  # fmt: skip
-    axes.plot(f, _shown(found.parametric[keep]), color="C0", label="left by the fitted coefficients")
-    axes.plot(f, _shown(found.unexplained[keep]), color="C1", linestyle=(0, (5.0, 2.0)), label="1 - multiple coherence")
-    axes.plot(f, _shown(found.noise[keep]), label="noise on the response alone", **NOISE)
+    axes.plot(f, _shown(error.parametric[keep]), color="C0", label="left by the fitted coefficients")
+    axes.plot(f, _shown(error.unexplained[keep]), color="C1", linestyle=(0, (5.0, 2.0)), label="1 - multiple coherence")
+    axes.plot(f, _shown(error.noise[keep]), label="noise on the response alone", **NOISE)
     axes.set_yscale("log")
-    axes.set_ylim(_limits(found, keep))
+    axes.set_ylim(_limits(error, keep))
     axes.set_xlim(0.0, highest)
     axes.set_xlabel("frequency (Hz)")
     axes.set_ylabel("unexplained share of the force")
     return axes
 
 
-def _limits(found: ForceError, keep: NDArray[np.bool_]) -> tuple[float, float]:
+def _limits(error: ForceError, keep: NDArray[np.bool_]) -> tuple[float, float]:
     """From the lowest share to the highest of the shaded band: beyond it the noise leaves the panel."""
-    shares = _shown(np.concatenate([found.parametric[keep], found.unexplained[keep]]))
-    inside = np.concatenate([found.parametric[found.band], found.unexplained[found.band]])
+    shares = _shown(np.concatenate([error.parametric[keep], error.unexplained[keep]]))
+    inside = np.concatenate([error.parametric[error.band], error.unexplained[error.band]])
     return 0.5 * float(np.min(shares)), max(2.0, 1.5 * float(np.max(inside)))
 
 
@@ -99,18 +99,18 @@ def _shown(share: Floats) -> Floats:
     return np.maximum(share, FLOOR)
 
 
-def missing_force(axes: Axes, found: Surface, unit: dict[str, str]) -> Axes:
+def missing_force(axes: Axes, plane: Surface, unit: dict[str, str]) -> Axes:
     """Mean missing force over displacement and velocity; a dot marks a cell whose mean may be noise."""
-    factor, shown = labels.prefixed(unit["displacement"], float(np.max(np.abs(found.displacement))))
-    rate, rate_shown = _rate(unit["velocity"], found.velocity)
-    largest = float(np.nanmax(np.abs(found.mean), initial=0.0)) or 1.0
+    factor, shown = labels.prefixed(unit["displacement"], float(np.max(np.abs(plane.displacement))))
+    rate, rate_shown = _rate(unit["velocity"], plane.velocity)
+    largest = float(np.nanmax(np.abs(plane.mean), initial=0.0)) or 1.0
     mesh = axes.pcolormesh(
-        found.displacement / factor, found.velocity / rate, found.mean.T, cmap="RdBu_r",
+        plane.displacement / factor, plane.velocity / rate, plane.mean.T, cmap="RdBu_r",
         norm=TwoSlopeNorm(0.0, -largest, largest), rasterized=True,
     )  # fmt: skip
-    middle_u = 0.5 * (found.displacement[1:] + found.displacement[:-1]) / factor
-    middle_v = 0.5 * (found.velocity[1:] + found.velocity[:-1]) / rate
-    i, j = np.nonzero(np.abs(found.mean) < SURE * found.error)
+    middle_u = 0.5 * (plane.displacement[1:] + plane.displacement[:-1]) / factor
+    middle_v = 0.5 * (plane.velocity[1:] + plane.velocity[:-1]) / rate
+    i, j = np.nonzero(np.abs(plane.mean) < SURE * plane.error)
     axes.plot(middle_u[i], middle_v[j], ".", color="0.45", markersize=1.5, label="may be noise")
     axes.grid(visible=False)
     place = axes.get_position()
@@ -124,14 +124,14 @@ def missing_force(axes: Axes, found: Surface, unit: dict[str, str]) -> Axes:
     return axes
 
 
-def force_curve(axes: Axes, found: Curve, against: str, unit: dict[str, str]) -> Axes:
+def force_curve(axes: Axes, curve: Curve, against: str, unit: dict[str, str]) -> Axes:
     """Mean missing force against displacement or velocity, with 95 % intervals."""
-    largest = float(np.max(np.abs(found.at), initial=0.0))
-    scaled = labels.prefixed(unit[against], largest) if against == "displacement" else _rate(unit[against], found.at)
+    largest = float(np.max(np.abs(curve.at), initial=0.0))
+    scaled = labels.prefixed(unit[against], largest) if against == "displacement" else _rate(unit[against], curve.at)
     factor, shown = scaled
     axes.axhline(0.0, color="0.6", linewidth=0.8)
     axes.errorbar(
-        found.at / factor, found.mean, 1.96 * found.error, fmt="o-", color="C0", markersize=3.5, linewidth=1.2,
+        curve.at / factor, curve.mean, 1.96 * curve.error, fmt="o-", color="C0", markersize=3.5, linewidth=1.2,
         elinewidth=1.0, capsize=2.0, label="mean and 95 % interval",
     )  # fmt: skip
     axes.set_xlabel(f"{against} ({dimensions.pretty(shown)})")
@@ -147,11 +147,11 @@ def _rate(unit: str, values: Floats) -> tuple[float, str]:
     return factor, f"{shown}/s"
 
 
-def error_in_time(axes: Axes, found: AlongTime, floor: float) -> Axes:
+def error_in_time(axes: Axes, along: AlongTime, floor: float) -> Axes:
     """Error and level of the response, stretch by stretch, over the rms response of the whole judging part."""
-    edges = [*(s.begin for s in found.stretches), found.stretches[-1].end]
+    edges = [*(s.begin for s in along.stretches), along.stretches[-1].end]
     axes.stairs(
-        [100.0 * s.response for s in found.stretches],
+        [100.0 * s.response for s in along.stretches],
         edges,
         baseline=None,
         color="0.35",
@@ -159,7 +159,7 @@ def error_in_time(axes: Axes, found: AlongTime, floor: float) -> Axes:
         label="response",
     )
     axes.stairs(
-        [100.0 * s.error for s in found.stretches], edges, baseline=None, color="C1", linewidth=2.0, label="error"
+        [100.0 * s.error for s in along.stretches], edges, baseline=None, color="C1", linewidth=2.0, label="error"
     )
     axes.axhline(100.0 * floor, label="noise floor", **NOISE)
     axes.set_yscale("log", subs=[])
@@ -169,13 +169,13 @@ def error_in_time(axes: Axes, found: AlongTime, floor: float) -> Axes:
     return _stretch_axis(axes, edges)
 
 
-def error_beyond_level(axes: Axes, found: AlongTime) -> Axes:
+def error_beyond_level(axes: Axes, along: AlongTime) -> Axes:
     """Power of the residual over what is usual at that level of the response."""
-    edges = [*(s.begin for s in found.stretches), found.stretches[-1].end]
+    edges = [*(s.begin for s in along.stretches), along.stretches[-1].end]
     axes.axhline(1.0, color="0.6", linewidth=0.8)
-    axes.stairs([s.ratio for s in found.stretches], edges, baseline=None, color="C0", linewidth=2.0)
+    axes.stairs([s.ratio for s in along.stretches], edges, baseline=None, color="C0", linewidth=2.0)
     axes.set_yscale("log", base=2)
-    reach = max(2.0, *(1.2 * max(s.ratio, 1.0 / max(s.ratio, 1e-9)) for s in found.stretches))
+    reach = max(2.0, *(1.2 * max(s.ratio, 1.0 / max(s.ratio, 1e-9)) for s in along.stretches))
     axes.set_ylim(1.0 / reach, reach)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylabel("power of the error over\nthat usual at this level")

@@ -170,12 +170,12 @@ def _hysteresis(steps: Floats, beta: float) -> Floats:
 
 def _times(left: Leftover) -> list[Floats]:
     turn = 2.0 * np.pi * np.arange(len(left.residual)) / len(left.base.fit.residual)
-    found: list[Floats] = []
+    shapes: list[Floats] = []
     for line in modulation_lines(left.base)[:3]:
-        found += [left.displacement * np.cos(line * turn), left.displacement * np.sin(line * turn)]
+        shapes += [left.displacement * np.cos(line * turn), left.displacement * np.sin(line * turn)]
     for line in residual_lines(left.base)[:3]:
-        found += [np.cos(line * turn), np.sin(line * turn)]
-    return found
+        shapes += [np.cos(line * turn), np.sin(line * turn)]
+    return shapes
 
 
 def _passed(left: Leftover, shapes: Sequence[Floats]) -> Floats:

@@ -11,26 +11,26 @@ KINDS = ("png", "svg")
 FOLLOWED = 3  # candidates whose coefficient is drawn along frequency and amplitude
 
 
-def pages(found: Diagnosis, record: str) -> dict[str, Figure]:
+def pages(diagnosis: Diagnosis, record: str) -> dict[str, Figure]:
     """Figures by the stem of their file name; the caller applies the style sheet."""
     ranking, (axes,) = page.page(
-        f"What is missing from the model of {record}", f"verdict: {found.verdict.replace('_', ' ')}",
+        f"What is missing from the model of {record}", f"verdict: {diagnosis.verdict.replace('_', ' ')}",
         panel=3.4, legend_rows=1, headed=False,
     )  # fmt: skip
     ranking.subplots_adjust(left=0.34)
-    diagnosis_pictures.ranking(axes, found)
+    diagnosis_pictures.ranking(axes, diagnosis)
     page.legend(ranking, [axes])
     constancy, panels = page.page(
         f"Is the coefficient a constant? {record}", "that of a true term is, along frequency and along amplitude",
         columns=2, width=page.width(2), panel=2.8, share=False,
     )  # fmt: skip
-    diagnosis_pictures.constancy(panels[0], panels[1], found.candidates[:FOLLOWED])
+    diagnosis_pictures.constancy(panels[0], panels[1], diagnosis.candidates[:FOLLOWED])
     page.legend(constancy, panels)
     return {"candidates": ranking, "constancy": constancy}
 
 
-def files(found: Diagnosis, record: str) -> dict[str, bytes]:
+def files(diagnosis: Diagnosis, record: str) -> dict[str, bytes]:
     """The pictures by file name, in the project's style."""
     with in_style():
-        drawn = pages(found, record)
+        drawn = pages(diagnosis, record)
         return {f"{name}.{kind}": page.rendered(figure, kind) for name, figure in drawn.items() for kind in KINDS}

@@ -71,15 +71,17 @@ def _of_the_reverse_system(entries: Mapping[str, ModelTerm], base: Baseline, pre
     fixed = [key for key in own if key not in base.fit.keys]
     target = target - sum((float(known.values[k] or 0.0) * columns[k] for k in fixed), np.zeros(len(target)))
     free = [key for key in own if key in base.fit.keys]
-    found: list[tuple[float, PairStart]] = []
+    starts: list[tuple[float, PairStart]] = []
     for one, other in combinations([n for n, e in entries.items() if set(e.term.symbols) <= set(columns)], 2):
         keys = [*free, *entries[one].term.symbols, *entries[other].term.symbols]
         design = np.stack([columns[k] for k in keys], axis=1)
         amounts = least_squares(design, target)
         left = float(np.sum((target - design @ amounts) ** 2))
         model = known.with_term(entries[one]).with_term(entries[other])
-        found.append((left, PairStart((one, other), model.with_values(dict(zip(keys, amounts.tolist(), strict=True))))))
-    return _best(found)
+        starts.append(
+            (left, PairStart((one, other), model.with_values(dict(zip(keys, amounts.tolist(), strict=True)))))
+        )
+    return _best(starts)
 
 
 def _of_the_sensitivities(
@@ -90,18 +92,18 @@ def _of_the_sensitivities(
     tried = {n: sensitivity(e.term, tuple(float(p or 0.0) for p in e.parameters), base, prepared)
              for n, e in entries.items()}  # fmt: skip
     columns = {name: added for name, added in tried.items() if added is not None}
-    found: list[tuple[float, PairStart]] = []
+    starts: list[tuple[float, PairStart]] = []
     for one, other in combinations(columns, 2):
         design = np.hstack([columns[one], columns[other]])
         left = float(np.sum((residual - design @ least_squares(design, residual, 1e-8)) ** 2))
         model = known.with_term(entries[one]).with_term(entries[other])
         zero = dict.fromkeys((*entries[one].term.symbols, *entries[other].term.symbols), 0.0)
-        found.append((left, PairStart((one, other), model.with_values(zero))))
-    return _best(found)
+        starts.append((left, PairStart((one, other), model.with_values(zero))))
+    return _best(starts)
 
 
-def _best(found: list[tuple[float, PairStart]]) -> list[PairStart]:
-    return [start for _, start in sorted(found, key=lambda f: f[0])[:TRIED]]
+def _best(starts: list[tuple[float, PairStart]]) -> list[PairStart]:
+    return [start for _, start in sorted(starts, key=lambda f: f[0])[:TRIED]]
 
 
 def _spectra(model: Model, base: Baseline, prepared: Prepared) -> tuple[dict[str, Floats], Floats]:

@@ -14,10 +14,10 @@ def own_candidates(given: Sequence[str]) -> list[Term]:
     StudyError
         If one is not of this form, or its formula is refused.
     """
-    found: list[Term] = []
+    terms: list[Term] = []
     for text in given:
         name, sign, formula = text.partition("=")
         if not sign:
             raise StudyError(f"{text!r} is no candidate; NAME=FORMULA such as 'bracket=u*abs(u)' is right")
-        found.append(custom(name.strip(), formula.strip()))
-    return found
+        terms.append(custom(name.strip(), formula.strip()))
+    return terms

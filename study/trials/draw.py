@@ -89,9 +89,9 @@ def make_trial(
     noise = drawn_noise if noise is None else noise
     response = response or drawn_response
     for _ in range(ATTEMPTS):
-        found = _attempt(rng, seed, tuple(hidden), noise, response)
-        if found is not None:
-            return found
+        trial = _attempt(rng, seed, tuple(hidden), noise, response)
+        if trial is not None:
+            return trial
     raise DivergenceError(f"no system of trial {seed} stays finite with {', '.join(hidden)}", 0.0)
 
 
@@ -183,10 +183,10 @@ def _with_own_nonlinearity(
     known = str(rng.choice(KNOWN))
     if known == "none" or known in hidden:
         return base, quiet
-    found = grown(base, free(get(known)), drive, dt, KNOWN_SHARE)
-    if found is None:
+    known_system = grown(base, free(get(known)), drive, dt, KNOWN_SHARE)
+    if known_system is None:
         return base, quiet
-    return found[0], simulate(found[0], drive, dt, Integrator("rk4", 4))
+    return known_system[0], simulate(known_system[0], drive, dt, Integrator("rk4", 4))
 
 
 def _with_effects(
@@ -199,10 +199,10 @@ def _with_effects(
     wanted = {name: (float(rng.uniform(*SHARE)), _drawn(rng, get(name), quiet)) for name in hidden}
     for name in (*hidden, *hidden[:-1]):
         target, entry = wanted[name]
-        found = grown(model.without_term(name), entry, drive, dt, target)
-        if found is None:
+        stronger = grown(model.without_term(name), entry, drive, dt, target)
+        if stronger is None:
             return None
-        model = found[0]
+        model = stronger[0]
     return model
 
 

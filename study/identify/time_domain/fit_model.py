@@ -251,9 +251,9 @@ def _from_segments(model: Model, prepared: Prepared, held: Sequence[str], steps:
     """A fit that begins where multiple shooting ends; None where the model cannot run even in segments."""
     length = round(PERIODS * 2.0 * np.pi / (angular_rate(prepared.fitted, prepared.dt) * prepared.dt))
     stretch = prepared.shortened(int(np.clip(length, SHORTEST, LONGEST)))
-    linear = linear_start(model, stretch)
-    start = {key: value for key, value in linear.items() if key not in held and "." not in key}
     try:
+        linear = linear_start(model, prepared)  # a short stretch may hold hardly any motion
+        start = {key: value for key, value in linear.items() if key not in held and "." not in key}
         near = fit_in_segments(
             model, prepared.record, start=start, held=held, response=prepared.response, span=stretch.plan.fit
         )

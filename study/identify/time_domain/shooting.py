@@ -39,6 +39,8 @@ def needed_restarts(
     of them say how a disturbance at any restart grows until any later one. Displacement and velocity are
     weighted by the angular rate of the motion, so that a linear system without damping has growth one.
     """
+    if not restarts:  # a motion of a single period or less
+        return ()
     run = prepare(model, record, steps_per_sample=steps_per_sample, span=span, restarts=restarts)
     motion, _, arrivals = run.respond_by_segment({}, states, 2)
     rate = angular_rate(motion, record.dt)
