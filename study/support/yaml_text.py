@@ -88,9 +88,9 @@ def shown(value: object) -> str:
         return "a number of too many digits"
 
 
-def short(text: str) -> str:
+def short(text: str, most: int = 60) -> str:
     """A text that fits in a message."""
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
 def scalar(text: str) -> str:

@@ -5,13 +5,14 @@ different people and are never guessed.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from study.records.readers.options import BESIDE, ReadOptions
 from study.records.readers.table import Column, Table
 from study.records.record import MOTIONS
-from study.support.errors import StudyError
+from study.support.errors import StudyError, expect
 from study.support.units import ROLES, parse_unit
 
 NAMES: dict[str, tuple[str, ...]] = {
@@ -21,7 +22,6 @@ NAMES: dict[str, tuple[str, ...]] = {
     "acceleration": ("a", "acceleration", "acc", "accel", "accelerometer"),
     "time": ("t", "time", "seconds"),
 }
-SUFFIX = re.compile(r"(.+)_([A-Za-z0-9]+)")
 
 
 def assign(path: Path, table: Table, options: ReadOptions) -> dict[str, Column]:
@@ -41,79 +41,78 @@ def assign(path: Path, table: Table, options: ReadOptions) -> dict[str, Column]:
     StudyError
         If a column is missing, named twice or could be several things; lists the columns.
     """
-    named = {role: _find(path, table, role, wanted) for role, wanted in options.columns.items()}
-    rest = [c for c in table.columns if all(c is not n for n in named.values())]
-    if "force" not in named or not any(m in named for m in MOTIONS):
+    named = {role: _named(path, table, role, wanted) for role, wanted in options.columns.items()}
+    complete = "force" in named and any(m in named for m in MOTIONS)
+    if not complete:
         _check_duplicates(path, table)
-        named |= _guessed(path, table, rest, set(named))
-    elif "time" not in named:
-        named |= {role: c for role, c in _guessed(path, table, rest, set(named)).items() if role == "time"}
-    missing = _missing(named)
-    if missing:
+    rest = [c for c in table.columns if all(c is not n for n in named.values())]
+    if not complete or "time" not in named:
+        guesses = _guessed(path, table, rest, [role for role in NAMES if role not in named])
+        named |= {role: column for role, column in guesses.items() if role == "time" or not complete}
+    motion = any(m in named for m in MOTIONS)
+    if "force" not in named or not motion:
+        missing = "displacement, velocity or acceleration" if "force" in named else "force"
         raise _ask(path, table, f"no column is known to be the {missing}")
     place = {id(c): k for k, c in enumerate(table.columns)}
     return dict(sorted((named | _extra(table, named)).items(), key=lambda item: place[id(item[1])]))
 
 
-def _missing(named: Mapping[str, Column]) -> str:
-    if "force" not in named:
-        return "force"
-    return "" if any(m in named for m in MOTIONS) else "displacement, velocity or acceleration"
-
-
-def _find(path: Path, table: Table, role: str, wanted: str | int) -> Column:
+def _named(path: Path, table: Table, role: str, wanted: str | int) -> Column:
     """The column that the user names, by its name, the end of its path, or its number."""
-    found = [c for c in table.columns if c.name == wanted]
-    if not found and isinstance(wanted, str):
+    matches = [c for c in table.columns if c.name == wanted]
+    if not matches and isinstance(wanted, str):
         ending = "/" + wanted.replace(".", "/")
-        found = [c for c in table.columns if ("/" + c.name).endswith(ending)]
-    if not found and re.fullmatch(r"[0-9]{1,9}", str(wanted)):
-        number = int(wanted)
-        found = list(table.columns[number - 1 : number]) if number > 0 else []
-    if not found:
+        matches = [c for c in table.columns if ("/" + c.name).endswith(ending)]
+    if not matches and re.fullmatch(r"[0-9]{1,9}", str(wanted)):
+        matches = [c for k, c in enumerate(table.columns, start=1) if k == int(wanted)]
+    if not matches:
         raise _ask(path, table, f"there is no column {wanted!r} for {role}")
-    if len(found) > 1:
-        numbers = " and ".join(str(k) for k, c in enumerate(table.columns, start=1) if any(c is f for f in found))
-        raise _ask(path, table, f"the column {wanted!r} for {role} is there {len(found)} times, as {numbers}")
-    return found[0]
+    if len(matches) > 1:
+        numbers = " and ".join(str(k) for k, c in enumerate(table.columns, start=1) if any(c is m for m in matches))
+        raise _ask(path, table, f"the column {wanted!r} for {role} is there {len(matches)} times, as {numbers}")
+    return matches[0]
 
 
 def _check_duplicates(path: Path, table: Table) -> None:
-    names = [c.name for c in table.columns]
-    for name in names:
-        if name and names.count(name) > 1:
-            numbers = " and ".join(str(k) for k, n in enumerate(names, start=1) if n == name)
-            raise StudyError(
-                f"{path}: the column {name!r} is there {names.count(name)} times, as columns {numbers}; "
-                f"give columns by number, such as --column force={names.index(name) + 1}"
-            )
+    for name, count in Counter(c.name for c in table.columns if c.name).items():
+        numbers = [str(k) for k, c in enumerate(table.columns, start=1) if c.name == name]
+        twice = f"the column {name!r} is there {count} times, as columns {' and '.join(numbers)}"
+        expect(count == 1, f"{path}: {twice}; give columns by number, such as --column force={numbers[0]}")
 
 
-def _guessed(path: Path, table: Table, columns: Sequence[Column], known: set[str]) -> dict[str, Column]:
+def _guessed(path: Path, table: Table, columns: Sequence[Column], roles: Iterable[str]) -> dict[str, Column]:
     """Roles that names, and where these say nothing units, leave no doubt about."""
-    found: dict[str, Column] = {}
-    for role in NAMES:
-        if role in known:
-            continue
-        exact = [c for c in columns if c.name == role]
-        candidates = exact or [c for c in columns if _role_of(c) == role]
+    guesses: dict[str, Column] = {}
+    for role in roles:
+        candidates = [c for c in columns if c.name == role] or [c for c in columns if _role_of(c) == role]
         if len(candidates) > 1:
             names = " and ".join(repr(c.name) for c in candidates)
             raise _ask(path, table, f"{names} could each be the {role}")
         if candidates:
-            found[role] = candidates[0]
-    return found
+            guesses[role] = candidates[0]
+    return guesses
 
 
 def _role_of(column: Column) -> str:
     """What a column is by what the file says, its name, or its unit; empty if these do not tell."""
-    if column.role:
-        return column.role
-    name = column.name.rsplit("/", 1)[-1]
-    suffixed = SUFFIX.fullmatch(name)
-    if suffixed and _plain_role(suffixed[1]) and _unit_role(suffixed[2]) == _plain_role(suffixed[1]):
-        return _plain_role(suffixed[1])
-    return _plain_role(name) or _unit_role(column.unit)
+    return column.role or _suffixed(column)[0] or _plain_role(_last(column)) or _unit_role(column.unit)
+
+
+def own_unit(column: Column, role: str) -> str:
+    """The unit that a file gives for a column, behind its name (``disp_mm``) or in a row of its own."""
+    suffixed, unit = _suffixed(column)
+    return column.unit or (unit if suffixed == role else "")
+
+
+def _suffixed(column: Column) -> tuple[str, str]:
+    """Role and unit of a name such as ``disp_mm``, whose parts agree; else two empty words."""
+    stem, _, unit = _last(column).rpartition("_")
+    role = _plain_role(stem)
+    return (role, unit) if role and unit.isalnum() and unit.isascii() and _unit_role(unit) == role else ("", "")
+
+
+def _last(column: Column) -> str:
+    return column.name.rsplit("/", 1)[-1]
 
 
 def _plain_role(name: str) -> str:
@@ -129,31 +128,18 @@ def _unit_role(unit: str) -> str:
     return next((role for role, (own, _) in ROLES.items() if own == powers), "")
 
 
-def own_unit(column: Column, role: str) -> str:
-    """The unit that a file gives for a column, behind its name (``disp_mm``) or in a row of its own."""
-    suffixed = SUFFIX.fullmatch(column.name.rsplit("/", 1)[-1])
-    if not column.unit and suffixed and _unit_role(suffixed[2]) == role == _plain_role(suffixed[1]):
-        return suffixed[2]
-    return column.unit
-
-
 def _extra(table: Table, named: Mapping[str, Column]) -> dict[str, Column]:
     """Further channels of the same length, under their own names."""
-    length = len(named["force"].values)
-    taken = [id(c) for c in named.values()]
-    names = [c.name for c in table.columns]
-    return {
-        c.name: c
-        for c in table.columns
-        if c.name and id(c) not in taken and c.name not in (*named, *NAMES) and not c.fault
-        and len(c.values) == length and names.count(c.name) == 1
-    }  # fmt: skip
+    length, taken = len(named["force"].values), [id(c) for c in named.values()]
+    counts = Counter(c.name for c in table.columns)
+    usable = [c for c in table.columns if not c.fault and len(c.values) == length and id(c) not in taken]
+    return {c.name: c for c in usable if c.name and counts[c.name] == 1 and c.name not in (*named, *NAMES)}
 
 
 def _ask(path: Path, table: Table, problem: str) -> StudyError:
     """The one sentence that shows the columns and the option to give."""
     if not table.columns:
-        return StudyError(f"{path}: {problem}, since the file holds no column of numbers; force and motion are right")
+        return StudyError(f"{path}: {problem}, since the file holds no column of numbers; expected force and motion")
     groups = sorted({c.name.rsplit("/", 1)[0] for c in table.columns if "/" in c.name})
     choose = f" and choose --group {groups[0]} or {groups[1]}" if len(groups) > 1 else ""
     return StudyError(
