@@ -14,10 +14,6 @@ with one_sentence():
 # The systems of Table 1: another model in the folder is none of the claims' business.
 MODELS = sorted({f"models/{name.split('.')[1]}.yaml" for name in _reported.statements if name.count(".") == 2})
 
-ENSEMBLE_CODE = sorted(
-    {*CODE["record"], *CODE["identify"], "study/reproduction/ensemble.py", "study/reproduction/claims/evidence.py", "study/reproduction/claims/sample.py"}
-)
-CLAIM_CODE = sorted({*ENSEMBLE_CODE, "study/reproduction/preliminary.py", *(str(p) for p in Path("study/reproduction/claims").glob("*.py"))})
 CLAIM_SETTINGS = {
     key: STUDY.settings.plain()[key]
     for key in "sampling noise_seed integrator segments fit_band tolerances ensembles".split()
@@ -34,7 +30,7 @@ rule excitation_reading:
     input:
         statements=STATEMENTS,
         models=MODELS,
-        code=[*ENSEMBLE_CODE, "study/reproduction/claims/excitation_reading.py", "study/reproduction/claims/reported.py"],
+        code=rests_on(Path("scripts/excitation_reading.py")),
     output:
         table=report(
             "results/excitation_reading.csv",
@@ -55,7 +51,7 @@ rule excitation_reading:
 rule integrator_steps:
     input:
         models=MODELS,
-        code=[*ENSEMBLE_CODE, "study/reproduction/integrator_study.py"],
+        code=rests_on(Path("scripts/integrator_steps.py")),
     output:
         csv=report(
             "results/integrator_steps.csv",
@@ -79,7 +75,7 @@ rule claims:
         statements=STATEMENTS,
         steps="results/integrator_steps.csv",
         models=MODELS,
-        code=[*CLAIM_CODE, "study/reproduction/claims/excitation_reading.py"],
+        code=rests_on(Path("scripts/claims.py")),
     output:
         csv=report(
             "results/claims.csv",

@@ -9,7 +9,7 @@ from study.support.workflow_step import one_sentence
 
 
 def main(models: str, statements: str, settings: dict[str, Any], output: str) -> None:
-    found = evidence.gather(settings, evidence.models_of(Path(models)), [])
+    found = evidence.Evidence(settings, evidence.models_of(Path(models)), [])
     stated = reported.load(Path(statements))
     tables.write_csv(excitation_reading.study(found, stated), Path(output))
 

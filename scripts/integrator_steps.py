@@ -7,8 +7,8 @@ from study.identify.estimators.base import Settings
 from study.records.excitation import READINGS
 from study.records.spectra import Segments
 from study.reproduction import integrator_study, tables
+from study.reproduction.claims.common import SYSTEMS
 from study.reproduction.claims.evidence import Drive, models_of, record_settings
-from study.reproduction.claims.simulation import SYSTEMS
 from study.reproduction.settings import RecordSettings
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence

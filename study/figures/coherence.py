@@ -14,7 +14,7 @@ from study.figures.styles import look
 
 LOOKS = (("C1", (0, (5.0, 2.0))), ("C2", (0, (1.5, 1.2))), ("C3", (0, (7.0, 1.5, 1.5, 1.5))), ("C5", "-."))
 MARKS = ("o", "s", "^", "v")
-APART = 9  # lines between two circles: the curve under them stays to be seen
+APART = 9  # lines between two marks, so that the curve under them stays visible
 ALL = ("C0", "-")  # the last curve is the multiple coherence: what the whole model explains
 OTHER_MOTION = {"instrumental": "fitted model's own motion"}  # near one whatever the model: it is no test
 

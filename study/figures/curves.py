@@ -19,24 +19,12 @@ TWO_SIDED_95 = NormalDist().inv_cdf(0.975)
 
 @dataclass(frozen=True)
 class Curve:
-    """One estimator's A_j(f); arrays of shape (lines,).
+    """One estimator's A_j(f); arrays of shape (lines,)."""
 
-    Attributes
-    ----------
-    estimator : str
-        Its name, by which ``styles`` knows it.
-    frequency : array
-        In hertz.
-    values : complex array
-        A_j(f).
-    error : array
-        Standard error of the complex estimate, ``sqrt(E|dA|^2)``; NaN where it is not known.
-    """
-
-    estimator: str
-    frequency: Floats
+    estimator: str  # its name, by which styles knows it
+    frequency: Floats  # hertz
     values: Complexes
-    error: Floats
+    error: Floats  # standard error of the complex estimate, sqrt(E|dA|^2); NaN where it is not known
 
     @property
     def half_width(self) -> Floats:
@@ -49,76 +37,45 @@ class Curve:
 
 @dataclass(frozen=True)
 class InputResponse:
-    """All estimates of one A_j(f), and what is true.
+    """All estimates of one A_j(f), and what is true."""
 
-    Attributes
-    ----------
-    number : int
-        j, counted from 1.
-    shape : str
-        Formula of the input, such as ``u**3``.
-    curves : tuple of Curve
-        One an estimator.
-    frequency : array, shape (lines,)
-        Of the exact function, in hertz.
-    exact : complex array, shape (lines,), or None
-        The exact function; None where the record is a measured one.
-    """
-
-    number: int
-    shape: str
-    curves: tuple[Curve, ...]
-    frequency: Floats
-    exact: Complexes | None
+    number: int  # j, counted from 1
+    shape: str  # formula of the input, such as u**3
+    curves: tuple[Curve, ...]  # one for each estimator
+    frequency: Floats  # lines of the exact function, in hertz
+    exact: Complexes | None  # the exact function; None where the record is a measured one
 
 
 @dataclass(frozen=True)
 class InputCoherence:
-    """One input's share of the output.
+    """One input's share of the output."""
 
-    Attributes
-    ----------
-    shape, terms : str
-        Formula of the input and names of the terms it carries.
-    frequency, cumulative : arrays, shape (lines,)
-        Hertz, and coherence of this and all earlier conditioned inputs with the output.
-    """
-
-    shape: str
-    terms: str
-    frequency: Floats
-    cumulative: Floats
+    shape: str  # formula of the input
+    terms: str  # names of the terms that the input carries
+    frequency: Floats  # hertz, shape (lines,)
+    cumulative: Floats  # coherence of this and all earlier conditioned inputs with the output, shape (lines,)
 
 
-def responses(
-    table: pd.DataFrame, highest: float, drawn: Sequence[str] | None = None
-) -> tuple[InputResponse, ...]:  # fmt: skip
+def responses(table: pd.DataFrame, highest: float, drawn: Sequence[str] | None = None) -> tuple[InputResponse, ...]:
     """Frequency response functions of ``frequency_response.csv``, one entry an input.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Columns ``frequency, estimator, input, shape, real, imag, standard_error, exact_real, exact_imag``.
-    highest : float
-        Lines above this frequency (Hz) are left out, as is the line at zero, which has no phase.
-    drawn : sequence of str, optional
-        Estimators that are shown; all of them if left out.
+    Lines above ``highest`` (in hertz) are left out, as is the line at zero, which has no phase. ``drawn`` names the
+    estimators that are shown; all of them if it is left out.
     """
     table = _lines(table if drawn is None else table[table["estimator"].isin(drawn)], highest)
     return tuple(_response(int(number), part) for number, part in _groups(table, "input"))
 
 
 def _response(number: int, part: pd.DataFrame) -> InputResponse:
+    groups = _groups(part, "estimator")
     curves = [
         Curve(name, _column(rows, "frequency"), _complex(rows, "real", "imag"), _column(rows, "standard_error"))
-        for name, rows in _groups(part, "estimator")
+        for name, rows in sorted(groups, key=lambda group: rank(group[0]))
     ]
-    first = _groups(part, "estimator")[0][1]
+    _, first = groups[0]
     exact = _complex(first, "exact_real", "exact_imag")
-    shape = str(part["shape"].iloc[0])
-    known = bool(np.all(np.isfinite(exact)))
-    curves.sort(key=lambda c: rank(c.estimator))
-    return InputResponse(number, shape, tuple(curves), _column(first, "frequency"), exact if known else None)
+    known = exact if np.all(np.isfinite(exact)) else None
+    return InputResponse(number, str(part["shape"].iloc[0]), tuple(curves), _column(first, "frequency"), known)
 
 
 def coherences(table: pd.DataFrame, highest: float, estimator: str = "miso") -> tuple[InputCoherence, ...]:
@@ -131,17 +88,13 @@ def coherences(table: pd.DataFrame, highest: float, estimator: str = "miso") -> 
     """
     if estimator not in set(table["estimator"]):
         known = ", ".join(table["estimator"].unique())
-        raise StudyError(f"the coherences hold nothing of the estimator {estimator!r}; they are of {known}")
+        raise StudyError(f"the coherences hold nothing of the estimator {estimator!r}; expected one of {known}")
     table = _lines(table[table["estimator"] == estimator], highest)
-    return tuple(
-        InputCoherence(
-            str(rows["shape"].iloc[0]),
-            str(rows["terms"].iloc[0]),
-            _column(rows, "frequency"),
-            _column(rows, "cumulative"),
-        )
-        for _, rows in _groups(table, "input")
-    )
+    coherences: list[InputCoherence] = []
+    for _, rows in _groups(table, "input"):
+        shape, terms = (str(rows[name].iloc[0]) for name in ("shape", "terms"))
+        coherences.append(InputCoherence(shape, terms, _column(rows, "frequency"), _column(rows, "cumulative")))
+    return tuple(coherences)
 
 
 def _lines(table: pd.DataFrame, highest: float) -> pd.DataFrame:

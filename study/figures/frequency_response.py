@@ -27,9 +27,7 @@ Part = Callable[[Complexes], Floats]
 def magnitude(axes: Axes, response: InputResponse, unit: str) -> Axes:
     """|A_j(f)| of every estimator on a logarithmic scale, with 95 % bands and the exact function."""
     for curve in response.curves:
-        size = np.abs(curve.values)
-        _band(axes, curve, np.maximum(size - curve.half_width, 1e-2 * size), size + curve.half_width)
-        axes.plot(curve.frequency, size, **look(curve.estimator).line)
+        _size(axes, curve, np.abs(curve.values))
     sizes = [np.abs(c.values) for c in response.curves]
     if response.exact is not None:
         axes.plot(response.frequency, np.abs(response.exact), **EXACT.line)
@@ -46,8 +44,7 @@ def phase(axes: Axes, response: InputResponse) -> Axes:
     for curve in response.curves:
         angle = _degrees(curve.values)
         width = np.degrees(np.minimum(curve.half_width / np.maximum(np.abs(curve.values), 1e-300), np.pi))
-        _band(axes, curve, angle - width, angle + width)
-        axes.plot(curve.frequency, _broken(angle), **look(curve.estimator).line)
+        _curve(axes, curve, _broken(angle), angle - width, angle + width)
         turns.append(angle)
     if response.exact is not None:
         turns.append(_degrees(response.exact))
@@ -62,18 +59,9 @@ def phase(axes: Axes, response: InputResponse) -> Axes:
 def real_and_imaginary(real: Axes, imaginary: Axes, response: InputResponse, unit: str, span: float) -> None:
     """Real and imaginary part of A_j(f) with 95 % bands and the exact values.
 
-    Parameters
-    ----------
-    real, imaginary : Axes
-        Where to draw.
-    response : InputResponse
-        What to draw.
-    unit : str
-        Of A_j.
-    span : float
-        Height of every linear scale, in that unit (see :func:`common_span`): a part which is zero is
-        then seen to be small. An imaginary part that grows with frequency (a damping term) has a
-        logarithmic scale, as in Figure 26b.
+    ``span`` is the height of every linear scale, in the unit of A_j (see :func:`common_span`): a part which is zero is
+    then seen to be small. An imaginary part that grows with frequency (a damping term) has a logarithmic scale, as in
+    Figure 26b.
     """
     factor, power = labels.power_of_ten(span)
     label, name = dimensions.pretty(f"{power}{unit}"), f"A_{response.number}"
@@ -105,10 +93,9 @@ def _grows(response: InputResponse) -> bool:
 
 
 def _linear(axes: Axes, response: InputResponse, part: Part, factor: float, span: float) -> None:
-    for curve in map(partial(_told, span=span), response.curves):
+    for curve in map(partial(_within, span=span), response.curves):
         values, width = part(curve.values) / factor, curve.half_width / factor
-        _band(axes, curve, values - width, values + width)
-        axes.plot(curve.frequency, values, **look(curve.estimator).line)
+        _curve(axes, curve, values, values - width, values + width)
     if response.exact is not None:
         axes.plot(response.frequency, part(response.exact) / factor, **EXACT.line)
     middle = sum(_limits(response, part)) / 2.0
@@ -129,14 +116,13 @@ def _limits(response: InputResponse, part: Part) -> tuple[float, float]:
 def _logarithmic(axes: Axes, response: InputResponse, span: float) -> None:
     """|Im A_j|; where its sign is not that of the exact function, crosses say so."""
     assert response.exact is not None, "the scale is logarithmic only where the exact function says so"
-    for curve in map(partial(_told, span=span), response.curves):
-        style, size = look(curve.estimator), np.abs(curve.values.imag)
-        _band(axes, curve, np.maximum(size - curve.half_width, 1e-2 * size), size + curve.half_width)
-        axes.plot(curve.frequency, size, **style.line)
-        signs = np.sign(curve.values.imag) * np.sign(_at(curve.frequency, response).imag)
-        wrong = signs < 0.0
+    for curve in map(partial(_within, span=span), response.curves):
+        size, colour = np.abs(curve.values.imag), look(curve.estimator).colour
+        _size(axes, curve, size)
+        exact_there = np.interp(curve.frequency, response.frequency, response.exact.imag)
+        wrong = np.sign(curve.values.imag) * np.sign(exact_there) < 0.0
         if np.any(wrong):
-            axes.plot(curve.frequency[wrong], size[wrong], "x", color=style.colour, ms=5, zorder=6.0, label=OPPOSITE)
+            axes.plot(curve.frequency[wrong], size[wrong], "x", color=colour, ms=5, zorder=6.0, label=OPPOSITE)
     exact = np.abs(response.exact.imag)
     axes.plot(response.frequency, exact, **EXACT.line)
     axes.set_yscale("log")
@@ -144,22 +130,22 @@ def _logarithmic(axes: Axes, response: InputResponse, span: float) -> None:
     _decades(axes, [*middle, exact])
 
 
-def _told(curve: Curve, span: float) -> Curve:
-    """The curve with gaps where its 95 % band is higher than the panel: the record tells nothing of A_j there."""
-    untold = 2.0 * curve.half_width > span
-    return replace(curve, values=np.where(untold, complex("nan+nanj"), curve.values))
+def _within(curve: Curve, span: float) -> Curve:
+    """The curve with gaps where its 95 % band is higher than the panel: the record says nothing about A_j there."""
+    unknown = 2.0 * curve.half_width > span
+    return replace(curve, values=np.where(unknown, complex("nan+nanj"), curve.values))
 
 
-def _at(frequency: Floats, response: InputResponse) -> Complexes:
-    """The exact function at the lines of an estimator, which may be other lines."""
-    assert response.exact is not None
-    real = np.interp(frequency, response.frequency, response.exact.real)
-    return real + 1j * np.interp(frequency, response.frequency, response.exact.imag)
+def _size(axes: Axes, curve: Curve, size: Floats) -> None:
+    """A size with its 95 % band, for a logarithmic scale: the band ends a hundredfold below the curve."""
+    _curve(axes, curve, size, np.maximum(size - curve.half_width, 1e-2 * size), size + curve.half_width)
 
 
-def _band(axes: Axes, curve: Curve, low: Floats, high: Floats) -> None:
+def _curve(axes: Axes, curve: Curve, values: Floats, low: Floats, high: Floats) -> None:
+    """Values of a curve and a band about them, in the estimator's look."""
     style = look(curve.estimator)
     axes.fill_between(curve.frequency, low, high, color=style.colour, zorder=style.level - 1.0, **BAND)
+    axes.plot(curve.frequency, values, **style.line)
 
 
 def _degrees(values: Complexes) -> Floats:

@@ -109,18 +109,13 @@ def quantity(value: float, unit: str) -> str:
 
 
 def estimated(parameters: pd.DataFrame) -> str:
-    """Shape parameters that were estimated: ``u_g = 2.5002 ± 0.0011 mm (given 2.5)``; empty if none was.
+    """Shape parameters in a case's ``parameters.csv``: ``u_g = 2.5002 ± 0.0011 mm (given 2.5)``; empty if none.
 
     An error that the six decimals shown do not reach is left out.
-
-    Parameters
-    ----------
-    parameters : DataFrame
-        ``parameters.csv`` of a case.
     """
     units_of = {p.name: SHAPE_UNITS[p.quantity] for term in terms.LIBRARY.values() for p in term.parameters}
     own = parameters[parameters["estimator"] == FREE_SHAPE]
-    found: list[str] = []
+    texts: list[str] = []
     for _, row in own[own["parameter"].isin(list(units_of))].iterrows():
         value, error = float(row["estimate"]), float(row["standard_error"])
         factor, unit = prefixed(units_of[str(row["parameter"])], abs(value))
@@ -128,8 +123,8 @@ def estimated(parameters: pd.DataFrame) -> str:
         symbol = _symbol(str(row["parameter"]))
         stated = f"${symbol}$ = {value / factor:.{digits}f}"
         within = f" ± {error / factor:.{digits}f}" if digits < MOST_DIGITS else ""
-        found.append(f"{stated}{within} {dimensions.pretty(unit)} (given {float(row['true']) / factor:g})")
-    return ", ".join(found)
+        texts.append(f"{stated}{within} {dimensions.pretty(unit)} (given {float(row['true']) / factor:g})")
+    return ", ".join(texts)
 
 
 def term_names(text: str) -> str:

@@ -62,10 +62,15 @@ def page(
         hspace=between / panel, wspace=0.24,
     )  # fmt: skip
     grid = figure.subplots(rows, columns, sharex="col" if share else False, squeeze=False)
-    left = LEFT / width
-    figure.text(left, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold", fontsize=11)
-    figure.text(left, 1.0 - 0.33 / height, subtitle, ha="left", va="top", fontsize=10)
+    head(figure, title, subtitle, LEFT, 0.12)
     return figure, list(grid.flat)
+
+
+def head(figure: Figure, title: str, subtitle: str, left: float, top: float) -> None:
+    """Title and subtitle, so many inches from the left and the title so many from the top."""
+    width, height = figure.get_size_inches()
+    figure.text(left / width, 1.0 - top / height, title, ha="left", va="top", fontweight="bold", fontsize=11)
+    figure.text(left / width, 1.0 - 0.33 / height, subtitle, ha="left", va="top", fontsize=10)
 
 
 def rows_for(entries: int) -> int:
@@ -76,12 +81,9 @@ def rows_for(entries: int) -> int:
 def legend(figure: Figure, axes: Sequence[Axes], columns: int | None = None, *, bands: bool = False) -> None:
     """One legend for all panels, between the title and the first of them; equal labels stand once.
 
-    With ``bands`` it says what a shade about a curve means.
+    With ``bands`` it explains the shade about a curve.
     """
-    entries: dict[str, Artist] = {}
-    for panel in axes:
-        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
-            entries.setdefault(str(label), handle)
+    entries = legend_entries(axes)
     if bands:
         entries["95 % band"] = Patch(facecolor="0.8", edgecolor="none")
     width, height = figure.get_size_inches()
@@ -91,7 +93,16 @@ def legend(figure: Figure, axes: Sequence[Axes], columns: int | None = None, *, 
         ncols=columns or -(-len(entries) // rows_for(len(entries))), borderaxespad=0.0, borderpad=0.0, labelspacing=0.3,
     )  # fmt: skip
     for line in shown.get_lines():
-        line.set_linewidth(max(line.get_linewidth(), 1.0))  # a hair of a line is not found in a legend
+        line.set_linewidth(max(line.get_linewidth(), 1.0))  # a hairline would be lost in a legend
+
+
+def legend_entries(axes: Sequence[Axes]) -> dict[str, Artist]:
+    """What the legends of the panels would hold, by label; of equal labels the first."""
+    entries: dict[str, Artist] = {}
+    for panel in axes:
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            entries.setdefault(str(label), handle)
+    return entries
 
 
 def letter(axes: Sequence[Axes], names: Sequence[str]) -> None:

@@ -6,27 +6,13 @@ from typing import Any
 
 @dataclass(frozen=True)
 class LineLook:
-    """How a curve is drawn.
+    """How a curve is drawn."""
 
-    Attributes
-    ----------
-    label : str
-        What the legend calls it.
-    colour : str
-        A place in the style sheet's colour cycle.
-    dash : str or tuple
-        Line style as Matplotlib knows it.
-    width : float
-        In points.
-    level : float
-        Which curve covers which: the higher lies on top.
-    """
-
-    label: str
-    colour: str
-    dash: str | tuple[int, tuple[float, ...]]
-    width: float
-    level: float
+    label: str  # what the legend calls it
+    colour: str  # a place in the style sheet's colour cycle
+    dash: str | tuple[int, tuple[float, ...]]  # line style as Matplotlib knows it
+    width: float  # points
+    level: float  # which curve covers which: the higher lies on top
 
     @property
     def line(self) -> dict[str, Any]:

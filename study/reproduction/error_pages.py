@@ -1,7 +1,7 @@
 """The estimators' errors in words and tables: what opens the study's page, and the figures of the user's page."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import pandas as pd
@@ -20,7 +20,7 @@ LARGE = 9950.0  # from here on a number is shown with a power of ten
 
 
 def opening(errors: pd.DataFrame, noise: Mapping[str, float]) -> list[Block]:
-    """Who is how far off: in sentences, then every case and parameter, then bias and scatter under noise."""
+    """How far each estimator is off: in sentences, by case and parameter, then bias and scatter under noise."""
     note = (
         f"Median over {int(errors['seeds'].max())} seeds of the error in %, every estimator on the very same records; "
         "in brackets the gain, the error of MI/SO over this one. Where the true value is zero the error is in the "
@@ -28,26 +28,26 @@ def opening(errors: pd.DataFrame, noise: Mapping[str, float]) -> list[Block]:
     )
     noisy = errors[(errors["case"].map(noise) > 0.0) & (errors["seeds"] >= ENOUGH)]
     picture = Image("Errors of the estimators by parameter and case", "../figures/estimators.png")
-    found: list[Block] = [Text(WHO), Bullets(sentences(errors, noise)), picture, Text(note), by_parameter(errors)]
+    blocks: list[Block] = [Text(WHO), Bullets(sentences(errors, noise)), picture, Text(note), by_parameter(errors)]
     if len(noisy):
-        found += [Text("Under noise on the displacement, bias ± scatter of one estimate, both in %:"), biases(noisy)]
-    return found
+        blocks += [Text("Under noise on the displacement, bias ± scatter of one estimate, both in %:"), biases(noisy)]
+    return blocks
 
 
 def sentences(errors: pd.DataFrame, noise: Mapping[str, float]) -> tuple[str, ...]:
     """For each estimator but MI/SO, without noise and with it: how often it is nearer, and by how much."""
     others = [name for name in estimator_errors.estimators(errors) if name != estimator_errors.BASIS]
-    loud = errors["case"].map(noise) > 0.0
-    parts = (("Without noise", errors[~loud]), ("With noise on the displacement", errors[loud]))
+    noisy = errors["case"].map(noise) > 0.0
+    parts = (("without noise", errors[~noisy]), ("with noise on the displacement", errors[noisy]))
     lines: list[str] = []
     for name in others:
-        words = [_gains(where, kept[kept["estimator"] == name]) for where, kept in parts]
+        words = [_gains(where, part[part["estimator"] == name]) for where, part in parts]
         lines.append(f"**{look(name).label}**: " + "; ".join(word for word in words if word) + ".")
     return tuple(lines)
 
 
 def about(errors: pd.DataFrame) -> str:
-    """What the numbers of :func:`overview` are, and of how many records."""
+    """What the numbers of :func:`overview` are, and from how many records they come."""
     seeds, noted = int(errors["seeds"].max()), errors[errors["noted"] > 0].groupby(["case", "estimator"])["noted"].max()
     trouble = f"{int(noted.sum())} searches did not converge" if len(noted) else "every search converged"
     return (
@@ -61,21 +61,34 @@ def _gains(where: str, own: pd.DataFrame) -> str:
     if gains.empty:
         return ""
     nearer = int((gains > 1.0).sum())
-    place = where[0].lower() + where[1:]
-    return f"{place} nearer than MI/SO in {nearer} of {len(gains)} parameters, its median gain {factor(gains.median())}"
+    return f"{where} nearer than MI/SO in {nearer} of {len(gains)} parameters, its median gain {factor(gains.median())}"
+
+
+def by_estimator(
+    table: pd.DataFrame, keys: Sequence[str], names: Sequence[str], cell: Callable[["pd.Series[Any]"], str]
+) -> list[list[str]]:
+    """One row for each value of the keys, one cell an estimator; it is empty where the table has no such row."""
+    rows: list[list[str]] = []
+    for key, group in table.groupby(list(keys), sort=False):
+        cells = {str(row["estimator"]): cell(row) for _, row in group.iterrows()}
+        rows.append([*(str(part) for part in key), *(cells.get(name, "") for name in names)])
+    return rows
+
+
+def _wide(
+    errors: pd.DataFrame, keys: Sequence[str], shown: pd.DataFrame, cell: Callable[["pd.Series[Any]"], str]
+) -> Block:
+    """The table of :func:`by_estimator` under the names of all estimators of ``errors``."""
+    names = estimator_errors.estimators(errors)
+    return table([*keys, *(look(name).label for name in names)], by_estimator(shown, keys, names, cell))
 
 
 def by_parameter(errors: pd.DataFrame) -> Block:
     """One row a case and parameter, one column an estimator: median error and gain."""
-    names = estimator_errors.estimators(errors)
-    rows: list[list[str]] = []
-    for (case, parameter), group in errors.groupby(["case", "parameter"], sort=False):
-        found = {str(row["estimator"]): row for _, row in group.iterrows()}
-        rows.append([str(case), str(parameter), *(_cell(found[n]) if n in found else "" for n in names)])
-    return table(["case", "parameter", *(look(name).label for name in names)], rows)
+    return _wide(errors, ["case", "parameter"], errors, _error_and_gain)
 
 
-def _cell(row: "pd.Series[Any]") -> str:
+def _error_and_gain(row: "pd.Series[Any]") -> str:
     scale, unit = (100.0, " %") if row["kind"] == "relative" else (1.0, "")
     size = f"{short(scale * row['median_error'])}{unit}" if math.isfinite(row["median_error"]) else "none"
     return size if row["estimator"] == estimator_errors.BASIS else f"{size} ({factor(row['gain'])})"
@@ -83,41 +96,22 @@ def _cell(row: "pd.Series[Any]") -> str:
 
 def biases(errors: pd.DataFrame) -> Block:
     """One row a case and parameter with a true value: bias and scatter in % by estimator."""
-    names = estimator_errors.estimators(errors)
-    kept = errors[errors["kind"] == "relative"]
-    rows: list[list[str]] = []
-    for (case, parameter), group in kept.groupby(["case", "parameter"], sort=False):
-        found = {str(row["estimator"]): row for _, row in group.iterrows()}
-        cells = [_bias(found[n]) if n in found else "" for n in names]
-        rows.append([str(case), str(parameter), *cells])
-    return table(["case", "parameter", *(look(name).label for name in names)], rows)
-
-
-def _bias(row: "pd.Series[Any]") -> str:
-    return f"{short(100.0 * row['bias'])} ± {short(100.0 * row['scatter'])}"
+    relative = errors[errors["kind"] == "relative"]
+    return _wide(
+        errors, ["case", "parameter"], relative,
+        lambda row: f"{short(100.0 * row['bias'])} ± {short(100.0 * row['scatter'])}",
+    )  # fmt: skip
 
 
 def overview(errors: pd.DataFrame) -> Block:
-    """One row a case, one column an estimator: the middle one of its parameters' errors, and of their gains."""
-    names = estimator_errors.estimators(errors)
-    found = estimator_errors.by_case(errors).assign(kind="relative")
-    rows: list[list[str]] = []
-    for case, group in found.groupby("case", sort=False):
-        own = {str(row["estimator"]): row for _, row in group.iterrows()}
-        cells = [_cell(own[n]) if n in own else "" for n in names]
-        rows.append([str(case), *cells])
-    return table(["case", *(look(name).label for name in names)], rows)
+    """One row a case, one column an estimator: the median of its parameters' errors, and of their gains."""
+    return _wide(errors, ["case"], estimator_errors.by_case(errors).assign(kind="relative"), _error_and_gain)
 
 
 def bias_overview(errors: pd.DataFrame, noise: Mapping[str, float]) -> Block:
     """One row a case with noise, one column an estimator: the largest bias over scatter, and whose it is."""
-    loud = errors[errors["case"].map(noise) > 0.0]
-    names, found = estimator_errors.estimators(errors), estimator_errors.worst_bias(loud)
-    rows: list[list[str]] = []
-    for case, group in found.groupby("case", sort=False):
-        own = {str(row["estimator"]): f"{short(row['ratio'])} ({row['parameter']})" for _, row in group.iterrows()}
-        rows.append([str(case), *(own.get(name, "") for name in names)])
-    return table(["case", *(look(name).label for name in names)], rows)
+    worst = estimator_errors.worst_bias(errors[errors["case"].map(noise) > 0.0])
+    return _wide(errors, ["case"], worst, lambda row: f"{short(row['ratio'])} ({row['parameter']})")
 
 
 def factor(gain: float) -> str:

@@ -14,28 +14,19 @@ COLUMNS = [
     "case", "estimator", "parameter", "true", "kind", "median_error", "standard_error", "gain",
     "bias", "bias_error", "scatter", "seeds", "found", "noted", "first_error",
 ]  # fmt: skip
-FIRST = 2  # seeds whose median stands apart: by it a later run shows that it gives the same errors
-ALIKE = 0.01  # of a median error: further apart, two runs are not the same
+FIRST = 2  # seeds whose median has a column of its own: by it a later run shows that it gives the same errors
+ALIKE = 0.01  # share of a median error by which two runs of the same study may differ
 
 
 def errors(estimates: pd.DataFrame) -> pd.DataFrame:
-    """Errors by case, estimator and parameter.
+    """Errors by case, estimator and parameter, from :func:`study.reproduction.ensemble.estimates` of one or more cases.
 
-    Parameters
-    ----------
-    estimates : DataFrame
-        As :func:`study.reproduction.ensemble.estimates` gives it, of one case or several.
-
-    Returns
-    -------
-    DataFrame
-        Columns ``COLUMNS``. Errors are relative where the true value is not zero (``kind``), otherwise in the
-        parameter's own unit. ``median_error`` is the median over the seeds of the size of the error; a seed
-        that gives no estimate is farther off than any other. ``standard_error`` is that of the median, whatever
-        the distribution. ``gain`` is the median error of MI/SO over this one. ``bias`` and ``scatter`` are
-        mean and standard deviation of the signed error. ``found`` of ``seeds`` give an estimate, ``noted`` of
-        them with a note, such as that the search did not converge. ``first_error`` is the median over the
-        first ``FIRST`` seeds alone.
+    Errors are relative where the true value is not zero (``kind``), otherwise in the parameter's own unit.
+    ``median_error`` is the median over the seeds of the size of the error; a seed that gives no estimate is farther
+    off than any other. ``standard_error`` is that of the median, whatever the distribution. ``gain`` is the median
+    error of MI/SO over this one. ``bias`` and ``scatter`` are mean and standard deviation of the signed error.
+    ``found`` of ``seeds`` give an estimate, ``noted`` of them with a note, such as that the search did not converge.
+    ``first_error`` is the median over the first ``FIRST`` seeds alone.
     """
     seeds = {str(case): sorted(group["seed"].unique()) for case, group in estimates.groupby("case")}
     rows: list[dict[str, Any]] = []
@@ -110,32 +101,21 @@ def with_gains(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def by_case(table: pd.DataFrame) -> pd.DataFrame:
-    """Medians over a case's parameters with a true value other than zero.
-
-    Returns
-    -------
-    DataFrame
-        Columns ``case, estimator, median_error, gain, noted``: the middle one of the parameters' errors and of
-        their gains, and the share of seeds with a note.
-    """
-    kept = table[table["kind"] == "relative"].assign(noted=table["noted"] / table["seeds"])
-    columns = ["median_error", "gain", "noted"]
-    return kept.groupby(["case", "estimator"], sort=False)[columns].median().reset_index()
+    """By case and estimator, medians over the parameters with a true value other than zero: of errors and of gains."""
+    relative = table[table["kind"] == "relative"]
+    return relative.groupby(["case", "estimator"], sort=False)[["median_error", "gain"]].median().reset_index()
 
 
 def worst_bias(table: pd.DataFrame) -> pd.DataFrame:
-    """By case and estimator the parameter whose bias is the largest part of its scatter.
+    """By case and estimator the parameter with the largest ``ratio`` of bias to scatter.
 
-    Returns
-    -------
-    DataFrame
-        Columns ``case, estimator, parameter, ratio, ratio_error``; ``ratio_error`` is what chance alone brings.
+    ``ratio_error`` is the ratio that chance alone brings.
     """
     scattered = table[table["scatter"] > 0.0]
     ratio = scattered["bias"].abs() / scattered["scatter"]
-    found = scattered.assign(ratio=ratio, ratio_error=1.0 / np.sqrt(scattered["found"]))
-    highest = found.groupby(["case", "estimator"], sort=False)["ratio"].idxmax()
-    return found.loc[highest, ["case", "estimator", "parameter", "ratio", "ratio_error"]].reset_index(drop=True)
+    ratios = scattered.assign(ratio=ratio, ratio_error=1.0 / np.sqrt(scattered["found"]))
+    highest = ratios.groupby(["case", "estimator"], sort=False)["ratio"].idxmax()
+    return ratios.loc[highest, ["case", "estimator", "parameter", "ratio", "ratio_error"]].reset_index(drop=True)
 
 
 def estimators(table: pd.DataFrame) -> Sequence[str]:

@@ -6,7 +6,7 @@ the MI/SO estimates is the integrator's doing alone, free of the leakage that bo
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,48 +18,13 @@ from study.identify.estimators.base import Settings, true_parameters
 from study.reproduction.ensemble import threaded
 from study.reproduction.make_record import make_record
 from study.reproduction.settings import IntegratorSettings, RecordSettings
+from study.support.document import unpadded
 from study.support.errors import DivergenceError
+from study.support.numbers import percent
 
 Table = Mapping[str, Any]
 FINE = IntegratorSettings(method="rk4", steps_per_sample=16)
 STUDIED = [IntegratorSettings(method=m, steps_per_sample=s) for m in ("abm4", "rk4") for s in (1, 2, 4, 8)]
-
-
-@dataclass(frozen=True)
-class Row:
-    """One parameter of one system under one setting; a row of ``results/integrator_steps.csv``.
-
-    Attributes
-    ----------
-    system, reading, method, steps_per_sample : str, str, str, int
-        What was integrated and how; ``reading`` says what the unit variance is that of.
-    parameter : str
-        Empty where every run diverged.
-    true, fine : float
-        The model's value, and the mean estimate from the finely integrated records.
-    mean_error, standard_error : float
-        Mean over the seeds of the estimate less that of the fine record.
-    relative_error : float
-        ``mean_error / true``; nan where the true value is zero.
-    seeds, diverged : int
-        Runs, and how many of them left the range of finite numbers.
-    diverged_seeds : str
-        Which, each with the time in seconds.
-    """
-
-    system: str
-    reading: str
-    method: str
-    steps_per_sample: int
-    parameter: str
-    true: float
-    fine: float
-    mean_error: float
-    standard_error: float
-    relative_error: float
-    seeds: int
-    diverged: int
-    diverged_seeds: str
 
 
 @dataclass(frozen=True)
@@ -77,7 +42,11 @@ def study(
     seeds: Sequence[int],
     readings: Sequence[str],
 ) -> pd.DataFrame:
-    """Every system under every setting.
+    """Every system under every setting: one row a parameter, as ``results/integrator_steps.csv`` holds them.
+
+    ``fine`` is the mean estimate from the finely integrated records, ``mean_error`` the mean over the seeds of the
+    estimate less that of the fine record. ``diverged`` of the ``seeds`` left the range of finite numbers;
+    ``diverged_seeds`` says which, each with the time. ``parameter`` is empty where every run diverged.
 
     Parameters
     ----------
@@ -93,7 +62,7 @@ def study(
         Readings of unit variance. The first is studied at every setting, the others (a force of twice
         the variance, by and large) at the report's own: Adams-Bashforth-Moulton, one step a sample.
     """
-    rows: list[Row] = []
+    rows: list[dict[str, Any]] = []
     for name, model in models.items():
         for reading in readings:
             excitation = record.excitation.model_copy(update={"reading": reading})
@@ -101,9 +70,9 @@ def study(
             fine = _runs(model, base, FINE, estimation, seeds)
             for integrator in STUDIED if reading == readings[0] else STUDIED[:1]:
                 runs = _runs(model, base, integrator, estimation, seeds)
-                about = {"system": name, "reading": reading, **integrator.plain(), "seeds": len(seeds)}
+                about = {"system": name, "reading": reading, **integrator.plain()}
                 rows += _rows(about, true_parameters(model.values), fine, runs, seeds)
-    return pd.DataFrame([asdict(row) for row in rows])
+    return pd.DataFrame(rows)
 
 
 def _runs(
@@ -111,52 +80,44 @@ def _runs(
 ) -> list[Run]:
     stepped = record.model_copy(update={"integrator": integrator})
 
-    def one(seed: int) -> Run:
+    def run(seed: int) -> Run:
         try:
-            made = make_record(model, stepped, seed=seed)
+            simulated = make_record(model, stepped, seed=seed)
         except DivergenceError as error:
             return Run({}, error.time)
-        return Run({p.name: p.value for p in miso.identify(model, made, estimation).parameters})
+        return Run({p.name: p.value for p in miso.identify(model, simulated, estimation).parameters})
 
-    return threaded(one, list(seeds))
+    return threaded(run, list(seeds))
 
 
-def _rows(about: Table, truth: Table, fine: list[Run], runs: list[Run], seeds: Sequence[int]) -> list[Row]:
-    lost = [(s, r.diverged) for s, r in zip(seeds, runs, strict=True) if r.diverged is not None]
-    told = {
-        **about,
-        "diverged": len(lost),
-        "diverged_seeds": ", ".join(f"{seed} at {time:.4g} s" for seed, time in lost),
-    }
+def _rows(about: Table, truth: Table, fine: list[Run], runs: list[Run], seeds: Sequence[int]) -> list[dict[str, Any]]:
+    lost = [f"{s} at {r.diverged:.4g} s" for s, r in zip(seeds, runs, strict=True) if r.diverged is not None]
     kept = [(f.values, r.values) for f, r in zip(fine, runs, strict=True) if f.values and r.values]
     names = [n for n in kept[0][0] if n in truth] if kept else []
-    if not names:
-        nothing = dict.fromkeys(("true", "fine", "mean_error", "standard_error", "relative_error"), math.nan)
-        return [Row(**told, parameter="", **nothing)]
-    return [_row(told, name, truth[name], kept) for name in names]
+    nothing = dict.fromkeys(("true", "fine", "mean_error", "standard_error", "relative_error"), math.nan)
+    parts = [{"parameter": n, **_errors(n, truth[n], kept)} for n in names] or [{"parameter": "", **nothing}]
+    counts = {"seeds": len(seeds), "diverged": len(lost), "diverged_seeds": ", ".join(lost)}
+    return [{**about, **part, **counts} for part in parts]
 
 
-def _row(told: Table, name: str, true: float, kept: list[tuple[Mapping[str, float], Mapping[str, float]]]) -> Row:
+def _errors(name: str, true: float, kept: list[tuple[Mapping[str, float], Mapping[str, float]]]) -> dict[str, float]:
     pairs = [(f[name], r[name]) for f, r in kept if name in f and name in r]
     fine = np.array([f for f, _ in pairs])
     error = np.array([r for _, r in pairs]) - fine
     mean = float(np.mean(error))
-    return Row(
-        **told,
-        parameter=name,
-        true=true,
-        fine=float(np.mean(fine)),
-        mean_error=mean,
-        standard_error=float(np.std(error, ddof=1) / math.sqrt(len(error))) if len(error) > 1 else math.nan,
-        relative_error=mean / true if true != 0.0 else math.nan,
-    )
+    return {
+        "true": true,
+        "fine": float(np.mean(fine)),
+        "mean_error": mean,
+        "standard_error": float(np.std(error, ddof=1) / math.sqrt(len(error))) if len(error) > 1 else math.nan,
+        "relative_error": mean / true if true != 0.0 else math.nan,
+    }
 
 
 def page(table: pd.DataFrame) -> str:
     """The table as a page: one block a system, relative errors in percent."""
-    lines = [
+    parts = [
         "# What the integrator's setting does to the recovered parameters",
-        "",
         "Mean error of each MI/SO estimate against the same records integrated finely "
         f"({FINE.method}, {FINE.steps_per_sample} steps a sample), with its standard error; "
         "relative in percent, in the parameter's own unit where the true value is zero. "
@@ -164,19 +125,16 @@ def page(table: pd.DataFrame) -> str:
     ]
     for (system, reading), block in table.groupby(["system", "reading"], sort=False):
         names = [str(n) for n in block["parameter"].unique() if n]
-        heading = ["integrator", "steps a sample", *names, "diverged"]
-        lines += ["", f"## {system}, unit variance {reading}", "", _cells(heading), _cells(["---"] * len(heading))]
+        rows: list[list[object]] = []
         for (method, steps), group in block.groupby(["method", "steps_per_sample"], sort=False):
-            found = {str(row["parameter"]): _error(row) for _, row in group.iterrows()}
+            errors = {str(row["parameter"]): _error(row) for _, row in group.iterrows()}
             lost = f"{group['diverged'].iloc[0]} of {group['seeds'].iloc[0]}"
-            lines.append(_cells([str(method), str(steps), *(found.get(n, "") for n in names), lost]))
-    return "\n".join(lines) + "\n"
-
-
-def _cells(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
+            rows.append([method, steps, *(errors.get(n, "") for n in names), lost])
+        heading = ["integrator", "steps a sample", *names, "diverged"]
+        parts += [f"## {system}, unit variance {reading}", unpadded(heading, rows)]
+    return "\n\n".join(parts) + "\n"
 
 
 def _error(row: "pd.Series[Any]") -> str:
-    scale, unit = (100.0 / abs(row["true"]), " %") if row["true"] != 0.0 else (1.0, "")
-    return f"{scale * row['mean_error']:+.2g} +- {scale * row['standard_error']:.1g}{unit}"
+    true, error, spread = abs(row["true"]), row["mean_error"], row["standard_error"]
+    return percent(error / true, "+.2g", spread / true) if true != 0.0 else f"{error:+.2g} +- {spread:.1g}"

@@ -29,30 +29,16 @@ class Pattern:
 
 @dataclass(frozen=True)
 class Histogram:
-    """How a quantity is distributed, beside a Gaussian of the same mean and variance.
+    """How a quantity is distributed, in its own unit, beside a Gaussian of the same mean and variance."""
 
-    Attributes
-    ----------
-    edges : array, shape (bins + 1,)
-        In the quantity's unit.
-    density : array, shape (bins,)
-        Probability density, one over that unit; its integral is one.
-    points, gaussian : arrays, shape (n,)
-        The Gaussian's density.
-    mean, deviation : float
-        In the quantity's unit.
-    skewness, kurtosis : float
-        Third and fourth standardised moment; 0 and 3 for a Gaussian.
-    """
-
-    edges: Floats
-    density: Floats
-    points: Floats
-    gaussian: Floats
+    edges: Floats  # shape (bins + 1,)
+    density: Floats  # probability density, whose integral is one; shape (bins,)
+    points: Floats  # where the Gaussian's density is given
+    gaussian: Floats  # the Gaussian's density
     mean: float
     deviation: float
-    skewness: float
-    kurtosis: float
+    skewness: float  # third standardised moment, 0 for a Gaussian
+    kurtosis: float  # fourth standardised moment, 3 for a Gaussian
 
 
 def restoring_force(record: Record, mass: float) -> Floats:
@@ -64,9 +50,9 @@ def restoring_force(record: Record, mass: float) -> Floats:
         If the record holds no acceleration or the mass is not above zero.
     """
     if "acceleration" not in record:
-        raise StudyError(f"{record.name} has no channel 'acceleration'; the restoring force F - m a needs one")
+        raise StudyError(f"{record.name} has no channel 'acceleration'; expected one for the restoring force F - m a")
     if not mass > 0.0:
-        raise StudyError(f"the mass is {mass:g}; the restoring force F - m a needs one above zero")
+        raise StudyError(f"the mass is {mass:g}; expected one above zero for the restoring force F - m a")
     return record["force"] - mass * record["acceleration"]
 
 
@@ -79,7 +65,7 @@ def random_pattern(record: Record, mass: float) -> Pattern:
         As :func:`restoring_force`, or if the record holds no displacement.
     """
     if "displacement" not in record:
-        raise StudyError(f"{record.name} has no channel 'displacement'; a force/displacement pattern needs one")
+        raise StudyError(f"{record.name} has no channel 'displacement'; expected one for a force/displacement pattern")
     return Pattern(record["displacement"], restoring_force(record, mass))
 
 
@@ -127,7 +113,7 @@ def harmonic_pattern(model: Model, amplitude: float, frequency: float, cycles: i
     """
     for name, value in (("amplitude", amplitude), ("frequency", frequency)):
         if not value > 0.0:
-            raise StudyError(f"the {name} of the harmonic motion is {value:g}; it must be above zero")
+            raise StudyError(f"the {name} of the harmonic motion is {value:g}; expected a value above zero")
     time = np.arange(cycles * POINTS_A_CYCLE + 1) / (POINTS_A_CYCLE * frequency)
     omega = 2.0 * math.pi * frequency
     displacement = amplitude * np.sin(omega * time)
@@ -161,23 +147,16 @@ def natural_frequency(values: Mapping[str, float | None]) -> float:
     """
     mass, stiffness = values.get("m"), values.get("k")
     if mass is None or stiffness is None or not mass > 0.0 or not stiffness > 0.0:
-        raise StudyError(f"m = {mass} and k = {stiffness} give no natural frequency; both must be above zero")
+        raise StudyError(f"m = {mass} and k = {stiffness} give no natural frequency; expected both above zero")
     return math.sqrt(stiffness / mass) / (2.0 * math.pi)
 
 
 def mathieu_lines(natural: float, modulation: float) -> dict[str, float]:
-    """Frequencies (Hz) at which a Mathieu system's response is strong, by their formulas (Section 3.3).
+    """Frequencies at which a Mathieu system's response is strong, by their formulas (Section 3.3).
 
-    Parameters
-    ----------
-    natural, modulation : float
-        f_n of the mean stiffness and f_m of the stiffness, in hertz.
+    All are in hertz, as are f_n of the mean stiffness and the frequency f_m of the stiffness that are given.
     """
-    return {
-        "|f_n - f_m|": abs(natural - modulation),
-        "f_n": natural,
-        "|f_n + f_m|": natural + modulation,
-    }
+    return {"|f_n - f_m|": abs(natural - modulation), "f_n": natural, "|f_n + f_m|": natural + modulation}
 
 
 def histogram(values: Floats, bins: int = 51) -> Histogram:
@@ -190,7 +169,7 @@ def histogram(values: Floats, bins: int = 51) -> Histogram:
     """
     mean, deviation = float(np.mean(values)), float(np.std(values))
     if not deviation > 0.0:
-        raise StudyError(f"all {len(values)} values are {mean:g}; a histogram needs values that differ")
+        raise StudyError(f"all {len(values)} values are {mean:g}; expected values that differ, for a histogram")
     reach = float(np.abs(values - mean).max())
     density, edges = np.histogram(values, bins=bins, range=(mean - reach, mean + reach), density=True)
     points = np.linspace(mean - max(reach, 3.5 * deviation), mean + max(reach, 3.5 * deviation), 201)

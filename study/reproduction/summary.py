@@ -9,6 +9,7 @@ import pandas as pd
 from study.reproduction import error_pages
 from study.reproduction.claims.judgement import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED, SEPARATOR
 from study.support.document import Block, Bullets, Heading, Text, table
+from study.support.numbers import percent
 
 INTRODUCTION = (
     "Bendat, Palo and Coppolino identify nonlinear systems with one degree of freedom from force and response: "
@@ -33,33 +34,21 @@ FILES = (
 
 @dataclass(frozen=True)
 class Tables:
-    """What the page is made of, each as the study wrote it.
+    """What the page is made of, each table as the study wrote it."""
 
-    Attributes
-    ----------
-    parameters, claims, reading, errors : DataFrame
-        ``results/parameters.csv``, ``claims.csv``, ``excitation_reading.csv``, ``estimators.csv``.
-    times : DataFrame
-        Columns ``stage, case, seconds``: one row a job.
-    noise : dict of float
-        Noise of each case, by name, in the order of the page.
-    setting : str
-        The reading of unit variance that the study runs with.
-    """
-
-    parameters: pd.DataFrame
-    claims: pd.DataFrame
-    reading: pd.DataFrame
-    errors: pd.DataFrame
-    times: pd.DataFrame
-    noise: dict[str, float]
-    setting: str
+    parameters: pd.DataFrame  # results/parameters.csv
+    claims: pd.DataFrame  # results/claims.csv
+    reading: pd.DataFrame  # results/excitation_reading.csv
+    errors: pd.DataFrame  # results/estimators.csv
+    times: pd.DataFrame  # columns stage, case, seconds: one row a job
+    noise: dict[str, float]  # of each case, by name, in the order of the page
+    setting: str  # the reading of unit variance that the study runs with
 
 
 def blocks(tables: Tables) -> list[Block]:
     """The whole page."""
     sections: list[tuple[str, Callable[[Tables], list[Block]]]] = [
-        ("How far each estimator is off", estimators),
+        ("How far each estimator is off", lambda t: error_pages.opening(t.errors, t.noise)),
         ("What was reproduced", counts),
         ("The report's numbers beside ours", numbers),
         ("Parameters by case", parameters),
@@ -69,28 +58,21 @@ def blocks(tables: Tables) -> list[Block]:
         ("Where everything is", lambda _: [table(["where", "what"], FILES)]),
         ("Run times", run_times),
     ]
-    found: list[Block] = [Heading("The report, run again", 1), Text(INTRODUCTION)]
+    page: list[Block] = [Heading("The report, run again", 1), Text(INTRODUCTION)]
     for title, section in sections:
-        found += [Heading(title), *section(tables)]
-    return found
-
-
-def estimators(tables: Tables) -> list[Block]:
-    """The errors of the estimators on the same records, and the picture of them."""
-    return error_pages.opening(tables.errors, tables.noise)
+        page += [Heading(title), *section(tables)]
+    return page
 
 
 def counts(tables: Tables) -> list[Block]:
     """How many claims and parameters hold, in sentences."""
     verdicts = tables.claims.loc[~tables.claims["where"].str.startswith(BESIDE), "verdict"]
-    total, (whole, part, none) = len(verdicts), (
-        int((verdicts == verdict).sum()) for verdict in (REPRODUCED, PARTLY, NOT_REPRODUCED)
-    )  # fmt: skip
+    whole, part, none = (int((verdicts == verdict).sum()) for verdict in (REPRODUCED, PARTLY, NOT_REPRODUCED))
     own = tables.parameters[tables.parameters["estimator"] == "miso"]
     quiet = own[own["case"].map(tables.noise) == 0.0]
     noisy = own[own["case"].map(tables.noise) > 0.0]
     lines = [
-        f"Of {total} statements of the report, **{whole} are reproduced**, {part} partly, {none} not: "
+        f"Of {len(verdicts)} statements of the report, **{whole} are reproduced**, {part} partly, {none} not: "
         "each of these has its reason below.",
         f"Without noise, MI/SO recovers {_met(quiet)} parameters of {quiet['case'].nunique()} cases within "
         "tolerances that were set before looking.",
@@ -120,27 +102,22 @@ def numbers(tables: Tables) -> list[Block]:
 
 def statements(claims: pd.DataFrame) -> Block:
     """One row a claim; of what was measured as many parts as the report gives numbers, those that fail first."""
-    rows = [
-        [row["where"], row["claim"], row["reported"], measured_parts(row["reported"], row["measured"]), row["verdict"]]
-        for _, row in claims.iterrows()
+    ours = [
+        SEPARATOR.join(measured.split(SEPARATOR)[: len(reported.split(", "))])  # "as stated" counts as one number
+        for reported, measured in zip(claims["reported"], claims["measured"], strict=True)
     ]
-    return table(["where", "what", "report", "ours", "verdict"], rows)
-
-
-def measured_parts(reported: str, measured: str) -> str:
-    """The first parts of ``measured``, one for each number of ``reported`` (one where it says "as stated")."""
-    return SEPARATOR.join(measured.split(SEPARATOR)[: len(reported.split(", "))])
+    columns = claims.assign(ours=ours)[["where", "claim", "reported", "ours", "verdict"]]
+    return table(["where", "what", "report", "ours", "verdict"], columns.to_numpy().tolist())
 
 
 def parameters(tables: Tables) -> list[Block]:
     """One row a parameter, one column an estimator: estimate, standard error, error, verdict."""
     names = list(dict.fromkeys(tables.parameters["estimator"]))
-    rows: list[list[str]] = []
-    for (case, parameter), group in tables.parameters.groupby(["case", "parameter"], sort=False):
-        found = {str(row["estimator"]): row for _, row in group.iterrows()}
-        cells = [_estimate(found[name]) if name in found else "" for name in names]
-        limit = found.get("miso", group.iloc[0])
-        rows.append([str(case), str(parameter), f"{limit['true']:.6g}", _tolerance(limit), *cells])
+    worded = {
+        "value": tables.parameters["true"].map("{:.6g}".format), "limit": tables.parameters.apply(_tolerance, axis=1),
+    }  # fmt: skip
+    keys = ["case", "parameter", "value", "limit"]
+    rows = error_pages.by_estimator(tables.parameters.assign(**worded), keys, names, _estimate)
     note = (
         "In SI units (kg, N s/m, N/m, Hz, N/m^3, N s/m^3, rad); with its standard error, and the error against the "
         "true value. In bold what lies outside the tolerance. The standard errors of SI/SO and MI/SO are Bendat and "
@@ -156,7 +133,7 @@ def parameters(tables: Tables) -> list[Block]:
 
 def _estimate(row: "pd.Series[Any]") -> str:
     error = "" if pd.isna(row["standard_error"]) else f" ± {row['standard_error']:.2g}"
-    relative = "" if pd.isna(row["relative_error"]) else f" ({100.0 * row['relative_error']:+.2g} %)"
+    relative = "" if pd.isna(row["relative_error"]) else f" ({percent(row['relative_error'], '+.2g')})"
     text = f"{row['estimate']:.5g}{error}{relative}"
     text = text if row["within_tolerance"] else f"**{text}**"
     note = row.get("note", "")
@@ -166,21 +143,22 @@ def _estimate(row: "pd.Series[Any]") -> str:
 def _tolerance(row: "pd.Series[Any]") -> str:
     if pd.isna(row["tolerance"]):
         return "none"
-    return f"{100.0 * row['tolerance']:g} %" if row["true"] != 0.0 else f"{row['tolerance']:g}"
+    return percent(row["tolerance"]) if row["true"] != 0.0 else f"{row['tolerance']:g}"
 
 
 def failing(tables: Tables) -> list[Block]:
     """What is not reproduced, or partly, and why."""
-    kept = tables.claims[tables.claims["verdict"] != REPRODUCED].sort_values("verdict", kind="stable")
-    rows = [[row["verdict"], row["where"], row["claim"], row["why"]] for _, row in kept.iterrows()]
-    return [table(["verdict", "where", "claim", "why"], rows)]
+    failed = tables.claims[tables.claims["verdict"] != REPRODUCED].sort_values("verdict", kind="stable")
+    return [_columns(failed, "verdict", "where", "claim", "why")]
 
 
 def reproduced(tables: Tables) -> list[Block]:
     """What is reproduced, and what was measured."""
-    kept = tables.claims[tables.claims["verdict"] == REPRODUCED]
-    rows = [[row["where"], row["claim"], row["measured"]] for _, row in kept.iterrows()]
-    return [table(["where", "claim", "measured"], rows)]
+    return [_columns(tables.claims[tables.claims["verdict"] == REPRODUCED], "where", "claim", "measured")]
+
+
+def _columns(frame: pd.DataFrame, *names: str) -> Block:
+    return table(names, frame[list(names)].to_numpy().tolist())
 
 
 def reading(tables: Tables) -> list[Block]:
@@ -204,10 +182,11 @@ def _mean(row: "pd.Series[Any]", which: str) -> str:
 
 def run_times(tables: Tables) -> list[Block]:
     """Seconds by stage."""
-    rows: list[list[str]] = []
-    for stage, group in tables.times.groupby("stage", sort=False):
-        seconds = group["seconds"]
-        rows.append([str(stage).replace("_", " "), str(len(group)), f"{seconds.sum():.1f}", f"{seconds.max():.1f}"])
-    rows.append(["all", str(len(tables.times)), f"{tables.times['seconds'].sum():.1f}", ""])
+    seconds = tables.times["seconds"]
+    rows = [
+        [str(stage).replace("_", " "), len(group), f"{group.sum():.1f}", f"{group.max():.1f}"]
+        for stage, group in seconds.groupby(tables.times["stage"], sort=False)
+    ]
+    rows.append(["all", len(seconds), f"{seconds.sum():.1f}", ""])
     note = "Wall time of each stage's jobs on the machine that made these results, start-up of Python included."
     return [Text(note), table(["stage", "jobs", "seconds together", "longest"], rows)]

@@ -11,7 +11,6 @@ import pandas as pd
 from study.equations.model import Model
 from study.identify.estimators.base import Identified, true_parameters
 from study.identify.frequency_domain.conditioned import MisoResult
-from study.identify.frequency_domain.inputs import Input
 from study.reproduction.settings import IdentificationSettings
 from study.support.files import replacing
 
@@ -25,12 +24,11 @@ RESPONSE_COLUMNS = [
 COHERENCE_COLUMNS = [
     "frequency", "estimator", "input", "shape", "terms", "ordinary", "partial", "contribution", "cumulative",
 ]  # fmt: skip
-
 NOISE_COLUMNS = ["frequency", "estimator", "noise"]
 
 
 def parameters(
-    case: str, model: Model, found: Mapping[str, Identified], settings: IdentificationSettings
+    case: str, model: Model, estimates: Mapping[str, Identified], settings: IdentificationSettings
 ) -> pd.DataFrame:
     """Every parameter of every estimator, one row each (``PARAMETER_COLUMNS``).
 
@@ -39,17 +37,14 @@ def parameters(
     that its search did not converge.
     """
     truth = true_parameters(model.values)
-    rows: list[dict[str, Any]] = []
-    for estimator, identified in found.items():
-        for parameter in identified.parameters:
-            true = truth.get(parameter.name, 0.0)
-            if parameter.name in ("f_n", "zeta") and parameter.name not in truth:
+    rows: list[tuple[Any, ...]] = []
+    for estimator, identified in estimates.items():
+        for name, value, error in ((p.name, p.value, p.error) for p in identified.parameters):
+            if name in ("f_n", "zeta") and name not in truth:
                 continue  # a system without stiffness has neither
-            judged = judge(parameter.name, true, parameter.value, settings)
-            rows.append(
-                {"case": case, "estimator": estimator, "parameter": parameter.name, "true": true,
-                 "estimate": parameter.value, "standard_error": parameter.error, **judged, "note": identified.note}
-            )  # fmt: skip
+            true = truth.get(name, 0.0)
+            judged = judge(name, true, value, settings).values()
+            rows.append((case, estimator, name, true, value, error, *judged, identified.note))
     return pd.DataFrame(rows, columns=PARAMETER_COLUMNS)
 
 
@@ -62,78 +57,50 @@ def judge(name: str, true: float, estimate: float, settings: IdentificationSetti
     return {"relative_error": math.nan, "tolerance": tolerance, "within_tolerance": abs(estimate) <= tolerance}
 
 
-def frequency_responses(model: Model, found: Mapping[str, Identified]) -> pd.DataFrame:
+def frequency_responses(model: Model, estimates: Mapping[str, Identified]) -> pd.DataFrame:
     """A_j(f) of each estimator that has it, with its standard error and the exact function, in long form."""
     values = {key: value for key, value in model.values.items() if value is not None}
-    frames: list[pd.DataFrame] = []
-    for estimator, identified in found.items():
+    parts: list[Sequence[Any]] = []
+    for estimator, identified in estimates.items():
         result = identified.responses
         if result is None:
             continue
         for j, item in enumerate(identified.inputs):
-            exact = item.response(result.frequency, values)
-            frames.append(
-                pd.DataFrame(
-                    {
-                        "frequency": result.frequency,
-                        "estimator": estimator,
-                        "input": j + 1,
-                        "shape": item.shape,
-                        "real": result.response[j].real,
-                        "imag": result.response[j].imag,
-                        "standard_error": np.sqrt(result.covariance[:, j, j].real),
-                        "exact_real": exact.real,
-                        "exact_imag": exact.imag,
-                    }
-                )
-            )
-    return _together(frames, RESPONSE_COLUMNS)
+            exact, response = item.response(result.frequency, values), result.response[j]
+            error = np.sqrt(result.covariance[:, j, j].real)
+            parts.append(
+                (result.frequency, estimator, j + 1, item.shape, response.real, response.imag, error, exact.real,
+                 exact.imag)
+            )  # fmt: skip
+    return _stacked(RESPONSE_COLUMNS, parts)
 
 
-def coherences(found: Mapping[str, Identified]) -> pd.DataFrame:
+def coherences(estimates: Mapping[str, Identified]) -> pd.DataFrame:
     """Ordinary, partial, nonlinear and cumulative coherence of each input, in long form; some estimators have none."""
-    frames: list[pd.DataFrame] = []
-    for estimator, identified in found.items():
+    parts: list[Sequence[Any]] = []
+    for estimator, identified in estimates.items():
         result = identified.analysis or identified.responses
         if not isinstance(result, MisoResult):
             continue
         for j, item in enumerate(identified.inputs):
-            frames.append(
-                pd.DataFrame(
-                    {
-                        "frequency": result.frequency,
-                        "estimator": estimator,
-                        "input": j + 1,
-                        "shape": item.shape,
-                        "terms": label(item),
-                        "ordinary": result.ordinary[j],
-                        "partial": result.partial[j],
-                        "contribution": result.contribution[j],
-                        "cumulative": result.cumulative[j],
-                    }
-                )
-            )
-    return _together(frames, COHERENCE_COLUMNS)
+            terms = " + ".join(name.replace("_", " ") for name in item.terms)
+            parts.append(
+                (result.frequency, estimator, j + 1, item.shape, terms, result.ordinary[j], result.partial[j],
+                 result.contribution[j], result.cumulative[j])
+            )  # fmt: skip
+    return _stacked(COHERENCE_COLUMNS, parts)
 
 
-def noise_spectra(found: Mapping[str, Identified]) -> pd.DataFrame:
-    """G_nn of each estimator that has it, what its inputs leave of the force (4.44), in N^2/Hz, in long form."""
-    frames = [
-        pd.DataFrame({"frequency": result.frequency, "estimator": estimator, "noise": result.noise})
-        for estimator, result in ((name, identified.responses) for name, identified in found.items())
-        if result is not None
-    ]
-    return _together(frames, NOISE_COLUMNS)
+def noise_spectra(estimates: Mapping[str, Identified]) -> pd.DataFrame:
+    """G_nn (4.44), the autospectrum of the residual force of each estimator that has one, in N^2/Hz, in long form."""
+    results = {estimator: identified.responses for estimator, identified in estimates.items()}
+    return _stacked(NOISE_COLUMNS, [(r.frequency, name, r.noise) for name, r in results.items() if r is not None])
 
 
-def _together(frames: Sequence[pd.DataFrame], columns: list[str]) -> pd.DataFrame:
-    """One table of all; with a heading alone where no estimator has such a thing."""
+def _stacked(columns: list[str], parts: Sequence[Sequence[Any]]) -> pd.DataFrame:
+    """One table of all parts, each a value or an array per column; a heading alone where there is no part."""
+    frames = [pd.DataFrame(dict(zip(columns, part, strict=True))) for part in parts]
     return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=columns)
-
-
-def label(item: Input) -> str:
-    """The terms that an input carries, in words."""
-    return " + ".join(name.replace("_", " ") for name in item.terms)
 
 
 def write_csv(table: pd.DataFrame, path: Path) -> None:

@@ -63,7 +63,7 @@ Block = Heading | Text | Bullets | Table | Image
 
 
 def table(heading: Sequence[str], rows: Sequence[Sequence[object]]) -> Block:
-    """A table, or a word that says that there is nothing."""
+    """A table, or the word "None." where there are no rows."""
     if not rows:
         return Text("None.")
     return Table(tuple(heading), tuple(tuple(str(cell) for cell in row) for row in rows))
@@ -89,6 +89,12 @@ def _markdown(block: Block) -> str:
             return tabulate(cells, headers=list(heading), tablefmt="pipe", disable_numparse=True)
 
 
+def unpadded(heading: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    """A table in Markdown whose columns are not aligned, for cells of several hundred characters."""
+    cells = [[str(cell).replace("|", "\\|") for cell in row] for row in (heading, ["---"] * len(heading), *rows)]
+    return "\n".join(f"| {' | '.join(row)} |" for row in cells)
+
+
 def put(path: Path, mark: str, blocks: Sequence[Block]) -> None:
     """Write blocks into a Markdown file, in place of what stands between ``<!-- mark -->`` and ``<!-- /mark -->``.
 
@@ -99,9 +105,11 @@ def put(path: Path, mark: str, blocks: Sequence[Block]) -> None:
     """
     place = re.compile(rf"(<!-- {mark} -->\n).*?(<!-- /{mark} -->)", re.DOTALL)
     block = markdown(blocks)
-    text, count = place.subn(lambda found: found[1] + block + found[2], path.read_text(encoding="utf-8"))
+    text, count = place.subn(lambda match: match[1] + block + match[2], path.read_text(encoding="utf-8"))
     if count != 1:
-        raise StudyError(f"{path} has no place for {mark}: a line '<!-- {mark} -->' and one '<!-- /{mark} -->'")
+        raise StudyError(
+            f"{path} has no place for {mark}: expected a line '<!-- {mark} -->' and one '<!-- /{mark} -->'"
+        )
     replace_file(path, text.encode())
 
 
@@ -133,6 +141,6 @@ def _html(block: Block) -> str:
 def _inline(text: str) -> str:
     """Marks within a line; links lead out of a self-contained page and become plain words."""
     text = html.escape(text, quote=False)
-    for pattern, put in ((BOLD, r"<strong>\1</strong>"), (CODE, r"<code>\1</code>"), (LINK, r"\1")):
-        text = re.sub(pattern, put, text)
+    for pattern, replacement in ((BOLD, r"<strong>\1</strong>"), (CODE, r"<code>\1</code>"), (LINK, r"\1")):
+        text = re.sub(pattern, replacement, text)
     return text

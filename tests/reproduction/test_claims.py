@@ -19,17 +19,13 @@ from study.records.spectra import Segments
 from study.reproduction import config, integrator_study
 from study.reproduction.claims import (
     claims_table,
-    damping,
-    duffing,
     evidence,
     excitation_reading,
     judgement,
     levels,
     noise_with_instruments,
     preliminary_claims,
-    response,
     sample,
-    simulation,
 )
 from study.reproduction.claims import reported as stated
 from study.reproduction.claims.judgement import Condition
@@ -64,12 +60,12 @@ def steps(settings: dict[str, Any]) -> pd.DataFrame:
 
 @pytest.fixture(scope="module")
 def found(settings: dict[str, Any], steps: pd.DataFrame) -> evidence.Evidence:
-    return evidence.gather(settings, evidence.models_of(ROOT / "models"), steps.to_dict("records"))
+    return evidence.Evidence(settings, evidence.models_of(ROOT / "models"), steps.to_dict("records"))
 
 
 @pytest.fixture(scope="module")
 def judged(found: evidence.Evidence, report: Reported) -> pd.DataFrame:
-    return claims_table.judge(found, report)
+    return claims_table.judge_all(found, report)
 
 
 @pytest.mark.parametrize(
@@ -91,16 +87,17 @@ def one_statement() -> Reported:
 
 
 def test_a_claim_that_holds_needs_no_reason() -> None:
-    claim = judgement.conclude(one_statement(), "a", MET, because="never said")
+    claim = judgement.conclude(one_statement(), "a", *judgement.explained("never said", [MET]))
     assert (claim.verdict, claim.why, claim.reported) == ("reproduced", "", "3 Hz")
 
 
 def test_a_claim_that_fails_says_what_and_why() -> None:
-    claim = judgement.conclude(one_statement(), "a", MET, MISSED, because="of this")
+    claim = judgement.conclude(one_statement(), "a", *judgement.explained("of this", [MET, MISSED]))
     assert claim.verdict == "partly"
     assert claim.why == "x 1, where the criterion is x above 2: of this"
     others = [judgement.Condition("c", f"m {i}", False, f"r {i}") for i in (1, 1, 2, 3)]
-    assert judgement.conclude(one_statement(), "a", *others, because="of this").why == "r 1 (2 more like it): of this"
+    same = judgement.explained("of this", others)
+    assert judgement.conclude(one_statement(), "a", *same).why == "r 1 (2 more like it): of this"
     assert judgement.conclude(one_statement(), "a", *others).why == "r 1; r 2; r 3"
 
 
@@ -198,7 +195,7 @@ def changed(folder: Path, settings: Mapping[str, Any], system: str, old: str, ne
     text = path.read_text(encoding="utf-8")
     assert text.count(old) == 1
     path.write_text(text.replace(old, new), encoding="utf-8")
-    return evidence.gather(settings, evidence.models_of(folder / "models"), [])
+    return evidence.Evidence(settings, evidence.models_of(folder / "models"), [])
 
 
 @pytest.mark.parametrize(
@@ -206,32 +203,33 @@ def changed(folder: Path, settings: Mapping[str, Any], system: str, old: str, ne
     [
         (
             "duffing", "2.0e7", "3.0e7",
-            [duffing.duffing_cubic, duffing.siso_stiffness, preliminary_claims.duffing_pattern, simulation.table_1],
+            ["duffing_cubic", "siso_stiffness", "duffing_pattern", "table_1"],
         ),
-        ("duffing_van_der_pol", "2.0e6", "1.0e6", [damping.combined_cubic, levels.invariant]),
-        ("linear", "3.77", "3.9", [preliminary_claims.oval_width]),
-        ("dead_band", "0.0025", "0.0035", [simulation.stiffness_gap, preliminary_claims.dead_band_pattern]),
+        ("duffing_van_der_pol", "2.0e6", "1.0e6", ["combined_cubic", "levels_invariant"]),
+        ("linear", "3.77", "3.9", ["oval_width"]),
+        ("dead_band", "0.0025", "0.0035", ["system_stiffness_gap", "dead_band_pattern"]),
     ],
 )  # fmt: skip
 def test_a_changed_coefficient_changes_the_verdicts(
     tmp_path: Path, settings: dict[str, Any], found: evidence.Evidence, report: Reported,
-    system: str, old: str, new: str, claims: list[Any],
+    system: str, old: str, new: str, claims: list[str],
 ) -> None:  # fmt: skip
     other = changed(tmp_path, settings, system, old, new)
     for claim in claims:
-        assert claim(found, report).verdict == "reproduced"
-        assert claim(other, report).verdict != "reproduced"
+        assert claims_table.judge(claim, found, report).verdict == "reproduced"
+        assert claims_table.judge(claim, other, report).verdict != "reproduced"
 
 
 def test_a_changed_statement_changes_the_verdict(found: evidence.Evidence, report: Reported) -> None:
     rows = dict(report.statements)
     rows["siso_stiffness"] = Statement(id="siso_stiffness", where="Section 5.2.2", what="k", value=400.0, unit="N/m")
-    assert duffing.siso_stiffness(found, Reported(rows)).verdict == "not reproduced"
+    assert claims_table.judge("siso_stiffness", found, Reported(rows)).verdict == "not reproduced"
 
 
 def test_the_same_evidence_twice(settings: dict[str, Any], found: evidence.Evidence, report: Reported) -> None:
-    again = evidence.gather(settings, evidence.models_of(ROOT / "models"), [])
-    assert duffing.siso_frequency(again, report) == duffing.siso_frequency(found, report)
+    again = evidence.Evidence(settings, evidence.models_of(ROOT / "models"), [])
+    first, second = (claims_table.judge("siso_frequency", whose, report) for whose in (found, again))
+    assert first == second
 
 
 def test_the_dead_band_is_read_from_its_pattern(found: evidence.Evidence) -> None:
@@ -261,13 +259,16 @@ def test_what_the_cubic_terms_add_at_the_lowest_level_is_what_siso_finds_too_muc
     single = found.at("duffing_van_der_pol", 0.2)
     assert single.siso("k").mean / 355.3 - 1.0 == pytest.approx(spring, rel=0.2)
     assert single.siso("c").mean / 3.77 - 1.0 == pytest.approx(damper, rel=0.2)
-    assert f"adds {100 * spring:.0f} % to the force that follows u" in levels.similar(found, report).why
+    assert (
+        f"adds {100 * spring:.0f} % to the force that follows u"
+        in claims_table.judge("levels_similar", found, report).why
+    )
 
 
 def test_a_histogram_is_far_from_gaussian_by_its_shape_not_by_its_length(
     found: evidence.Evidence, report: Reported
 ) -> None:
-    claim = damping.combined_histogram(found, report)
+    claim = claims_table.judge("combined_histogram", found, report)
     assert "2.6 % lie beyond two standard deviations where a Gaussian has 4.6 %" in claim.why
     record = found.records(evidence.Drive("duffing_van_der_pol"))[0]["displacement"]
     short = np.split(record, 8)
@@ -290,7 +291,7 @@ def test_the_resonance_of_the_fast_mathieu_system_is_drawn_towards_half_its_stif
     turn = abs(np.angle(np.linalg.eigvals(np.array(ends).T)[0])) / (2.0 * math.pi)  # of a cycle in each period
     line = (1.0 - turn) / period
     assert 2.5 < line < 2.9
-    claim = response.mathieu_fast(found, report)
+    claim = claims_table.judge("mathieu_fast", found, report)
     said = re.search(r"to ([0-9.]+) Hz, and its sum with f_m to ([0-9.]+) Hz", claim.why)
     assert said
     assert [float(x) for x in said.groups()] == pytest.approx([line, 5.0 + line], abs=0.11)
@@ -306,7 +307,7 @@ def test_instruments_are_judged_at_every_noise_by_their_own_bias(
         return {"m": Sample((-0.098, 0.0) if noise == 0.1 else (-0.01, 0.02)), "c": Sample((-0.2, 0.21))}
 
     monkeypatch.setattr(noise_with_instruments, "biases", off)
-    claim = noise_with_instruments.unbiased(found, report)
+    claim = claims_table.judge("noise_instruments", found, report)
     assert asked == [0.05, 0.1, 0.2]
     assert claim.verdict == "reproduced", "a bias below the limit, and scatter that explains it"
     assert "10 % noise: m -4.9 +- 4.9 %, c +0.5 +- 20 %" in claim.measured
@@ -316,7 +317,8 @@ def test_instruments_are_judged_at_every_noise_by_their_own_bias(
 
 def test_raw_is_the_nearer_reading(found: evidence.Evidence, report: Reported) -> None:
     rows = excitation_reading.study(found, report)
-    assert excitation_reading.preferred(list(rows["nearer"])) == "raw"
+    raw, filtered = ((rows["nearer"] == reading).sum() for reading in ("raw", "filtered"))
+    assert raw > filtered
     stiffness = rows.iloc[0]
     assert stiffness["raw_distance"] == pytest.approx(stiffness["raw_mean"] - 500.0)
     assert abs(stiffness["raw_distance"]) < abs(stiffness["filtered_distance"])
@@ -353,8 +355,8 @@ def integrated(error: float, diverged: int = 0) -> list[dict[str, Any]]:
 def test_a_run_that_diverges_makes_error_free_worse_and_none_makes_it_better(
     settings: dict[str, Any], report: Reported, error: float, diverged: int, said: str
 ) -> None:
-    some = evidence.gather(settings, evidence.models_of(ROOT / "models"), integrated(error, diverged))
-    claim = simulation.error_free(some, report)
+    some = evidence.Evidence(settings, evidence.models_of(ROOT / "models"), integrated(error, diverged))
+    claim = claims_table.judge("error_free", some, report)
     assert claim.verdict == said
     assert ("2 of 4 runs of linear diverge (unit variance filtered)" in claim.measured) == (diverged == 2)
 

@@ -197,7 +197,7 @@ def test_the_band_holds_95_percent_of_real_parts_and_of_magnitudes():
 
 
 def test_coherences_of_an_estimator_that_is_not_there():
-    with pytest.raises(StudyError, match="nothing of the estimator 'other'; they are of miso"):
+    with pytest.raises(StudyError, match="nothing of the estimator 'other'; expected one of miso"):
         curves.coherences(coherence_table("duffing"), 10.0, "other")
 
 

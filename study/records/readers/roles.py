@@ -6,7 +6,7 @@ different people and are never guessed.
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from study.records.readers.options import BESIDE, ReadOptions
@@ -47,7 +47,7 @@ def assign(path: Path, table: Table, options: ReadOptions) -> dict[str, Column]:
         _check_duplicates(path, table)
     rest = [c for c in table.columns if all(c is not n for n in named.values())]
     if not complete or "time" not in named:
-        guesses = _guessed(path, table, rest, [role for role in NAMES if role not in named])
+        guesses = _guessed(path, table, rest, named)
         named |= {role: column for role, column in guesses.items() if role == "time" or not complete}
     motion = any(m in named for m in MOTIONS)
     if "force" not in named or not motion:
@@ -80,17 +80,25 @@ def _check_duplicates(path: Path, table: Table) -> None:
         expect(count == 1, f"{path}: {twice}; give columns by number, such as --column force={numbers[0]}")
 
 
-def _guessed(path: Path, table: Table, columns: Sequence[Column], roles: Iterable[str]) -> dict[str, Column]:
+def _guessed(path: Path, table: Table, columns: Sequence[Column], known: Collection[str]) -> dict[str, Column]:
     """Roles that names, and where these say nothing units, leave no doubt about."""
-    guesses: dict[str, Column] = {}
-    for role in roles:
-        candidates = [c for c in columns if c.name == role] or [c for c in columns if _role_of(c) == role]
+    possible: dict[str, list[Column]] = {}
+    for role in (r for r in NAMES if r not in known):
+        possible[role] = [c for c in columns if c.name == role] or [c for c in columns if _role_of(c) == role]
+    motions = [role for role in MOTIONS if role in possible]
+    if any(_spelt_out(c, role) for role in motions for c in possible[role]):
+        for role in motions:  # beside a motion that is spelt out, a column called v or a may be anything
+            possible[role] = [c for c in possible[role] if _spelt_out(c, role)]
+    for role, candidates in possible.items():
         if len(candidates) > 1:
             names = " and ".join(repr(c.name) for c in candidates)
             raise _ask(path, table, f"{names} could each be the {role}")
-        if candidates:
-            guesses[role] = candidates[0]
-    return guesses
+    return {role: candidates[0] for role, candidates in possible.items() if candidates}
+
+
+def _spelt_out(column: Column, role: str) -> bool:
+    """Whether more than a single letter says what a column is."""
+    return len(_last(column)) > 1 or _unit_role(column.unit) == role
 
 
 def _role_of(column: Column) -> str:
@@ -112,6 +120,7 @@ def _suffixed(column: Column) -> tuple[str, str]:
 
 
 def _last(column: Column) -> str:
+    """A column's name without the folders of its path."""
     return column.name.rsplit("/", 1)[-1]
 
 

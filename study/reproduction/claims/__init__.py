@@ -1,5 +1,5 @@
 """The report's checkable statements, each held against what the study measures.
 
-A claim is a small function ``(Evidence, Reported) -> Claim`` in the module of its section. What the
-report states comes from ``config/reported.tsv``; the verdict follows from the measured numbers alone.
+A claim is a small function in the module of its section, named after its row in ``config/reported.tsv``, that gives
+the conditions on which the statement holds. The verdict follows from them and is never written down.
 """

@@ -1,6 +1,6 @@
 """All claims as a table and as a page."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import asdict
 
 import pandas as pd
@@ -19,47 +19,38 @@ from study.reproduction.claims import (
     simulation,
 )
 from study.reproduction.claims.evidence import Evidence
-from study.reproduction.claims.judgement import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED, Claim
+from study.reproduction.claims.judgement import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED, Claim, conclude
 from study.reproduction.claims.reported import Reported
+from study.support.document import unpadded
 
-CLAIMS: tuple[Callable[[Evidence, Reported], Claim], ...] = (
-    *simulation.CLAIMS,
-    *response.CLAIMS,
-    *preliminary_claims.CLAIMS,
-    *linear_system.CLAIMS,
-    *duffing.CLAIMS,
-    *damping.CLAIMS,
-    *mathieu.CLAIMS,
-    *dead_band.CLAIMS,
-    *levels.CLAIMS,
-    *noise_with_instruments.CLAIMS,
-    *conclusions.CLAIMS,
-)
-COLUMNS = ["id", "where", "claim", "reported", "measured", "criterion", "verdict", "why"]
+SECTIONS = (
+    simulation, response, preliminary_claims, linear_system, duffing, damping, mathieu, dead_band, levels,
+    noise_with_instruments, conclusions,
+)  # fmt: skip
+CLAIMS = {name: conditions for section in SECTIONS for name, conditions in section.CLAIMS.items()}
 
 
-def judge(evidence: Evidence, reported: Reported, progress: Callable[[int, Claim], None] | None = None) -> pd.DataFrame:
+def judge(name: str, evidence: Evidence, reported: Reported) -> Claim:
+    """One claim, by its id."""
+    return conclude(reported, name, *CLAIMS[name](evidence, reported))
+
+
+def judge_all(
+    evidence: Evidence, reported: Reported, progress: Callable[[int, Claim], None] | None = None
+) -> pd.DataFrame:
     """Every claim, one row each, in the order of the report."""
-    rows: list[Claim] = []
-    for claim in CLAIMS:
-        rows.append(claim(evidence, reported))
+    claims: list[Claim] = []
+    for name in CLAIMS:
+        claims.append(judge(name, evidence, reported))
         if progress is not None:
-            progress(len(rows), rows[-1])
+            progress(len(claims), claims[-1])
     order = list(reported.statements)
-    rows.sort(key=lambda r: order.index(r.id))
-    return pd.DataFrame([asdict(row) for row in rows], columns=COLUMNS)
+    return pd.DataFrame([asdict(claim) for claim in sorted(claims, key=lambda c: order.index(c.id))])
 
 
 def page(table: pd.DataFrame) -> str:
     """The table as a page: counts, then every claim."""
-    own = table[~table["where"].str.startswith(BESIDE)]
-    counts = own["verdict"].value_counts()
-    found = [f"{int(counts.get(v, 0))} {v}" for v in (REPRODUCED, PARTLY, NOT_REPRODUCED)]
-    lines = ["# Claims of the report", "", f"{len(own)} statements: {', '.join(found)}.", ""]
-    lines += [_cells(COLUMNS), _cells(["---"] * len(COLUMNS))]
-    lines += [_cells(row) for row in table[COLUMNS].to_numpy()]
-    return "\n".join(lines) + "\n"
-
-
-def _cells(cells: Iterable[object]) -> str:
-    return "| " + " | ".join(str(c).replace("|", "\\|") for c in cells) + " |"
+    verdicts = table.loc[~table["where"].str.startswith(BESIDE), "verdict"]
+    counts = ", ".join(f"{(verdicts == verdict).sum()} {verdict}" for verdict in (REPRODUCED, PARTLY, NOT_REPRODUCED))
+    rows = unpadded([str(column) for column in table.columns], table.to_numpy().tolist())
+    return f"# Claims of the report\n\n{len(verdicts)} statements: {counts}.\n\n{rows}\n"

@@ -1,64 +1,54 @@
 """Section 6: the conclusions."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
 from study.equations.simulate import Integrator, simulate
 from study.records.excitation import Excitation, force, theoretical_autospectrum
-from study.reproduction.claims.common import recovered
-from study.reproduction.claims.damping import COMBINED
-from study.reproduction.claims.duffing import LINEAR_PARTS, levels
+from study.reproduction.claims.common import COMBINED, LINEAR_PARTS, levels, noises, recovered
 from study.reproduction.claims.evidence import Assumed, Drive, Ensemble, Evidence, Outcome
-from study.reproduction.claims.judgement import Claim, Condition, at_least, conclude, together
-from study.reproduction.claims.levels import PARTS, noises
+from study.reproduction.claims.judgement import Condition, at_least, claims, explained, together
+from study.reproduction.claims.levels import PARTS
 from study.reproduction.claims.reported import Reported
-from study.reproduction.claims.sample import Sample
 from study.reproduction.ensemble import threaded
+from study.support.numbers import percent
 
 Floats = NDArray[np.float64]
-ALL_PARTS = {
-    "duffing": (*LINEAR_PARTS, "k3"),
-    "van_der_pol": (*LINEAR_PARTS, "c3"),
-    "mathieu": (*LINEAR_PARTS, "k_m"),
-    "dead_band": (*LINEAR_PARTS, "k_dead_band"),
-}
+NONLINEAR_PART = {"duffing": "k3", "van_der_pol": "c3", "mathieu": "k_m", "dead_band": "k_dead_band"}
 SPECTRA = {
-    "Pierson-Moskowitz": (("kind", "pierson_moskowitz"),),
-    "random-phase multisine": (("kind", "random_phase_multisine"),),
-    "swept sine": (("kind", "swept_sine"),),
+    "Pierson-Moskowitz": "pierson_moskowitz",
+    "random-phase multisine": "random_phase_multisine",
+    "swept sine": "swept_sine",
 }
 
 
-def conclusion_3(evidence: Evidence, reported: Reported) -> Claim:
+def conclusion_3(evidence: Evidence, reported: Reported) -> list[Condition]:
     """Two terms that the combined system does not have, assumed beside its own."""
-    more = ("quadratic_stiffness", "quintic_stiffness")
-    ensemble = evidence.ensemble(Drive(COMBINED), Assumed(plus=more))
-    found = recovered(evidence, reported, COMBINED, ensemble, PARTS)
-    extra: list[Condition] = []
+    ensemble = evidence.ensemble(Drive(COMBINED), Assumed(plus=("quadratic_stiffness", "quintic_stiffness")))
+    conditions = recovered(evidence, reported, ensemble, PARTS)
     for name in ("k2", "k5"):
         sample = ensemble.miso(name)
-        inside = abs(sample.mean) <= 2.0 * sample.scatter
-        extra.append(Condition(f"mean {name} within 2 standard deviations of zero", f"{name} {sample}", inside))
-    return conclude(reported, "conclusion_3", *found, *extra)
+        met = abs(sample.mean) <= 2.0 * sample.scatter
+        conditions.append(Condition(f"mean {name} within 2 standard deviations of zero", f"{name} {sample}", met))
+    return conditions
 
 
-def conclusion_4(evidence: Evidence, reported: Reported) -> Claim:
+def conclusion_4(evidence: Evidence, reported: Reported) -> list[Condition]:
     """Other spectra, a periodic force, a sweep, and a strongly skewed force."""
-    conditions: list[Condition] = []
-    for label, excitation in SPECTRA.items():
-        ensemble = evidence.ensemble(Drive(COMBINED, excitation=excitation), Assumed())
-        conditions.append(together(label, recovered(evidence, reported, COMBINED, ensemble, PARTS)))
-    skewed = recovered(evidence, reported, COMBINED, _skewed(evidence), PARTS)
-    conditions.append(together("squared Gaussian", skewed))
-    low, (_, high) = _force_from(evidence), evidence.settings["fit_band"]
-    drive = Drive(COMBINED, excitation=SPECTRA["Pierson-Moskowitz"])
-    there = recovered(evidence, reported, COMBINED, evidence.ensemble(drive, Assumed(band=(low, high))), PARTS)
-    return conclude(
-        reported, "conclusion_4", *conditions,
-        because="lines that the force hardly excites hold leakage; fitted from "
-        f"{low:.1f} Hz on, where the Pierson-Moskowitz force begins, {', '.join(c.measured for c in there)} are left; "
-        "a sweep, which is not stationary, excites each line in one or two segments only",
-    )  # fmt: skip
+    drives = {label: Drive(COMBINED, excitation=(("kind", kind),)) for label, kind in SPECTRA.items()}
+    ensembles = {label: evidence.ensemble(drive) for label, drive in drives.items()}
+    ensembles["squared Gaussian"] = _skewed(evidence)
+    low, high = _force_from(evidence), evidence.settings["fit_band"][1]
+    excited = evidence.ensemble(drives["Pierson-Moskowitz"], Assumed(band=(low, high)))
+    left = ", ".join(condition.measured for condition in recovered(evidence, reported, excited, PARTS))
+    return explained(
+        f"lines that the force hardly excites hold leakage; fitted from {low:.1f} Hz on, where the Pierson-Moskowitz "
+        f"force begins, {left} are left; a sweep, which is not stationary, excites each line in one or two segments "
+        "only",
+        [together(label, recovered(evidence, reported, e, PARTS)) for label, e in ensembles.items()],
+    )
 
 
 def _force_from(evidence: Evidence) -> float:
@@ -76,60 +66,57 @@ def squared(seed: int, samples: int, dt: float, cutoff: float) -> Floats:
 
 
 def _skewed(evidence: Evidence) -> Ensemble:
-    sampling, settings = evidence.settings["sampling"], evidence.settings["excitations"]["report"]
-    model, told = evidence.model(Drive(COMBINED)), Integrator(**evidence.settings["integrator"])
+    sampling, excitation = evidence.settings["sampling"], evidence.settings["excitations"]["report"]
+    model, integrator = evidence.model(Drive(COMBINED)), Integrator(**evidence.settings["integrator"])
 
-    def one(seed: int) -> Outcome:
-        values = squared(seed, sampling["samples"], sampling["dt"], settings.get("cutoff", 12.5))
-        return evidence.analyse(model, simulate(model, values, sampling["dt"], told))
+    def outcome(seed: int) -> Outcome:
+        values = squared(seed, sampling["samples"], sampling["dt"], excitation.get("cutoff", 12.5))
+        return evidence.analyse(model, simulate(model, values, sampling["dt"], integrator))
 
-    own, *others = threaded(one, [settings["seed"], *evidence.seeds])
-    return Ensemble(own, tuple(others))
-
-
-def conclusion_5_level(evidence: Evidence, reported: Reported) -> Claim:
-    """Nonlinear systems at the levels of Section 5.3."""
-    conditions: list[Condition] = []
-    for system in ("duffing", "van_der_pol", "dead_band"):
-        for level in (levels(reported)[0], levels(reported)[-1]):
-            ensemble = evidence.at(system, level)
-            found = recovered(evidence, reported, system, ensemble, ALL_PARTS[system])
-            conditions.append(together(f"{system} at {level:g}", found))
-    return conclude(reported, "conclusion_5_level", *conditions)
+    own, *others = threaded(outcome, [excitation["seed"], *evidence.seeds])
+    return Ensemble(COMBINED, own, tuple(others))
 
 
-def conclusion_5_noise(evidence: Evidence, reported: Reported) -> Claim:
+def _parts(system: str) -> tuple[str, ...]:
+    return (*LINEAR_PARTS, NONLINEAR_PART[system])
+
+
+def conclusion_5_level(evidence: Evidence, reported: Reported) -> list[Condition]:
+    """Nonlinear systems at the lowest and the highest level of Section 5.3."""
+    lowest, *_, highest = levels(reported)
+    return [
+        together(
+            f"{system} at {level:g}", recovered(evidence, reported, evidence.at(system, level), _parts(system))
+        )
+        for system in ("duffing", "van_der_pol", "dead_band")
+        for level in (lowest, highest)
+    ]  # fmt: skip
+
+
+def conclusion_5_noise(evidence: Evidence, reported: Reported) -> list[Condition]:
     """Each parameter under the lowest noise within 5 %."""
     noise = noises(reported)[0]
-    ensemble = evidence.at(COMBINED, 1.0, noise)
     conditions: list[Condition] = []
     for name in PARTS:
-        true = reported.table_1(COMBINED, name)
-        sample: Sample = ensemble.miso(name).scaled(1.0 / true)
-        text = f"{100 * noise:g} % noise: {name} {100 * (sample.mean - 1):+.3g} +- {100 * sample.error:.1g} %"
-        conditions.append(Condition(f"mean {name} within 5 %", text, abs(sample.mean - 1.0) <= 0.05, text))
-    return conclude(
-        reported, "conclusion_5_noise", *conditions,
-        because="noise on u biases the reverse estimate, most where the response is weak",
-    )  # fmt: skip
+        ratio = evidence.at(COMBINED, noise=noise).miso(name).scaled(1.0 / reported.table_1(COMBINED, name))
+        text = f"{percent(noise)} noise: {name} {percent(ratio.mean - 1.0, '+.3g', ratio.error)}"
+        conditions.append(Condition(f"mean {name} within 5 %", text, abs(ratio.mean - 1.0) <= 0.05, text))
+    return explained("noise on u biases the reverse estimate, most where the response is weak", conditions)
 
 
-def conclusion_6(evidence: Evidence, reported: Reported) -> Claim:
+def conclusion_6(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """The lowest level of Section 5.3."""
     ensemble = evidence.at(COMBINED, levels(reported)[0])
-    return conclude(
-        reported, "conclusion_6",
-        at_least("linear coherence at the lowest level", ensemble.linear_coherence(), 0.95),
-        *recovered(evidence, reported, COMBINED, ensemble, ("k3", "c3")),
-    )  # fmt: skip
+    yield at_least("linear coherence at the lowest level", ensemble.linear_coherence(), 0.95)
+    yield from recovered(evidence, reported, ensemble, ("k3", "c3"))
 
 
-def conclusion_7(evidence: Evidence, reported: Reported) -> Claim:
+def conclusion_7(evidence: Evidence, reported: Reported) -> list[Condition]:
     """Every parameter of the four kinds."""
-    conditions: list[Condition] = []
-    for system, names in ALL_PARTS.items():
-        conditions.append(together(system, recovered(evidence, reported, system, evidence.unit(system), names)))
-    return conclude(reported, "conclusion_7", *conditions)
+    return [
+        together(system, recovered(evidence, reported, evidence.at(system), _parts(system)))
+        for system in NONLINEAR_PART
+    ]  # fmt: skip
 
 
-CLAIMS = (conclusion_3, conclusion_4, conclusion_5_level, conclusion_5_noise, conclusion_6, conclusion_7)
+CLAIMS = claims(conclusion_3, conclusion_4, conclusion_5_level, conclusion_5_noise, conclusion_6, conclusion_7)

@@ -1,179 +1,116 @@
 """Sections 4.5 and 5.2.2: the Duffing system."""
 
-import math
-from itertools import pairwise
+from collections.abc import Iterator
 
 import numpy as np
 
-from study.reproduction.claims.common import less_distorted, looks_gaussian, near_unity, recovered
-from study.reproduction.claims.evidence import Assumed, Drive, Ensemble, Evidence
-from study.reproduction.claims.judgement import Claim, Condition, at_most, close, conclude, near, one_record
+from study.reproduction.claims import common
+from study.reproduction.claims.evidence import Assumed, Drive, Evidence
+from study.reproduction.claims.judgement import Condition, at_most, claims, close, explained, near, one_record
 from study.reproduction.claims.reported import Reported
-from study.reproduction.claims.sample import Sample, average
-
-LEVELS = ("lowest", "second", "third", "highest")
-READ_OFF = 0.05  # what a hand reads off a curve
-LINEAR_PARTS = ("m", "c", "k", "f_n", "zeta")
+from study.reproduction.claims.sample import average
+from study.support.numbers import percent
 
 
-def levels(reported: Reported) -> list[float]:
-    """The input variances of Section 5.3."""
-    return [reported.value(f"levels_invariant.{name}") for name in LEVELS]
-
-
-def added_terms(evidence: Evidence, reported: Reported) -> Claim:
+def added_terms(evidence: Evidence, reported: Reported) -> list[Condition]:
     """A quintic stiffness in the Duffing analysis, without noise and with the lowest noise of Section 5.4."""
-    noise = reported.value("noise_random_only.low")
-    conditions: list[Condition] = []
-    for level, text in ((0.0, "no noise"), (noise, f"{100 * noise:g} % noise")):
-        drive = Drive("duffing", noise=level)
-        plain = evidence.ensemble(drive, Assumed())
-        more = evidence.ensemble(drive, Assumed(plus=("quintic_stiffness",)))
-        conditions += _added(plain, more, text)
-    return conclude(
-        reported, "added_terms", *conditions,
-        because="noise on u biases its powers, and the added power takes up part of what the others lose",
-    )  # fmt: skip
-
-
-def _added(plain: Ensemble, more: Ensemble, text: str) -> list[Condition]:
-    extra = more.sample(lambda o: o.miso.values["k5"])
-    found = [
-        Condition(
-            f"{text}: mean k5 within 2 standard deviations of a record of zero",
-            f"{text}: k5 {extra}, scatter {extra.scatter:.2g}",
-            abs(extra.mean) <= 2.0 * extra.scatter,
-            f"with {text} k5 lies {abs(extra.mean) / extra.scatter:.1f} scatters of a record from zero",
-        )
-    ]  # fmt: skip
-    for name in ("m", "c", "k", "k3"):
-        before, after = plain.miso(name), more.miso(name)
-        change, limit = after.minus(before), 2.0 * before.scatter
-        found.append(
-            Condition(
-                f"{text}: mean change of {name} within 2 standard deviations of a record",
-                f"{text}: {name} changes by {change} (scatter {before.scatter:.2g})",
-                abs(change.mean) <= limit,
-                f"with {text} it moves {name} from {before.mean:.4g} to {after.mean:.4g}",
-            )
-        )
-    return found
-
-
-def duffing_linear(evidence: Evidence, reported: Reported) -> Claim:
-    """A_1 of the Duffing system by MI/SO."""
-    return conclude(
-        reported, "duffing_linear", *recovered(evidence, reported, "duffing", evidence.unit("duffing"), LINEAR_PARTS)
+    lowest = common.noises(reported)[0]
+    return explained(
+        "noise on u biases its powers, and the added power takes up part of what the others lose",
+        [*_added(evidence, 0.0, "no noise"), *_added(evidence, lowest, f"{percent(lowest)} noise")],
     )
 
 
-def siso_stiffness(evidence: Evidence, reported: Reported) -> Claim:
-    """k = 500."""
-    stated, ensemble = reported.value("siso_stiffness"), evidence.unit("duffing")
-    read = ensemble.sample(lambda o: o.siso.read["k"])
-    return conclude(
-        reported, "siso_stiffness",
-        close("hand-read k", read, stated, READ_OFF),
-        one_record("hand-read k", read, stated),
-        close("fitted k", ensemble.siso("k"), stated, READ_OFF),
-    )  # fmt: skip
+def _added(evidence: Evidence, noise: float, label: str) -> list[Condition]:
+    drive = Drive("duffing", noise=noise)
+    plain, extended = evidence.ensemble(drive), evidence.ensemble(drive, Assumed(plus=("quintic_stiffness",)))
+    k5 = extended.miso("k5")
+    conditions = [
+        Condition(
+            f"{label}: mean k5 within 2 standard deviations of a record of zero",
+            f"{label}: k5 {k5}, scatter {k5.scatter:.2g}", abs(k5.mean) <= 2.0 * k5.scatter,
+            f"with {label} k5 lies {abs(k5.mean) / k5.scatter:.1f} scatters of a record from zero",
+        )
+    ]  # fmt: skip
+    for name in ("m", "c", "k", "k3"):
+        before, after = plain.miso(name), extended.miso(name)
+        change = after.minus(before)
+        conditions.append(
+            Condition(
+                f"{label}: mean change of {name} within 2 standard deviations of a record",
+                f"{label}: {name} changes by {change} (scatter {before.scatter:.2g})",
+                abs(change.mean) <= 2.0 * before.scatter,
+                f"with {label} it moves {name} from {before.mean:.4g} to {after.mean:.4g}",
+            )
+        )
+    return conditions
 
 
-def siso_frequency(evidence: Evidence, reported: Reported) -> Claim:
+def _siso_curve(evidence: Evidence, name: str, stated: float, why: str = "") -> list[Condition]:
+    """The SI/SO curve gives a parameter that the report states, read by hand and fitted."""
+    read, fitted = evidence.at("duffing").hand_read(name), evidence.at("duffing").siso(name)
+    return [
+        close(f"hand-read {name}", read, stated, common.READ_OFF, why),
+        one_record(f"hand-read {name}", read, stated, why),
+        close(f"fitted {name}", fitted, stated, common.READ_OFF, why),
+    ]
+
+
+def siso_frequency(evidence: Evidence, reported: Reported) -> list[Condition]:
     """f_n = 3.6 Hz."""
-    stated, ensemble = reported.value("siso_frequency"), evidence.unit("duffing")
-    read, fitted = ensemble.sample(lambda o: o.siso.read.get("f_n", math.nan)), ensemble.siso("f_n")
-    lower = evidence.at("duffing", levels(reported)[1]).sample(lambda o: o.siso.read.get("f_n", math.nan))
+    fitted = evidence.at("duffing").siso("f_n")
+    lower = evidence.at("duffing", common.levels(reported)[1]).hand_read("f_n")
     why = (
         f"the best linear fit lies at {fitted.mean:.2f} Hz; at half the variance it is read at {lower.mean:.2f} Hz, so "
         "that the report's force seems to have been weaker"
     )
-    return conclude(
-        reported, "siso_frequency",
-        close("hand-read f_n", read, stated, READ_OFF, why),
-        one_record("hand-read f_n", read, stated, why),
-        close("fitted f_n", fitted, stated, READ_OFF, why),
-    )  # fmt: skip
+    return _siso_curve(evidence, "f_n", reported.value("siso_frequency"), why)
 
 
-def siso_wrong(evidence: Evidence, reported: Reported) -> Claim:
-    """SI/SO k and m at every level, fitted and (k) hand-read, against the study's tolerances."""
-    conditions: list[Condition] = []
-    for level in levels(reported):
-        ensemble = evidence.at("duffing", level)
+def siso_wrong(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
+    """SI/SO k and m at every level, against the study's tolerances."""
+    for level in common.levels(reported):
         for name in ("k", "m"):
-            true, found = reported.table_1("duffing", name), ensemble.siso(name)
+            true, sample = reported.table_1("duffing", name), evidence.at("duffing", level).siso(name)
             allowed = evidence.tolerance("duffing", name)
-            conditions.append(
-                Condition(
-                    f"variance {level:g}: mean SI/SO {name} more than {100 * allowed:g} % off",
-                    f"variance {level:g}: {name} {found}",
-                    abs(found.mean - true) > allowed * true,
-                )
-            )
-    return conclude(reported, "siso_wrong", *conditions)
+            yield Condition(
+                f"variance {level:g}: mean SI/SO {name} more than {percent(allowed)} off",
+                f"variance {level:g}: {name} {sample}", abs(sample.mean - true) > allowed * true,
+            )  # fmt: skip
 
 
-def siso_varies(evidence: Evidence, reported: Reported) -> Claim:
-    """SI/SO k rises from level to level, by more than it scatters."""
-    found = {level: evidence.at("duffing", level).siso("k") for level in levels(reported)}
-    return conclude(reported, "siso_varies", *rising("SI/SO k", found))
-
-
-def rising(label: str, found: dict[float, Sample]) -> list[Condition]:
-    """From each level to the next the mean rises by more than two standard deviations of a record."""
-    pairs = list(found.items())
-    return [
-        Condition(
-            f"{label} at {high:g} above that at {low:g} by two standard deviations of a record",
-            f"{low:g}: {a}, {high:g}: {b}",
-            b.mean - a.mean > 2.0 * max(a.scatter, b.scatter),
-        )
-        for (low, a), (high, b) in pairwise(pairs)
-    ]
-
-
-def duffing_cubic(evidence: Evidence, reported: Reported) -> Claim:
+def duffing_cubic(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Re A_2 = k3, Im A_2 = 0."""
-    ensemble, k3 = evidence.unit("duffing"), reported.value("duffing_cubic")
+    ensemble, k3 = evidence.at("duffing"), reported.value("duffing_cubic")
     imaginary = ensemble.sample(lambda o: average(o.miso.response[1].imag) / k3)
     lines = ensemble.sample(lambda o: float(np.median(np.abs(o.miso.response[1].imag))) / k3)
-    return conclude(
-        reported, "duffing_cubic",
-        close("k3", ensemble.miso("k3"), k3, evidence.tolerance("duffing", "k3")),
-        near("Im A_2 / k3 averaged over the band", imaginary, 0.0, 0.01),
-        at_most("median |Im A_2| / k3 of a line", lines, READ_OFF),
-    )  # fmt: skip
+    yield close("k3", ensemble.miso("k3"), k3, evidence.tolerance("duffing", "k3"))
+    yield near("Im A_2 / k3 averaged over the band", imaginary, 0.0, 0.01)
+    yield at_most("median |Im A_2| / k3 of a line", lines, common.READ_OFF)
 
 
-def duffing_coherence(evidence: Evidence, reported: Reported) -> Claim:
-    """Figure 23, upper curve."""
-    return conclude(reported, "duffing_coherence", *near_unity(evidence.unit("duffing")))
-
-
-def duffing_share(evidence: Evidence, reported: Reported) -> Claim:
+def duffing_share(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Figure 23, lower curve: approximately 90 percent."""
-    stated, found = reported.value("duffing_share"), evidence.unit("duffing").linear_coherence()
-    lower = evidence.at("duffing", levels(reported)[1]).linear_coherence()
-    return conclude(
-        reported, "duffing_share",
-        near("linear coherence over the fit band", found, stated, 0.05,
-             f"on average {found.mean:.3f} passes through L_1; {stated:g} would be met by a weaker force "
-             f"({lower.mean:.3f} at half the variance)"),
-    )  # fmt: skip
+    stated, share = reported.value("duffing_share"), evidence.at("duffing").linear_coherence()
+    lower = evidence.at("duffing", common.levels(reported)[1]).linear_coherence()
+    why = (
+        f"on average {share.mean:.3f} passes through L_1; {stated:g} would be met by a weaker force ({lower.mean:.3f} "
+        "at half the variance)"
+    )
+    yield near("linear coherence over the fit band", share, stated, 0.05, why)
 
 
-def duffing_histogram(evidence: Evidence, reported: Reported) -> Claim:
+def duffing_histogram(evidence: Evidence, _: Reported) -> Iterator[Condition]:
     """Figure 24: a histogram would not tell, and tells less than Van der Pol's."""
     why = "a flat top and short tails: a record of this length is long enough to refuse the Gaussian"
-    return conclude(
-        reported, "duffing_histogram",
-        *looks_gaussian(evidence, "duffing", 0.5, why),
-        less_distorted(evidence, "duffing", "van_der_pol"),
-    )  # fmt: skip
+    yield common.looks_gaussian(evidence, "duffing", 0.5, why)
+    yield common.less_distorted(evidence, "duffing", "van_der_pol")
 
 
-CLAIMS = (
-    added_terms, duffing_linear, siso_stiffness, siso_frequency, siso_wrong, siso_varies, duffing_cubic,
-    duffing_coherence, duffing_share, duffing_histogram,
+CLAIMS = claims(
+    added_terms, siso_frequency, siso_wrong, duffing_cubic, duffing_share, duffing_histogram,
+    siso_stiffness=lambda e, r: _siso_curve(e, "k", r.value("siso_stiffness")),
+    duffing_linear=lambda e, r: common.recovered(e, r, e.at("duffing"), common.LINEAR_PARTS),
+    siso_varies=lambda e, r: common.rising("SI/SO k", {v: e.at("duffing", v).siso("k") for v in common.levels(r)}),
+    duffing_coherence=lambda e, _: common.near_unity(e.at("duffing")),
 )  # fmt: skip

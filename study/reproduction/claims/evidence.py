@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from study.identify.estimators.base import Identified, Settings
 from study.identify.estimators.hand_read import read_curve
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.records.record import Record
-from study.records.spectra import Segments
+from study.records.spectra import Segments, autospectrum
 from study.reproduction.claims.sample import Sample, average
 from study.reproduction.ensemble import NOISE_OFFSET, threaded
 from study.reproduction.make_record import make_record
@@ -25,80 +25,44 @@ from study.support.errors import StudyError
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Table = Mapping[str, Any]
-T = TypeVar("T")
-KEPT = 9  # ensembles of records held at a time: seven systems and what is being worked on
+KEPT = 9  # ensembles of records held at a time: the seven systems and those being worked on
 
 
 @dataclass(frozen=True)
 class Drive:
-    """A system and what is done to it; anything not named is as the study's configuration has it.
+    """A system and what is done to it; anything not named is as the study's configuration has it."""
 
-    Attributes
-    ----------
-    system : str
-        A model of ``models/``.
-    level, noise : float
-        Input variance in N^2; mean square of the noise on the displacement over its own.
-    excitation : tuple of (str, value)
-        Settings of the excitation in place of the configured.
-    values : tuple of (str, float)
-        Values of the model in place of its own.
-    """
-
-    system: str
-    level: float = 1.0
-    noise: float = 0.0
-    excitation: tuple[tuple[str, Any], ...] = ()
-    values: tuple[tuple[str, float], ...] = ()
+    system: str  # a model of models/
+    level: float = 1.0  # input variance in N^2
+    noise: float = 0.0  # mean square of the noise on the displacement over that of the displacement
+    excitation: tuple[tuple[str, Any], ...] = ()  # settings of the excitation that replace the configured ones
+    values: tuple[tuple[str, float], ...] = ()  # values of the model that replace its own
 
 
 @dataclass(frozen=True)
 class Assumed:
-    """What the identification assumes beside (or without) the system's own terms, and how it cuts.
+    """What the identification assumes beside (or without) the system's own terms, and how it cuts the record."""
 
-    Attributes
-    ----------
-    plus, minus : tuple of str
-        Terms added to the system's own; terms left out.
-    segments : tuple of (str, value)
-        Settings of the segments in place of the configured.
-    band : pair of float, optional
-        Lines that the parameters are fitted to, in hertz, in place of the configured.
-    """
+    plus: tuple[str, ...] = ()  # terms added to the system's own
+    minus: tuple[str, ...] = ()  # terms of the system that are left out
+    segments: tuple[tuple[str, Any], ...] = ()  # settings of the segments that replace the configured ones
+    band: tuple[float, float] | None = None  # hertz: lines the parameters are fitted to, if not the configured band
 
-    plus: tuple[str, ...] = ()
-    minus: tuple[str, ...] = ()
-    segments: tuple[tuple[str, Any], ...] = ()
-    band: tuple[float, float] | None = None
+
+OWN_TERMS = Assumed()
 
 
 @dataclass(frozen=True)
 class Analysis:
-    """What one estimator finds in one record, on the lines of the fit band.
+    """What one estimator finds in one record, on the lines of the fit band."""
 
-    Attributes
-    ----------
-    frequency : array, shape (lines,)
-        In hertz.
-    response : complex array, shape (inputs, lines)
-        ``L_1`` of SI/SO, ``A_j`` of MI/SO.
-    cumulative : array, shape (inputs, lines)
-        Cumulative coherence.
-    averages : float
-        Effective number of averages.
-    values, errors : dict of float
-        Fitted parameters and their standard errors.
-    read : dict of float
-        Parameters as a hand reads them off the first curve (Section 5.2.1).
-    """
-
-    frequency: Floats
-    response: Complexes
-    cumulative: Floats
-    averages: float
-    values: dict[str, float]
-    errors: dict[str, float]
-    read: dict[str, float]
+    frequency: Floats  # hertz, shape (lines,)
+    response: Complexes  # L_1 of SI/SO or A_j of MI/SO, shape (inputs, lines)
+    cumulative: Floats  # cumulative coherence, shape (inputs, lines)
+    averages: float  # effective number
+    values: dict[str, float]  # fitted parameters
+    errors: dict[str, float]  # standard errors of the fitted parameters
+    read: dict[str, float]  # parameters as a hand reads them off the first curve (Section 5.2.1)
 
 
 @dataclass(frozen=True)
@@ -111,8 +75,9 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Ensemble:
-    """The study's own record (its configured seed) and those of the ensemble's seeds."""
+    """A system identified from the study's own record (its configured seed) and from those of the ensemble's seeds."""
 
+    system: str
     own: Outcome
     seeds: tuple[Outcome, ...]
 
@@ -124,132 +89,125 @@ class Ensemble:
         """A parameter fitted to the SI/SO curve."""
         return self.sample(lambda o: o.siso.values[name])
 
+    def hand_read(self, name: str) -> Sample:
+        """A parameter as a hand reads it off the SI/SO curve; nan where the curve has no minimum."""
+        return self.sample(lambda o: o.siso.read.get(name, np.nan))
+
     def miso(self, name: str) -> Sample:
         """A parameter fitted to the MI/SO curves."""
         return self.sample(lambda o: o.miso.values[name])
 
     def lines(self, rows: Callable[[Outcome], Floats]) -> Floats:
-        """Mean over the seeds of something per line, shape (lines,)."""
+        """Mean over the seeds of a quantity with one value per line, shape (lines,)."""
         return np.mean([rows(o) for o in self.seeds], axis=0)
 
     def lowest(self, rows: Callable[[Outcome], Floats]) -> tuple[float, float]:
         """Frequency and height of the lowest line of the mean over the seeds."""
-        found = self.lines(rows)
-        i = int(np.argmin(found))
-        return float(self.frequency[i]), float(found[i])
+        heights = self.lines(rows)
+        i = int(np.argmin(heights))
+        return float(self.frequency[i]), float(heights[i])
 
     @property
     def frequency(self) -> Floats:
         """Lines of the fit band in hertz."""
         return self.own.miso.frequency
 
-    def linear_coherence(self) -> Sample:
-        """Mean over the fit band of the share that passes through L_1."""
-        return self.sample(lambda o: average(o.miso.cumulative[0]))
+    def between(self, low: float, high: float) -> NDArray[np.bool_]:
+        """Which lines lie from ``low`` to ``high`` hertz."""
+        return (self.frequency >= low) & (self.frequency <= high)
+
+    def linear_coherence(self, low: float = 0.0, high: float = np.inf) -> Sample:
+        """Mean over the lines from ``low`` to ``high`` hertz of the share that passes through L_1."""
+        keep = self.between(low, high)
+        return self.sample(lambda o: average(o.miso.cumulative[0][keep]))
 
     def multiple_coherence(self) -> Sample:
         """Mean over the fit band of the coherence of the whole model."""
         return self.sample(lambda o: average(o.miso.cumulative[-1]))
 
 
-@dataclass(frozen=True)
 class Evidence:
     """Records and identifications on demand, each computed once.
 
-    Attributes
-    ----------
-    settings : dict
-        Of ``config/config.yaml``.
-    models : dict of Model
-        The systems by name.
-    seeds : range
-        Seeds of the ensembles.
-    integrator_steps : sequence of dict
-        Rows of ``results/integrator_steps.csv``.
-    records : callable
-        ``Drive -> tuple of Record``, the study's own first.
-    ensemble : callable
-        ``(Drive, Assumed) -> Ensemble``.
+    They follow from the settings of ``config/config.yaml``, the models by the system's name, and the rows of
+    ``results/integrator_steps.csv``.
     """
 
-    settings: Table
-    models: Mapping[str, Model]
-    seeds: range
-    integrator_steps: Sequence[Table]
-    records: Callable[[Drive], tuple[Record, ...]]
-    ensemble: Callable[[Drive, Assumed], Ensemble]
-
-    def unit(self, system: str) -> Ensemble:
-        """A system at unit variance without noise, identified with its own terms."""
-        return self.ensemble(Drive(system), Assumed())
-
-    def at(self, system: str, level: float, noise: float = 0.0) -> Ensemble:
-        """A system at another level or with noise, identified with its own terms."""
-        return self.ensemble(Drive(system, level, noise), Assumed())
+    def __init__(self, settings: Table, models: Mapping[str, Model], integrator_steps: Sequence[Table]) -> None:
+        self.settings, self.models, self.integrator_steps = settings, models, integrator_steps
+        first = settings["ensembles"]["first_seed"]
+        self.seeds = range(first, first + settings["ensembles"]["seeds"])
+        self.segments = Segments(**settings["segments"])
+        self.records: Callable[[Drive], tuple[Record, ...]] = lru_cache(KEPT)(self._records)
+        self._ensembles = cache(self._identified)
 
     def model(self, drive: Drive) -> Model:
-        """The model of a drive, with the drive's values."""
-        return driven_model(self.models, drive)
+        """The model of a drive, with the drive's values; a ``StudyError`` names the file of one that is missing."""
+        if drive.system not in self.models:
+            raise StudyError(
+                f"expected models/{drive.system}.yaml, a system of the report's Table 1; there is no such model"
+            )
+        return self.models[drive.system].with_values(dict(drive.values))
+
+    def _records(self, drive: Drive) -> tuple[Record, ...]:
+        """Records of a drive, the study's own first."""
+        model, settings = self.model(drive), record_settings(self.settings, drive)
+        streams = [(None, None), *((seed, NOISE_OFFSET + seed) for seed in self.seeds)]
+        return tuple(threaded(lambda s: make_record(model, settings, seed=s[0], noise_seed=s[1]), streams))
+
+    def ensemble(self, drive: Drive, assumed: Assumed = OWN_TERMS) -> Ensemble:
+        """The records of a drive, identified."""
+        return self._ensembles(drive, assumed)
+
+    def _identified(self, drive: Drive, assumed: Assumed) -> Ensemble:
+        model = self.model(drive)
+        own, *others = threaded(lambda r: self.analyse(model, r, assumed), self.records(drive))
+        return Ensemble(drive.system, own, tuple(others))
+
+    def at(self, system: str, level: float = 1.0, noise: float = 0.0) -> Ensemble:
+        """A system at a level, with or without noise, identified with its own terms."""
+        return self.ensemble(Drive(system, level, noise))
 
     def each(self, drive: Drive, number: Callable[[Record], float]) -> Sample:
         """A number of each record."""
-        own, *others = threaded(number, self.records(drive))
-        return Sample(tuple(others), own)
+        return Sample.own_first(threaded(number, self.records(drive)))
+
+    def of_channel(self, system: str, number: Callable[[Floats], float], channel: str = "displacement") -> Sample:
+        """A number of one channel of each record of a system at unit variance."""
+        return self.each(Drive(system), lambda r: number(r[channel]))
+
+    def spectra(self, drive: Drive, channel: str = "displacement") -> tuple[Floats, Floats]:
+        """Frequency, and the autospectrum of one channel of each record, shape (records, lines)."""
+        spectra = [autospectrum(r[channel], r.dt, self.segments) for r in self.records(drive)]
+        return spectra[0][0], np.stack([density for _, density in spectra])
 
     def tolerance(self, system: str, name: str) -> float:
-        """The configured tolerance of a parameter: relative, or absolute where Table 1 has a zero."""
+        """The configured tolerance of a parameter, relative to its true value."""
         tolerances = self.settings["tolerances"]
         own = tolerances.get("of_case", {}).get(system, {})
         return own.get(name, tolerances["relative"][name])
 
-    def analyse(self, model: Model, record: Record, assumed: Assumed | None = None) -> Outcome:
-        """Identify one record."""
-        return identify(model, record, assumed or Assumed(), self.settings)
+    def estimator_settings(self, assumed: Assumed = OWN_TERMS) -> Settings:
+        """What the estimators go by: the configured segments and band, where nothing else is assumed."""
+        segments = {**self.settings["segments"], **dict(assumed.segments)}
+        low, high = assumed.band or self.settings["fit_band"]
+        return Settings(Segments(**segments), (low, high))
 
-
-def gather(settings: Table, models: Mapping[str, Model], integrator_steps: Sequence[Table]) -> Evidence:
-    """Evidence from a configuration and the models it names."""
-    first, count = settings["ensembles"]["first_seed"], settings["ensembles"]["seeds"]
-    seeds = range(first, first + count)
-
-    @lru_cache(KEPT)
-    def records(drive: Drive) -> tuple[Record, ...]:
-        model, told = driven_model(models, drive), record_settings(settings, drive)
-        streams = [(None, None), *((seed, NOISE_OFFSET + seed) for seed in seeds)]
-        return tuple(threaded(lambda s: make_record(model, told, seed=s[0], noise_seed=s[1]), streams))
-
-    @cache
-    def ensemble(drive: Drive, assumed: Assumed) -> Ensemble:
-        model = driven_model(models, drive)
-        own, *others = threaded(lambda r: identify(model, r, assumed, settings), records(drive))
-        return Ensemble(own, tuple(others))
-
-    return Evidence(settings, models, seeds, integrator_steps, records, ensemble)
-
-
-def driven_model(models: Mapping[str, Model], drive: Drive) -> Model:
-    """The model of a drive, with the drive's values.
-
-    Raises
-    ------
-    StudyError
-        If there is no model of this name.
-    """
-    if drive.system not in models:
-        raise StudyError(f"the claims need models/{drive.system}.yaml, the report's Table 1; there is no such model")
-    return models[drive.system].with_values(dict(drive.values))
+    def analyse(self, model: Model, record: Record, assumed: Assumed = OWN_TERMS) -> Outcome:
+        """Identify one record, SI/SO and MI/SO."""
+        for name in assumed.minus:
+            model = model.without_term(name)
+        for name in assumed.plus:
+            model = model.with_term(get(name))
+        settings = self.estimator_settings(assumed)
+        single, multiple = (estimator.identify(model, record, settings) for estimator in (siso, miso))
+        return Outcome(_analysis(single, settings), _analysis(multiple, settings))
 
 
 def record_settings(settings: Table, drive: Drive) -> dict[str, Any]:
-    """What ``study.reproduction.make_record.make_record`` wants, for a drive.
-
-    Raises
-    ------
-    StudyError
-        If the configuration has no excitation ``report``.
-    """
+    """What ``study.reproduction.make_record.make_record`` expects, for a drive."""
     if "report" not in settings["excitations"]:
-        raise StudyError("config/config.yaml: excitations has no 'report'; the claims judge that force history")
+        raise StudyError("config/config.yaml: expected an excitation 'report'; the claims judge that force history")
     return {
         "case": drive.system,
         "excitation": {**settings["excitations"]["report"], **dict(drive.excitation)},
@@ -261,30 +219,18 @@ def record_settings(settings: Table, drive: Drive) -> dict[str, Any]:
     }
 
 
-def identify(model: Model, record: Record, assumed: Assumed, settings: Table) -> Outcome:
-    """Identify one record, SI/SO and MI/SO."""
-    for name in assumed.minus:
-        model = model.without_term(name)
-    for name in assumed.plus:
-        model = model.with_term(get(name))
-    low, high = assumed.band or settings["fit_band"]
-    told = Settings(Segments(**{**settings["segments"], **dict(assumed.segments)}), (low, high))
-    single = _analysis(siso.identify(model, record, told), told)
-    return Outcome(single, _analysis(miso.identify(model, record, told), told))
-
-
-def _analysis(found: Identified, told: Settings) -> Analysis:
-    result = found.responses
+def _analysis(identified: Identified, settings: Settings) -> Analysis:
+    result = identified.responses
     assert isinstance(result, MisoResult)  # both estimators give coherences
-    keep = (result.frequency >= told.band[0]) & (result.frequency <= told.band[1])
+    keep = (result.frequency >= settings.band[0]) & (result.frequency <= settings.band[1])
     return Analysis(
         frequency=result.frequency[keep],
         response=result.response[:, keep],
         cumulative=result.cumulative[:, keep],
         averages=result.averages,
-        values={p.name: p.value for p in found.parameters},
-        errors={p.name: p.error for p in found.parameters},
-        read=read_curve(result, told.band),
+        values={p.name: p.value for p in identified.parameters},
+        errors={p.name: p.error for p in identified.parameters},
+        read=read_curve(result, settings.band),
     )
 
 

@@ -1,34 +1,26 @@
 """What "unit variance" refers to: both readings against the numbers that the report quotes."""
 
-import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from study.records.excitation import READINGS
-from study.reproduction.claims.evidence import Assumed, Drive, Ensemble, Evidence
+from study.reproduction.claims.common import band
+from study.reproduction.claims.evidence import Drive, Ensemble, Evidence, Outcome
 from study.reproduction.claims.reported import Reported
 from study.reproduction.claims.sample import Sample
 
-SURE = 2.0  # standard errors by which one reading must come nearer than the other ...
-TIE = "tie"  # ... or this is said
+SURE = 2.0  # standard errors by which one reading must be the nearer one; otherwise there is a tie
+TIE = "tie"
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number the report quotes and how it is read off an ensemble.
-
-    Attributes
-    ----------
-    name, reported : str
-        What it is; its id in ``config/reported.tsv``.
-    system : str
-        Whose it is.
-    read : callable
-        ``Ensemble -> Sample``.
-    """
+    """A number the report quotes: its name, its id in ``config/reported.tsv``, its system, and how to read it off."""
 
     name: str
     reported: str
@@ -36,47 +28,25 @@ class Quantity:
     read: Callable[[Ensemble], Sample]
 
 
-@dataclass(frozen=True)
-class Row:
-    """A quantity under both readings; a row of ``results/excitation_reading.csv``.
-
-    ``distance`` is the mean less the reported number; ``in_scatter`` is the distance over the standard
-    deviation of one record, for the report shows one.
-    """
-
-    quantity: str
-    where: str
-    unit: str
-    reported: float
-    raw_mean: float
-    raw_standard_error: float
-    raw_distance: float
-    raw_in_scatter: float
-    filtered_mean: float
-    filtered_standard_error: float
-    filtered_distance: float
-    filtered_in_scatter: float
-    nearer: str
+def line_errors(outcome: Outcome, true: float) -> NDArray[np.float64]:
+    """Relative error of the Dead-Band's Re A_2, line by line."""
+    return np.abs(outcome.miso.response[1].real / true - 1.0)
 
 
 def largest_error(ensemble: Ensemble, reported: Reported) -> Sample:
     """Largest relative error of the Dead-Band's Re A_2 in the report's 2- to 3-Hz band."""
-    true = -reported.table_1("dead_band", "k")
-    low, high = reported.value("dead_band_error.low"), reported.value("dead_band_error.high")
-    keep = (ensemble.frequency >= low) & (ensemble.frequency <= high)
-    return ensemble.sample(lambda o: float(np.max(np.abs(o.miso.response[1].real[keep] / true - 1.0))))
+    keep, true = ensemble.between(*band(reported, "dead_band_error")), -reported.table_1("dead_band", "k")
+    return ensemble.sample(lambda o: float(np.max(line_errors(o, true)[keep])))
 
 
 def quantities(reported: Reported) -> tuple[Quantity, ...]:
     """The numbers of Section 5.2 that depend on the level."""
-
-    def read(name: str) -> Callable[[Ensemble], Sample]:
-        return lambda e: e.sample(lambda o: o.siso.read.get(name, math.nan))
-
     return (
-        Quantity("SI/SO k of the Duffing system, hand-read", "siso_stiffness", "duffing", read("k")),
+        Quantity("SI/SO k of the Duffing system, hand-read", "siso_stiffness", "duffing", lambda e: e.hand_read("k")),
         Quantity("SI/SO k of the Duffing system, fitted", "siso_stiffness", "duffing", lambda e: e.siso("k")),
-        Quantity("SI/SO f_n of the Duffing system, hand-read", "siso_frequency", "duffing", read("f_n")),
+        Quantity(
+            "SI/SO f_n of the Duffing system, hand-read", "siso_frequency", "duffing", lambda e: e.hand_read("f_n")
+        ),
         Quantity("SI/SO f_n of the Duffing system, fitted", "siso_frequency", "duffing", lambda e: e.siso("f_n")),
         Quantity("linear coherence of the Duffing system", "duffing_share", "duffing", Ensemble.linear_coherence),
         Quantity("linear coherence of the Dead-Band system", "dead_band_share", "dead_band", Ensemble.linear_coherence),
@@ -88,32 +58,29 @@ def quantities(reported: Reported) -> tuple[Quantity, ...]:
 
 
 def study(evidence: Evidence, reported: Reported) -> pd.DataFrame:
-    """One row a quantity, ``Row``."""
-    return pd.DataFrame([asdict(_row(q, evidence, reported)) for q in quantities(reported)])
+    """Each quantity under both readings, one row each; ``results/excitation_reading.csv``.
+
+    ``distance`` is the mean less the reported number; ``in_scatter`` is the distance over the standard
+    deviation of one record, for the report shows one.
+    """
+    return pd.DataFrame([_row(quantity, evidence, reported) for quantity in quantities(reported)])
 
 
-def _row(quantity: Quantity, evidence: Evidence, reported: Reported) -> Row:
+def _row(quantity: Quantity, evidence: Evidence, reported: Reported) -> dict[str, Any]:
     statement, target = reported[quantity.reported], reported.value(quantity.reported)
-    found: dict[str, Sample] = {}
-    numbers: dict[str, float] = {}
+    row = {"quantity": quantity.name, "where": statement.where, "unit": statement.unit, "reported": target}
+    samples: dict[str, Sample] = {}
     for reading in READINGS:
         drive = Drive(quantity.system, excitation=(("reading", reading),))
-        sample = found[reading] = quantity.read(evidence.ensemble(drive, Assumed()))
-        numbers |= {
+        sample = samples[reading] = quantity.read(evidence.ensemble(drive))
+        row |= {
             f"{reading}_mean": sample.mean,
             f"{reading}_standard_error": sample.error,
             f"{reading}_distance": sample.mean - target,
             f"{reading}_in_scatter": (sample.mean - target) / sample.scatter,
         }
-    nearer = min(READINGS, key=lambda r: abs(found[r].mean - target))
-    distances = [abs(found[r].mean - target) for r in READINGS]
-    between = found[READINGS[0]].minus(found[READINGS[1]])  # seed by seed: both readings have the same seeds
-    if abs(distances[0] - distances[1]) < SURE * between.error:
-        nearer = TIE
-    return Row(quantity.name, statement.where, statement.unit, target, **numbers, nearer=nearer)
-
-
-def preferred(nearer: Sequence[str]) -> str:
-    """The reading that comes nearer to more of the numbers."""
-    counts: Mapping[str, int] = {reading: list(nearer).count(reading) for reading in READINGS}
-    return max(READINGS, key=lambda r: counts[r])
+    distances = {reading: abs(sample.mean - target) for reading, sample in samples.items()}
+    first, second = (samples[reading] for reading in READINGS)
+    apart = abs(distances[READINGS[0]] - distances[READINGS[1]])
+    sure = apart >= SURE * first.minus(second).error  # seed by seed: both readings have the same seeds
+    return {**row, "nearer": min(distances, key=lambda reading: distances[reading]) if sure else TIE}

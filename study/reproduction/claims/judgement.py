@@ -4,37 +4,33 @@ The criterion of a claim is a list of conditions that follow from the report's w
 ``reproduced``; some: ``partly``; none: ``not reproduced``.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 
+from study.reproduction.claims.evidence import Evidence
 from study.reproduction.claims.reported import Reported
 from study.reproduction.claims.sample import Sample
+from study.support.numbers import percent
 
 REPRODUCED, PARTLY, NOT_REPRODUCED = "reproduced", "partly", "not reproduced"
-SEPARATOR = "; "  # between the parts of what was measured, one a condition
-BESIDE = "beside"  # begins the place of what is no statement of the report: judged, but not counted among them
+SEPARATOR = "; "  # between the parts of what was measured, one for each condition
+BESIDE = "beside"  # first word of a place that is no statement of the report: it is judged, but not counted
 
 
 @dataclass(frozen=True)
 class Condition:
-    """One thing that must hold.
+    """One thing that must hold."""
 
-    Attributes
-    ----------
-    criterion : str
-        What must hold, with its numbers.
-    measured : str
-        What was found.
-    met : bool
-        Whether it holds.
-    why : str
-        The reason, for when it does not hold.
-    """
-
-    criterion: str
+    criterion: str  # what must hold, with its numbers
     measured: str
     met: bool
-    why: str = ""
+    why: str = ""  # the reason, in case it does not hold
+    because: str = ""  # what lies behind that reason, the same for every condition of a claim
+
+    @property
+    def reason(self) -> str:
+        """Why the condition is not met."""
+        return self.why or f"{self.measured}, where the criterion is {self.criterion}"
 
 
 @dataclass(frozen=True)
@@ -51,96 +47,103 @@ class Claim:
     why: str
 
 
-def verdict(met: list[bool]) -> str:
+Conditions = Callable[[Evidence, Reported], Iterable[Condition]]
+
+
+def claims(*functions: Conditions, **short: Conditions) -> dict[str, Conditions]:
+    """Conditions of the claims of a section by the claim's id: a function's name, or a keyword for a short one."""
+    return {function.__name__: function for function in functions} | short
+
+
+def verdict(met: Sequence[bool]) -> str:
     """``reproduced`` if all hold, ``not reproduced`` if none does, else ``partly``."""
     return REPRODUCED if all(met) else PARTLY if any(met) else NOT_REPRODUCED
 
 
-def conclude(reported: Reported, name: str, *conditions: Condition, because: str = "") -> Claim:
-    """The claim of this id in ``reported.tsv`` with the verdict that its conditions give.
-
-    ``because`` is what is behind every condition that fails.
-    """
+def conclude(reported: Reported, name: str, *conditions: Condition) -> Claim:
+    """The claim of this id in ``reported.tsv`` with the verdict that its conditions give."""
     statement = reported[name]
     conditions = tuple(sorted(conditions, key=lambda c: c.met))  # what fails decides, and stands first
-    failed = list(dict.fromkeys(reason(c) for c in conditions if not c.met))
     return Claim(
         id=name,
         where=statement.where,
         claim=statement.what,
         reported=reported.numbers(name),
-        measured=_joined([c.measured for c in conditions]),
-        criterion=_joined([c.criterion for c in conditions]),
+        measured=_joined(c.measured for c in conditions),
+        criterion=_joined(c.criterion for c in conditions),
         verdict=verdict([c.met for c in conditions]),
-        why=_sentence(failed, because) if failed else "",
+        why=_reasons([c for c in conditions if not c.met]),
     )
 
 
-def _sentence(failed: list[str], because: str) -> str:
-    """Why a claim fails; of many conditions with one reason the first, as all of them stand under ``measured``."""
-    if not because:
-        return _joined(failed)
-    more = len(failed) - 1
-    return f"{failed[0]}{f' ({more} more like it)' if more else ''}: {because}"
+def _reasons(failed: Sequence[Condition]) -> str:
+    """Why a claim fails; of many conditions with one cause the first, as all of them stand under ``measured``."""
+    reasons = list(dict.fromkeys(c.reason for c in failed))
+    if not failed or not failed[0].because:
+        return _joined(reasons)
+    more = f" ({len(reasons) - 1} more like it)" if len(reasons) > 1 else ""
+    return f"{reasons[0]}{more}: {failed[0].because}"
 
 
-def reason(condition: Condition) -> str:
-    """Why a condition is not met."""
-    return condition.why or f"{condition.measured}, where the criterion is {condition.criterion}"
+def _joined(parts: Iterable[str]) -> str:
+    return SEPARATOR.join(dict.fromkeys(part for part in parts if part))
+
+
+def explained(because: str, conditions: Iterable[Condition]) -> list[Condition]:
+    """The conditions of a claim with what lies behind each that fails."""
+    return [replace(c, because=because) for c in conditions]
 
 
 def together(label: str, conditions: Sequence[Condition]) -> Condition:
     """Several conditions on one thing as one, met when all are."""
-    failed = [reason(c) for c in conditions if not c.met]
+    failed = ", ".join(c.reason for c in conditions if not c.met)
     return Condition(
         f"{label}: {', '.join(c.criterion for c in conditions)}",
         f"{label}: {', '.join(c.measured for c in conditions)}",
         not failed,
-        f"{label}: {', '.join(failed)}" if failed else "",
+        f"{label}: {failed}" if failed else "",
     )
 
 
-def _joined(parts: list[str]) -> str:
-    return SEPARATOR.join(dict.fromkeys(p for p in parts if p))
+def close(label: str, sample: Sample, target: float, relative: float, why: str = "") -> Condition:
+    """The mean over the seeds lies within a share of a number."""
+    met = abs(sample.mean - target) <= relative * abs(target)
+    return Condition(f"mean {label} within {percent(relative)} of {target:.6g}", f"{label} {sample}", met, why)
 
 
-def close(label: str, found: Sample, target: float, relative: float, why: str = "") -> Condition:
-    """The mean over seeds lies within a share of a number."""
-    return Condition(
-        f"mean {label} within {100.0 * relative:g} % of {target:.6g}",
-        f"{label} {found}",
-        abs(found.mean - target) <= relative * abs(target),
-        why,
-    )
+def far(label: str, sample: Sample, target: float, relative: float, why: str = "") -> Condition:
+    """The mean over the seeds is off a number by more than a share of it."""
+    met = abs(sample.mean - target) > relative * abs(target)
+    return Condition(f"mean {label} more than {percent(relative)} off", f"{label} {sample}", met, why)
 
 
-def near(label: str, found: Sample, target: float, distance: float, why: str = "") -> Condition:
-    """The mean over seeds lies within a distance of a number."""
-    met = abs(found.mean - target) <= distance
-    return Condition(f"mean {label} within {target:.6g} +- {distance:g}", f"{label} {found}", met, why)
+def near(label: str, sample: Sample, target: float, distance: float, why: str = "") -> Condition:
+    """The mean over the seeds lies within a distance of a number."""
+    met = abs(sample.mean - target) <= distance
+    return Condition(f"mean {label} within {target:.6g} +- {distance:g}", f"{label} {sample}", met, why)
 
 
-def one_record(label: str, found: Sample, target: float, why: str = "") -> Condition:
+def one_record(label: str, sample: Sample, target: float, why: str = "") -> Condition:
     """A number that the report read off one record is one that a single record may well show."""
     return Condition(
         f"{target:.6g} within two standard deviations of a single record's {label}",
-        f"{label} {found}, scatter of a record {found.scatter:.2g}",
-        abs(found.mean - target) <= 2.0 * found.scatter,
+        f"{label} {sample}, scatter of a record {sample.scatter:.2g}",
+        abs(sample.mean - target) <= 2.0 * sample.scatter,
         why,
     )
 
 
-def at_least(label: str, found: Sample, bound: float, why: str = "") -> Condition:
-    """The mean over seeds is not below a bound."""
-    return Condition(f"mean {label} at least {bound:g}", f"{label} {found}", found.mean >= bound, why)
+def at_least(label: str, sample: Sample, bound: float, why: str = "") -> Condition:
+    """The mean over the seeds is not below a bound."""
+    return Condition(f"mean {label} at least {bound:g}", f"{label} {sample}", sample.mean >= bound, why)
 
 
-def at_most(label: str, found: Sample, bound: float, why: str = "") -> Condition:
-    """The mean over seeds is not above a bound."""
-    return Condition(f"mean {label} at most {bound:g}", f"{label} {found}", found.mean <= bound, why)
+def at_most(label: str, sample: Sample, bound: float, why: str = "") -> Condition:
+    """The mean over the seeds is not above a bound."""
+    return Condition(f"mean {label} at most {bound:g}", f"{label} {sample}", sample.mean <= bound, why)
 
 
-def significant(label: str, found: Sample, why: str = "", errors: float = 3.0) -> Condition:
-    """The mean over seeds is above zero by several of its standard errors."""
-    met = found.mean > errors * found.error
-    return Condition(f"mean {label} above zero by {errors:g} standard errors", f"{label} {found}", met, why)
+def significant(label: str, sample: Sample, why: str = "") -> Condition:
+    """The mean over the seeds is above zero by three of its standard errors."""
+    met = sample.mean > 3.0 * sample.error
+    return Condition(f"mean {label} above zero by 3 standard errors", f"{label} {sample}", met, why)

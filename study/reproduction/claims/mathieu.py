@@ -1,125 +1,92 @@
 """Section 5.2.5: the Mathieu system."""
 
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Iterator
 
-from study.reproduction.claims.common import has_line, in_band, linear_share, local_maxima, near_unity, recovered
-from study.reproduction.claims.duffing import LINEAR_PARTS
-from study.reproduction.claims.evidence import Analysis, Drive, Evidence
-from study.reproduction.claims.judgement import Claim, Condition, at_most, close, conclude, near
+import numpy as np
+
+from study.reproduction.claims import common
+from study.reproduction.claims.evidence import Evidence
+from study.reproduction.claims.judgement import Condition, at_most, claims, close, near
 from study.reproduction.claims.reported import Reported
 from study.reproduction.claims.sample import GAUSSIAN_CENTRAL_SHARE, average, central_share, kurtosis
+from study.support.numbers import percent
 
-LINE = 0.2  # hertz: two lines of the report's spectra
 LOW_COHERENCE = 0.5  # "quite low", "rather low": less than half passes
 NEGLIGIBLE = 0.02
 EXCELLENT = 0.05
 
 
-def _size(found: Analysis) -> NDArray[np.float64]:
-    return np.abs(found.response[0])
-
-
-def third(evidence: Evidence, reported: Reported) -> Claim:
+def mathieu_third(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """A_3 against A_2, and what passes through it."""
-    ensemble, k_m = evidence.unit("mathieu"), reported.table_1("mathieu", "k_m")
+    ensemble, k_m = evidence.at("mathieu"), reported.table_1("mathieu", "k_m")
     size = ensemble.sample(lambda o: average(o.miso.response[2].real) / k_m)
     passed = ensemble.sample(lambda o: average(o.miso.cumulative[2] - o.miso.cumulative[1]))
-    return conclude(
-        reported, "mathieu_third",
-        near("A_3 / k_m averaged over the band", size, 0.0, NEGLIGIBLE),
-        at_most("share of the force through A_3", passed, NEGLIGIBLE),
-    )  # fmt: skip
+    yield near("A_3 / k_m averaged over the band", size, 0.0, NEGLIGIBLE)
+    yield at_most("share of the force through A_3", passed, NEGLIGIBLE)
 
 
-def side_resonances(evidence: Evidence, reported: Reported) -> Claim:
+def mathieu_side_resonances(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Local minima of the averaged SI/SO |A_1|: what a resonance is to an impedance."""
-    ensemble = evidence.unit("mathieu")
-    low, high = reported.value("mathieu_side_resonances.low"), reported.value("mathieu_side_resonances.high")
-    found = local_maxima(ensemble.frequency, -ensemble.lines(lambda o: _size(o.siso)))
-    own = local_maxima(ensemble.frequency, -_size(ensemble.own.siso))
-    seen = ", ".join(f"{f:.2f}" for f in own if low - 1.0 <= f <= high + 1.0)
-    return conclude(
-        reported, "mathieu_side_resonances",
-        has_line("minimum of the averaged SI/SO |A_1|", found, low, LINE),
-        has_line("minimum of the averaged SI/SO |A_1|", found, high, LINE),
-        Condition(
-            "the own record's curve has minima there as well", f"own record has minima at {seen} Hz",
-            all(np.any(np.abs(own - f) <= LINE) for f in (low, high)),
-        ),
+    ensemble = evidence.at("mathieu")
+    low, high = common.band(reported, "mathieu_side_resonances")
+    averaged = common.local_maxima(ensemble.frequency, -ensemble.lines(lambda o: np.abs(o.siso.response[0])))
+    own = common.local_maxima(ensemble.frequency, -np.abs(ensemble.own.siso.response[0]))
+    shown = ", ".join(f"{f:.2f}" for f in own if low - 1.0 <= f <= high + 1.0)
+    yield common.has_line("minimum of the averaged SI/SO |A_1|", averaged, low)
+    yield common.has_line("minimum of the averaged SI/SO |A_1|", averaged, high)
+    yield Condition(
+        "the own record's curve has minima there as well", f"own record has minima at {shown} Hz",
+        all(np.any(np.abs(own - f) <= common.LINE) for f in (low, high)),
     )  # fmt: skip
 
 
-def siso_coherence(evidence: Evidence, reported: Reported) -> Claim:
+def mathieu_siso_coherence(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Between and about the side resonances, where the response is."""
-    ensemble = evidence.unit("mathieu")
-    low, high = reported.value("mathieu_side_resonances.low"), reported.value("mathieu_side_resonances.high")
-    found = linear_share(ensemble, low, high)
-    return conclude(
-        reported, "mathieu_siso_coherence",
-        at_most(f"SI/SO coherence from {low:g} to {high:g} Hz", found, LOW_COHERENCE,
-                f"from {low:g} to {high:g} Hz {found.mean:.2f} passes through the linear path, more than half"),
-    )  # fmt: skip
+    low, high = common.band(reported, "mathieu_side_resonances")
+    share = evidence.at("mathieu").linear_coherence(low, high)
+    why = f"from {low:g} to {high:g} Hz {share.mean:.2f} passes through the linear path, more than half"
+    yield at_most(f"SI/SO coherence from {low:g} to {high:g} Hz", share, LOW_COHERENCE, why)
 
 
-def linear(evidence: Evidence, reported: Reported) -> Claim:
-    """A_1 by MI/SO."""
-    ensemble = evidence.unit("mathieu")
-    return conclude(
-        reported, "mathieu_linear", *recovered(evidence, reported, "mathieu", ensemble, LINEAR_PARTS)
-    )  # fmt: skip
-
-
-def stiffness(evidence: Evidence, reported: Reported) -> Claim:
+def mathieu_stiffness(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """A_2: the fitted amplitude, and line by line where the response is strong."""
-    ensemble, stated = evidence.unit("mathieu"), reported.value("mathieu_stiffness")
-    low, high = reported.value("mathieu_side_resonances.low"), reported.value("mathieu_side_resonances.high")
-    keep = in_band(ensemble, low, high)
+    ensemble, stated = evidence.at("mathieu"), reported.value("mathieu_stiffness")
+    low, high = common.band(reported, "mathieu_side_resonances")
+    keep = ensemble.between(low, high)
     error = ensemble.sample(lambda o: average(np.abs(o.miso.response[1][keep] / stated - 1.0)))
     imaginary = ensemble.sample(lambda o: average(o.miso.response[1][keep].imag) / stated)
-    return conclude(
-        reported, "mathieu_stiffness",
-        close("k_m", ensemble.miso("k_m"), stated, evidence.tolerance("mathieu", "k_m")),
-        at_most(f"error of a line of A_2 from {low:g} to {high:g} Hz", error, EXCELLENT),
-        near(f"Im A_2 / k_m from {low:g} to {high:g} Hz", imaginary, 0.0, NEGLIGIBLE),
-    )  # fmt: skip
+    yield close("k_m", ensemble.miso("k_m"), stated, evidence.tolerance("mathieu", "k_m"))
+    yield at_most(f"error of a line of A_2 from {low:g} to {high:g} Hz", error, EXCELLENT)
+    yield near(f"Im A_2 / k_m from {low:g} to {high:g} Hz", imaginary, 0.0, NEGLIGIBLE)
 
 
-def coherence(evidence: Evidence, reported: Reported) -> Claim:
-    """Figure 35, upper curve."""
-    return conclude(reported, "mathieu_coherence", *near_unity(evidence.unit("mathieu")))
-
-
-def share(evidence: Evidence, reported: Reported) -> Claim:
+def mathieu_share(evidence: Evidence, _: Reported) -> Iterator[Condition]:
     """Figure 35, lower curve."""
-    ensemble = evidence.unit("mathieu")
-    found = ensemble.linear_coherence()
+    ensemble = evidence.at("mathieu")
+    share = ensemble.linear_coherence()
     where, lowest = ensemble.lowest(lambda o: o.miso.cumulative[0])
-    return conclude(
-        reported, "mathieu_share",
-        at_most("linear coherence over the fit band", found, LOW_COHERENCE,
-                f"it falls to {lowest:.2f} at {where:.1f} Hz, but above the resonance the mass takes most of the "
-                f"force, so that {found.mean:.2f} passes on average"),
-    )  # fmt: skip
+    why = (
+        f"it falls to {lowest:.2f} at {where:.1f} Hz, but above the resonance the mass takes most of the force, so "
+        f"that {share.mean:.2f} passes on average"
+    )
+    yield at_most("linear coherence over the fit band", share, LOW_COHERENCE, why)
 
 
-def histogram(evidence: Evidence, reported: Reported) -> Claim:
+def mathieu_histogram(evidence: Evidence, _: Reported) -> Iterator[Condition]:
     """Figure 36: fewer values near zero than a Gaussian has."""
-    drive = Drive("mathieu")
-    found = evidence.each(drive, lambda r: central_share(r["displacement"]))
-    shape = evidence.each(drive, lambda r: kurtosis(r["displacement"]))
-    flat = found.mean < GAUSSIAN_CENTRAL_SHARE - 3.0 * found.error
-    flat_records = average([v < GAUSSIAN_CENTRAL_SHARE for v in found.values])
-    return conclude(
-        reported, "mathieu_histogram",
-        Condition(
-            f"share of values within half a standard deviation below the Gaussian's {GAUSSIAN_CENTRAL_SHARE:.3f} "
-            "by three standard errors",
-            f"share {found}; kurtosis {shape}", flat,
-            f"the varying stiffness gives heavy tails (kurtosis {shape.mean:.2f}) and a peaked top; single records "
-            f"look flat by chance ({100 * flat_records:.0f} % of them)",
-        ),
+    central, shape = evidence.of_channel("mathieu", central_share), evidence.of_channel("mathieu", kurtosis)
+    flat_records = average([v < GAUSSIAN_CENTRAL_SHARE for v in central.values])
+    yield Condition(
+        f"share of values within half a standard deviation below the Gaussian's {GAUSSIAN_CENTRAL_SHARE:.3f} "
+        "by three standard errors",
+        f"share {central}; kurtosis {shape}", central.mean < GAUSSIAN_CENTRAL_SHARE - 3.0 * central.error,
+        f"the varying stiffness gives heavy tails (kurtosis {shape.mean:.2f}) and a peaked top; single records "
+        f"look flat by chance ({percent(flat_records, '.0f')} of them)",
     )  # fmt: skip
 
 
-CLAIMS = (third, side_resonances, siso_coherence, linear, stiffness, coherence, share, histogram)
+CLAIMS = claims(
+    mathieu_third, mathieu_side_resonances, mathieu_siso_coherence, mathieu_stiffness, mathieu_share, mathieu_histogram,
+    mathieu_linear=lambda e, r: common.recovered(e, r, e.at("mathieu"), common.LINEAR_PARTS),
+    mathieu_coherence=lambda e, _: common.near_unity(e.at("mathieu")),
+)  # fmt: skip

@@ -1,7 +1,7 @@
 """A number over the seeds of an ensemble, and how far a distribution is from a Gaussian."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -10,25 +10,27 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.stats import t as student
 
+from study.support.numbers import percent
+
 Floats = NDArray[np.float64]
 SIGNIFICANT = 1.96  # two-sided 5 % of the standard normal
-BY_CHANCE = 0.01  # of all lines together: how often even a uniform spectrum is refused
+BY_CHANCE = 0.01  # how often one of all lines of a uniform spectrum may be refused
+GAUSSIAN_CENTRAL_SHARE = math.erf(0.5 / math.sqrt(2.0))  # of a Gaussian's values: within half a standard deviation
+GAUSSIAN_OUTER_SHARE = math.erfc(2.0 / math.sqrt(2.0))  # of a Gaussian's values: beyond two standard deviations
 
 
 @dataclass(frozen=True)
 class Sample:
-    """One number from each seed of an ensemble.
-
-    Attributes
-    ----------
-    values : tuple of float
-        From the seeds.
-    own : float or None
-        From the study's own record, where there is one.
-    """
+    """One number from each seed of an ensemble, and from the study's own record where there is one."""
 
     values: tuple[float, ...]
     own: float | None = None
+
+    @staticmethod
+    def own_first(numbers: Iterable[float]) -> "Sample":
+        """A sample of one number a record, of which the first is the study's own."""
+        own, *values = numbers
+        return Sample(tuple(values), own)
 
     @property
     def mean(self) -> float:
@@ -37,7 +39,7 @@ class Sample:
 
     @property
     def median(self) -> float:
-        """Median over the seeds: what a reading that now and then misses the curve comes to."""
+        """Median over the seeds; a reading that now and then misses the curve does not spoil it."""
         return float(np.median(self.values))
 
     @property
@@ -60,7 +62,7 @@ class Sample:
         return Sample(tuple(factor * v for v in self.values), None if self.own is None else factor * self.own)
 
     def minus(self, other: "Sample") -> "Sample":
-        """Seed by seed, the difference to another sample over the same seeds."""
+        """Seed by seed, the difference from another sample over the same seeds."""
         own = None if self.own is None or other.own is None else self.own - other.own
         return Sample(tuple(a - b for a, b in zip(self.values, other.values, strict=True)), own)
 
@@ -70,9 +72,14 @@ def average(values: Floats | NDArray[np.bool_] | Sequence[float]) -> float:
     return float(np.mean(np.asarray(values, dtype=np.float64)))
 
 
-def share(flags: Sequence[bool]) -> Sample:
+def how_often(flags: Iterable[bool]) -> Sample:
     """How often something holds."""
-    return Sample(tuple(float(f) for f in flags))
+    return Sample(tuple(float(flag) for flag in flags))
+
+
+def relative_distance(curve: NDArray[np.complex128], exact: NDArray[np.complex128] | Floats) -> float:
+    """Root mean square of the difference of two curves, over that of the second."""
+    return float(np.linalg.norm(curve - exact) / np.linalg.norm(exact))
 
 
 def kurtosis(values: Floats) -> float:
@@ -82,23 +89,13 @@ def kurtosis(values: Floats) -> float:
 
 
 def gaussian_score(values: Floats) -> float:
-    """Excess kurtosis over the standard error that a Gaussian process of the same correlation would show.
+    """Excess kurtosis of an evenly sampled record over the standard error that a Gaussian process would show.
 
-    A correlated sample of n is worth ``n / sum rho^4`` independent ones to its kurtosis: the standard
-    error is ``sqrt(24 sum rho^4 / n)`` (Lomnicki, 1961). Symmetric systems leave nothing to the skewness.
-
-    Parameters
-    ----------
-    values : array, shape (n,)
-        Evenly sampled.
-
-    Returns
-    -------
-    float
-        Beyond +-1.96 the Gaussian is refused at 5 %.
+    Of a process of the same correlation, a sample of n is worth ``n / sum rho^4`` independent values to its
+    kurtosis: the standard error is ``sqrt(24 sum rho^4 / n)`` (Lomnicki, 1961). Symmetric systems leave nothing
+    to the skewness. Beyond +-1.96 the Gaussian is refused at 5 %.
     """
-    error = math.sqrt(24.0 / effective_size(values))
-    return (kurtosis(values) - 3.0) / error
+    return (kurtosis(values) - 3.0) / math.sqrt(24.0 / effective_size(values))
 
 
 def effective_size(values: Floats) -> float:
@@ -116,36 +113,38 @@ def is_gaussian(values: Floats) -> bool:
     return abs(gaussian_score(values)) <= SIGNIFICANT
 
 
+def central_share(values: Floats) -> float:
+    """Share of the values within half a standard deviation of the mean."""
+    centred = values - np.mean(values)
+    return float(np.mean(np.abs(centred) < 0.5 * np.std(centred)))
+
+
+def outer_share(values: Floats) -> float:
+    """Share of the values beyond two standard deviations of the mean."""
+    centred = values - np.mean(values)
+    return float(np.mean(np.abs(centred) > 2.0 * np.std(centred)))
+
+
 @dataclass(frozen=True)
 class Departure:
-    """How far the line of an averaged spectrum that departs most stands from the mean of all lines.
+    """How far the line of an averaged spectrum that departs most stands from the mean of all lines."""
 
-    Attributes
-    ----------
-    share : float
-        Of the mean.
-    errors : float
-        In standard errors, from the scatter between the seeds.
-    allowed : float
-        Standard errors that one of so many lines reaches by chance in a hundredth of all cases (Student, Bonferroni).
-    """
-
-    share: float
-    errors: float
-    allowed: float
-
-    @property
-    def uniform(self) -> bool:
-        """Whether chance alone may depart so far."""
-        return self.errors <= self.allowed
+    share: float  # of the mean
+    errors: float  # in standard errors, by the scatter between the seeds
+    allowed: float  # standard errors that one of so many lines reaches by chance (Student, Bonferroni)
 
     def __str__(self) -> str:
         """In words."""
-        return f"the line furthest off departs by {100.0 * self.share:.2g} %, {self.errors:.2g} standard errors"
+        return f"the line furthest off departs by {percent(self.share, '.2g')}, {self.errors:.2g} standard errors"
+
+    @property
+    def uniform(self) -> bool:
+        """Whether chance alone may account for it."""
+        return self.errors <= self.allowed
 
 
 def departure(spectra: Floats) -> Departure:
-    """Of the mean of autospectra, shape (seeds, lines)."""
+    """How far the mean of autospectra, shape (seeds, lines), departs from a uniform one."""
     seeds, lines = spectra.shape
     mean: Floats = np.mean(spectra, axis=0)
     away: Floats = np.abs(mean - average(mean))
@@ -154,21 +153,3 @@ def departure(spectra: Floats) -> Departure:
     worst = int(np.argmax(score))
     allowed = float(cast(float, student.isf(BY_CHANCE / (2.0 * lines), seeds - 1)))
     return Departure(float(away[worst]) / average(mean), float(score[worst]), allowed)
-
-
-def central_share(values: Floats) -> float:
-    """Share of the values within half a standard deviation of the mean; 0.383 for a Gaussian."""
-    centred = values - np.mean(values)
-    return float(np.mean(np.abs(centred) < 0.5 * np.std(centred)))
-
-
-GAUSSIAN_CENTRAL_SHARE = math.erf(0.5 / math.sqrt(2.0))
-
-
-def outer_share(values: Floats) -> float:
-    """Share of the values beyond two standard deviations of the mean; 0.046 for a Gaussian."""
-    centred = values - np.mean(values)
-    return float(np.mean(np.abs(centred) > 2.0 * np.std(centred)))
-
-
-GAUSSIAN_OUTER_SHARE = math.erfc(2.0 / math.sqrt(2.0))

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
+from study.figures import page
 from study.figures.styles import look
 from study.reproduction import estimator_errors
 
@@ -77,15 +77,9 @@ def _panel(panel: Axes, table: pd.DataFrame, cases: Sequence[str]) -> None:
 
 
 def _heading(figure: Figure, axes: Sequence[Axes], seeds: int) -> None:
+    subtitle = f"median over {seeds} seeds of the relative error, with the median's standard error; less is to the left"
+    page.head(figure, "Errors of the estimators on the same records", subtitle, LEFT, 0.1)
     width, height = figure.get_size_inches()
-    left = LEFT / width
-    figure.text(left, 1.0 - 0.1 / height, "Errors of the estimators on the same records", ha="left", va="top",
-                fontweight="bold", fontsize=11)  # fmt: skip
-    said = f"median over {seeds} seeds of the relative error, with the median's standard error; less is to the left"
-    figure.text(left, 1.0 - 0.33 / height, said, ha="left", va="top", fontsize=10)
-    entries: dict[str, Artist] = {}
-    for panel in axes:
-        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
-            entries.setdefault(str(label), handle)
-    figure.legend(list(entries.values()), list(entries), loc="upper left", bbox_to_anchor=(left, 1.0 - 0.58 / height),
-                  ncols=len(entries), borderaxespad=0.0, borderpad=0.0, handlelength=1.2)  # fmt: skip
+    entries = page.legend_entries(axes)
+    figure.legend(list(entries.values()), list(entries), loc="upper left", ncols=len(entries), borderaxespad=0.0,
+                  bbox_to_anchor=(LEFT / width, 1.0 - 0.58 / height), borderpad=0.0, handlelength=1.2)  # fmt: skip

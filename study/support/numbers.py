@@ -1,0 +1,7 @@
+"""Numbers as a reader wants them."""
+
+
+def percent(share: float, form: str = ".3g", error: float | None = None, error_form: str = ".1g") -> str:
+    """A share in percent, by Python's format codes: ``percent(0.0123, "+.3g", 0.001)`` is ``+1.23 +- 0.1 %``."""
+    spread = "" if error is None else f" +- {100.0 * error:{error_form}}"
+    return f"{100.0 * share:{form}}{spread} %"
