@@ -26,15 +26,15 @@ def rests_on(script: Path, *, also: Iterable[str] = (), without: Collection[str]
         Sorted paths relative to the working directory.
     """
     root = script.parent.parent
-    found: set[Path] = set()
+    reached: set[Path] = set()
     waiting = [script, *(path for name in also for path in _files(name, root))]
     skipped = {path for name in without for path in _files(name, root)}
     while waiting:
         path = waiting.pop()
-        if path not in found and path not in skipped:
-            found.add(path)
+        if path not in reached and path not in skipped:
+            reached.add(path)
             waiting += [other for name in _imported(path) for other in _files(name, root)]
-    return sorted(str(path) for path in found - {script})
+    return sorted(str(path) for path in reached - {script})
 
 
 @cache
