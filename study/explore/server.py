@@ -36,7 +36,11 @@ def serve(desk: Desk, port: int | None, ready: Callable[[str], None]) -> None:
     StudyError
         If the port is taken.
     """
-    application = Application(FunctionHandler(lambda document: _watched(desk, document)))
+
+    def show(document: Document) -> None:
+        Watcher(desk, document)
+
+    application = Application(FunctionHandler(show))
     server = _bound(application, port)
     server.start()
     desk.diagnose()
@@ -49,20 +53,15 @@ def serve(desk: Desk, port: int | None, ready: Callable[[str], None]) -> None:
         server.stop()
 
 
-def _watched(desk: Desk, document: Document) -> None:
-    Watcher(desk, document)
-
-
 def _bound(application: Application, port: int | None) -> Server:
     """A server on a port; Bokeh lets a browser's page open the socket only if its origin is one of these two."""
     try:
-        wanted = USUAL if port is None else port
-        return _server(application, wanted)
+        return _server(application, USUAL if port is None else port)
     except OSError as error:
         if error.errno not in (errno.EADDRINUSE, errno.EACCES):
             raise
         if port is not None:
-            raise StudyError(f"port {port} is taken or not allowed; another --port is right, or 0 for any") from None
+            raise StudyError(f"port {port} is taken or not allowed; expected another --port, or 0 for any") from None
         return _server(application, 0)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from study.compare.comparison import Comparison, compare
-from study.compare.comparison_report import rung as ladder_step
+from study.compare.comparison_report import rung as history_step
 from study.compare.missing_force import MissingForce, missing_force
 from study.diagnose import candidates
 from study.diagnose.candidates import Candidate
@@ -25,7 +25,7 @@ from study.records.prepared import Prepared
 from study.support.errors import StudyError
 
 Step = dict[str, Any]
-Told = Callable[[str], None]
+Progress = Callable[[str], None]
 SHOWN = 8  # candidates
 
 
@@ -84,7 +84,7 @@ class Session:
     own : tuple of Term
         The user's own candidates.
     earlier : tuple of dict
-        Steps of the ladder that was kept beside the model file.
+        Steps of the history that was kept beside the model file.
     """
 
     prepared: Prepared
@@ -99,27 +99,17 @@ class Session:
 
     @property
     def steps(self) -> list[Step]:
-        """The ladder, the steps before this session included."""
-        own = [ladder_step(r.comparison, r.added) for r in self.rungs]
+        """The history, the steps before this session included."""
+        own = [history_step(r.comparison, r.added) for r in self.rungs]
         last = self.earlier[-1] if self.earlier else None
         known = last is not None and last["terms"] == own[0]["terms"] and last["record"] == own[0]["record"]
         return [*self.earlier, *own[1 if known else 0 :]]
 
 
 def begin(
-    model: Model,
-    prepared: Prepared,
-    *,
-    earlier: Sequence[Step] = (),
-    progress: Told | None = None,
+    model: Model, prepared: Prepared, *, earlier: Sequence[Step] = (), progress: Progress | None = None
 ) -> Session:
-    """A session with the model as given.
-
-    Raises
-    ------
-    StudyError
-        If the model cannot be compared with the record.
-    """
+    """A session with the model as given."""
     comparison = compare(model, prepared, progress=progress)
     return Session(prepared, (Rung(model, "as given", None, comparison),), earlier=tuple(earlier))
 
@@ -130,18 +120,12 @@ def climbed(session: Session, comparison: Comparison, label: str, added: str | N
 
 
 def candidate(session: Session, name: str) -> Ranked:
-    """A candidate of the present diagnosis.
-
-    Raises
-    ------
-    StudyError
-        If there is none of this name.
-    """
-    found = session.now.diagnosis
-    for row in found.candidates if found is not None else ():
+    """The candidate of this name in the present diagnosis, which must have one."""
+    diagnosis = session.now.diagnosis
+    for row in diagnosis.candidates if diagnosis is not None else ():
         if row.name == name:
             return row
-    raise StudyError(f"{name!r} is no candidate of the present model; one of the list is right")
+    raise StudyError(f"{name!r} is no candidate of the present model; expected one of the list")
 
 
 def with_added(session: Session, name: str) -> Session:
@@ -180,8 +164,8 @@ def with_held(session: Session, key: str, hold: bool) -> Session:
 
 def examined(session: Session, progress: Callable[[int], None] | None = None) -> tuple[Rung, Diagnosis]:
     """The present rung with what is missing, in words too, and what each candidate would leave; and the diagnosis."""
-    found = diagnose(session.now.comparison, extra=session.own, progress=progress)
-    return _foreseen(replace(session.now, diagnosis=found, said=in_words(found))), found
+    diagnosis = diagnose(session.now.comparison, extra=session.own, progress=progress)
+    return _foreseen(replace(session.now, diagnosis=diagnosis, said=in_words(diagnosis))), diagnosis
 
 
 def lacking_with(row: Ranked) -> MissingForce:
@@ -231,7 +215,7 @@ def own_term(session: Session, text: str) -> Term:
                 f"the expression {formula.strip()!r} uses the name {used!r}; it may use {', '.join(known)}"
             )
     if term.name in taken:
-        raise StudyError(f"the name {term.name!r} is taken; another name is right")
+        raise StudyError(f"the name {term.name!r} is taken; expected another")
     return term
 
 
@@ -259,14 +243,13 @@ def tried(session: Session, text: str) -> Session:
         If the formula is refused, or has no finite response on this record.
     """
     term, now = own_term(session, text), session.now
-    found = now.diagnosis
-    if found is None:
+    if now.diagnosis is None:
         raise StudyError("the present model is still being diagnosed; a formula can be tried when that is done")
-    known = [Candidate(r.term, r.fit, r.prediction) for r in found.candidates]
+    known = [Candidate(r.term, r.fit, r.prediction) for r in now.diagnosis.candidates]
     try:
         with np.errstate(all="ignore"):  # a formula may overflow: then it has no finite response
             rows = rank([*known, _attempted(term, session)], now.comparison.prediction.residual, session.prepared)
     except np.linalg.LinAlgError:
         raise _no_response(term) from None
-    ranked = replace(found, candidates=tuple(rows))
+    ranked = replace(now.diagnosis, candidates=tuple(rows))
     return replace(with_rung(session, _foreseen(replace(now, diagnosis=ranked))), own=(*session.own, term))

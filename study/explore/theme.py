@@ -19,10 +19,11 @@ from bokeh.models import (
 from bokeh.plotting import figure
 
 FONT = "Helvetica Neue, Helvetica, Arial, Liberation Sans, sans-serif"
-INK, QUIET, RULE = "#1f2933", "#5c6873", "#e4e7eb"
+INK, QUIET, RULE, AXIS = "#1f2933", "#5c6873", "#e4e7eb", "#9aa5b1"
+BLUE, ORANGE = "#0b5394", "#d1600a"
 MEASURED: dict[str, Any] = {"line_color": "#a3adb7", "line_width": 2.4}
-PREDICTED: dict[str, Any] = {"line_color": "#0b5394", "line_width": 1.2}
-DIFFERENCE: dict[str, Any] = {"line_color": "#d1600a", "line_width": 1.0}
+PREDICTED: dict[str, Any] = {"line_color": BLUE, "line_width": 1.2}
+DIFFERENCE: dict[str, Any] = {"line_color": ORANGE, "line_width": 1.0}
 NOISE: dict[str, Any] = {"line_color": "#000000", "line_width": 1.3, "line_dash": "dotted"}
 WOULD: dict[str, Any] = {"line_color": "#111111", "line_width": 1.3}
 PICKED: dict[str, Any] = {"line_color": "#7a1fa2", "line_width": 2.0, "line_dash": "dashed"}
@@ -96,7 +97,7 @@ def _axis(axis: Any, name: str) -> None:
     axis.axis_label_text_font_size, axis.major_label_text_font_size = "12px", "11px"
     axis.axis_label_text_color, axis.major_label_text_color = INK, QUIET
     axis.axis_label_standoff = 4
-    axis.axis_line_color = axis.major_tick_line_color = "#9aa5b1"
+    axis.axis_line_color = axis.major_tick_line_color = AXIS
     axis.minor_tick_line_color = None
     axis.major_tick_in, axis.major_tick_out = 0, 4
 

@@ -88,13 +88,13 @@ def split_unit(text: str) -> tuple[str, str]:
     can be.
     """
     text = text.strip()
-    found = re.fullmatch(r"(.*?)\s*\[([^\[\]]*)\]", text)
-    if found and found[1]:
-        return found[1], found[2].strip()
+    heading = re.fullmatch(r"(.*?)\s*\[([^\[\]]*)\]", text)
+    if heading and heading[1]:
+        return heading[1], heading[2].strip()
     for pattern in (r"(.*?)\s*\((.*)\)", r"([^/]*?)\s*/\s*(.*)"):
-        found = re.fullmatch(pattern, text)
-        if found and found[1] and is_unit(found[2]):
-            return found[1], found[2].strip()
+        heading = re.fullmatch(pattern, text)
+        if heading and heading[1] and is_unit(heading[2]):
+            return heading[1], heading[2].strip()
     return text, ""
 
 
