@@ -24,22 +24,20 @@ SAVED = "climb.html"  # the whole climb as one page
 def climb(record: Path, model: Path, options: Sequence[str], steps: int, folder: Path) -> list[history.Step]:
     """Begin with a model and add the first candidate of each diagnosis to it, as a user of ``study explore`` would.
 
+    The model file stays as it is. The folder gets ``climb/`` (the model reached, its history and pictures, and a folder
+    for each diagnosis), ``climb.html``, ``history.json`` and the history's picture; what an earlier climb left there is
+    removed.
+
     Parameters
     ----------
     record, model : Path
-        The measured record, and the model file, which stays as it is.
+        The measured record, and the model file.
     options : sequence of str
         How the record is read, fitted and judged, as on the command line.
     steps : int
         Effects to add at most.
     folder : Path
-        Gets ``climb/`` (the model reached, its history and pictures, and a folder for each diagnosis),
-        ``climb.html``, ``history.json`` and the history's picture. What an earlier climb left there is removed.
-
-    Returns
-    -------
-    list of dict
-        The history.
+        Where results go.
     """
     arguments = parser().parse_args(["explore", str(record), "--model", str(model), *options])
     text = read_text(model, WANTED)

@@ -11,25 +11,13 @@ QUIET = 2.0  # seconds of work before progress is shown
 
 @dataclass(frozen=True)
 class Command:
-    """An entry in the table of commands.
-
-    Attributes
-    ----------
-    name, summary : str
-        What the user types, and what it does in a few words.
-    example : str
-        Shown by its ``--help``.
-    arguments : callable
-        Adds its arguments to a parser.
-    run : callable
-        Does it; a user's mistakes are raised as ``StudyError``.
-    """
+    """An entry in the table of commands."""
 
     name: str
-    summary: str
-    example: str
-    arguments: Callable[[argparse.ArgumentParser], None]
-    run: Callable[[argparse.Namespace], None]
+    summary: str  # what it does in a few words
+    example: str  # shown by its ``--help``
+    arguments: Callable[[argparse.ArgumentParser], None]  # adds its arguments to a parser
+    run: Callable[[argparse.Namespace], None]  # does it; a user's mistakes are raised as ``StudyError``
 
 
 @contextmanager

@@ -22,27 +22,13 @@ SETTLE = 0.4  # seconds in which pages are drawn, before a diagnosis takes the p
 
 @dataclass(frozen=True)
 class State:
-    """What pages show beside the model.
+    """What pages show beside the model."""
 
-    Attributes
-    ----------
-    busy : str
-        What is done while nothing else can be asked for.
-    diagnosing : str
-        What goes on behind that.
-    answer : str
-        The sentence beside the field for a formula.
-    accepted : str
-        The formula that was taken last.
-    notice : str
-        A sentence above everything else.
-    """
-
-    busy: str = ""
-    diagnosing: str = ""
-    answer: str = ""
-    accepted: str = ""
-    notice: str = ""
+    busy: str = ""  # what is done while nothing else can be asked for
+    diagnosing: str = ""  # what goes on behind that
+    answer: str = ""  # the sentence beside the field for a formula
+    accepted: str = ""  # the formula that was taken last
+    notice: str = ""  # a sentence above everything else
 
 
 class OvertakenError(Exception):

@@ -31,15 +31,7 @@ SELECTED = "if (cb_obj.final) window.study.selected(kind, cb_obj.geometry.x0, cb
 
 @dataclass(frozen=True)
 class Page:
-    """A page of one document.
-
-    Attributes
-    ----------
-    sources : dict
-        What is drawn, by name.
-    panels : dict
-        The figures, by the name of their place in the template.
-    """
+    """A page of one document: what is drawn, by name, and the figures, by the name of their place in the template."""
 
     sources: dict[str, ColumnDataSource]
     panels: dict[str, Any]

@@ -13,7 +13,7 @@ Sources = Mapping[str, ColumnDataSource]
 
 def response(s: Sources, time: Any) -> Any:
     """Measured and predicted response."""
-    drawn = theme.panel("response", 150, "", "response", select="width", ranges=(time, None))
+    drawn = theme.panel("response", 150, "", "response", select=True, ranges=(time, None))
     drawn.xaxis.visible = False
     _blocks(drawn, s)
     measured = drawn.line("t", "measured", source=s["time"], **theme.MEASURED)
@@ -26,7 +26,7 @@ def response(s: Sources, time: Any) -> Any:
 
 def difference(s: Sources, time: Any) -> Any:
     """What the model misses, the noise, and what a candidate would leave."""
-    drawn = theme.panel("difference", 158, "time / s", "difference", select="width", ranges=(time, None))
+    drawn = theme.panel("difference", 158, "time / s", "difference", select=True, ranges=(time, None))
     _blocks(drawn, s)
     line = drawn.line("t", "difference", source=s["time"], **theme.DIFFERENCE)
     would = drawn.line("t", "y", source=s["ghost_time"], **theme.WOULD)
@@ -55,7 +55,7 @@ def _blocks(drawn: Any, s: Sources) -> None:
 def force(s: Sources, frequency: Any, share: Any) -> Any:
     """Unexplained share of the force with the noise floor."""
     drawn = theme.panel(
-        "force", 222, "frequency / Hz", "unexplained share of the force / %", select="width", ranges=(frequency, share),
+        "force", 222, "frequency / Hz", "unexplained share of the force / %", select=True, ranges=(frequency, share),
         narrow=True, y_axis_type="log",
     )  # fmt: skip
     left = drawn.line("f", "parametric", source=s["force"], line_color=theme.BLUE, line_width=1.6)
@@ -69,7 +69,7 @@ def force(s: Sources, frequency: Any, share: Any) -> Any:
 def coherence(s: Sources, frequency: Any) -> Any:
     """Cumulative coherence: what the inputs explain, one after the other."""
     ranges = (frequency, theme.fixed("range_coherence", 0.0, 1.03))
-    drawn = theme.panel("coherence", 222, "frequency / Hz", "cumulative coherence / 1", select="width", ranges=ranges,
+    drawn = theme.panel("coherence", 222, "frequency / Hz", "cumulative coherence / 1", select=True, ranges=ranges,
                         narrow=True)  # fmt: skip
     lines = drawn.multi_line("f", "share", source=s["coherence"], line_color="colour", line_dash="dash", line_width=1.5)
     theme.legend(drawn, [({"field": "name"}, [lines])], "bottom_right")
@@ -80,7 +80,7 @@ def coherence(s: Sources, frequency: Any) -> Any:
 def spectrum(s: Sources, frequency: Any) -> Any:
     """The difference of the response by frequency, the noise, what is selected and what a candidate would leave."""
     drawn = theme.panel(
-        "spectrum", 222, "frequency / Hz", "difference", select="width", ranges=(frequency, None),
+        "spectrum", 222, "frequency / Hz", "difference", select=True, ranges=(frequency, None),
         narrow=True, y_axis_type="log",
     )  # fmt: skip
     line = drawn.line("f", "difference", source=s["spectrum"], line_color=theme.ORANGE, line_width=1.5)
@@ -125,7 +125,7 @@ def plane(s: Sources) -> Any:
 def against(s: Sources, of: str) -> Any:
     """Mean missing force against displacement (u) or velocity (v) with 95 % intervals."""
     name = f"against_{of}"
-    drawn = theme.panel(name, 250, of, "missing force", select="width", narrow=True)
+    drawn = theme.panel(name, 250, of, "missing force", select=True, narrow=True)
     drawn.add_layout(Span(location=0.0, dimension="width", line_color=theme.AXIS, line_width=1.0))
     mean = drawn.line("at", "mean", source=s[name], line_color=theme.BLUE, line_width=1.4)
     dots = drawn.scatter("at", "mean", source=s[name], fill_color=theme.BLUE, line_color=None, size=4.5)

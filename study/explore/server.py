@@ -30,11 +30,6 @@ def serve(desk: Desk, port: int | None, ready: Callable[[str], None]) -> None:
         Where; zero takes any that is free, None the usual one or, if that is taken, any.
     ready : callable
         Called with the address once it can be opened.
-
-    Raises
-    ------
-    StudyError
-        If the port is taken.
     """
 
     def show(document: Document) -> None:
@@ -71,11 +66,6 @@ def _server(application: Application, port: int) -> Server:
         socket.close()
     origins = [f"{host}:{bound}" for host in (HOST, "localhost")]
     return Server(
-        {"/": application},
-        address=HOST,
-        port=bound,
-        allow_websocket_origin=origins,
-        session_token_expiration=DAY,
-        check_unused_sessions_milliseconds=1000,
-        unused_session_lifetime_milliseconds=2000,
-    )
+        {"/": application}, address=HOST, port=bound, allow_websocket_origin=origins, session_token_expiration=DAY,
+        check_unused_sessions_milliseconds=1000, unused_session_lifetime_milliseconds=2000,
+    )  # fmt: skip

@@ -3,19 +3,8 @@
 from collections.abc import Sequence
 from typing import Any
 
-from bokeh.models import (
-    BoxAnnotation,
-    BoxSelectTool,
-    DataRange1d,
-    Legend,
-    LegendItem,
-    PanTool,
-    Range1d,
-    ResetTool,
-    SaveTool,
-    Title,
-    WheelZoomTool,
-)
+from bokeh.models import BoxAnnotation, DataRange1d, Legend, LegendItem, Range1d, Title
+from bokeh.models.tools import BoxSelectTool, PanTool, ResetTool, SaveTool, WheelZoomTool
 from bokeh.plotting import figure
 
 FONT = "Helvetica Neue, Helvetica, Arial, Liberation Sans, sans-serif"
@@ -32,34 +21,14 @@ PASSING = ("candidate", "selected")  # entries of legends
 
 
 def panel(
-    name: str,
-    height: int,
-    x: str,
-    y: str,
-    *,
-    select: str = "",
-    ranges: tuple[Any, Any] = (None, None),
-    narrow: bool = False,
-    **more: Any,
-) -> Any:
+    name: str, height: int, x: str, y: str, *, select: bool = False, ranges: tuple[Any, Any] = (None, None),
+    narrow: bool = False, **more: Any,
+) -> Any:  # fmt: skip
     """A figure in the page's style.
 
-    Parameters
-    ----------
-    name : str
-        Of its place in the page, where the figure is ``panel_name`` and its axes ``name_x`` and ``name_y``.
-    height : int
-        In pixels; the width is that of its place.
-    x, y : str
-        Labels, units included.
-    select : str
-        ``width`` if a range of x can be selected.
-    ranges : pair
-        Ranges of x and y; found from the data if None.
-    narrow : bool
-        Whether the panel shares its row: fewer ticks.
-    more : keyword arguments
-        Of ``bokeh.plotting.figure``.
+    Its place in the page is called ``name``, the figure ``panel_name``, its axes ``name_x`` and ``name_y``; ``x`` and
+    ``y`` are their labels. The width is that of its place, the height in pixels. With ``select``, a range of x can be
+    selected; ``ranges`` of x and y that are None follow the data. A ``narrow`` panel shares its row: fewer ticks.
     """
     tools: list[Any] = [PanTool(dimensions="width"), WheelZoomTool(dimensions="width"), ResetTool(), SaveTool()]
     if select:
@@ -69,14 +38,10 @@ def panel(
         x_axis_label=x, y_axis_label=y, x_range=ranges[0] or DataRange1d(range_padding=0.0),
         y_range=ranges[1] or DataRange1d(range_padding=0.06),
         active_drag=tools[0] if select else None, active_scroll=None, toolbar_location="right", toolbar_inner=True,
-        min_border_right=8,
-        **more,
+        min_border_right=8, outline_line_color=None, background_fill_color=None, border_fill_color=None, **more,
     )  # fmt: skip
     drawn.toolbar.autohide = True
     drawn.toolbar.logo = None
-    drawn.outline_line_color = None
-    drawn.background_fill_color = None
-    drawn.border_fill_color = None
     for axis, side in ((drawn.xaxis[0], "x"), (drawn.yaxis[0], "y")):
         _axis(axis, f"{name}_{side}")
     if narrow and "x_axis_type" not in more:

@@ -1,4 +1,4 @@
-"""What a rung shows, as columns by the name of their source: numbers in the units of the axes, ready to be drawn."""
+"""What a page shows of a model, as columns by the name of their source: numbers in the units of the axes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,44 +26,18 @@ SURE = 2.0  # standard errors: cells whose mean is below may be noise
 
 @dataclass(frozen=True)
 class View:
-    """A rung as it is drawn.
+    """A model of the session as it is drawn."""
 
-    Attributes
-    ----------
-    columns : dict
-        Columns of each source.
-    scales : Scales
-        Units of the axes.
-    highest : float
-        Frequency in hertz at which the axes of frequency end.
-    quantity : str
-        The measured motion.
-    limits : (float, float)
-        Ends of the axis of the force.
-    least : float
-        Missing force, in the unit of its axis, down to which axes are drawn: below lies nothing to be seen.
-    """
-
-    columns: dict[str, Columns]
+    columns: dict[str, Columns]  # of each source
     scales: Scales
-    highest: float
-    quantity: str
-    limits: tuple[float, float]
-    least: float
+    highest: float  # frequency in hertz at which the axes of frequency end
+    quantity: str  # the measured motion
+    limits: tuple[float, float]  # of the axis of the force
+    least: float  # missing force, in the unit of its axis, below which nothing is to be seen
 
 
 def view(rung: Rung, step: int, live: bool = True) -> View:
-    """The columns of one rung.
-
-    Parameters
-    ----------
-    rung : Rung
-        A model with its comparison and, perhaps, its diagnosis.
-    step : int
-        Its number in the session.
-    live : bool
-        Whether the page can act (a saved one cannot).
-    """
+    """The columns of a model, by its number in the session; only a ``live`` page can act."""
     comparison, scales = rung.comparison, scales_of(rung.comparison)
     rows, force, least = rung.shown, scales.force, least_force(rung.comparison)
     u, v, missing = within(comparison.missing_force)

@@ -9,21 +9,10 @@ from study.support.errors import StudyError
 
 
 def rests_on(script: Path, *, also: Iterable[str] = (), without: Collection[str] = ()) -> list[str]:
-    """Files of the package that a script imports, directly or through one another.
+    """Sorted paths of the files of the package that a script imports, directly or through one another.
 
-    Parameters
-    ----------
-    script : Path
-        A Python file; the package stands in the folder above its own.
-    also : iterable of str
-        Modules that are imported by name while the script runs, such as ``estimators.miso``.
-    without : collection of str
-        Modules that are not followed: what the script imports along with what it needs, and does not use.
-
-    Returns
-    -------
-    list of str
-        Sorted paths relative to the working directory.
+    ``also`` names modules that are imported while the script runs, such as ``estimators.miso``; those in ``without``
+    are not followed: what the script imports along with what it needs, and does not use.
     """
     root = script.parent.parent
     reached: set[Path] = set()

@@ -46,20 +46,10 @@ ROLES: dict[str, tuple[Powers, str]] = {
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit that was understood.
+    """A unit that was understood."""
 
-    Attributes
-    ----------
-    text : str
-        As records, tables and figures write it (``m/s^2``, ``um``).
-    factor : float
-        How many SI units (N, m, s, V) it is.
-    powers : tuple of int
-        Powers of force, length, time and voltage.
-    """
-
-    text: str
-    factor: float
+    text: str  # as records, tables and figures write it (``m/s^2``, ``um``)
+    factor: float  # how many SI units (N, m, s, V) it is
     powers: Powers
 
 
@@ -105,14 +95,9 @@ def _unknown(text: str) -> StudyError:
 
 
 def role_unit(role: str, text: str) -> Unit:
-    """The unit of a channel, checked against what the channel is.
+    """The unit of a channel such as ``force`` or ``time``, checked against what the channel is.
 
-    Parameters
-    ----------
-    role : str
-        ``force``, ``displacement``, ``velocity``, ``acceleration`` or ``time``.
-    text : str
-        As the user or the file wrote it. Volts are accepted for all but time: an uncalibrated sensor.
+    Volts are accepted for all but time: an uncalibrated sensor.
 
     Raises
     ------

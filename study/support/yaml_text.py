@@ -95,16 +95,9 @@ def scalar(text: str) -> str:
 
 
 def with_entry(text: str, key: str, entry: str) -> str:
-    """The text with one entry more at the end of the top-level list ``key``; nothing else changes.
+    """The text with one entry, YAML on one line, more at the end of its top-level list ``key``; nothing else changes.
 
-    Parameters
-    ----------
-    text : str
-        YAML that :func:`read_plain` accepts, whose ``key`` is a list of at least one entry.
-    key : str
-        Name of the list.
-    entry : str
-        YAML on one line.
+    :func:`read_plain` must accept the text, and the list have an entry.
     """
     sequence = _list(text, key)
     if sequence.flow_style:

@@ -18,37 +18,19 @@ WANTED = "a YAML file with 'columns', 'units', 'fs' or 'dt', 'group', 'samples',
 class ReadOptions:
     """How to read a file; everything that is left out is looked for in the file itself.
 
-    Attributes
-    ----------
-    columns : dict
-        Role to column: ``{"force": "V1", "displacement": 2}``. A column is a name or its number,
-        counted from 1. Roles are force, displacement, velocity, acceleration and time; any other
-        name makes an extra channel of that name.
-    units : dict of str
-        Role to unit: ``{"force": "kN", "displacement": "mm"}``.
-    dt, fs : float, optional
-        Sampling interval in seconds, or sampling rate in hertz.
-    group : str, optional
-        Folder of an HDF5 file, or structure of a MATLAB file, that holds the channels.
-    samples : pair of int, optional
-        First sample, counted from 0, and the one after the last (None: to the end).
-    period : int, optional
-        Samples in one period of a periodic excitation.
-    accept_saturated : bool
-        Take a channel that rests at its extreme value for what it is (a trapezoidal force, say).
-    accept_swapped : bool
-        Take force and response as they are, though they seem to stand in each other's place.
+    Roles are force, displacement, velocity, acceleration and time; any other name makes an extra channel of that name.
     """
 
+    # Role to column, a name or its number counted from 1: {"force": "V1", "displacement": 2}.
     columns: Mapping[str, str | int] = field(default_factory=dict[str, "str | int"])
-    units: Mapping[str, str] = field(default_factory=dict[str, str])
-    dt: float | None = None
-    fs: float | None = None
-    group: str | None = None
-    samples: tuple[int, int | None] | None = None
-    period: int | None = None
-    accept_saturated: bool = False
-    accept_swapped: bool = False
+    units: Mapping[str, str] = field(default_factory=dict[str, str])  # role to unit: {"force": "kN"}
+    dt: float | None = None  # sampling interval in seconds, or ...
+    fs: float | None = None  # ... sampling rate in hertz
+    group: str | None = None  # folder of an HDF5 file, or structure of a MATLAB file, that holds the channels
+    samples: tuple[int, int | None] | None = None  # the first, counted from 0, and the one after the last
+    period: int | None = None  # samples in one period of a periodic excitation
+    accept_saturated: bool = False  # a channel that rests at its extreme value is like that (a trapezoidal force, say)
+    accept_swapped: bool = False  # force and response are as named, though they seem exchanged
 
     def __post_init__(self) -> None:
         """Refuse what contradicts itself or no record can have."""

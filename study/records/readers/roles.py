@@ -27,19 +27,8 @@ NAMES: dict[str, tuple[str, ...]] = {
 def assign(path: Path, table: Table, options: ReadOptions) -> dict[str, Column]:
     """Column of each channel, in the file's order; extra channels keep their names.
 
-    Parameters
-    ----------
-    path : Path
-        For messages.
-    table : Table
-        What the file holds.
-    options : ReadOptions
-        What the user says; its ``columns`` come before any guess.
-
-    Raises
-    ------
-    StudyError
-        If a column is missing, named twice or could be several things; lists the columns.
+    What the user says in ``columns`` comes before any guess. If a column is missing, named twice or could be several
+    things, the fault lists the columns.
     """
     named = {role: _named(path, table, role, wanted) for role, wanted in options.columns.items()}
     complete = "force" in named and any(m in named for m in MOTIONS)

@@ -15,22 +15,10 @@ ROUNDING = 0.4  # of the sampling interval: the coarsest rounding of printed tim
 
 
 def even_interval(path: Path, time: Floats, place: Callable[[int], str]) -> tuple[float, float]:
-    """Sampling interval and first time, in seconds.
+    """Sampling interval and first time in seconds; ``place`` says where in the file a sample stands.
 
-    Parameters
-    ----------
-    path : Path
-        For messages.
-    time : array, shape (n,)
-        Times of the samples in seconds, n at least 2.
-    place : callable
-        Where in the file a sample stands.
-
-    Returns
-    -------
-    dt, start : float
-        The interval is the shortest decimal (of itself or of its inverse) that the times allow; times
-        that lie exactly on a grid are met to the last bit.
+    The interval is the shortest decimal (of itself or of its inverse) that the times allow; times that lie exactly on
+    a grid are met to the last bit.
 
     Raises
     ------

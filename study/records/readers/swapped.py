@@ -35,16 +35,8 @@ def suspect_swapped(record: Record) -> str | None:
     (4.25) of the report: it grows as f^2 above resonance, the response lags, and m and c are above zero. The
     record is read both ways, and suspected if only the other reading comes out so. What has no spring (force over
     acceleration a constant) looks the same both ways.
-
-    Parameters
-    ----------
-    record : Record
-        As read, before any motion is filled in. The measured motion nearest to displacement is used.
-
-    Returns
-    -------
-    str or None
-        None also where the record cannot tell: too short, or its band holds no resonance and no mass.
+    The measured motion nearest to displacement is used. A record that is too short, or whose band holds no resonance
+    and no mass, cannot tell.
     """
     motion = next(m for m in MOTIONS if m in record)
     length = min(LONGEST, 2 * len(record) // AVERAGES)

@@ -22,50 +22,24 @@ INTERVALS = ("dt", "ts", "samplingtime", "samplingperiod", "sampletime", "sampli
 
 @dataclass(frozen=True)
 class Column:
-    """A column as it stands in the file.
+    """A column as it stands in the file."""
 
-    Attributes
-    ----------
-    name : str
-        Its name, without the unit.
-    values : array, shape (n,)
-        Empty where ``fault`` says why there are none.
-    unit, role : str
-        What the file says it is; empty where it says nothing.
-    fault : str
-        A sentence for the user who asks for this column, if it cannot be used.
-    period : int, optional
-        Samples in a period, if the file holds periods side by side.
-    """
-
-    name: str
-    values: Floats
-    unit: str = ""
-    role: str = ""
-    fault: str = ""
-    period: int | None = None
+    name: str  # without the unit
+    values: Floats  # empty where ``fault`` says why there are none
+    unit: str = ""  # what the file says it is; empty where it says nothing
+    role: str = ""  # the same
+    fault: str = ""  # a sentence for the user who asks for this column, if it cannot be used
+    period: int | None = None  # samples in a period, if the file holds periods side by side
 
 
 @dataclass(frozen=True)
 class Table:
-    """The columns of a file.
-
-    Attributes
-    ----------
-    columns : tuple of Column
-        In the file's order.
-    dt : float, optional
-        Sampling interval in seconds, if the file states one.
-    start : float
-        Time of the first sample in seconds, if the file states one.
-    place : callable
-        Where in the file a sample stands, in words: ``line 17``.
-    """
+    """The columns of a file in its order, and what it states about their sampling."""
 
     columns: tuple[Column, ...]
-    dt: float | None = None
-    start: float = 0.0
-    place: Callable[[int], str] = "sample {}".format
+    dt: float | None = None  # sampling interval in seconds
+    start: float = 0.0  # time of the first sample in seconds
+    place: Callable[[int], str] = "sample {}".format  # where in the file a sample stands, in words: ``line 17``
 
     def from_sample(self, first: int) -> "Table":
         """The same table, places counted from a later sample on."""

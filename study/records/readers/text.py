@@ -35,21 +35,11 @@ NO_TEXT = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f]")  # control characters tha
 
 @dataclass(frozen=True)
 class Layout:
-    """How a text file is laid out.
+    """How a text file is laid out."""
 
-    Attributes
-    ----------
-    delimiter, decimal : str
-        Between cells; within numbers.
-    first : int
-        Line of the first sample, counted from 0.
-    names, units : tuple of str
-        One each column.
-    """
-
-    delimiter: str
-    decimal: str
-    first: int
+    delimiter: str  # between cells
+    decimal: str  # within numbers
+    first: int  # line of the first sample, counted from 0
     names: tuple[str, ...]
     units: tuple[str, ...]
 
