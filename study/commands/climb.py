@@ -26,18 +26,8 @@ def climb(record: Path, model: Path, options: Sequence[str], steps: int, folder:
 
     The model file stays as it is. The folder gets ``climb/`` (the model reached, its history and pictures, and a folder
     for each diagnosis), ``climb.html``, ``history.json`` and the history's picture; what an earlier climb left there is
-    removed.
-
-    Parameters
-    ----------
-    record, model : Path
-        The measured record, and the model file.
-    options : sequence of str
-        How the record is read, fitted and judged, as on the command line.
-    steps : int
-        Effects to add at most.
-    folder : Path
-        Where results go.
+    removed. The options are those of the command line: how the record is read, fitted and judged. At most ``steps``
+    effects are added.
     """
     arguments = parser().parse_args(["explore", str(record), "--model", str(model), *options])
     text = read_text(model, WANTED)

@@ -45,12 +45,7 @@ class Measurement(Row):
 def load(folder: Path, cases: Collection[str] = ()) -> Mapping[str, Measurement]:
     """Read ``measurements.tsv`` of a folder; whether the data are there is not asked.
 
-    Parameters
-    ----------
-    folder : Path
-        ``config/``.
-    cases : collection of str
-        Names that a record may not have, nor the target of its climb.
+    No record, nor the target of its climb, may have one of the names of ``cases``.
 
     Raises
     ------

@@ -20,16 +20,9 @@ DAY = 86400  # seconds within which a page that was fetched must open its socket
 
 
 def serve(desk: Desk, port: int | None, ready: Callable[[str], None]) -> None:
-    """Serve a desk until interrupted.
+    """Serve a desk until interrupted, and call ``ready`` with the address once it can be opened.
 
-    Parameters
-    ----------
-    desk : Desk
-        What pages look at.
-    port : int or None
-        Where; zero takes any that is free, None the usual one or, if that is taken, any.
-    ready : callable
-        Called with the address once it can be opened.
+    A port of zero takes any that is free, None the usual one or, if that is taken, any.
     """
 
     def show(document: Document) -> None:

@@ -10,7 +10,9 @@ import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from io import BytesIO
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +33,9 @@ COMMENTS = ("#", "%", "!", "//")
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
 EXPECTED = "expected a table with one line for each sample"
 NO_TEXT = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f]")  # control characters that no text file holds
+
+
+Place = Callable[[int], str]
 
 
 @dataclass(frozen=True)
@@ -176,11 +181,11 @@ def _commented(lines: Sequence[str], best: _Reading) -> list[str]:
 
 
 def _table(path: Path, body: bytes, layout: Layout) -> Table:
-    place, width = _Place(body, layout.first), len(layout.names)
+    place, width = partial(_line, body, layout.first), len(layout.names)
     try:
         frame, read = _frame(body, layout)
     except ValueError as error:
-        raise StudyError(f"{path}: {_ragged(str(error), place, width)}") from None
+        raise StudyError(f"{path}: {_ragged(str(error), layout, place(0))}") from None
     hidden = f"{path}: line {layout.first + 1} has {frame.shape[1]} cells of numbers; expected {width}"
     expect(frame.shape[1] == width, hidden)  # a comment behind the first sample can hide some of its cells
     headings = zip(layout.names, layout.units, strict=True)
@@ -208,11 +213,11 @@ def _parse(body: bytes, layout: Layout, dtype: str) -> pd.DataFrame:
     )  # fmt: skip
 
 
-def _numbers(name: str, unit: str, cells: "pd.Series[Any]", _decimal: str, _place: "_Place") -> Column:
+def _numbers(name: str, unit: str, cells: "pd.Series[Any]", _decimal: str, _place: Place) -> Column:
     return Column(name, cells.to_numpy(dtype=np.float64), unit)
 
 
-def _checked(name: str, unit: str, cells: "pd.Series[Any]", decimal: str, place: "_Place") -> Column:
+def _checked(name: str, unit: str, cells: "pd.Series[Any]", decimal: str, place: Place) -> Column:
     """Each cell on its own; a column with text says where it stands if it is asked for."""
     texts = [cell.strip(SPACE) if isinstance(cell, str) else "" for cell in cells.tolist()]
     wrong = next((i for i, cell in enumerate(texts) if cell and not _is_number(cell, decimal)), None)
@@ -223,25 +228,18 @@ def _checked(name: str, unit: str, cells: "pd.Series[Any]", decimal: str, place:
     return Column(name, np.array([float(cell) if cell else np.nan for cell in numbers]), unit)
 
 
-def _ragged(error: str, place: "_Place", width: int) -> str:
+def _ragged(error: str, layout: Layout, top: str) -> str:
+    width = len(layout.names)
     numbers = re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", error)
     if numbers is None:
         return f"the table cannot be read; {EXPECTED}"
     if int(numbers[1]) != width:  # the first line is the odd one
-        return f"{place(0)} has {numbers[1]} cells of numbers; expected {width}"
-    return f"line {int(numbers[2]) + place.first} has {numbers[3]} cells; expected {width} as in the lines above"
+        return f"{top} has {numbers[1]} cells of numbers; expected {width}"
+    return f"line {int(numbers[2]) + layout.first} has {numbers[3]} cells; expected {width} as in the lines above"
 
 
-@dataclass(frozen=True)
-class _Place:
+def _line(body: bytes, first: int, index: int) -> str:
     """In which line of the file a sample stands."""
-
-    body: bytes
-    first: int
-
-    def __call__(self, index: int) -> str:
-        samples = (
-            k for k, line in enumerate(self.body.decode("utf-8", errors="replace").split("\n"))
-            if line.strip() and not _is_comment(line)
-        )  # fmt: skip
-        return f"line {next((k for i, k in enumerate(samples) if i == index), index) + self.first + 1}"
+    lines = enumerate(body.decode("utf-8", errors="replace").split("\n"))
+    samples = (k for k, line in lines if line.strip() and not _is_comment(line))
+    return f"line {next(islice(samples, index, None), index) + first + 1}"

@@ -61,8 +61,8 @@ def _table(path: Path, histories: list[Mapping[str, Any]]) -> Table:
         time = Column("time", np.asarray(first["x"], dtype=np.float64), "s", "time")
         return Table((time, *columns))
     steps = sorted({float(h["abscissa_inc"]) for h in histories})
-    one = len(steps) == 1 and steps[0] > 0.0
-    expect(one, f"{path}: its channels have the sampling intervals {steps}; expected one above zero")
+    even = len(steps) == 1 and steps[0] > 0.0
+    expect(even, f"{path}: its channels have the sampling intervals {steps}; expected one above zero")
     return Table(tuple(columns), shortest_decimal(steps[0], ROUNDING * steps[0]), float(first["abscissa_min"]))
 
 
