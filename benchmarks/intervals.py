@@ -44,7 +44,7 @@ def one(noise: float, seed: int) -> list[dict[str, object]]:
     rows: list[dict[str, object]] = []
     for name in NAMES:
         found = estimators.identify(name, MODEL, record, TOLD)
-        fit = output_error.fit(MODEL, record, TOLD)
+        fit = output_error.fit(MODEL, record)
         known = np.sqrt(np.mean(added**2)) / fit.rms  # the bound takes the noise's own variance
         assert found.estimate is not None
         for key in found.estimate.symbols:

@@ -18,7 +18,7 @@ from scripts.page_picture import QUIET, browser
 from study import trials
 from study.explore import session
 from study.explore.view import view
-from study.records.plan import make_plan
+from study.records.prepared import prepare_record
 from study.records.record import write_csv
 
 ROUNDS = 5
@@ -59,7 +59,7 @@ def on_the_page(url: str) -> dict[str, float]:
 
 def alone(trial: Any) -> float:
     """Seconds of the fit and of the page's columns, without a page."""
-    now = session.begin(trial.believed, trial.record, make_plan(trial.record))
+    now = session.begin(trial.believed, prepare_record(trial.record))
     rung, _ = session.examined(now)
     now = session.with_rung(now, rung)
     start = time.perf_counter()

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from study.compare import panels
 from study.compare.across_levels import Level
 from study.compare.comparison import Comparison
-from study.compare.comparison_sentences import percent
 from study.compare.force_map import curve, surface
 from study.figures import coherence, page
 from study.figures.curves import InputCoherence
 from study.figures.sheet import in_style
+from study.support.numbers import percent
 
 Floats = NDArray[np.float64]
 KINDS = ("png", "svg")

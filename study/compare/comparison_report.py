@@ -12,10 +12,11 @@ import pandas as pd
 from study.compare.across_levels import Level
 from study.compare.by_estimator import FREE_RUN
 from study.compare.comparison import Comparison
-from study.compare.comparison_sentences import percent, says, says_of_all
+from study.compare.comparison_sentences import says, says_of_all
 from study.compare.fitted_coefficients import Coefficient
 from study.compare.force_map import curve, surface
 from study.equations import model_file
+from study.support.numbers import percent
 
 Row = dict[str, Any]
 

@@ -9,6 +9,7 @@ from study.compare.along_time import AlongTime
 from study.compare.comparison import Comparison
 from study.compare.growth import Growth, Growths
 from study.compare.noise import SCATTER
+from study.support.numbers import percent
 
 NEGLIGIBLE = 2e-3  # of the rms response: structure below this is no evidence that something is missing
 CHANCE = 0.01  # p value below which a change along the record is no chance
@@ -33,12 +34,6 @@ def says(found: Comparison) -> str:
     if not found.fit.converged:
         sentences.append(f"The fit did not arrive at a minimum ({found.fit.message}), so this may be the fit's fault")
     return ". ".join(s[0].upper() + s[1:] for s in sentences) + "."
-
-
-def percent(share: float) -> str:
-    """A share in per cent, two digits: ``38 %``, ``1.2 %``, ``0.034 %``."""
-    value = 100.0 * share
-    return f"{value:.0f} %" if value >= 9.95 else f"{value:.2g} %"
 
 
 def _plain(number: float) -> str:

@@ -6,6 +6,7 @@ from typing import Any, cast
 
 from study.support.errors import StudyError
 from study.support.files import read_text, replace_file
+from study.support.numbers import percent
 
 Step = dict[str, Any]
 
@@ -65,13 +66,10 @@ def table(steps: list[Step]) -> str:
     for number, step in enumerate(steps):
         what = f"+ {step['added']}" if step.get("added") else ", ".join(step["terms"])
         error = step["error"]
+        force = "-" if error["force"] is None else percent(error["force"])
         rows.append(
-            [str(number), what, step["record"], _percent(error["force"]), _percent(error["response"]),
-             f"{step['rms']:.4g} {step['unit']}", _percent(step["noise_floor"]["response"])]
+            [str(number), what, step["record"], force, percent(error["response"]),
+             f"{step['rms']:.4g} {step['unit']}", percent(step["noise_floor"]["response"])]
         )  # fmt: skip
     head = ["", "model", "record", "force error", "response error", "rms", "noise floor"]
     return tabulate(rows, head, tablefmt="simple", disable_numparse=True)
-
-
-def _percent(share: float | None) -> str:
-    return "-" if share is None else f"{100.0 * share:.3g} %"

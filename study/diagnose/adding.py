@@ -15,7 +15,7 @@ def added(comparison: Comparison, term: Term) -> Comparison:
     StudyError
         If the model with it has no finite response.
     """
-    prepared = comparison.prepared
-    fit = with_term(search_base(comparison).fit, free(term), search_base(comparison), prepared.shortened(SEARCHED))
+    prepared, base = comparison.prepared, search_base(comparison)
+    fit = with_term(base.fit, free(term), base, prepared.shortened(SEARCHED))
     fit = settled(continued(fit, prepared), prepared)
     return compare(comparison.model.with_term(term), prepared, fit=fit)

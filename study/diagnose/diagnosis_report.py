@@ -7,6 +7,7 @@ import numpy as np
 
 from study.diagnose.ranking import Ranked
 from study.diagnose.verdict import Diagnosis
+from study.support.numbers import percent
 
 TIES = 2  # ties named in the table; the file names all
 SHOWN = 8  # candidates in the table on the screen
@@ -31,11 +32,11 @@ def _shown(place: int, row: Ranked, force: str, length: str) -> list[str]:
     return [
         str(place),
         row.name,
-        f"{100 * row.gain.explained:z.1f} +- {100 * row.gain.error:.1f} %",
-        f"{100 * row.response_error:.3g} %",
+        percent(row.gain.explained, "z.1f", row.gain.error, ".1f"),
+        percent(row.response_error),
         f"{row.coefficient:.4g} +- {half:.2g} {unit}",
         f"{row.p_value:.1g}",
-        f"{100 * row.unsteadiness:.0f} %" if math.isfinite(row.unsteadiness) else "-",
+        percent(row.unsteadiness, ".0f") if math.isfinite(row.unsteadiness) else "-",
         _few(row.tied_with),
     ]
 

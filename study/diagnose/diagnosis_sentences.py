@@ -5,6 +5,7 @@ import math
 from study.diagnose.ranking import UNSTEADY, Ranked, wavers
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
 from study.figures.labels import term_names
+from study.support.numbers import percent
 
 DEPENDENCE = 0.1  # held-out share from which the unexplained force is said to depend on something
 CLOSE = 0.05  # families this close to the best one are named with it
@@ -23,8 +24,8 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
 def _nothing(diagnosis: Diagnosis) -> str:
     prediction = diagnosis.comparison.prediction
     return (
-        f"Nothing is missing that this record could show: the error of the response is {_percent(prediction.error)}"
-        f" and its noise floor {_percent(prediction.floor)}; none of {len(diagnosis.candidates)} candidates "
+        f"Nothing is missing that this record could show: the error of the response is {percent(prediction.error)}"
+        f" and its noise floor {percent(prediction.floor)}; none of {len(diagnosis.candidates)} candidates "
         "explains any of it."
     )
 
@@ -34,15 +35,15 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
     force, length = units.get("force", "N"), units.get("displacement", "m")
     said = [
         f"{_words(first.name)} is missing ({first.term.meaning}).",
-        f"With it the held-out error of the response falls from {_percent(diagnosis.comparison.prediction.error)} to "
-        f"{_percent(first.response_error)}; the noise floor is {_percent(first.prediction.floor)}.",
+        f"With it the held-out error of the response falls from {percent(diagnosis.comparison.prediction.error)} to "
+        f"{percent(first.response_error)}; the noise floor is {percent(first.prediction.floor)}.",
         f"Its coefficient is {_amount(first, force, length)}{_shape(first, length)}.",
     ]
     if diagnosis.pair:
         second = next(name for name in diagnosis.pair if name != first.name)
         said.append(f"It does not explain all: of all candidates, {term_names(second)} beside it explains most.")
     elif diagnosis.left > 0.0:
-        said.append(f"Structure of {_percent(diagnosis.left)} of the response is left beside it.")
+        said.append(f"Structure of {percent(diagnosis.left)} of the response is left beside it.")
     if first.unphysical:
         said.append(f"As fitted it is no physical effect: {first.unphysical}.")
     if first.tied_with:
@@ -53,13 +54,13 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
 def _unknown(diagnosis: Diagnosis) -> list[str]:
     prediction = diagnosis.comparison.prediction
     said = [
-        f"Something is missing that no candidate explains: {_percent(prediction.error)} error of the response, "
-        f"of which {_percent(prediction.floor)} would be noise."
+        f"Something is missing that no candidate explains: {percent(prediction.error)} error of the response, "
+        f"of which {percent(prediction.floor)} would be noise."
     ]
     best = diagnosis.candidates[0] if diagnosis.candidates else None
     if best is not None and best.gain.explained > 0.0 and best.p_value < 0.05:
         said.append(
-            f"The nearest, {term_names(best.name)}, leaves {_percent(best.response_error)}; "
+            f"The nearest, {term_names(best.name)}, leaves {percent(best.response_error)}; "
             f"{_doubt(best)}, so its shape is not right."
         )
     families = sorted(diagnosis.families.items(), key=lambda item: -item[1])
@@ -67,7 +68,7 @@ def _unknown(diagnosis: Diagnosis) -> list[str]:
         named = [name for name, share in families if share > families[0][1] - CLOSE]
         said.append(
             f"The missing force depends on {' or '.join(named)}: general functions of it explain "
-            f"{_percent(families[0][1])} of what is unexplained, held out."
+            f"{percent(families[0][1])} of what is unexplained, held out."
         )
     else:
         said.append("Neither displacement, velocity, the past nor time as such explains a tenth of it.")
@@ -76,10 +77,10 @@ def _unknown(diagnosis: Diagnosis) -> list[str]:
 
 def _doubt(row: Ranked) -> str:
     if row.steadiness is not None and wavers(row.steadiness):
-        change, p = _percent(row.steadiness.spread()), row.steadiness.p_value()
+        change, p = percent(row.steadiness.spread()), row.steadiness.p_value()
         return f"its coefficient changes with the amplitude by {change} (p = {p:.1g})"
     if row.flatness is not None and row.flatness.spread() > UNSTEADY:
-        return f"its coefficient changes with the frequency by {_percent(row.flatness.spread())}"
+        return f"its coefficient changes with the frequency by {percent(row.flatness.spread())}"
     return "what remains has structure"
 
 
@@ -110,7 +111,3 @@ def _shape(row: Ranked, length: str) -> str:
 def _words(name: str) -> str:
     words = term_names(name)
     return words[0].upper() + words[1:]
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.3g} %" if share < 10.0 else f"{100.0 * share:.0f} %"

@@ -5,13 +5,14 @@ from html import escape
 from typing import Any
 
 from study.compare.comparison import Comparison
-from study.compare.comparison_sentences import percent, says
+from study.compare.comparison_sentences import says
 from study.compare.fitted_coefficients import Coefficient
 from study.diagnose.ranking import Ranked
 from study.diagnose.verdict import MISSING, NOTHING
 from study.explore.page_units import in_text, length, number, rate
 from study.explore.session import Rung
 from study.figures.labels import power_of_ten, term_names
+from study.support.numbers import percent
 
 VERDICTS = {MISSING: "An effect is missing", NOTHING: "Nothing is missing"}
 UNKNOWN = "Something is missing that no candidate explains"

@@ -13,8 +13,10 @@ def least_squares(columns: Floats, target: Floats, cutoff: float = 1e-12) -> Flo
 
     Columns are scaled to unit length first; what is then weaker than ``cutoff`` counts as absent.
     """
-    scale = np.linalg.norm(columns, axis=0)
-    scale = np.where(scale > 0.0, scale, 1.0)
+    peak = np.max(np.abs(columns), axis=0, initial=0.0)
+    peak = np.where(peak > 0.0, peak, 1.0)  # first of all, so that no square overflows
+    length = np.linalg.norm(columns / peak, axis=0)
+    scale = peak * np.where(length > 0.0, length, 1.0)
     solve = cast(Any, np.linalg.lstsq)  # its annotation leaves the element type open
     amounts: Floats = np.asarray(solve(columns / scale, target, rcond=cutoff)[0], dtype=np.float64)
     return amounts / scale

@@ -3,5 +3,7 @@
 
 def percent(share: float, form: str = ".3g", error: float | None = None, error_form: str = ".1g") -> str:
     """A share in percent, by Python's format codes: ``percent(0.0123, "+.3g", 0.001)`` is ``+1.23 +- 0.1 %``."""
+    if form == ".3g" and abs(share) >= 10.0:  # no exponents
+        form = ".0f"
     spread = "" if error is None else f" +- {100.0 * error:{error_form}}"
     return f"{100.0 * share:{form}}{spread} %"

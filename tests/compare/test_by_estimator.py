@@ -7,22 +7,23 @@ import numpy as np
 import pytest
 
 from study import cli
-from study.compare.by_estimator import CHAOTIC
-from study.compare.comparison import Comparison, compare
+from study.compare.by_estimator import FREE_RUN
+from study.compare.comparison import CHAOTIC, Comparison, compare
 from study.compare.comparison_report import document, summary
 from study.compare.fitted_coefficients import Coefficient
 from study.compare.local_force_error import local_force_error
+from study.compare.prediction import predict
 from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
 from study.identify import estimators
 from study.identify.estimators.base import Settings
-from study.records.completion import CompletedRecord
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.plan import Plan
+from study.records.prepared import prepare_record
 from study.records.record import Record, write_csv
 from study.records.spectra import Segments
-from study.support.errors import StudyError
+from study.support.errors import DivergenceError, StudyError
 
 NAMES = ("inertia", "linear_damping", "linear_stiffness", "cubic_stiffness")
 VALUES = {"m": 1.0, "c": 3.77, "k": 355.3, "k3": 2e7}
@@ -39,48 +40,53 @@ def record(periods: int = 1, noise: float = 0.005, on_force: float = 0.0) -> Rec
     return Record(0.02, channels, name="rig", period=512 if periods > 1 else None)
 
 
-def off(found: Comparison) -> dict[str, float]:
+def off(comparison: Comparison) -> dict[str, float]:
     """Each coefficient's error in its own standard errors."""
-    return {c.key: (c.value - VALUES[c.key]) / (c.error or np.nan) for c in found.coefficients}
+    return {c.key: (c.value - VALUES[c.key]) / (c.error or np.nan) for c in comparison.coefficients}
+
+
+def compared(believed: Model, made: Record, *, estimator: str = FREE_RUN) -> Comparison:
+    return compare(believed, prepare_record(made), estimator=estimator)
 
 
 @pytest.fixture(scope="module")
 def local() -> Comparison:
-    return compare(OPEN, record(), estimator="local_polynomial")
+    return compared(OPEN, record(), estimator="local_polynomial")
 
 
 def test_an_estimator_in_reverse_stands_in_for_the_free_run(local: Comparison) -> None:
     assert all(abs(error) < 4.0 for error in off(local).values()), off(local)
     assert all(c.error is not None and c.error < 0.01 * c.value for c in local.coefficients)
-    assert local.response_error < 3.0 * local.noise_floor, "judged in free run, like any other"
+    assert local.prediction.error < 3.0 * local.prediction.floor, "judged in free run, like any other"
     assert document([local])["fit"]["estimator"] == "local_polynomial"
     assert "fitted to samples 0 to 4096 by local_polynomial, judged on 4096 to 8192" in summary([local])
 
 
 def test_the_error_of_the_force_is_without_leakage() -> None:
     made = record(noise=0.0)
-    own, report = (compare(OPEN, made, estimator=name).force for name in ("local_polynomial", "miso"))
+    own, report = (compared(OPEN, made, estimator=name).force for name in ("local_polynomial", "miso"))
     assert own.total < 1e-6 < 1e-3 < report.total, "nothing is missing"
     assert own.parametric_total < 1e-5
     assert own.frequency[1] - own.frequency[0] == pytest.approx(own.frequency[2] - own.frequency[1])
     linear = Model("believed", OPEN.terms[:3])
-    one, other = (compare(linear, made, estimator=name).force for name in ("local_polynomial", "miso"))
+    one, other = (compared(linear, made, estimator=name).force for name in ("local_polynomial", "miso"))
     assert one.total == pytest.approx(other.total, rel=0.15), "what is missing is seen by both"
     assert one.parametric_total == pytest.approx(other.parametric_total, rel=0.15)
     assert np.all(np.diff(own.cumulative, axis=0) >= 0.0)
 
 
 def test_a_judging_part_too_short_for_two_bands(local: Comparison) -> None:
-    how, whole = Plan("displacement", (0, 4096), (4096, 4160)), CompletedRecord(local.record, (0.0, 25.0), 0, ())
+    prepared = prepare_record(record(), Plan("displacement", (0, 4096), (4096, 4160)))
+    prediction = predict(local.fit, prepared)
     with pytest.raises(StudyError, match="the part of rig to judge has 64 samples, too few for two bands of 17 lines"):
-        local_force_error(local.found.model, whole, how, local.noise)
+        local_force_error(local.fit.model, prediction)
 
 
 def test_noise_on_the_force_is_allowed_for_where_there_are_periods() -> None:
     made = record(periods=18, noise=0.1, on_force=0.2)
-    found = compare(OPEN, made, estimator="errors_in_variables")
-    assert all(abs(error) < 4.0 for error in off(found).values()), off(found)
-    assert found.force.inputs, "the rest of the comparison is as ever"
+    comparison = compared(OPEN, made, estimator="errors_in_variables")
+    assert all(abs(error) < 4.0 for error in off(comparison).values()), off(comparison)
+    assert comparison.force.inputs, "the rest of the comparison is as ever"
 
 
 def simulated(model: Model, noise: float, seed: int, samples: int = 8192) -> Record:
@@ -92,9 +98,9 @@ def simulated(model: Model, noise: float, seed: int, samples: int = 8192) -> Rec
 def test_a_chaotic_motion_that_one_free_run_loses_is_fitted_in_pieces(systems: dict[str, Model]) -> None:
     """The Dead-Band system with nothing given: one free run ends in a side valley, far from the truth."""
     model = systems["dead_band"]
-    found = compare(model.with_values(dict.fromkeys(model.values)), simulated(model, 0.05, 1))
-    assert CHAOTIC in found.notes
-    for c in found.coefficients:
+    comparison = compared(model.with_values(dict.fromkeys(model.values)), simulated(model, 0.05, 1))
+    assert CHAOTIC in comparison.notes
+    for c in comparison.coefficients:
         assert c.interval is not None
         true = model.values[c.key]
         assert true is not None
@@ -102,19 +108,24 @@ def test_a_chaotic_motion_that_one_free_run_loses_is_fitted_in_pieces(systems: d
         assert c.value == pytest.approx(true, rel=0.02)
 
 
-def test_where_pieces_fail_too_the_free_run_stands(local: Comparison, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(*_: object) -> None:
-        raise StudyError("nothing in common")
+@pytest.mark.parametrize("chaotic", [True, False])
+def test_where_pieces_fail_too_the_free_run_stands(
+    chaotic: bool, local: Comparison, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: object, **__: object) -> None:
+        raise DivergenceError("nothing in common", 0.0)
 
-    monkeypatch.setattr("study.compare.comparison.has_lost", lambda *_: True)
-    monkeypatch.setattr("study.compare.comparison.fit_by", fails)
-    found = compare(OPEN, local.record)
-    assert CHAOTIC not in found.notes
-    assert all(abs(error) < 4.0 for error in off(found).values())
+    where = "study.identify.time_domain.fit_model"
+    monkeypatch.setattr(f"{where}.lost", lambda *_: True)
+    monkeypatch.setattr(f"{where}.magnifies", lambda *_: chaotic)
+    monkeypatch.setattr(f"{where}.fit_in_pieces", fails)
+    comparison = compared(OPEN, local.record)
+    assert CHAOTIC not in comparison.notes
+    assert all(abs(error) < 4.0 for error in off(comparison).values())
 
 
 def test_a_regular_motion_is_not_called_chaotic(local: Comparison) -> None:
-    assert CHAOTIC not in compare(OPEN, local.record).notes
+    assert CHAOTIC not in compared(OPEN, local.record).notes
     assert CHAOTIC not in local.notes
 
 
@@ -123,29 +134,29 @@ def test_shape_parameters_come_with_the_coefficients(name: str, systems: dict[st
     model = systems["mathieu"]
     believed = model.with_values(dict.fromkeys(model.values))
     made = simulated(model, 0.0025, 2)
-    found = compare(believed, made, estimator=name)
-    frequency = next(c for c in found.coefficients if c.key == "periodic_stiffness.f_m")
+    comparison = compared(believed, made, estimator=name)
+    frequency = next(c for c in comparison.coefficients if c.key == "periodic_stiffness.f_m")
     assert frequency.error is not None
     assert abs(frequency.value - 1.0) < 1e-3
-    assert found.response_error < 0.2, "5 % is noise"
+    assert comparison.prediction.error < 0.2, "5 % is noise"
     if name == "miso_free_shape":
         given = believed.with_values({"periodic_stiffness.f_m": 1.0})
         with pytest.raises(StudyError, match=r"gives periodic_stiffness\.f_m; the estimator miso_free_shape"):
-            compare(given, made, estimator=name)
+            compared(given, made, estimator=name)
 
 
 def test_a_search_that_fails_is_told(local: Comparison, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = estimators.identify("miso", OPEN, local.record, Settings(Segments(), (0.3, 10.0)))
-    monkeypatch.setattr(estimators, "identify", lambda *_: replace(found, note="stuck after 9 free runs"))
-    told = compare(OPEN, local.record, estimator="instrumental")
-    assert not told.found.converged
-    assert "did not arrive at a minimum (stuck after 9 free runs)" in summary([told])
+    identified = estimators.identify("miso", OPEN, local.record, Settings(Segments(), (0.3, 10.0)))
+    monkeypatch.setattr(estimators, "identify", lambda *_: replace(identified, note="stuck after 9 free runs"))
+    comparison = compared(OPEN, local.record, estimator="instrumental")
+    assert not comparison.fit.converged
+    assert "did not arrive at a minimum (stuck after 9 free runs)" in summary([comparison])
 
 
 def test_lines_that_are_noise_are_left_out() -> None:
     """Under 5 % noise the displacement is lost above some 8 Hz; MI/SO over these lines finds a third of the mass."""
     found = {
-        c.key: c for c in compare(OPEN, simulated(OPEN.with_values(VALUES), 0.05, 3), estimator="miso").coefficients
+        c.key: c for c in compared(OPEN, simulated(OPEN.with_values(VALUES), 0.05, 3), estimator="miso").coefficients
     }
     assert found["m"].value == pytest.approx(1.0, rel=0.15)
 
@@ -159,12 +170,12 @@ def test_few_degrees_of_freedom_widen_the_interval() -> None:
 def test_what_is_held_and_what_is_not_found(local: Comparison) -> None:
     held = OPEN.with_values({"k": 355.3})
     with pytest.raises(StudyError, match="'believed' holds k; the estimator local_polynomial finds every coefficient"):
-        compare(held, local.record, estimator="local_polynomial")
+        compared(held, local.record, estimator="local_polynomial")
     offset = replace(OPEN, terms=(*OPEN.terms, free(get("constant_force"))))
     with pytest.raises(
         StudyError, match=r"local_polynomial finds no .* in rig from .* Hz; take output_error or another"
     ):
-        compare(offset, local.record, estimator="local_polynomial")
+        compared(offset, local.record, estimator="local_polynomial")
 
 
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

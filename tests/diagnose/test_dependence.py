@@ -4,22 +4,22 @@ import numpy as np
 import pytest
 
 from study import trials
+from study.compare.prediction import predict
 from study.diagnose import candidates, constancy, dependence, pair_screening, pairs
 from study.diagnose.ranking import rank
 from study.equations.model import free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
-from study.identify.time_domain import held_out, shape_search
+from study.identify.time_domain import shape_search
 from study.identify.time_domain.fit_model import fit_model
 from study.records.excitation import Excitation, force
-from study.records.plan import make_plan
+from study.records.prepared import prepare_record
 from study.records.record import Record
 
 
 def left_by(model, record):
-    how = make_plan(record)
-    found, _ = fit_model(model, record, how)
-    return dependence.leftover(found, shape_search.baseline(found, record, how), record, how)
+    prepared = prepare_record(record)
+    return dependence.leftover(shape_search.baseline(fit_model(model, prepared), prepared), prepared)
 
 
 def test_an_imitator_under_noise_leaves_a_shape_and_the_truth_leaves_none():
@@ -57,35 +57,34 @@ def test_few_strong_blocks_do_not_make_a_coefficient_move():
 @pytest.fixture(scope="module")
 def two_effects():
     made = trials.make_trial(93001, ("quadratic_stiffness", "quadratic_damping"), 0.01, "displacement")
-    how = make_plan(made.record)
-    found, _ = fit_model(made.believed, made.record, how)
-    base = shape_search.baseline(found, made.record, how)
+    prepared = prepare_record(made.record)
+    fit = fit_model(made.believed, prepared)
+    base = shape_search.baseline(fit, prepared)
     terms = [get(n) for n in ("quadratic_stiffness", "quadratic_damping", "cubic_stiffness", "bilinear_stiffness")]
-    tried = candidates.try_all(terms, base, made.record, how, ())
-    return made, how, base, rank(tried, held_out.held_out_residual(found, made.record, how), made.record, how)
+    tried = candidates.try_all(terms, base, prepared)
+    return made, prepared, base, rank(tried, predict(fit, prepared).residual, prepared)
 
 
 def test_both_of_two_effects_are_the_best_pair(two_effects):
-    made, how, base, rows = two_effects
-    best = pairs.best_pair(rows, base, made.record, how, ())
+    made, prepared, base, rows = two_effects
+    best = pairs.best_pair(rows, base, prepared)
     assert best is not None
     assert set(best.names) == set(made.hidden)
 
 
 def test_each_way_of_preselecting_names_the_pair(two_effects):
-    made, how, base, rows = two_effects
-    starts = pair_screening.promising(rows, base, made.record, how, ())
+    made, prepared, base, rows = two_effects
+    starts = pair_screening.promising(rows, base, prepared)
     assert sum(set(start.names) == set(made.hidden) for start in starts) == 2
     assert all(value is not None for start in starts for value in start.model.values.values())
 
 
 def test_a_candidate_whose_fits_all_lost_the_motion_begins_in_pieces():
     made = trials.make_trial(97072, ("quintic_stiffness",), 0.05, "displacement")
-    how = make_plan(made.record)
-    found, _ = fit_model(made.believed, made.record, how)
-    base = shape_search.baseline(found, made.record, how)
-    tried = candidates.attempt(get("quintic_stiffness"), base, made.record, how, ())
+    prepared = prepare_record(made.record)
+    fit = fit_model(made.believed, prepared)
+    tried = candidates.attempt(get("quintic_stiffness"), shape_search.baseline(fit, prepared), prepared)
     assert tried is not None
     size = np.std(made.record["displacement"])
-    assert np.std(found.residual) > 0.8 * size
-    assert np.std(tried.residual) < 0.3 * size
+    assert np.std(fit.residual) > 0.8 * size
+    assert np.std(tried.prediction.residual) < 0.3 * size

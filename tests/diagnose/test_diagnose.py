@@ -1,20 +1,25 @@
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from study import trials
+from study.compare.comparison import compare
+from study.compare.prediction import predict
 from study.diagnose import constancy, diagnosis_report
+from study.diagnose.adding import added
 from study.diagnose.diagnosis_sentences import sentences
 from study.diagnose.separating_test import separating_level
-from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN, diagnose
-from study.equations.model import ModelTerm
+from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN, Diagnosis, diagnose
+from study.equations.model import Model, ModelTerm
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY, custom
-from study.identify.time_domain import held_out
+from study.identify.time_domain.fit_model import fit_model
+from study.identify.time_domain.part_fit import fit_part
 from study.records import noise_floor
-from study.records.plan import make_plan
+from study.records.prepared import prepare_record
 from study.records.record import Record
 from study.support import statistics
 
@@ -26,9 +31,8 @@ def all_but(*names: str) -> tuple[str, ...]:
     return tuple(name for name in LIBRARY if name not in names)
 
 
-def found_in(trial: trials.Trial, **options: object):
-    how = make_plan(trial.record)
-    return diagnose(trial.believed, trial.record, how, **options), how
+def diagnosed(believed: Model, record: Record, **options: Any) -> Diagnosis:
+    return diagnose(compare(believed, prepare_record(record)), **options)
 
 
 @pytest.fixture(scope="module")
@@ -37,57 +41,56 @@ def drag() -> trials.Trial:
 
 
 @pytest.fixture(scope="module")
-def drag_found(drag: trials.Trial):
-    return found_in(drag)
+def of_drag(drag: trials.Trial) -> Diagnosis:
+    return diagnosed(drag.believed, drag.record)
 
 
-def test_the_hidden_effect_is_named_with_its_coefficient(drag, drag_found):
-    found, _ = drag_found
-    first = found.candidates[0]
-    assert found.verdict == MISSING
+def test_the_hidden_effect_is_named_with_its_coefficient(drag, of_drag):
+    first, before = of_drag.candidates[0], of_drag.comparison.prediction
+    assert of_drag.verdict == MISSING
     assert first.name == "quadratic_damping"
     assert first.p_value < 1e-4
     true = drag.truth.values["c2"]
     assert true is not None
     assert abs(first.coefficient - true) < 4.0 * first.error
     assert first.error < 0.2 * abs(true)
-    assert first.response_error < found.response_error
-    assert first.response_error == pytest.approx(found.noise, rel=0.1)
+    assert first.response_error < before.error
+    assert first.response_error == pytest.approx(before.floor, rel=0.1)
 
 
-def test_adding_it_comes_as_near_as_the_true_model(drag, drag_found):
-    found, how = drag_found
-    start = {k: v for k, v in drag.truth.values.items() if v is not None}
-    true = held_out.fit(drag.truth, drag.record, how, (), start)
-    of_truth = np.std(held_out.held_out_residual(true, drag.record, how))
-    assert np.std(found.candidates[0].residual) < 1.05 * of_truth
+def test_adding_it_comes_as_near_as_the_true_model(drag, of_drag):
+    prepared = of_drag.comparison.prepared
+    true = predict(fit_part(drag.truth, prepared, (), drag.truth.numbers()), prepared)
+    assert np.std(of_drag.candidates[0].residual) < 1.05 * np.std(true.residual)
+    after = added(of_drag.comparison, of_drag.candidates[0].term)
+    assert np.std(after.prediction.residual) < 1.05 * np.std(true.residual)
 
 
 @pytest.mark.parametrize(("force", "motion"), [(1e-3, 1e3), (1e6, 1e-4)])
-def test_units_do_not_matter(drag, drag_found, force, motion):
-    found, how = drag_found
+def test_units_do_not_matter(drag, of_drag, force, motion):
     scaled = drag.record.with_channels(
         {"force": force * drag.record["force"], "displacement": motion * drag.record["displacement"]}
     )
-    again = diagnose(drag.believed, scaled, how)
-    assert again.verdict == found.verdict
-    assert [c.name for c in again.candidates[:3]] == [c.name for c in found.candidates[:3]]
-    assert again.candidates[0].response_error == pytest.approx(found.candidates[0].response_error, rel=1e-3)
+    again = diagnosed(drag.believed, scaled)
+    assert again.verdict == of_drag.verdict
+    assert [c.name for c in again.candidates[:3]] == [c.name for c in of_drag.candidates[:3]]
+    assert again.candidates[0].response_error == pytest.approx(of_drag.candidates[0].response_error, rel=1e-3)
 
 
 def test_nothing_missing_is_said_where_nothing_is():
     trial = trials.make_trial(902, hidden=[], noise=0.05)
-    found, _ = found_in(trial)
-    assert found.verdict == NOTHING
-    assert found.response_error == pytest.approx(found.noise, rel=0.1)
-    assert "Nothing is missing" in sentences(found, "N", "m")[0]
+    diagnosis = diagnosed(trial.believed, trial.record)
+    prediction = diagnosis.comparison.prediction
+    assert diagnosis.verdict == NOTHING
+    assert prediction.error == pytest.approx(prediction.floor, rel=0.1)
+    assert "Nothing is missing" in sentences(diagnosis)[0]
 
 
 def test_an_effect_that_is_not_in_the_library_is_unknown_and_its_kind_is_said():
     trial = trials.make_trial(903, hidden=["periodic_stiffness"], noise=0.0)
-    found, _ = found_in(trial, without=["periodic_stiffness"])
-    assert found.verdict == UNKNOWN
-    assert max(found.families, key=lambda name: found.families[name]) == "time"
+    diagnosis = diagnosed(trial.believed, trial.record, without=["periodic_stiffness"])
+    assert diagnosis.verdict == UNKNOWN
+    assert max(diagnosis.families, key=lambda name: diagnosis.families[name]) == "time"
 
 
 @pytest.mark.parametrize("ripples", [5.0, 6.0])
@@ -100,43 +103,39 @@ def test_a_small_effect_is_not_given_the_name_of_what_takes_a_little_of_it(syste
     record = Record(DT, {"force": report_force, "displacement": history})
     believed = systems["linear"].with_values(dict.fromkeys(systems["linear"].values))
     few = all_but("dead_band", "cubic_stiffness")
-    found = diagnose(believed, record, make_plan(record), without=few)
-    assert found.response_error < 0.01
-    assert found.candidates[0].p_value < 0.01
-    assert found.verdict == UNKNOWN
-    assert "changes with the frequency" in " ".join(sentences(found, "N", "m"))
+    diagnosis = diagnosed(believed, record, without=few)
+    assert diagnosis.comparison.prediction.error < 0.01
+    assert diagnosis.candidates[0].p_value < 0.01
+    assert diagnosis.verdict == UNKNOWN
+    assert "changes with the frequency" in " ".join(sentences(diagnosis))
 
 
-def test_the_fields_are_those_of_the_file(drag_found):
-    found, _ = drag_found
-    fields = diagnosis_report.fields(found)
+def test_the_fields_are_those_of_the_file(of_drag):
+    fields = diagnosis_report.fields(of_drag)
     assert set(fields) >= {"verdict", "error", "noise_floor", "candidates"}
     wanted = {"term", "parameters", "coefficient", "interval", "response_error", "explained", "p_value", "tied_with"}
     assert all(set(row) >= wanted for row in fields["candidates"])
-    assert "quadratic_damping" in diagnosis_report.table(found, "N", "m")
+    assert "quadratic_damping" in diagnosis_report.table(of_drag)
 
 
-def test_the_ends_of_a_narrow_interval_are_told_apart(drag_found):
-    found, _ = drag_found
-    first = replace(found.candidates[0], error=1e-7 * abs(found.candidates[0].coefficient))
-    said = " ".join(sentences(replace(found, candidates=(first, *found.candidates[1:])), "N", "m"))
+def test_the_ends_of_a_narrow_interval_are_told_apart(of_drag):
+    first = replace(of_drag.candidates[0], error=1e-7 * abs(of_drag.candidates[0].coefficient))
+    said = " ".join(sentences(replace(of_drag, candidates=(first, *of_drag.candidates[1:]))))
     low, high = re.search(r"95 % interval (\S+) to (\S+?)\)", said).groups()
     assert float(low) < first.coefficient < float(high)
     assert float(high) - float(low) == pytest.approx(3.92e-7 * abs(first.coefficient), rel=0.2)
 
 
 @pytest.mark.parametrize("error", [np.inf, np.nan, 0.0])
-def test_an_interval_without_ends_is_said_all_the_same(drag_found, error):
-    found, _ = drag_found
-    first = replace(found.candidates[0], error=error)
-    said = sentences(replace(found, candidates=(first, *found.candidates[1:])), "N", "m")
+def test_an_interval_without_ends_is_said_all_the_same(of_drag, error):
+    first = replace(of_drag.candidates[0], error=error)
+    said = sentences(replace(of_drag, candidates=(first, *of_drag.candidates[1:])))
     assert any("95 % interval" in sentence for sentence in said)
 
 
-def test_twins_are_told_apart_by_exciting_harder(drag, drag_found):
-    found, how = drag_found
-    rival = next(c for c in found.candidates if c.name == "cubic_damping")
-    assert separating_level(found.candidates[0], rival, drag.record, how) is not None
+def test_twins_are_told_apart_by_exciting_harder(of_drag):
+    rival = next(c for c in of_drag.candidates if c.name == "cubic_damping")
+    assert separating_level(of_drag.candidates[0], rival, of_drag.comparison.prepared) is not None
 
 
 def test_a_true_coefficient_is_flat_and_an_imitators_is_not():
@@ -205,13 +204,12 @@ def test_noise_floor_of_noise_and_of_noise_with_a_tone():
 
 
 def test_the_judging_part_is_never_fitted(drag):
-    how = make_plan(drag.record)
-    first, last = how.judge
+    first, last = prepare_record(drag.record).plan.judge
     changed = drag.record["displacement"].copy()
     changed[first:last] *= 3.0
-    one = held_out.fit(drag.believed, drag.record, how, ())
-    other = held_out.fit(
-        drag.believed, Record(drag.record.dt, {**drag.record.channels, "displacement": changed}), how, ()
+    one, other = (
+        fit_model(drag.believed, prepare_record(record))
+        for record in (drag.record, drag.record.with_channels({"displacement": changed}))
     )
     assert np.array_equal(one.values, other.values)
 
@@ -219,19 +217,20 @@ def test_the_judging_part_is_never_fitted(drag):
 def test_a_model_that_runs_away_is_diagnosed_all_the_same() -> None:
     made = trials.make_trial(7_000_122, ("displacement_damping", "quadratic_damping"), 0.0, "acceleration")
     few = all_but("displacement_damping", "quadratic_damping", "van_der_pol_damping", "cubic_stiffness")
-    found = diagnose(made.believed, made.record, make_plan(made.record), without=few)
-    assert found.diverged
-    assert found.response_error == pytest.approx(1.0)
-    assert set(found.pair) == {"displacement_damping", "quadratic_damping"}
-    assert "does not stay finite" in sentences(found, "N", "m")[0]
+    diagnosis = diagnosed(made.believed, made.record, without=few)
+    assert diagnosis.comparison.prediction.diverged
+    assert diagnosis.comparison.prediction.error == pytest.approx(1.0)
+    assert set(diagnosis.pair) == {"displacement_damping", "quadratic_damping"}
+    assert "does not stay finite" in sentences(diagnosis)[0]
 
 
 def test_an_imitator_that_leaves_only_noise_is_found_out_by_its_coefficient() -> None:
     made = trials.make_trial(7_000_142, ("quintic_stiffness",), 0.01, "acceleration")
-    found, _ = found_in(made, without=all_but("cubic_stiffness", "signed_quadratic_stiffness", "quadratic_damping"))
-    assert found.verdict == UNKNOWN
-    assert found.candidates[0].response_error < 0.5 * found.response_error
-    assert "changes with the amplitude" in " ".join(sentences(found, "N", "m"))
+    few = all_but("cubic_stiffness", "signed_quadratic_stiffness", "quadratic_damping")
+    diagnosis = diagnosed(made.believed, made.record, without=few)
+    assert diagnosis.verdict == UNKNOWN
+    assert diagnosis.candidates[0].response_error < 0.5 * diagnosis.comparison.prediction.error
+    assert "changes with the amplitude" in " ".join(sentences(diagnosis))
 
 
 def test_a_constant_is_a_constant_and_a_moving_coefficient_is_not() -> None:

@@ -6,9 +6,10 @@ each of seven effects, at a seed of its own that was fixed before it was first r
 
 import pytest
 
+from study.compare.comparison import compare
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN, Diagnosis, diagnose
 from study.equations.terms import LIBRARY
-from study.records.plan import make_plan
+from study.records.prepared import prepare_record
 from study.trials import Trial, make_trial, runs
 from study.trials.runs import Order
 
@@ -22,19 +23,19 @@ RESPONSES = ("displacement", "acceleration")
 
 
 def diagnosed(trial: Trial, without: tuple[str, ...] = ()) -> Diagnosis:
-    return diagnose(trial.believed, trial.record, make_plan(trial.record), without=without)
+    return diagnose(compare(trial.believed, prepare_record(trial.record)), without=without)
 
 
 @pytest.mark.parametrize(("place", "name"), list(EFFECTS.items()))
 def test_hidden_effect_comes_first_or_is_named_in_the_tie(place: int, name: str) -> None:
     noise = NOISES[place % 3]
     trial = make_trial(FIRST_SEED + place, (name,), noise, RESPONSES[place % 2])
-    found = diagnosed(trial)
-    first = found.candidates[0]
-    assert found.verdict == MISSING
+    diagnosis = diagnosed(trial)
+    first, comparison = diagnosis.candidates[0], diagnosis.comparison
+    assert diagnosis.verdict == MISSING
     assert name == first.name or name in first.tied_with
-    assert first.response_error < found.response_error
-    truth = runs.error_of_truth(trial, make_plan(trial.record))
+    assert first.response_error < comparison.prediction.error
+    truth = runs.error_of_truth(trial, comparison.prepared, first.fit.steps_per_sample)
     assert first.response_error < 1.05 * truth + 1e-6  # where nothing is noise, the rounding of the fit
 
 
@@ -54,5 +55,5 @@ def test_two_hidden_effects_are_found_one_after_the_other() -> None:
 def test_effect_that_is_not_in_the_library_is_not_given_another_name_with_confidence() -> None:
     trial = make_trial(FIRST_SEED + 300, ("coulomb_friction",), 0.0, "displacement")
     others = ("quadratic_damping", "cubic_damping", "van_der_pol_damping", "dead_band", "relaxation")
-    found = diagnosed(trial, without=tuple(name for name in LIBRARY if name not in others))
-    assert found.verdict == UNKNOWN or found.candidates[0].tied_with
+    diagnosis = diagnosed(trial, without=tuple(name for name in LIBRARY if name not in others))
+    assert diagnosis.verdict == UNKNOWN or diagnosis.candidates[0].tied_with

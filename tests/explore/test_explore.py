@@ -10,8 +10,10 @@ import pytest
 
 from study import cli, trials
 from study.compare import history
+from study.compare.comparison import compare
 from study.compare.force_map import curve, surface
 from study.compare.links import links
+from study.diagnose.adding import added
 from study.equations import model_file
 from study.equations.model import Model, free
 from study.equations.terms import get
@@ -20,7 +22,7 @@ from study.explore import session as sessions
 from study.explore.desk import Desk
 from study.explore.saved import saved
 from study.explore.saved_files import PAGE, files
-from study.records.plan import make_plan
+from study.records.prepared import prepare_record
 from study.support.errors import StudyError
 
 TEXT = """# the rig in hall 3
@@ -40,7 +42,7 @@ def trial() -> trials.Trial:
 @pytest.fixture(scope="module")
 def begun(trial: trials.Trial) -> sessions.Session:
     record = replace(trial.record.part(0, 4096), name="rig")
-    return sessions.begin(trial.believed, record, make_plan(record))
+    return sessions.begin(trial.believed, prepare_record(record))
 
 
 @pytest.fixture(scope="module")
@@ -75,8 +77,8 @@ def test_decimated_peaks_stand_where_they_are():
 def test_adding_what_is_missing_lets_the_error_fall_and_undoing_brings_it_back(asked, grown):
     before, after = asked.now.comparison, grown.now.comparison
     assert asked.now.diagnosis.candidates[0].name == "quadratic_damping"
-    assert before.response_error > 1.4 * before.noise_floor
-    assert after.response_error == pytest.approx(after.noise_floor, rel=0.1)
+    assert before.prediction.error > 1.4 * before.prediction.floor
+    assert after.prediction.error == pytest.approx(after.prediction.floor, rel=0.1)
     assert [s["added"] for s in grown.steps] == [None, "quadratic_damping"]
     assert sessions.undone(grown) == asked
     assert sessions.undone(asked) is asked
@@ -85,10 +87,11 @@ def test_adding_what_is_missing_lets_the_error_fall_and_undoing_brings_it_back(a
 
 
 def test_an_added_term_is_what_add_would_have_found(grown):
-    from study.compare.comparison import compare
-
-    anew = compare(grown.now.model, grown.record, grown.how)
-    assert grown.now.comparison.response_error == pytest.approx(anew.response_error, rel=1e-3)
+    error = grown.now.comparison.prediction.error
+    after = added(grown.rungs[0].comparison, get("quadratic_damping"))
+    assert error == pytest.approx(after.prediction.error, rel=1e-3)
+    anew = compare(grown.now.model, grown.prepared)
+    assert error == pytest.approx(anew.prediction.error, rel=1e-3)
 
 
 def test_a_value_is_held_where_it_stands_and_freed_again(grown):
@@ -97,7 +100,8 @@ def test_a_value_is_held_where_it_stands_and_freed_again(grown):
     assert next(c for c in held.now.comparison.coefficients if c.key == "k").held
     freed = sessions.with_held(held, "k", False)
     assert freed.now.model == grown.now.model
-    assert freed.now.comparison.response_error == pytest.approx(grown.now.comparison.response_error, rel=1e-3)
+    error = grown.now.comparison.prediction.error
+    assert freed.now.comparison.prediction.error == pytest.approx(error, rel=1e-3)
     for key, hold, said in (("k", True, "held already"), ("no", True, "no value of this model"), ("m", False, "free")):
         with pytest.raises(StudyError, match=said):
             sessions.with_held(held, key, hold)
@@ -113,7 +117,7 @@ def test_a_formula_is_tried_beside_the_library(asked):
     assert "mine" in [r.name for r in tried.now.shown]
     assert sessions.tried(tried, "u*u*v").own[-1].name == "own_1"
     after = sessions.with_added(tried, "mine").now.comparison
-    assert after.response_error == pytest.approx(after.noise_floor, rel=0.1)
+    assert after.prediction.error == pytest.approx(after.prediction.floor, rel=0.1)
 
 
 @pytest.mark.parametrize(
@@ -131,8 +135,8 @@ def test_a_bad_formula_gets_its_sentence(asked, text, said):
 
 
 def test_links_add_up_to_the_curves_and_the_map(grown):
-    found = grown.rungs[0].comparison
-    tied, lacking = links(found), found.missing_force
+    comparison = grown.rungs[0].comparison
+    tied, lacking = links(comparison), comparison.missing_force
     u, v, force = (x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force))
     for classes, values in ((tied.displacement, u), (tied.velocity, v)):
         visits, sums = classes.visits.sum(axis=0), classes.force.sum(axis=0)
@@ -143,7 +147,8 @@ def test_links_add_up_to_the_curves_and_the_map(grown):
     assert np.all(cells[np.isfinite(surface(u, v, force).mean.ravel())] > 0)
     assert cells.sum() == pytest.approx(len(u), rel=0.01)
     width = tied.frequency[1]
-    assert tied.power.sum() * width / len(tied.power) == pytest.approx(np.mean(found.judged.residual**2), rel=0.1)
+    left = np.mean(comparison.prediction.residual**2)
+    assert tied.power.sum() * width / len(tied.power) == pytest.approx(left, rel=0.1)
 
 
 def test_what_a_candidate_would_leave_is_what_its_diagnosis_found(asked):
@@ -185,9 +190,10 @@ def test_the_saved_page_stays_small_however_long_record_and_ladder(asked):
 
 def test_what_a_user_named_cannot_leave_its_place(asked):
     evil = "</script><script>alert(1)</script>"
-    record = replace(asked.record, name=evil, units={**asked.record.units, "force": "<b>N"})
-    now = replace(asked.now, comparison=replace(asked.now.comparison, record=record))
-    hostile = saved(replace(asked, record=record, rungs=(now,))).decode()
+    record = asked.prepared.record
+    prepared = replace(asked.prepared, record=replace(record, name=evil, units={**record.units, "force": "<b>N"}))
+    now = replace(asked.now, comparison=replace(asked.now.comparison, prepared=prepared))
+    hostile = saved(replace(asked, prepared=prepared, rungs=(now,))).decode()
     assert "alert(1)</script>" not in hostile
     assert "<b>N" not in hostile
     assert "&lt;b&gt;N" in hostile or "\\u003cb>N" in hostile
@@ -206,10 +212,11 @@ def test_units_are_written_as_people_write_them():
 
 def test_the_missing_force_has_one_unit_everywhere(asked):
     rung, factor = asked.now, 1e-5
-    record = replace(rung.comparison.record, channels=rung.comparison.record.channels | {})
-    lacking = replace(rung.comparison.missing_force, force=rung.comparison.missing_force.force * factor)
-    record.channels["force"] = record.channels["force"] * factor
-    small = view.view(replace(rung, comparison=replace(rung.comparison, record=record, missing_force=lacking)), 0)
+    comparison, lacking = rung.comparison, rung.comparison.missing_force
+    record = comparison.record.with_channels({"force": comparison.record["force"] * factor})
+    prepared = replace(comparison.prepared, record=record)
+    lacking = replace(lacking, force=lacking.force * factor)
+    small = view.view(replace(rung, comparison=replace(comparison, prepared=prepared, missing_force=lacking)), 0)
     usual = view.view(rung, 0)
     assert usual.scales.force.factor == 1.0
     assert small.scales.force.factor < 0.01

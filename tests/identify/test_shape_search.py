@@ -7,8 +7,6 @@ import pytest
 
 from study.equations.terms import LIBRARY, get
 from study.identify.time_domain import shape_search
-from study.records.plan import make_plan
-from study.records.record import Record
 
 DT, N = 0.02, 4096
 TIME = DT * np.arange(N)
@@ -19,13 +17,11 @@ LINES = (60.0, 210.5)  # of the spectrum of N samples, what the residual holds
 
 
 @pytest.fixture(scope="module")
-def search() -> tuple[object, Record, object]:
+def base() -> SimpleNamespace:
     """A motion, and a residual of two sines."""
     residual = sum(np.sin(2 * np.pi * line * np.arange(N) / N) for line in LINES)
     residual = residual + 1e-3 * np.random.default_rng(4).standard_normal(N)
-    base = SimpleNamespace(displacement=U, found=SimpleNamespace(residual=residual), dt=DT)
-    record = Record(DT, {"force": np.zeros(2 * N), "displacement": np.zeros(2 * N)})
-    return base, record, make_plan(record, (0, N), (N, 2 * N))
+    return SimpleNamespace(displacement=U, fit=SimpleNamespace(residual=residual), dt=DT)
 
 
 POINTS = {
@@ -37,15 +33,15 @@ POINTS = {
 
 
 @pytest.mark.parametrize("name", POINTS)
-def test_amplitudes_and_times_come_from_the_motion(name: str, search: tuple) -> None:
-    found = shape_search.grid(get(name), *search)
+def test_amplitudes_and_times_come_from_the_motion(name: str, base: SimpleNamespace) -> None:
+    found = shape_search.grid(get(name), base)
     np.testing.assert_allclose(found, POINTS[name], rtol=1e-12)
     keys = get(name).keys[1:]
     assert all(not get(name).physical(dict(zip(keys, point, strict=True))) for point in found)
 
 
-def test_frequencies_come_from_the_lines_of_the_residual(search: tuple) -> None:
-    found = np.array(shape_search.grid(get("harmonic_force"), *search))[:, 0] * N * DT
+def test_frequencies_come_from_the_lines_of_the_residual(base: SimpleNamespace) -> None:
+    found = np.array(shape_search.grid(get("harmonic_force"), base))[:, 0] * N * DT
     for line in LINES:
         for shift in (-0.35, 0.0, 0.35):
             assert np.min(np.abs(found - line - shift)) < 0.05
@@ -53,5 +49,5 @@ def test_frequencies_come_from_the_lines_of_the_residual(search: tuple) -> None:
 
 
 @pytest.mark.parametrize("name", [name for name, term in LIBRARY.items() if not term.parameters])
-def test_a_term_without_shape_parameters_is_tried_once(name: str, search: tuple) -> None:
-    assert shape_search.grid(get(name), *search) == [()]
+def test_a_term_without_shape_parameters_is_tried_once(name: str, base: SimpleNamespace) -> None:
+    assert shape_search.grid(get(name), base) == [()]

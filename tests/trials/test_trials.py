@@ -9,11 +9,12 @@ import pandas as pd
 import pytest
 
 from study.cli import main
+from study.compare.prediction import predict
 from study.equations.model_file import parse_model, read_model
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY
-from study.identify.time_domain import held_out
-from study.records.plan import make_plan
+from study.identify.time_domain.fit_model import fit_model
+from study.records.prepared import prepare_record
 from study.records.readers import read_record
 from study.reproduction.settings import TrialSettings
 from study.support.errors import StudyError
@@ -224,14 +225,15 @@ def test_summary_confusion_and_ladder_of_a_table(tmp_path: Path) -> None:
 
 def test_a_trial_that_cannot_be_made_is_a_row_with_its_trouble(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("study.trials.draw.ATTEMPTS", 0)
-    found = runs.run(Order("single", 1, ("relaxation",), 0.0, "displacement"))
-    assert "no system" in found["trouble"]
+    made = runs.run(Order("single", 1, ("relaxation",), 0.0, "displacement"))
+    assert "no system" in made["trouble"]
 
 
-def test_what_was_added_may_run_away_and_then_predicts_nothing():
+def test_a_model_that_runs_away_predicts_nothing() -> None:
     trial = make_trial(911, ["quadratic_damping"], 0.01, "displacement")
-    how = make_plan(trial.record)
-    found = held_out.fit(trial.believed, trial.record, how, ())
-    wild = replace(found, model=found.model.with_values({"k": -found.model.numbers()["k"]}))
-    assert runs._held_out(found, trial, how) < 1.0
-    assert runs._held_out(wild, trial, how) == 1.0
+    prepared = prepare_record(trial.record)
+    fit = fit_model(trial.believed, prepared)
+    wild = replace(fit, model=fit.model.with_values({"k": -fit.model.numbers()["k"]}))
+    assert predict(fit, prepared).error < 1.0
+    assert predict(wild, prepared).diverged
+    assert predict(wild, prepared).error == pytest.approx(1.0, abs=1e-12)

@@ -20,7 +20,7 @@ from study.identify.frequency_domain.inputs import history, reverse_inputs
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.multiple_shooting import fit_in_pieces, lost, magnifies
+from study.identify.time_domain.multiple_shooting import POOR, fit_in_pieces, lost, magnifies
 from study.identify.time_domain.part_fit import STEPS, fit_part, linearise, run_of
 from study.identify.time_domain.shape_search import Baseline
 from study.records.prepared import Prepared
@@ -137,11 +137,11 @@ def best_fit(
     first = [_tried(model, prepared, (*held, *shapes), start, TRIED) for start in starts]
     best = min((fit for fit in first if fit is not None), key=lambda fit: fit.rms, default=None)
     if best is not None and (shapes or not best.converged):
-        best = _better(best, _tried(best.model, prepared, held, best.model.numbers(), KEPT)) or best
+        best = _freed(best, prepared, held)
     if best is None or not best.converged:
         apart = _from_segments(best.model if best else model, prepared, (*held, *shapes))
         if apart is not None and shapes:
-            apart = _better(apart, _tried(apart.model, prepared, held, apart.model.numbers(), KEPT))
+            apart = _freed(apart, prepared, held)
         best = _better(best, apart)
     if best is None:
         raise StudyError(f"{model.name!r} has no finite response to the force of {prepared.record.name!r}")
@@ -159,22 +159,40 @@ def continued(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
 def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit at its minimum with enough steps; in segments where a chaotic system loses the motion in one run."""
     fit = with_enough_steps(fit, prepared)
-    if not lost(fit, prepared.fitted):
+    if _stands(fit, prepared):
         return fit
     held = tuple(key for key in fit.model.values if key not in fit.keys)
-    if not magnifies(fit, prepared):
-        return _better(fit, _from_segments(fit.model, prepared, held, fit.steps_per_sample)) or fit
+    best = begin = fit
+    if not magnifies(fit, prepared):  # which a fit at wrong values may not, where the true system does
+        near = _from_segments(fit.model, prepared, held, fit.steps_per_sample)
+        best = _better(fit, near) or fit
+        if near is None or _stands(best, prepared) or not magnifies(near, prepared):
+            return best
+        begin = near
     try:
         apart = fit_in_pieces(
-            fit.model, prepared.record, held=held, response=prepared.response, span=prepared.plan.fit,
+            begin.model, prepared.record, held=held, response=prepared.response, span=prepared.plan.fit,
             steps_per_sample=fit.steps_per_sample,
         )  # fmt: skip
         together = fit_part(
             apart.model, prepared, held, steps=fit.steps_per_sample, initial=np.atleast_2d(apart.initial)[:1]
         )
     except DivergenceError:  # where segments fail as well, the one free run is what there is
-        return fit
-    return apart if lost(together, prepared.fitted) else together
+        return best
+    if _stands(together, prepared):
+        return together
+    return apart if apart.converged or (begin is fit and lost(fit, prepared.fitted)) else best
+
+
+def _stands(fit: FreeRunFit, prepared: Prepared) -> bool:
+    """Whether one free run may be believed: at a minimum, and at none of the many that a chaotic system has.
+
+    What leaves next to nothing has no rival; what leaves more may be any of them, and the sharp curvature of one tells
+    an error far below the distance to the next.
+    """
+    if lost(fit, prepared.fitted):
+        return False
+    return fit.rms < POOR * prepared.spread or not magnifies(fit, prepared)
 
 
 def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
@@ -202,14 +220,24 @@ def _rough(model: Model, prepared: Prepared, start: Values) -> int:
     return max(STEPS, needed_steps(model.with_values(start), prepared.record, prepared.response).rough)
 
 
-def _tried(model: Model, prepared: Prepared, held: Sequence[str], start: Values, runs: int) -> FreeRunFit | None:
+def _tried(
+    model: Model, prepared: Prepared, held: Sequence[str], start: Values, runs: int, initial: Floats | None = None
+) -> FreeRunFit | None:  # fmt: skip
     """A fit from one start; None where the model has no finite response there."""
     begun = model.with_values(start)
     try:
         steps = _rough(begun, prepared, start)
-        return fit_part(begun, prepared, held, steps=steps, max_iterations=runs, offset=NEAR)
+        return fit_part(begun, prepared, held, steps=steps, max_iterations=runs, initial=initial, offset=NEAR)
     except StudyError:
         return None
+
+
+def _freed(fit: FreeRunFit, prepared: Prepared, held: Sequence[str]) -> FreeRunFit | None:
+    """A fit with all free that is not held, from where one stands that held more: its state too, or it could be worse.
+
+    Whoever took the other then, for its smaller residual, would hold what the model leaves open.
+    """
+    return _tried(fit.model, prepared, held, fit.model.numbers(), KEPT, np.atleast_2d(fit.initial))
 
 
 def _better(one: FreeRunFit | None, other: FreeRunFit | None) -> FreeRunFit | None:
@@ -223,9 +251,9 @@ def _from_segments(model: Model, prepared: Prepared, held: Sequence[str], steps:
     """A fit that begins where multiple shooting ends; None where the model cannot run even in segments."""
     length = round(PERIODS * 2.0 * np.pi / (angular_rate(prepared.fitted, prepared.dt) * prepared.dt))
     stretch = prepared.shortened(int(np.clip(length, SHORTEST, LONGEST)))
-    linear = linear_start(model, stretch)
-    start = {key: value for key, value in linear.items() if key not in held and "." not in key}
     try:
+        linear = linear_start(model, prepared)  # a short stretch may hold hardly any motion
+        start = {key: value for key, value in linear.items() if key not in held and "." not in key}
         near = fit_in_pieces(
             model, prepared.record, start=start, held=held, response=prepared.response, span=stretch.plan.fit
         )

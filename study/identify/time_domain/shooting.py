@@ -55,6 +55,8 @@ def needed_restarts(
     steps_per_sample : int
         Runge-Kutta steps in each sampling interval.
     """
+    if not restarts:  # a motion of a single period or less
+        return ()
     run = prepare(model, record, steps_per_sample=steps_per_sample, span=span, restarts=restarts)
     motion, _, arrivals = run.respond_by_piece({}, states, 2)
     rate = angular_rate(motion, record.dt)

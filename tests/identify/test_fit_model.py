@@ -1,0 +1,97 @@
+"""The one fit of a model to a record: held values, order of terms, starts, and what counts as lost."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from study.equations.model import free
+from study.equations.simulate import Integrator, simulate
+from study.equations.terms import get
+from study.identify.time_domain import fit_model as fits
+from study.identify.time_domain import shape_search
+from study.identify.time_domain.fit_model import continued, fit_model, with_term
+from study.identify.time_domain.multiple_shooting import lost, magnifies
+from study.identify.time_domain.part_fit import fit_part
+from study.records.excitation import Excitation, displacement_noise, force
+from study.records.prepared import prepare_record, whole
+
+
+def noisy(record, seed=1, fraction=0.01):
+    clean = record["displacement"]
+    return record.with_channels({"displacement": clean + displacement_noise(clean, fraction, seed)})
+
+
+def opened(model):
+    return model.with_values(dict.fromkeys(model.values))
+
+
+def test_what_is_held_stays_and_the_terms_keep_their_order(systems, records):
+    """A term with an open shape parameter is fitted last, wherever it stands."""
+    model = opened(systems["mathieu"]).with_values({"k": 355.3})
+    model = replace(model, terms=model.terms[::-1])
+    fit = fit_model(model, whole(noisy(records["mathieu"])))
+    assert fit.model.values["k"] == 355.3
+    assert "k" not in fit.keys
+    assert [t.name for t in fit.model.terms] == [t.name for t in model.terms]
+    assert fit.model.values["periodic_stiffness.f_m"] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_with_a_start_nothing_is_searched_for(systems, records, monkeypatch):
+    def searched(*_, **__):
+        pytest.fail("a search")
+
+    for name in ("best_fit", "first_starts", "with_term"):
+        monkeypatch.setattr(fits, name, searched)
+    model = systems["mathieu"]
+    fit = fit_model(opened(model), whole(noisy(records["mathieu"])), start=model.numbers())
+    assert fit.converged
+    assert fit.model.values["k"] == pytest.approx(355.3, rel=0.01)
+
+
+def test_a_fit_that_did_not_arrive_is_lost_and_noise_is_not(systems, records):
+    prepared = whole(noisy(records["duffing"], fraction=0.2))
+    fit = fit_model(opened(systems["duffing"]), prepared)
+    assert not lost(fit, prepared.fitted), "a residual of nearly half the response that is white"
+    assert lost(replace(fit, converged=False), prepared.fitted)
+    linear = fit_part(systems["linear"], prepared, ())
+    assert lost(linear, prepared.fitted), "a cube is missing: what is left looks like motion"
+
+
+def test_a_dead_band_magnifies_disturbances_and_a_duffing_oscillator_does_not(systems, records):
+    for name, chaotic in (("dead_band", True), ("duffing", False)):
+        prepared = whole(records[name].part(0, 2048))
+        fit = fit_part(systems[name], prepared, tuple(systems[name].values))
+        assert magnifies(fit, prepared) is chaotic, name
+
+
+def test_a_term_more_never_fits_worse_and_is_found_with_its_shape(systems, records):
+    prepared = prepare_record(noisy(records["mathieu"]))
+    fit = fit_model(opened(systems["linear"]), prepared)
+    base = shape_search.baseline(fit, prepared)
+    grown = with_term(fit, free(get("periodic_stiffness")), base, prepared)
+    assert grown.rms < 0.5 * fit.rms
+    assert grown.model.values["periodic_stiffness.f_m"] == pytest.approx(1.0, abs=2e-3)
+    useless = with_term(grown, free(get("cubic_damping")), shape_search.baseline(grown, prepared), prepared)
+    assert useless.rms <= grown.rms * (1.0 + 1e-9)
+
+
+def test_a_fit_of_the_beginning_goes_on_to_the_whole_fitting_part(systems, records):
+    prepared = prepare_record(noisy(records["duffing"]))
+    look = prepared.shortened(1024)
+    fit = fit_model(opened(systems["duffing"]), look)
+    assert continued(fit, look) is fit
+    longer = continued(fit, prepared)
+    assert len(longer.residual) == len(prepared.fitted)
+    assert np.all(np.diag(longer.covariance) < np.diag(fit.covariance))
+
+
+@pytest.mark.parametrize("seed", [6000, 6007])
+def test_a_width_is_found_within_its_error_where_no_free_run_follows(seed, systems):
+    """None with the width held may stand for one that has it open, and none in a side valley for the record."""
+    made = simulate(systems["dead_band"], force(Excitation(), 8192, 0.02, seed), 0.02, Integrator("abm4", 16))
+    fit = fit_model(opened(systems["dead_band"]), whole(noisy(made, seed, 0.05)))
+    assert set(fit.keys) == set(systems["dead_band"].values)
+    assert fit.restarts
+    assert abs(fit.estimate["dead_band.u_g"] - 0.0025) < 4.0 * fit.estimate.error("dead_band.u_g")
+    assert fit.estimate["dead_band.u_g"] == pytest.approx(0.0025, rel=0.02)

@@ -1,0 +1,55 @@
+"""A record made ready: units, motions, parts, and what is judged of it."""
+
+import numpy as np
+import pytest
+
+from study.records.plan import Plan, make_plan
+from study.records.prepared import prepare_record, whole
+from study.records.record import MOTIONS
+from study.support.errors import StudyError
+
+
+@pytest.fixture(scope="module")
+def measured(records):
+    clean = records["linear"]
+    return type(clean)(clean.dt, {name: clean[name] for name in ("force", "acceleration")}, name="rig")
+
+
+def test_what_was_measured_is_completed_and_stays_what_is_fitted_and_judged(measured, records):
+    prepared = prepare_record(measured)
+    assert prepared.response == "acceleration"
+    assert all(name in prepared.record for name in MOTIONS)
+    assert prepared.notes
+    np.testing.assert_array_equal(prepared.fitted, measured["acceleration"][:4096])
+    np.testing.assert_array_equal(prepared.judged, measured["acceleration"][4096:])
+    inner = slice(*prepared.inner((0, len(measured))))
+    assert np.std(prepared.record["displacement"][inner] - records["linear"]["displacement"][inner]) < 0.1 * np.std(
+        records["linear"]["displacement"]
+    )
+
+
+def test_what_lies_below_the_cutoff_is_out_of_the_band(measured):
+    assert prepare_record(measured, cutoff=0.5).band[0] == 0.5
+    with pytest.raises(StudyError, match="cut-off"):
+        prepare_record(measured, cutoff=30.0)
+
+
+def test_the_uncertain_ends_belong_to_no_inner_span(measured):
+    prepared = prepare_record(measured)
+    assert prepared.edge > 0
+    assert prepared.inner((0, 8192)) == (prepared.edge, 8192 - prepared.edge)
+    assert prepared.inner((4000, 5000)) == (4000, 5000)
+
+
+def test_a_shorter_look_fits_the_first_samples_and_judges_as_before(measured):
+    prepared = prepare_record(measured, make_plan(measured, (1000, 5000), (5000, 8000)))
+    look = prepared.shortened(512)
+    assert look.plan == Plan("acceleration", (1000, 1512), (5000, 8000))
+    assert look.record is prepared.record
+    assert prepared.shortened(4000) is prepared
+
+
+def test_a_whole_record_is_fitted_and_none_of_it_judged(records):
+    prepared = whole(records["duffing"])
+    np.testing.assert_array_equal(prepared.fitted, records["duffing"]["displacement"])
+    assert len(prepared.judged) == 0
