@@ -81,7 +81,7 @@ def history_height(steps: int) -> int:
     return 84 + 27 * max(steps, 2)
 
 
-def history_columns(session: Session) -> Columns:
+def ladder_columns(session: Session) -> Columns:
     """The history as columns: errors and noise floor in per cent by the name of the step."""
     steps = session.steps
     earlier = [f"+ {step['added']}" if step.get("added") else "as given" for step in steps]

@@ -23,7 +23,7 @@ class Watcher:
         self.shown = desk.session
         self.asked = ColumnDataSource({"act": [], "name": [], "count": []}, name="asked")
         self.state = ColumnDataSource(self._state(), name="state")
-        self.page = html_page.build(self._view(), html_page.history_columns(self.shown), [self.asked, self.state])
+        self.page = html_page.build(self._view(), html_page.ladder_columns(self.shown), [self.asked, self.state])
         self.span: tuple[float, float] | None = None
         self._lay()
         desk.watch(self, self._changed)
@@ -61,7 +61,7 @@ class Watcher:
         self.document.hold("combine")
         if session is not self.shown:
             self.shown = session
-            self.page.show(self._view(), html_page.history_columns(session))
+            self.page.show(self._view(), html_page.ladder_columns(session))
             if self.span is not None:
                 self._refine(self.span)
         self.state.data = self._state()

@@ -21,7 +21,7 @@ EMBED = "Bokeh.safely(() => Bokeh.embed.embed_items({docs}, {items}))"
 def saved(session: Session) -> bytes:
     """The whole session as a file that a browser opens; it shows the last model first."""
     views = [view(rung, number, live=False) for number, rung in enumerate(session.rungs)]
-    history = html_page.history_columns(session)
+    history = html_page.ladder_columns(session)
     stores: list[ColumnDataSource] = []
     if len(views) > 1:
         for number, seen in enumerate(views):
