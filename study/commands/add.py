@@ -4,15 +4,19 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from study.commands.command import Command
-from study.commands.record_arguments import add_reading_arguments, out_folder, prepared_of, read_records
+from study.commands.command import Command, progress
+from study.commands.record_arguments import (
+    add_out_argument,
+    add_reading_arguments,
+    out_folder,
+    prepared_of,
+    read_records,
+)
 
 if TYPE_CHECKING:
     from study.compare.comparison import Comparison
     from study.equations.model import Model
     from study.equations.terms import Term
-
-QUIET = 2.0  # seconds of work before progress is shown
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,34 +24,31 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("term", help="an effect of the library, or a name for your own with --force")
     parser.add_argument("--force", metavar="FORMULA", help="formula of your own effect, such as 'u*abs(u)'")
     parser.add_argument("--data", dest="records", type=Path, nargs="+", required=True, metavar="RECORD")
-    parser.add_argument("--out", type=Path, help="folder for results (default results/RECORD)")
     add_reading_arguments(parser)
+    add_out_argument(parser)
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    from tqdm import tqdm
-
     from study.compare import history
     from study.compare.comparison import compare
     from study.compare.comparison_report import as_json, document, rung, summary
     from study.diagnose.adding import added
     from study.equations.model_file import add_term, read_model
-    from study.support.file_sets import check_folder, write_files
+    from study.support.file_sets import write_files
 
     folder = out_folder(arguments)
-    check_folder(folder)
     term = _term(arguments)
     model = read_model(arguments.model)
     _refuse_second(arguments.model, model, term)
     steps = history.read(arguments.model)
     records = read_records(arguments)
     pairs: list[tuple[Comparison, Comparison]] = []
-    with tqdm(total=2 * len(records), delay=QUIET, leave=False, unit=" fits") as bar:
+    with progress(" fits", 2 * len(records)) as step:
         for record in records:
             before = compare(model, prepared_of(arguments, record))
-            bar.update()
+            step("")
             pairs.append((before, added(before, term)))
-            bar.update()
+            step("")
     for before, after in pairs:
         steps = history.climbed(steps, rung(before), rung(after, term.name))
     history.write(arguments.model, steps)
@@ -67,13 +68,11 @@ def _term(arguments: argparse.Namespace) -> "Term":
 
 def _refuse_second(path: Path, model: "Model", term: "Term") -> None:
     from study.equations.redundancy import repeated_force
-    from study.support.errors import StudyError
+    from study.support.errors import expect
 
-    if term.name in model:
-        raise StudyError(f"{path}: {term.name} is in the model already; an effect can be added once")
+    expect(term.name not in model, f"{path}: {term.name} is in the model already; an effect can be added once")
     fault = repeated_force(model.with_term(term))
-    if fault is not None:
-        raise StudyError(f"{path}: {fault}")
+    expect(fault is None, f"{path}: {fault}")
 
 
 COMMAND = Command(

@@ -7,7 +7,7 @@ from pathlib import Path
 from study.commands.parser import parser
 from study.commands.record_arguments import prepared_of, read_records
 from study.compare import history
-from study.compare.history_picture import files as ladder_pictures
+from study.compare.history_picture import files as history_pictures
 from study.diagnose import diagnosis_report
 from study.diagnose.diagnosis_files import files as diagnosis_files
 from study.diagnose.verdict import MISSING, Diagnosis
@@ -24,27 +24,10 @@ SAVED = "climb.html"  # the whole climb as one page
 def climb(record: Path, model: Path, options: Sequence[str], steps: int, folder: Path) -> list[history.Step]:
     """Begin with a model and add the first candidate of each diagnosis to it, as a user of ``study explore`` would.
 
-    Parameters
-    ----------
-    record, model : Path
-        The measured record, and the model file, which stays as it is.
-    options : sequence of str
-        How the record is read, fitted and judged, as on the command line.
-    steps : int
-        Effects to add at most.
-    folder : Path
-        Gets ``climb/`` (the model reached, its ladder and pictures, and a folder for each diagnosis),
-        ``climb.html``, ``history.json`` and the ladder's picture. What an earlier climb left there is removed.
-
-    Returns
-    -------
-    list of dict
-        The ladder.
-
-    Raises
-    ------
-    StudyError
-        If a file cannot be read or written.
+    The model file stays as it is. The folder gets ``climb/`` (the model reached, its history and pictures, and a folder
+    for each diagnosis), ``climb.html``, ``history.json`` and the history's picture; what an earlier climb left there is
+    removed. The options are those of the command line: how the record is read, fitted and judged. At most ``steps``
+    effects are added.
     """
     arguments = parser().parse_args(["explore", str(record), "--model", str(model), *options])
     text = read_text(model, WANTED)
@@ -53,23 +36,23 @@ def climb(record: Path, model: Path, options: Sequence[str], steps: int, folder:
     shutil.rmtree(work, ignore_errors=True)
     session = sessions.begin(parse_model(text, model), prepared_of(arguments, data))
     for number in range(steps + 1):
-        session, found = _diagnosed(session, work / f"step_{number}")
-        if found.verdict != MISSING or number == steps:
+        session, diagnosis = _diagnosed(session, work / f"step_{number}")
+        if diagnosis.verdict != MISSING or number == steps:
             break
-        session = sessions.with_added(session, found.candidates[0].name)
-    made = files(session, model.name, text)
-    write_files(folder, {SAVED: made.pop(PAGE), "history.json": history.as_bytes(session.steps)})
-    write_files(folder, ladder_pictures(session.steps, model.stem))
-    write_files(work, made)
+        session = sessions.with_added(session, diagnosis.candidates[0].name)
+    saved = files(session, model.name, text)
+    write_files(folder, {SAVED: saved.pop(PAGE), "history.json": history.as_bytes(session.steps)})
+    write_files(folder, history_pictures(session.steps, model.stem))
+    write_files(work, saved)
     print(history.table(session.steps))
     return session.steps
 
 
 def _diagnosed(session: Session, folder: Path) -> tuple[Session, Diagnosis]:
     """The session with its present model diagnosed, printed and written into a folder; and the diagnosis."""
-    now, found = sessions.examined(session)
-    print(f"{now.label}: {found.verdict.replace('_', ' ')}")
-    print(diagnosis_report.table(found))
+    now, diagnosis = sessions.examined(session)
+    print(f"{now.label}: {diagnosis.verdict.replace('_', ' ')}")
+    print(diagnosis_report.table(diagnosis))
     print(f"\n{now.said}\n", flush=True)
-    write_files(folder, diagnosis_files(found, now.said))
-    return sessions.with_rung(session, now), found
+    write_files(folder, diagnosis_files(diagnosis, now.said))
+    return sessions.with_rung(session, now), diagnosis

@@ -2,31 +2,37 @@
 
 import argparse
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from dataclasses import dataclass
+
+QUIET = 2.0  # seconds of work before progress is shown
 
 
 @dataclass(frozen=True)
 class Command:
-    """An entry in the table of commands.
-
-    Attributes
-    ----------
-    name, summary : str
-        What the user types, and what it does in a few words.
-    example : str
-        Shown by its ``--help``.
-    arguments : callable
-        Adds its arguments to a parser.
-    run : callable
-        Does it; a user's mistakes are raised as ``StudyError``.
-    """
+    """An entry in the table of commands."""
 
     name: str
-    summary: str
-    example: str
-    arguments: Callable[[argparse.ArgumentParser], None]
-    run: Callable[[argparse.Namespace], None]
+    summary: str  # what it does in a few words
+    example: str  # shown by its ``--help``
+    arguments: Callable[[argparse.ArgumentParser], None]  # adds its arguments to a parser
+    run: Callable[[argparse.Namespace], None]  # does it; a user's mistakes are raised as ``StudyError``
+
+
+@contextmanager
+def progress(unit: str, total: int | None = None, name: str = "") -> Generator[Callable[[str], None], None, None]:
+    """A line of progress; what is given back counts a step, and says what is done in it unless that is empty."""
+    from tqdm import tqdm
+
+    with tqdm(total=total, delay=QUIET, leave=False, unit=unit, desc=name or None) as bar:
+
+        def step(doing: str) -> None:
+            if doing:
+                bar.set_description(doing, refresh=False)
+            bar.update()
+
+        yield step
 
 
 def number(above: float = -math.inf, least: float = -math.inf, most: float = math.inf) -> Callable[[str], float]:

@@ -1,10 +1,9 @@
 """``study compare``: how good a model is, and where it fails."""
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from study.commands.command import Command
+from study.commands.command import Command, progress
 from study.commands.record_arguments import add_record_arguments, out_folder, prepared_of, read_records
 from study.identify.estimators import ESTIMATORS
 
@@ -13,69 +12,52 @@ if TYPE_CHECKING:
 
 PAGE = "explore.html"
 WITHOUT = ("siso", "miso_hand_read")  # estimators that do not find all coefficients of a model, or not together
-QUIET = 2.0  # seconds of work before progress is shown
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     add_record_arguments(parser)
-    parser.add_argument("--model", type=Path, required=True, help="model file (YAML); what it gives is held")
     parser.add_argument(
         "--estimator", choices=[n for n in ESTIMATORS if n not in WITHOUT], default="output_error",
         help="what finds the coefficients: a fit in free run (default), or in reverse from the frequency response "
         "functions; errors_in_variables is for several periods (--period) with noise on the force as well",
     )  # fmt: skip
-    parser.add_argument("--out", type=Path, help="folder for results (default results/RECORD)")
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    from tqdm import tqdm
-
     from study.compare.comparison import STEPS, across, compare
     from study.compare.comparison_pictures import level_pictures, pictures
     from study.compare.comparison_report import as_json, document, summary, tables
     from study.equations.model_file import read_model
     from study.support.extras import lacking
-    from study.support.file_sets import check_folder, write_files
+    from study.support.file_sets import write_files
 
     folder = out_folder(arguments)
-    check_folder(folder)
     model = read_model(arguments.model)
-    records = read_records(arguments)
-    prepared = [prepared_of(arguments, record) for record in records]
-    many, unpaged = len(records) > 1, lacking("bokeh", PAGE, "explore")
+    prepared = [prepared_of(arguments, record) for record in read_records(arguments)]
+    many, unpaged = len(prepared) > 1, lacking("bokeh", PAGE, "explore")
     files: dict[str, bytes] = {}
-    with tqdm(total=(STEPS + 1) * len(records), delay=QUIET, leave=False, unit="step") as bar:
-
-        def told(what: str) -> None:
-            bar.set_description(what, refresh=False)
-            bar.update()
-
-        found = [compare(model, one, estimator=arguments.estimator, progress=told) for one in prepared]
-        for one in found:
-            told("pictures")
-            prefix = f"{one.record.name}_" if many else ""
-            files |= {prefix + name: content for name, content in pictures(one).items()}
-            if not unpaged:
-                files |= _page(one, prefix)
-    moving = across(found)
-    files |= level_pictures(moving, found[0].record.units.get("force", "N"))
-    files |= {f"{name}.csv": content for name, content in tables(found, moving).items()}
-    files["comparison.json"] = as_json(document(found, moving))
+    with progress("step", (STEPS + 1) * len(prepared)) as step:
+        comparisons = [compare(model, p, estimator=arguments.estimator, progress=step) for p in prepared]
+        for comparison in comparisons:
+            step("pictures")
+            prefix = f"{comparison.record.name}_" if many else ""
+            own = pictures(comparison) | ({} if unpaged else _page(comparison))
+            files |= {prefix + name: content for name, content in own.items()}
+    levels = across(comparisons)
+    files |= level_pictures(levels, comparisons[0].record.units.get("force", "N"))
+    files |= {f"{name}.csv": content for name, content in tables(comparisons, levels).items()}
+    files["comparison.json"] = as_json(document(comparisons, levels))
     write_files(folder, files)
-    print(summary(found, moving))
-    what = f"{_count(files, '.csv')} tables, {_count(files, '.png')} pictures (PNG and SVG)"
+    print(summary(comparisons, levels))
     page = f"no page ({unpaged})" if unpaged else "a page for each record" if many else PAGE
-    print(f"\n{folder}: {page}, comparison.json, {what}")
+    count = {kind: sum(name.endswith(kind) for name in files) for kind in (".csv", ".png")}
+    print(f"\n{folder}: {page}, comparison.json, {count['.csv']} tables, {count['.png']} pictures (PNG and SVG)")
 
 
-def _page(comparison: "Comparison", prefix: str) -> dict[str, bytes]:
+def _page(comparison: "Comparison") -> dict[str, bytes]:
     from study.explore.saved import of_comparison
 
-    return {prefix + PAGE: of_comparison(comparison)}
-
-
-def _count(files: dict[str, bytes], kind: str) -> int:
-    return sum(name.endswith(kind) for name in files)
+    return {PAGE: of_comparison(comparison)}
 
 
 COMMAND = Command(

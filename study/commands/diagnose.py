@@ -1,10 +1,9 @@
 """``study diagnose``: which effect is missing from a model."""
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from study.commands.command import Command
+from study.commands.command import Command, progress
 from study.commands.record_arguments import add_record_arguments, out_folder, prepared_of, read_records
 
 if TYPE_CHECKING:
@@ -12,13 +11,9 @@ if TYPE_CHECKING:
     from study.equations.terms import Term
     from study.records.record import Record
 
-QUIET = 2.0  # seconds of work before progress is shown
-
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     add_record_arguments(parser)
-    parser.add_argument("--model", type=Path, required=True, help="model file (YAML); what it gives is held")
-    parser.add_argument("--out", type=Path, help="folder for results (default results/RECORD)")
     parser.add_argument(
         "--candidate", action="append", default=[], metavar="NAME=FORMULA", help="a candidate of your own"
     )
@@ -29,10 +24,9 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.diagnose.user_candidates import own_candidates
     from study.equations import terms
     from study.equations.model_file import read_model
-    from study.support.file_sets import check_folder, write_files
+    from study.support.file_sets import write_files
 
     folder = out_folder(arguments)
-    check_folder(folder)
     model = read_model(arguments.model)
     own = own_candidates(arguments.candidate)
     for name in arguments.without:
@@ -41,28 +35,23 @@ def _run(arguments: argparse.Namespace) -> None:
     records = read_records(arguments)
     for record in records:
         prefix = f"{record.name}_" if len(records) > 1 else ""
-        files |= {prefix + name: data for name, data in _one(model, record, arguments, own).items()}
+        files |= {prefix + name: data for name, data in _diagnosed(model, record, arguments, own).items()}
     write_files(folder, files)
     print(f"\n{folder}: {', '.join(name for name in files if not name.endswith('.svg'))}")
 
 
-def _one(model: "Model", record: "Record", arguments: argparse.Namespace, own: "list[Term]") -> dict[str, bytes]:
-    """Diagnose one record, print what was found, and give the files' contents."""
-    from tqdm import tqdm
-
+def _diagnosed(model: "Model", record: "Record", arguments: argparse.Namespace, own: "list[Term]") -> dict[str, bytes]:
+    """Diagnose one record, print the diagnosis, and give the files' contents."""
     from study.compare.comparison import compare
     from study.diagnose import diagnosis_report
     from study.diagnose.diagnosis_files import files, in_words
     from study.diagnose.verdict import diagnose
 
     prepared = prepared_of(arguments, record)
-    with tqdm(delay=QUIET, leave=False, unit=" candidates", desc=record.name) as bar:
-
-        def one_more(_: int) -> None:
-            bar.update()
-
+    with progress(" candidates", name=record.name) as step:
         comparison = compare(model, prepared)
-        diagnosis = diagnose(comparison, extra=own, without=tuple(arguments.without), progress=one_more)
+        without = tuple(arguments.without)
+        diagnosis = diagnose(comparison, extra=own, without=without, progress=lambda _: step(""))
         words = in_words(diagnosis)
     print(f"{record.name}: {diagnosis.verdict.replace('_', ' ')}")
     print(diagnosis_report.table(diagnosis))

@@ -1,4 +1,4 @@
-"""``study history``: the ladder of models tried so far, with their errors and the noise floor."""
+"""``study history``: the models tried so far, with their errors and the noise floor."""
 
 import argparse
 from pathlib import Path
@@ -8,7 +8,7 @@ from study.commands.command import Command
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", type=Path, help="model file (YAML) that 'study add' has added to")
-    parser.add_argument("--out", type=Path, help="also draw the ladder and write history.json there")
+    parser.add_argument("--out", type=Path, help="also draw the history and write history.json there")
 
 
 def _run(arguments: argparse.Namespace) -> None:
@@ -18,7 +18,7 @@ def _run(arguments: argparse.Namespace) -> None:
     read_model(arguments.model)
     steps = history.read(arguments.model)
     if not steps:
-        print(f"{arguments.model}: nothing was added yet; 'study add' begins the ladder")
+        print(f"{arguments.model}: nothing was added yet; 'study add' begins the history")
         return
     print(history.table(steps))
     if arguments.out is not None:

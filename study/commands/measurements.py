@@ -13,6 +13,7 @@ from study.support.config_files import Row, Text, read_rows
 from study.support.errors import StudyError, at, expect
 
 VARIABLE = "$STUDY_DATA"  # at the beginning of a path: the folder that this environment variable names
+NAME = "up to 64 of a to z, 0 to 9 and _, a letter first"  # targets and folders bear it
 TAKEN = ("--out", "--model", "-h", "--help")
 
 
@@ -32,43 +33,19 @@ def _words(text: object) -> object:
 
 
 class Measurement(Row):
-    """One row of ``config/measurements.tsv``.
+    """One row of ``config/measurements.tsv``."""
 
-    Attributes
-    ----------
-    record : str
-        As targets and folders name it.
-    path : str
-        The data file.
-    model : str
-        The model that is compared, and from which a climb begins: its name below ``models/``, or its file.
-    steps : int
-        Effects that a climb may add.
-    options : tuple of str
-        How the record is read, fitted and judged: options of ``study compare``.
-    """
-
-    record: Annotated[
-        str,
-        Field(
-            pattern=r"^[a-z][a-z0-9_]*\Z", max_length=64, description="up to 64 of a to z, 0 to 9 and _, a letter first"
-        ),
-    ]
+    record: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*\Z", max_length=64, description=NAME)]
     path: Text
-    model: Text
-    steps: Annotated[int, Field(ge=1, le=20)]
-    options: Annotated[tuple[str, ...], BeforeValidator(_words)]
+    model: Text  # that is compared, and from which a climb begins: its name below ``models/``, or its file
+    steps: Annotated[int, Field(ge=1, le=20)]  # effects that a climb may add
+    options: Annotated[tuple[str, ...], BeforeValidator(_words)]  # of ``study compare``
 
 
 def load(folder: Path, cases: Collection[str] = ()) -> Mapping[str, Measurement]:
     """Read ``measurements.tsv`` of a folder; whether the data are there is not asked.
 
-    Parameters
-    ----------
-    folder : Path
-        ``config/``.
-    cases : collection of str
-        Names that a record may not have, nor the target of its climb.
+    No record, nor the target of its climb, may have one of the names of ``cases``.
 
     Raises
     ------
@@ -92,13 +69,7 @@ def load(folder: Path, cases: Collection[str] = ()) -> Mapping[str, Measurement]
 
 
 def check_present(path: Path) -> None:
-    """See that a data file is there.
-
-    Raises
-    ------
-    StudyError
-        If not, or if no folder of data is named.
-    """
+    """See that a folder of data is named and a data file is there."""
     named = VARIABLE[1:]
     if VARIABLE in path.parts:
         raise StudyError(f"{path}: {named} is not set; expected the folder that holds {path.relative_to(VARIABLE)}")

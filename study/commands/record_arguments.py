@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from study.commands.command import number, whole
-from study.support.errors import StudyError
+from study.support.errors import at, expect
 
 if TYPE_CHECKING:
-    from study.records.plan import Plan
     from study.records.prepared import Prepared
     from study.records.readers import ReadOptions
     from study.records.record import Record
@@ -17,13 +16,23 @@ if TYPE_CHECKING:
 RANGE = re.compile(r"([0-9]{0,15}):([0-9]{0,15})")
 MOTIONS = ("displacement", "velocity", "acceleration")
 RESULTS = Path("results")
+GIVEN = ("dt", "fs", "group", "period", "accept_saturated", "accept_swapped")  # as ``ReadOptions`` calls them
 Span = tuple[int, int | None]
 
 
-def add_record_arguments(parser: argparse.ArgumentParser) -> None:
-    """Records, how to read them, what to fit and what to judge."""
-    parser.add_argument("records", type=Path, nargs="+", metavar="RECORD", help="CSV, MATLAB, HDF5, UFF or Parquet")
+def add_record_arguments(
+    parser: argparse.ArgumentParser, nargs: str | int = "+", out: str = "folder for results"
+) -> None:
+    """Records and a model, how to read them, what to fit and what to judge, and where results go."""
+    parser.add_argument("records", type=Path, nargs=nargs, metavar="RECORD", help="CSV, MATLAB, HDF5, UFF or Parquet")
     add_reading_arguments(parser)
+    parser.add_argument("--model", type=Path, required=True, help="model file (YAML); what it gives is held")
+    add_out_argument(parser, out)
+
+
+def add_out_argument(parser: argparse.ArgumentParser, out: str = "folder for results") -> None:
+    """Where results go."""
+    parser.add_argument("--out", type=Path, help=f"{out} (default results/RECORD)")
 
 
 def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,12 +66,12 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
 
 def span(text: str) -> Span:
     """``40650:127400`` as first sample and the one after the last; an end left out is that of the record."""
-    found = RANGE.fullmatch(text.strip())
-    if found is None:
+    ends = RANGE.fullmatch(text.strip())
+    if ends is None:
         raise argparse.ArgumentTypeError(f"{text!r} is no range of samples such as 0:4096")
-    first, last = (int(part) if part else None for part in found.groups())
+    first, last = (int(end) if end else None for end in ends.groups())
     if last is not None and last <= (first or 0):
-        raise argparse.ArgumentTypeError(f"{text!r} ends before it begins; a range such as 0:4096 is right")
+        raise argparse.ArgumentTypeError(f"{text!r} ends before it begins; expected a range such as 0:4096")
     return first or 0, last
 
 
@@ -72,25 +81,14 @@ def read_options(arguments: argparse.Namespace) -> "ReadOptions":
 
     columns = assignments(arguments.column, "--column")
     return ReadOptions(
-        columns={role: int(name) if name.isdecimal() else name for role, name in columns.items()},
-        units=assignments(arguments.unit, "--unit"),
-        dt=arguments.dt,
-        fs=arguments.fs,
-        group=arguments.group,
-        period=arguments.period,
-        accept_saturated=arguments.accept_saturated,
-        accept_swapped=arguments.accept_swapped,
+        {role: int(name) if name.isdecimal() else name for role, name in columns.items()},
+        assignments(arguments.unit, "--unit"),
+        **{name: getattr(arguments, name) for name in GIVEN},
     )
 
 
 def read_records(arguments: argparse.Namespace) -> list["Record"]:
-    """The records, each with a name of its own.
-
-    Raises
-    ------
-    StudyError
-        If one cannot be read.
-    """
+    """The records, each with a name of its own."""
     from study.compare.comparison import distinct
     from study.records.readers import read_record
 
@@ -106,48 +104,33 @@ def prepared_of(arguments: argparse.Namespace, record: "Record") -> "Prepared":
     StudyError
         If the ranges overlap or leave the record, it lacks the response asked for, or cannot be completed.
     """
+    from study.records.plan import make_plan
     from study.records.prepared import prepare_record
 
-    return prepare_record(record, _plan(arguments, record), arguments.cutoff)
-
-
-def _plan(arguments: argparse.Namespace, record: "Record") -> "Plan":
-    """What to fit and what to judge of a record.
-
-    Raises
-    ------
-    StudyError
-        If the ranges overlap or leave the record, or it lacks the response asked for.
-    """
-    from study.records.plan import make_plan
-
     fit, judge = _within(arguments.fit, record), _within(arguments.judge, record)
-    if arguments.response is not None and arguments.response not in record:
-        have = ", ".join(m for m in MOTIONS if m in record)
-        raise StudyError(f"{record.name}: no {arguments.response} was measured; --response {have} is right")
-    if fit is None and judge is not None:
-        fit = _other(judge, len(record))
-    if judge is None and fit is not None:
-        judge = _other(fit, len(record))
-    try:
-        return make_plan(record, fit, judge, arguments.response)
-    except StudyError as error:
-        raise StudyError(f"{record.name}: {error}") from None
+    fit, judge = fit or _other(judge, record), judge or _other(fit, record)
+    with at(record.name):
+        measured = ", ".join(m for m in MOTIONS if m in record)
+        usable = arguments.response is None or arguments.response in record
+        expect(usable, f"no {arguments.response} was measured; expected --response {measured}")
+        plan = make_plan(record, fit, judge, arguments.response)
+    return prepare_record(record, plan, arguments.cutoff)
 
 
 def _within(given: Span | None, record: "Record") -> tuple[int, int] | None:
     return None if given is None else (given[0], len(record) if given[1] is None else given[1])
 
 
-def _other(given: tuple[int, int], length: int) -> tuple[int, int]:
+def _other(given: tuple[int, int] | None, record: "Record") -> tuple[int, int] | None:
     """The longer of the parts before and after a range."""
-    before, after = (0, given[0]), (given[1], length)
-    return before if before[1] - before[0] > after[1] - after[0] else after
+    return given and max(((given[1], len(record)), (0, given[0])), key=lambda part: part[1] - part[0])
 
 
 def out_folder(arguments: argparse.Namespace) -> Path:
-    """Where results go: ``--out``, or ``results/`` and the stem of the first record."""
-    if arguments.out is not None:
-        return arguments.out
+    """Where results go, seen to be writable: ``--out``, or ``results/`` and the stem of the first record."""
+    from study.support.file_sets import check_folder
+
     first: Path = arguments.records[0]
-    return RESULTS / (first.stem or "record")
+    folder: Path = arguments.out if arguments.out is not None else RESULTS / (first.stem or "record")
+    check_folder(folder)
+    return folder

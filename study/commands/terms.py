@@ -45,18 +45,13 @@ def details(term: "Term") -> str:
 
     rows = [["coefficient", s, term.unit(s, "N", "m"), _shape(term, s)] for s in term.symbols]
     rows += [["shape parameter", p.name, PARAMETER_UNITS[p.quantity], p.meaning] for p in term.parameters]
-    lines = [
-        f"{term.name}: {term.formula}",
-        f"  meaning       {term.meaning}",
-        f"  common cause  {term.cause}",
-        "",
-        tabulate(rows, ["", "symbol", "SI unit", "stands before, or is"], tablefmt="simple", disable_numparse=True),
-        "",
-        "In a model file:",
-        f"  - {term.name}",
-        f"  - {{term: {term.name}, {', '.join(_given(term))}}}",
-    ]
-    return "\n".join(lines)
+    listing = tabulate(
+        rows, ["", "symbol", "SI unit", "stands before, or is"], tablefmt="simple", disable_numparse=True
+    )
+    return (
+        f"{term.name}: {term.formula}\n  meaning       {term.meaning}\n  common cause  {term.cause}\n\n{listing}\n\n"
+        f"In a model file:\n  - {term.name}\n  - {{term: {term.name}, {', '.join(_given(term))}}}"
+    )
 
 
 def _shape(term: "Term", symbol: str) -> str:
@@ -67,10 +62,8 @@ def _shape(term: "Term", symbol: str) -> str:
 
 
 def _given(term: "Term") -> list[str]:
-    parameters = [f"{p.name}: ..." for p in term.parameters]
-    if len(term.symbols) == 1:
-        return [*parameters, "value: ..."]
-    return [*parameters, "amplitude: ...", "phase: ..."]
+    values = ["value"] if len(term.symbols) == 1 else ["amplitude", "phase"]
+    return [f"{name}: ..." for name in (*(p.name for p in term.parameters), *values)]
 
 
 COMMAND = Command(

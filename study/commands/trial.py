@@ -11,9 +11,9 @@ if TYPE_CHECKING:
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    what = parser.add_mutually_exclusive_group(required=True)
-    what.add_argument("--seed", type=whole(0, 2**63 - 1), help="the same seed gives the same trial")
-    what.add_argument("--open", type=Path, metavar="FILE", help="show the sealed answer of a trial")
+    task = parser.add_mutually_exclusive_group(required=True)
+    task.add_argument("--seed", type=whole(0, 2**63 - 1), help="the same seed gives the same trial")
+    task.add_argument("--open", type=Path, metavar="FILE", help="show the sealed answer of a trial")
     parser.add_argument(
         "--hidden", metavar="NAMES", help="'none', or one or more effects (a,b) to hide; drawn if left out"
     )
@@ -46,14 +46,11 @@ def _names(text: str | None) -> tuple[str, ...] | None:
 
 def _written(trial: "Trial", record: Path, model: Path, answer: Path) -> str:
     response = next(name for name in trial.record.channels if name != "force")
-    return "\n".join(
-        [
-            f"{record}: force and {response}, {len(trial.record)} samples at {trial.record.dt:.4g} s",
-            f"{model}: the model its owner believes in ({', '.join(t.name for t in trial.believed.terms)})",
-            f"{answer}: the answer, sealed; 'study trial --open {answer}' shows it",
-            "",
-            f"Try: study diagnose {record} --model {model}",
-        ]
+    return (
+        f"{record}: force and {response}, {len(trial.record)} samples at {trial.record.dt:.4g} s\n"
+        f"{model}: the model its owner believes in ({', '.join(t.name for t in trial.believed.terms)})\n"
+        f"{answer}: the answer, sealed; 'study trial --open {answer}' shows it\n\n"
+        f"Try: study diagnose {record} --model {model}"
     )
 
 

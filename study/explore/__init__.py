@@ -1,6 +1,6 @@
 """A page to see the loop on: compare, diagnose, add, watch the error fall.
 
 No mathematics of its own: ``session`` keeps the models tried and calls what the commands call, ``view`` turns a
-rung into columns and ``words`` into sentences, ``plots`` and ``page`` lay them out, ``saved`` makes one file that
-needs no network, ``files`` what is written on saving, ``desk`` and ``server`` the live page.
+model's findings into columns and ``words`` into sentences, ``plots`` and ``html_page`` lay them out, ``saved`` makes
+one file that needs no network, ``saved_files`` what is written on saving, ``desk`` and ``server`` the live page.
 """

@@ -8,19 +8,7 @@ BUCKETS = 1200  # about one for each column of pixels
 
 
 def extremes(values: Floats, buckets: int = BUCKETS) -> Floats:
-    """Two values a bucket, its least and its greatest, in the order in which they come.
-
-    Parameters
-    ----------
-    values : array, shape (n,)
-        What is to be drawn as a line.
-    buckets : int
-        How many; a record of no more than twice as many samples stays as it is.
-
-    Returns
-    -------
-    array, shape (min(n, 2 buckets),)
-    """
+    """Least and greatest value of each bucket, in the order in which they come; short records stay as they are."""
     if len(values) <= 2 * buckets:
         return values
     starts = _starts(len(values), buckets)

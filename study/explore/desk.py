@@ -22,27 +22,13 @@ SETTLE = 0.4  # seconds in which pages are drawn, before a diagnosis takes the p
 
 @dataclass(frozen=True)
 class State:
-    """What pages show beside the rung.
+    """What pages show beside the model."""
 
-    Attributes
-    ----------
-    busy : str
-        What is done while nothing else can be asked for.
-    diagnosing : str
-        What goes on behind that.
-    answer : str
-        The sentence beside the field for a formula.
-    accepted : str
-        The formula that was taken last.
-    notice : str
-        A sentence above everything else.
-    """
-
-    busy: str = ""
-    diagnosing: str = ""
-    answer: str = ""
-    accepted: str = ""
-    notice: str = ""
+    busy: str = ""  # what is done while nothing else can be asked for
+    diagnosing: str = ""  # what goes on behind that
+    answer: str = ""  # the sentence beside the field for a formula
+    accepted: str = ""  # the formula that was taken last
+    notice: str = ""  # a sentence above everything else
 
 
 class OvertakenError(Exception):
@@ -62,18 +48,21 @@ class Desk:
         self._hand = ThreadPoolExecutor(1, "change")
         self._behind = ThreadPoolExecutor(1, "diagnosis")
         self._actions: Mapping[str, tuple[str, Callable[[str], None]]] = {
-            "add": ("adding {}", self._add), "undo": ("undoing", self._undo), "save": ("writing files", self._save),
-            "hold": ("holding {}", lambda key: self._hold(key, True)),
-            "free": ("freeing {}", lambda key: self._hold(key, False)), "try": ("trying {}", self._try),
-        }  # fmt: skip
+            "add": ("adding {}", lambda name: self._change(sessions.with_added(self.session, name))),
+            "undo": ("undoing", lambda _: self._change(sessions.undone(self.session))),
+            "hold": ("holding {}", lambda key: self._change(sessions.with_held(self.session, key, True))),
+            "free": ("freeing {}", lambda key: self._change(sessions.with_held(self.session, key, False))),
+            "try": ("trying {}", self._try),
+            "save": ("writing files", self._save),
+        }
 
-    def watch(self, who: object, told: Callable[[], None]) -> None:
-        """Tell someone of every change, from whatever thread makes it."""
+    def watch(self, who: object, changed: Callable[[], None]) -> None:
+        """Call someone after every change, from whatever thread makes it."""
         with self._lock:
-            self.watchers[who] = told
+            self.watchers[who] = changed
 
     def leave(self, who: object) -> None:
-        """Tell them no more."""
+        """Call them no more."""
         with self._lock:
             self.watchers.pop(who, None)
 
@@ -83,7 +72,7 @@ class Desk:
             if action not in self._actions or self.state.busy:
                 return
             doing, work = self._actions[action]
-            self._tell(replace(self.state, busy=doing.format(name[:40]), answer="", accepted="", notice=""))
+            self._tell(busy=doing.format(name[:40]), answer="", accepted="", notice="")
         self._hand.submit(self._do, work, name, action)
 
     def diagnose(self) -> None:
@@ -96,52 +85,38 @@ class Desk:
         self._hand.shutdown(wait=False, cancel_futures=True)
         self._behind.shutdown(wait=False, cancel_futures=True)
 
-    def _tell(self, state: State, session: Session | None = None) -> None:
+    def _tell(self, session: Session | None = None, **state: str) -> None:
+        """Change the state, perhaps the session, and call whoever watches."""
         with self._lock:
-            self.state = state
-            if session is not None:
-                self.session = session
-            told = list(self.watchers.values())
-        for one in told:
-            one()
+            self.state = replace(self.state, **state)
+            self.session = session or self.session
+            watchers = list(self.watchers.values())
+        for changed in watchers:
+            changed()
 
     def _do(self, work: Callable[[str], None], name: str, action: str) -> None:
+        place = "answer" if action == "try" else "notice"
         try:
             work(name)
         except StudyError as error:
-            self._refuse(str(error), action)
+            self._tell(None, **{place: str(error)})
         except Exception as error:  # a fault of this program: the page says so and stays as it was
             traceback.print_exc()
-            self._refuse(f"a fault in the program, not in your input ({type(error).__name__}: {error})", action)
-        self._tell(replace(self.state, busy=""))
-
-    def _refuse(self, sentence: str, action: str) -> None:
-        said = {"answer": sentence} if action == "try" else {"notice": sentence}
-        self._tell(replace(self.state, **said))
+            self._tell(None, **{place: f"a fault in the program, not in your input ({type(error).__name__}: {error})"})
+        self._tell(busy="")
 
     def _change(self, session: Session) -> None:
-        self._tell(replace(self.state, busy=""), session)
+        self._tell(session, busy="")
         self.diagnose()
 
-    def _add(self, name: str) -> None:
-        self._change(sessions.with_added(self.session, name))
-
-    def _undo(self, _: str) -> None:
-        self._change(sessions.undone(self.session))
-
-    def _hold(self, key: str, hold: bool) -> None:
-        self._change(sessions.with_held(self.session, key, hold))
-
     def _try(self, text: str) -> None:
-        after = sessions.tried(self.session, text)
-        self._tell(replace(self.state, accepted=text), after)
-        self._behind.submit(self._examine, after.own)
+        session = sessions.tried(self.session, text)
+        self._tell(session, accepted=text)
+        self._behind.submit(self._examine, session.own)
 
     def _save(self, _: str) -> None:
         write_files(self.folder, files(self.session, self.model.name, self.text))
-        self._tell(
-            replace(self.state, notice=f"Saved in {self.folder}: {self.model.name}, {PAGE}, pictures and tables")
-        )
+        self._tell(notice=f"Saved in {self.folder}: {self.model.name}, {PAGE}, pictures and tables")
 
     def _examine(self, own: object = None) -> None:
         self._rest.wait(SETTLE)
@@ -150,23 +125,20 @@ class Desk:
         if asked.now.diagnosis is not None and own is None:
             return
 
-        def one_more(count: int) -> None:
+        def count(candidates: int) -> None:
             if self.session.now.model != model or self._rest.is_set():
                 raise OvertakenError
-            self._tell(replace(self.state, diagnosing=f"diagnosing: {count} candidates tried"))
+            self._tell(diagnosing=f"diagnosing: {candidates} candidates tried")
 
         try:
-            self._tell(replace(self.state, diagnosing="diagnosing"))
-            rung, _ = sessions.examined(asked, one_more)
+            self._tell(diagnosing="diagnosing")
+            rung, _ = sessions.examined(asked, count)
             with self._lock:
-                current = sessions.with_rung(self.session, rung)
-                self._tell(replace(self.state, diagnosing=""), current)
+                self._tell(sessions.with_rung(self.session, rung), diagnosing="")
         except OvertakenError:
-            self._tell(replace(self.state, diagnosing=""))
+            self._tell(diagnosing="")
         except StudyError as error:
-            self._tell(replace(self.state, diagnosing="", notice=str(error)))
+            self._tell(diagnosing="", notice=str(error))
         except Exception as error:
             traceback.print_exc()
-            self._tell(
-                replace(self.state, diagnosing="", notice=f"the diagnosis failed ({type(error).__name__}: {error})")
-            )
+            self._tell(diagnosing="", notice=f"the diagnosis failed ({type(error).__name__}: {error})")

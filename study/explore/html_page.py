@@ -11,9 +11,10 @@ from bokeh.models import ColumnDataSource, CustomJS
 from jinja2 import Environment, Template
 
 from study.explore import plots, theme, words
+from study.explore.axis_scales import Columns
 from study.explore.page_units import in_text
-from study.explore.session import Session, Step
-from study.explore.view import Columns, View
+from study.explore.session import Session
+from study.explore.view import View
 
 GHOSTS: dict[str, Columns] = {
     "ghost_time": {"t": [], "y": []}, "ghost_spectrum": {"f": [], "y": []}, "ghost_u": {"at": [], "y": []},
@@ -30,42 +31,24 @@ SELECTED = "if (cb_obj.final) window.study.selected(kind, cb_obj.geometry.x0, cb
 
 @dataclass(frozen=True)
 class Page:
-    """A page of one document.
-
-    Attributes
-    ----------
-    sources : dict
-        What is drawn, by name.
-    panels : dict
-        The figures, by the name of their place in the template.
-    """
+    """A page of one document: what is drawn, by name, and the figures, by the name of their place in the template."""
 
     sources: dict[str, ColumnDataSource]
     panels: dict[str, Any]
 
-    def show(self, seen: View, ladder: Columns) -> None:
-        """Draw another rung; the words come last, since the page begins anew when they change."""
-        for name, columns in {**seen.columns, "ladder": ladder, "frame": frame(seen)}.items():
+    def show(self, seen: View, history: Columns) -> None:
+        """Draw another model; the words come last, since the page begins anew when they change."""
+        for name, columns in {**seen.columns, "history": history, "frame": frame(seen)}.items():
             if name != "words":
                 self.sources[name].data = columns
-        self.panels["ladder"].y_range.factors = ladder["name"][::-1]
-        self.panels["ladder"].height = ladder_height(len(ladder["name"]))
+        self.panels["history"].y_range.factors = history["name"][::-1]
+        self.panels["history"].height = history_height(len(history["name"]))
         self.sources["words"].data = seen.columns["words"]
 
 
-def build(seen: View, ladder: Columns, stores: Sequence[ColumnDataSource] = ()) -> Page:
-    """A page that shows one rung.
-
-    Parameters
-    ----------
-    seen : View
-        The rung.
-    ladder : dict
-        Columns of :func:`ladder_columns`.
-    stores : sequence of ColumnDataSource
-        Further sources that the page's script looks up by name.
-    """
-    given = {**seen.columns, **GHOSTS, "ladder": ladder, "frame": frame(seen)}
+def build(seen: View, history: Columns, stores: Sequence[ColumnDataSource] = ()) -> Page:
+    """A page that shows one model, with the columns of its history; ``stores`` are further sources of its script."""
+    given = {**seen.columns, **GHOSTS, "history": history, "frame": frame(seen)}
     sources = {name: ColumnDataSource(columns, name=name) for name, columns in given.items()}
     t, highest = seen.columns["time"]["t"], seen.highest
     time = theme.fixed("range_time", float(t[0]), float(t[-1]))
@@ -77,7 +60,7 @@ def build(seen: View, ladder: Columns, stores: Sequence[ColumnDataSource] = ()) 
         "coherence": plots.coherence(sources, frequency),
         "spectrum": plots.spectrum(sources, frequency), "plane": plots.plane(sources),
         "against_u": plots.against(sources, "u"), "against_v": plots.against(sources, "v"),
-        "ladder": plots.ladder(sources, ladder["name"], ladder_height(len(ladder["name"]))),
+        "history": plots.history(sources, history["name"], history_height(len(history["name"]))),
         "constancy": plots.constancy(sources),
     }  # fmt: skip
     for name, kind in KINDS.items():
@@ -93,48 +76,45 @@ def placed(made: Page, diagnosed: bool) -> list[Any]:
     return [panel for name, panel in made.panels.items() if diagnosed or name != "constancy"]
 
 
-def ladder_height(steps: int) -> int:
-    """Height of the ladder in pixels."""
+def history_height(steps: int) -> int:
+    """Height of the history in pixels."""
     return 84 + 27 * max(steps, 2)
 
 
 def ladder_columns(session: Session) -> Columns:
-    """The ladder as columns: errors and noise floor in per cent by the name of the step."""
-    return ladder_of(session.steps, [r.label for r in session.rungs])
-
-
-def ladder_of(steps: Sequence[Step], labels: Sequence[str]) -> Columns:
-    """The same of steps as they are kept; the last of them have labels of their own."""
-    named = ["as given" if not s.get("added") else f"+ {s['added']}" for s in steps]
-    named[len(named) - len(labels) :] = labels
-    size = [6.0] * (len(steps) - 1) + [10.0]
+    """The history as columns: errors and noise floor in per cent by the name of the step."""
+    steps = session.steps
+    earlier = [f"+ {step['added']}" if step.get("added") else "as given" for step in steps]
+    named = [*earlier[: len(steps) - len(session.rungs)], *(rung.label for rung in session.rungs)]
     return {
         "name": [f"{i} {words.in_words(label)}" for i, label in enumerate(named)],
-        "response": [100.0 * s["error"]["response"] for s in steps],
-        "force": [100.0 * (s["error"]["force"] or np.nan) for s in steps],
-        "floor": [100.0 * s["noise_floor"]["response"] for s in steps],
-        "size": size,
+        "response": [100.0 * step["error"]["response"] for step in steps],
+        "force": [100.0 * (step["error"]["force"] or np.nan) for step in steps],
+        "floor": [100.0 * step["noise_floor"]["response"] for step in steps],
+        "size": [6.0] * (len(steps) - 1) + [10.0],
     }
 
 
 def frame(seen: View) -> Columns:
-    """Labels and limits that differ from rung to rung, as settings of named models."""
+    """Labels and limits that differ from model to model, as settings of named models."""
     scale = seen.scales
     largest = max(float(np.nanmax(np.abs(seen.columns["plane"]["mean"]), initial=0.0)), seen.least)
-    u, v, f = (in_text(s.unit) for s in (scale.displacement, scale.velocity, scale.force))
+    u, v, f, y, d = (
+        in_text(s.unit) for s in (scale.displacement, scale.velocity, scale.force, scale.response, scale.difference)
+    )
+    labels = {
+        "response": f"{seen.quantity} / {y}", "close": f"{seen.quantity} / {y}", "difference": f"difference / {d}",
+        "spectrum": f"amplitude density / {d}/√Hz", "plane": f"velocity / {v}", "against_u": f"missing force / {f}",
+        "against_v": f"missing force / {f}",
+    }  # fmt: skip
+    motions = {"plane": f"displacement / {u}", "against_u": f"displacement / {u}", "against_v": f"velocity / {v}"}
     rows: list[tuple[str, str, Any]] = [
-        ("response_y", "axis_label", f"{seen.quantity} / {in_text(scale.response.unit)}"),
-        ("close_y", "axis_label", f"{seen.quantity} / {in_text(scale.response.unit)}"),
-        ("difference_y", "axis_label", f"difference / {in_text(scale.difference.unit)}"),
-        ("spectrum_y", "axis_label", f"amplitude density / {in_text(scale.difference.unit)}/√Hz"),
-        ("plane_x", "axis_label", f"displacement / {u}"), ("plane_y", "axis_label", f"velocity / {v}"),
-        ("against_u_x", "axis_label", f"displacement / {u}"), ("against_u_y", "axis_label", f"missing force / {f}"),
-        ("against_v_x", "axis_label", f"velocity / {v}"), ("against_v_y", "axis_label", f"missing force / {f}"),
-        ("mapper", "low", -largest), ("mapper", "high", largest),
-        ("range_frequency", "end", seen.highest), ("range_force", "start", seen.limits[0]),
-        ("range_force", "end", seen.limits[1]),
+        *((f"{name}_y", "axis_label", label) for name, label in labels.items()),
+        *((f"{name}_x", "axis_label", label) for name, label in motions.items()),
+        ("mapper", "low", -largest), ("mapper", "high", largest), ("range_frequency", "end", seen.highest),
+        ("range_force", "start", seen.limits[0]), ("range_force", "end", seen.limits[1]),
     ]  # fmt: skip
-    return {"model": [r[0] for r in rows], "property": [r[1] for r in rows], "value": [r[2] for r in rows]}
+    return dict(zip(("model", "property", "value"), map(list, zip(*rows, strict=True)), strict=True))
 
 
 @cache

@@ -8,8 +8,9 @@ from bokeh.events import RangesUpdate
 from bokeh.models import ColumnDataSource, CustomJS
 
 from study.explore import decimate, html_page, preview
+from study.explore.axis_scales import scales_of
 from study.explore.desk import Desk
-from study.explore.view import View, over_time, scales_of, view, within
+from study.explore.view import View, over_time, stretch, view
 
 HELLO = "hello"  # what a page says when it is there
 
@@ -25,7 +26,7 @@ class Watcher:
         self.page = html_page.build(self._view(), html_page.ladder_columns(self.shown), [self.asked, self.state])
         self.span: tuple[float, float] | None = None
         self._lay()
-        desk.watch(self, self._told)
+        desk.watch(self, self._changed)
         document.on_session_destroyed(lambda _: desk.leave(self))
 
     def _lay(self) -> None:
@@ -51,7 +52,7 @@ class Watcher:
             "accepted": [state.accepted], "notice": [state.notice], "undo": [many],
         }  # fmt: skip
 
-    def _told(self) -> None:
+    def _changed(self) -> None:
         """Called from any thread; the document is touched in its own loop."""
         self.document.add_next_tick_callback(self._show)
 
@@ -84,7 +85,7 @@ class Watcher:
     def _refine(self, span: tuple[float, float]) -> None:
         self.span = span
         rung = self.shown.now
-        found, scales = rung.comparison, scales_of(rung.comparison)
-        rows = preview.difference(rung.shown, scales, within(found, span))
-        self.page.sources["would_time"].data = rows
-        self.page.sources["time"].data = over_time(found, scales, span)
+        comparison, scales = rung.comparison, scales_of(rung.comparison)
+        part = stretch(comparison, span)
+        self.page.sources["would_time"].data = preview.difference(rung.shown, scales, part)
+        self.page.sources["time"].data = over_time(comparison, scales, span)

@@ -1,4 +1,4 @@
-// What the page does by itself: join selections, preview candidates, step through the ladder, pass on what is
+// What the page does by itself: join selections, preview candidates, step through the history, pass on what is
 // clicked. It draws from tables that Python has filled, so that a saved page does the same without a server.
 window.study = (() => {
   const model = (name) => Bokeh.documents[0].get_model_by_name(name)
@@ -14,10 +14,10 @@ window.study = (() => {
       if (element) element.innerHTML = html[i]
     }
     const frame = model("frame")
-    const [who, what, value] = ["model", "property", "value"].map((key) => frame.get_column(key))
-    for (let i = 0; i < who.length; i++) {
-      const target = model(who[i])
-      if (target && target[what[i]] !== value[i]) target[what[i]] = value[i]
+    const [names, properties, values] = ["model", "property", "value"].map((key) => frame.get_column(key))
+    for (let i = 0; i < names.length; i++) {
+      const target = model(names[i])
+      if (target && target[properties[i]] !== values[i]) target[properties[i]] = values[i]
     }
     far = null
     clear()
@@ -49,7 +49,7 @@ window.study = (() => {
     constancy(has ? i : 0)
   }
 
-  const entry = (name, what, on) => { const item = model(`panel_${name}_${what}`); if (item) item.visible = on }
+  const entry = (name, label, on) => { const item = model(`panel_${name}_${label}`); if (item) item.visible = on }
 
   function constancy(i) {
     const rows = column("constancy", "row"), shown = {f: [], value: [], low: [], high: []}
@@ -149,10 +149,10 @@ window.study = (() => {
 
   function tell(kind, from, to) {
     const axis = {time: "difference_x", band: "force_x", u: "against_u_x", v: "against_v_x"}[kind]
-    const [what, unit] = model(axis).axis_label.split(" / ")
+    const [quantity, unit] = model(axis).axis_label.split(" / ")
     const element = place("selection")
     if (!element) return
-    element.textContent = `Selected: ${what} from ${Number(from.toPrecision(3))} to ${Number(to.toPrecision(3))} ${unit}; ` +
+    element.textContent = `Selected: ${quantity} from ${Number(from.toPrecision(3))} to ${Number(to.toPrecision(3))} ${unit}; ` +
       "all panels show what belongs to it. Escape clears."
     element.classList.add("on")
   }
@@ -188,42 +188,42 @@ window.study = (() => {
 
   // ---- what is clicked goes to Python
   let count = 0
-  function act(what, name) {
-    if (what === "step") return step(Number(name))
-    if (document.body.classList.contains("busy") && what !== "try") return
-    put("asked", {act: [what], name: [String(name)], count: [++count]})
+  function act(action, name) {
+    if (action === "step") return step(Number(name))
+    if (document.body.classList.contains("busy") && action !== "try") return
+    put("asked", {act: [action], name: [String(name)], count: [++count]})
   }
 
   function state() {
-    const told = (key) => column("state", key)[0]
-    document.body.classList.toggle("busy", told("busy") !== "")
+    const shown = (key) => column("state", key)[0]
+    document.body.classList.toggle("busy", shown("busy") !== "")
     for (const [id, key] of [["busy", "doing"], ["answer", "answer"], ["notice", "notice"]]) {
       const element = place(id)
-      if (element) element.textContent = told(key)
+      if (element) element.textContent = shown(key)
     }
-    document.body.classList.toggle("working", told("doing") !== "")
+    document.body.classList.toggle("working", shown("doing") !== "")
     const undo = document.querySelector("[data-act=undo]")
-    if (undo) undo.disabled = !told("undo")
+    if (undo) undo.disabled = !shown("undo")
     const field = place("formula")
     if (field) {
-      field.setAttribute("aria-invalid", told("answer") !== "" ? "true" : "false")
-      if (told("accepted") && field.value === told("accepted")) field.value = ""
+      field.setAttribute("aria-invalid", shown("answer") !== "" ? "true" : "false")
+      if (shown("accepted") && field.value === shown("accepted")) field.value = ""
     }
   }
 
-  const found = (event, key) => event.composedPath().find((e) => e.dataset && e.dataset[key] !== undefined)
+  const under = (event, key) => event.composedPath().find((e) => e.dataset && e.dataset[key] !== undefined)
   let hovered = null
   document.addEventListener("click", (event) => {
-    const element = found(event, "act")
+    const element = under(event, "act")
     if (element && !element.disabled)
       act(element.dataset.act, element.dataset.act === "try" ? place("formula").value : element.dataset.name ?? "")
   })
   document.addEventListener("mouseover", (event) => {
-    const element = found(event, "candidate"), next = element ? Number(element.dataset.candidate) : null
+    const element = under(event, "candidate"), next = element ? Number(element.dataset.candidate) : null
     if (next !== hovered && place("candidates") && window.study.ready) preview((hovered = next))
   })
   document.addEventListener("focusin", (event) => {
-    const element = found(event, "candidate")
+    const element = under(event, "candidate")
     if (element) preview((hovered = Number(element.dataset.candidate)))
   })
   document.addEventListener("keydown", (event) => {

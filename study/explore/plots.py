@@ -13,7 +13,7 @@ Sources = Mapping[str, ColumnDataSource]
 
 def response(s: Sources, time: Any) -> Any:
     """Measured and predicted response."""
-    drawn = theme.panel("response", 150, "", "response", select="width", ranges=(time, None))
+    drawn = theme.panel("response", 150, "", "response", select=True, ranges=(time, None))
     drawn.xaxis.visible = False
     _blocks(drawn, s)
     measured = drawn.line("t", "measured", source=s["time"], **theme.MEASURED)
@@ -26,7 +26,7 @@ def response(s: Sources, time: Any) -> Any:
 
 def difference(s: Sources, time: Any) -> Any:
     """What the model misses, the noise, and what a candidate would leave."""
-    drawn = theme.panel("difference", 158, "time / s", "difference", select="width", ranges=(time, None))
+    drawn = theme.panel("difference", 158, "time / s", "difference", select=True, ranges=(time, None))
     _blocks(drawn, s)
     line = drawn.line("t", "difference", source=s["time"], **theme.DIFFERENCE)
     would = drawn.line("t", "y", source=s["ghost_time"], **theme.WOULD)
@@ -55,11 +55,11 @@ def _blocks(drawn: Any, s: Sources) -> None:
 def force(s: Sources, frequency: Any, share: Any) -> Any:
     """Unexplained share of the force with the noise floor."""
     drawn = theme.panel(
-        "force", 222, "frequency / Hz", "unexplained share of the force / %", select="width", ranges=(frequency, share),
+        "force", 222, "frequency / Hz", "unexplained share of the force / %", select=True, ranges=(frequency, share),
         narrow=True, y_axis_type="log",
     )  # fmt: skip
-    left = drawn.line("f", "parametric", source=s["force"], line_color="#0b5394", line_width=1.6)
-    least = drawn.line("f", "unexplained", source=s["force"], line_color="#d1600a", line_width=1.4, line_dash=[6, 3])
+    left = drawn.line("f", "parametric", source=s["force"], line_color=theme.BLUE, line_width=1.6)
+    least = drawn.line("f", "unexplained", source=s["force"], line_color=theme.ORANGE, line_width=1.4, line_dash=[6, 3])
     noise = drawn.line("f", "noise", source=s["force"], **theme.NOISE)
     theme.chosen(drawn, "box_force")
     theme.legend(drawn, [("fitted", [left]), ("1 − coherence", [least]), ("noise", [noise])])
@@ -68,14 +68,10 @@ def force(s: Sources, frequency: Any, share: Any) -> Any:
 
 def coherence(s: Sources, frequency: Any) -> Any:
     """Cumulative coherence: what the inputs explain, one after the other."""
-    drawn = theme.panel(
-        "coherence", 222, "frequency / Hz", "cumulative coherence / 1", select="width",
-        narrow=True,
-        ranges=(frequency, theme.fixed("range_coherence", 0.0, 1.03)),
-    )  # fmt: skip
-    lines = drawn.multi_line(
-        "f", "share", source=s["coherence"], line_color="colour", line_dash="dash", line_width=1.5
-    )  # fmt: skip
+    ranges = (frequency, theme.fixed("range_coherence", 0.0, 1.03))
+    drawn = theme.panel("coherence", 222, "frequency / Hz", "cumulative coherence / 1", select=True, ranges=ranges,
+                        narrow=True)  # fmt: skip
+    lines = drawn.multi_line("f", "share", source=s["coherence"], line_color="colour", line_dash="dash", line_width=1.5)
     theme.legend(drawn, [({"field": "name"}, [lines])], "bottom_right")
     theme.chosen(drawn, "box_coherence")
     return drawn
@@ -84,10 +80,10 @@ def coherence(s: Sources, frequency: Any) -> Any:
 def spectrum(s: Sources, frequency: Any) -> Any:
     """The difference of the response by frequency, the noise, what is selected and what a candidate would leave."""
     drawn = theme.panel(
-        "spectrum", 222, "frequency / Hz", "difference", select="width", ranges=(frequency, None),
+        "spectrum", 222, "frequency / Hz", "difference", select=True, ranges=(frequency, None),
         narrow=True, y_axis_type="log",
     )  # fmt: skip
-    line = drawn.line("f", "difference", source=s["spectrum"], line_color="#d1600a", line_width=1.5)
+    line = drawn.line("f", "difference", source=s["spectrum"], line_color=theme.ORANGE, line_width=1.5)
     noise = drawn.line("f", "noise", source=s["spectrum"], **theme.NOISE)
     would = drawn.line("f", "y", source=s["ghost_spectrum"], **theme.WOULD)
     picked = drawn.line("f", "y", source=s["picked_spectrum"], **theme.PICKED)
@@ -110,8 +106,8 @@ def plane(s: Sources) -> Any:
     drawn.scatter(**at, size="below", marker="dash", line_color="#00000088", line_width=1.0)
     drawn.scatter(**at, size="unsure", fill_color="#4a4a4a", line_color=None)
     outline = Quad(
-        left="left", right="right", top="top", bottom="bottom", fill_color=None, line_color="#7a1fa2", line_width=1.6,
-        line_alpha="picked",
+        left="left", right="right", top="top", bottom="bottom", fill_color=None, line_width=1.6, line_alpha="picked",
+        line_color=theme.PICKED["line_color"],
     )  # fmt: skip
     drawn.add_glyph(s["plane"], outline, nonselection_glyph=None)
     bar = ColorBar(
@@ -129,11 +125,11 @@ def plane(s: Sources) -> Any:
 def against(s: Sources, of: str) -> Any:
     """Mean missing force against displacement (u) or velocity (v) with 95 % intervals."""
     name = f"against_{of}"
-    drawn = theme.panel(name, 250, of, "missing force", select="width", narrow=True)
-    drawn.add_layout(Span(location=0.0, dimension="width", line_color="#9aa5b1", line_width=1.0))
-    mean = drawn.line("at", "mean", source=s[name], line_color="#0b5394", line_width=1.4)
-    dots = drawn.scatter("at", "mean", source=s[name], fill_color="#0b5394", line_color=None, size=4.5)
-    bars = drawn.segment("at", "low", "at", "high", source=s[name], line_color="#0b5394", line_width=1.0)
+    drawn = theme.panel(name, 250, of, "missing force", select=True, narrow=True)
+    drawn.add_layout(Span(location=0.0, dimension="width", line_color=theme.AXIS, line_width=1.0))
+    mean = drawn.line("at", "mean", source=s[name], line_color=theme.BLUE, line_width=1.4)
+    dots = drawn.scatter("at", "mean", source=s[name], fill_color=theme.BLUE, line_color=None, size=4.5)
+    bars = drawn.segment("at", "low", "at", "high", source=s[name], line_color=theme.BLUE, line_width=1.0)
     would = drawn.line("at", "y", source=s[f"ghost_{of}"], **theme.WOULD)
     picked = drawn.line("at", "y", source=s[f"picked_{of}"], **theme.PICKED)
     theme.chosen(drawn, f"box_{name}")
@@ -147,33 +143,32 @@ def constancy(s: Sources) -> Any:
     """A_j(f): the coefficient of one candidate along frequency; that of a true term is a constant."""
     drawn = theme.panel("constancy", 150, "frequency / Hz", "coefficient", ranges=(None, None))
     drawn.x_range.range_padding = 0.05
-    line = drawn.line("f", "value", source=s["shown"], line_color="#0b5394", line_width=1.3)
-    drawn.scatter("f", "value", source=s["shown"], fill_color="#0b5394", line_color=None, size=5)
-    drawn.segment("f", "low", "f", "high", source=s["shown"], line_color="#0b5394", line_width=1.0)
-    zero = drawn.line("f", "zero", source=s["shown"], line_color="#9aa5b1", line_width=1.0)
+    line = drawn.line("f", "value", source=s["shown"], line_color=theme.BLUE, line_width=1.3)
+    drawn.scatter("f", "value", source=s["shown"], fill_color=theme.BLUE, line_color=None, size=5)
+    drawn.segment("f", "low", "f", "high", source=s["shown"], line_color=theme.BLUE, line_width=1.0)
+    zero = drawn.line("f", "zero", source=s["shown"], line_color=theme.AXIS, line_width=1.0)
     theme.follows(drawn, [line, zero])
     drawn.y_range.range_padding = 0.25
     return drawn
 
 
-def ladder(s: Sources, names: list[str], height: int) -> Any:
+def history(s: Sources, names: list[str], height: int) -> Any:
     """Error by model, one below the other, with the noise floor."""
     drawn = theme.panel(
-        "ladder", height, "held-out error / %", "", x_axis_type="log",
-        ranges=(None, FactorRange(factors=names[::-1], name="range_ladder", range_padding=0.15)),
+        "history", height, "held-out error / %", "", x_axis_type="log",
+        ranges=(None, FactorRange(factors=names[::-1], name="range_history", range_padding=0.15)),
     )  # fmt: skip
     drawn.x_range.range_padding = 0.08
+    at: dict[str, Any] = {"y": "name", "source": s["history"]}
     floor = drawn.scatter(
-        "floor", "name", source=s["ladder"], marker="dash", angle=1.5708, size=22, line_color="#000000", line_width=1.3,
-        line_dash="dotted",
-    )  # fmt: skip
-    drawn.line("response", "name", source=s["ladder"], line_color=theme.INK, line_width=1.3)
-    response = drawn.scatter("response", "name", source=s["ladder"], size="size", fill_color=theme.INK, line_color=None)
-    drawn.line("force", "name", source=s["ladder"], line_color="#8a949e", line_dash="dashed", line_width=1.2)
+        "floor", **at, marker="dash", angle=1.5708, size=22, line_color="#000000", line_width=1.3, line_dash="dotted"
+    )
+    drawn.line("response", **at, line_color=theme.INK, line_width=1.3)
+    response = drawn.scatter("response", **at, size="size", fill_color=theme.INK, line_color=None)
+    drawn.line("force", **at, line_color="#8a949e", line_dash="dashed", line_width=1.2)
     force = drawn.scatter(
-        "force", "name", source=s["ladder"], marker="square", size=6, fill_color="white", line_color="#5c6873",
-        line_width=1.3,
-    )  # fmt: skip
+        "force", **at, marker="square", size=6, fill_color="white", line_color="#5c6873", line_width=1.3
+    )
     drawn.yaxis.major_label_text_color = theme.INK
     drawn.yaxis.major_label_text_font_size = "12px"
     theme.legend(drawn, [("response", [response]), ("force", [force]), ("noise floor", [floor])])

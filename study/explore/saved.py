@@ -1,4 +1,4 @@
-"""A session as one HTML file: every rung of the ladder, no server, no network, the same bytes from the same input."""
+"""A session as one HTML file: every model of the session, no server, no network, the same bytes from the same input."""
 
 import json
 from collections.abc import Sequence
@@ -11,24 +11,25 @@ from bokeh.resources import Resources
 
 from study.compare.comparison import Comparison
 from study.explore import html_page
+from study.explore.axis_scales import Columns
 from study.explore.session import Rung, Session
-from study.explore.view import Columns, view
+from study.explore.view import view
 
 EMBED = "Bokeh.safely(() => Bokeh.embed.embed_items({docs}, {items}))"
 
 
 def saved(session: Session) -> bytes:
-    """The whole session as a file that a browser opens; it shows the last rung first."""
+    """The whole session as a file that a browser opens; it shows the last model first."""
     views = [view(rung, number, live=False) for number, rung in enumerate(session.rungs)]
-    ladder = html_page.ladder_columns(session)
+    history = html_page.ladder_columns(session)
     stores: list[ColumnDataSource] = []
     if len(views) > 1:
         for number, seen in enumerate(views):
             columns: dict[str, Columns] = {
-                **seen.columns, "frame": html_page.frame(seen), "ladder": _marked(ladder, number - len(views))
+                **seen.columns, "frame": html_page.frame(seen), "history": _marked(history, number - len(views))
             }  # fmt: skip
             stores += [ColumnDataSource(c, name=f"{name}@{number}") for name, c in columns.items()]
-    made = html_page.build(views[-1], ladder, stores)
+    made = html_page.build(views[-1], history, stores)
     values = html_page.variables(session, live=False)
     shown = html_page.placed(made, values["diagnosed"])
     document = Document()
@@ -47,17 +48,17 @@ def saved(session: Session) -> bytes:
     return text.encode()
 
 
-def of_comparison(found: Comparison) -> bytes:
+def of_comparison(comparison: Comparison) -> bytes:
     """The same of a comparison alone, which nobody has diagnosed."""
-    rung = Rung(found.model, "as given", None, found)
-    return saved(Session(found.prepared, (rung,)))
+    rung = Rung(comparison.model, "as given", None, comparison)
+    return saved(Session(comparison.prepared, (rung,)))
 
 
-def _marked(ladder: Columns, place: int) -> Columns:
-    """The ladder with a larger dot where the page stands."""
-    size = [6.0] * len(ladder["size"])
+def _marked(history: Columns, place: int) -> Columns:
+    """The history with a larger dot where the page stands."""
+    size = [6.0] * len(history["size"])
     size[place] = 10.0
-    return {**ladder, "size": size}
+    return {**history, "size": size}
 
 
 def _in_script(content: object) -> str:

@@ -1,9 +1,9 @@
-"""What Save writes: the model file with its comments, the ladder, the pictures, and the session as one page."""
+"""What Save writes: the model file with its comments, the history, the pictures, and the session as one page."""
 
 from study.compare import history
 from study.compare.comparison_pictures import pictures
 from study.compare.comparison_report import as_json, document
-from study.compare.history_picture import files as ladder_pictures
+from study.compare.history_picture import files as history_pictures
 from study.diagnose.diagnosis_files import files as diagnosis_files
 from study.equations import model_file
 from study.explore.saved import saved
@@ -13,31 +13,16 @@ PAGE = "explore.html"
 
 
 def files(session: Session, name: str, text: str) -> dict[str, bytes]:
-    """Contents by file name.
-
-    Parameters
-    ----------
-    session : Session
-        What is to be kept.
-    name : str
-        File name of the model.
-    text : str
-        The model file as it was read: its comments and order stay.
-
-    Raises
-    ------
-    StudyError
-        If the model's layout leaves no place for a change.
-    """
+    """Contents by file name, of a session whose model came from a file of this name and text: its comments stay."""
     now, steps = session.now, session.steps
     stem = name.rpartition(".")[0] or name
-    found = {
+    contents = {
         name: model_file.revised(text, name, now.model).encode(),
         f"{stem}.history.json": history.as_bytes(steps),
         "comparison.json": as_json(document([now.comparison])),
         PAGE: saved(session),
     }
-    found |= pictures(now.comparison) | ladder_pictures(steps, stem)
+    contents |= pictures(now.comparison) | history_pictures(steps, stem)
     if now.diagnosis is not None:
-        found |= diagnosis_files(now.diagnosis, now.said)
-    return found
+        contents |= diagnosis_files(now.diagnosis, now.said)
+    return contents

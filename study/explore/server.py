@@ -20,23 +20,15 @@ DAY = 86400  # seconds within which a page that was fetched must open its socket
 
 
 def serve(desk: Desk, port: int | None, ready: Callable[[str], None]) -> None:
-    """Serve a desk until interrupted.
+    """Serve a desk until interrupted, and call ``ready`` with the address once it can be opened.
 
-    Parameters
-    ----------
-    desk : Desk
-        What pages look at.
-    port : int or None
-        Where; zero takes any that is free, None the usual one or, if that is taken, any.
-    ready : callable
-        Called with the address once it can be opened.
-
-    Raises
-    ------
-    StudyError
-        If the port is taken.
+    A port of zero takes any that is free, None the usual one or, if that is taken, any.
     """
-    application = Application(FunctionHandler(lambda document: _watched(desk, document)))
+
+    def show(document: Document) -> None:
+        Watcher(desk, document)
+
+    application = Application(FunctionHandler(show))
     server = _bound(application, port)
     server.start()
     desk.diagnose()
@@ -49,20 +41,15 @@ def serve(desk: Desk, port: int | None, ready: Callable[[str], None]) -> None:
         server.stop()
 
 
-def _watched(desk: Desk, document: Document) -> None:
-    Watcher(desk, document)
-
-
 def _bound(application: Application, port: int | None) -> Server:
     """A server on a port; Bokeh lets a browser's page open the socket only if its origin is one of these two."""
     try:
-        wanted = USUAL if port is None else port
-        return _server(application, wanted)
+        return _server(application, USUAL if port is None else port)
     except OSError as error:
         if error.errno not in (errno.EADDRINUSE, errno.EACCES):
             raise
         if port is not None:
-            raise StudyError(f"port {port} is taken or not allowed; another --port is right, or 0 for any") from None
+            raise StudyError(f"port {port} is taken or not allowed; expected another --port, or 0 for any") from None
         return _server(application, 0)
 
 
@@ -72,11 +59,6 @@ def _server(application: Application, port: int) -> Server:
         socket.close()
     origins = [f"{host}:{bound}" for host in (HOST, "localhost")]
     return Server(
-        {"/": application},
-        address=HOST,
-        port=bound,
-        allow_websocket_origin=origins,
-        session_token_expiration=DAY,
-        check_unused_sessions_milliseconds=1000,
-        unused_session_lifetime_milliseconds=2000,
-    )
+        {"/": application}, address=HOST, port=bound, allow_websocket_origin=origins, session_token_expiration=DAY,
+        check_unused_sessions_milliseconds=1000, unused_session_lifetime_milliseconds=2000,
+    )  # fmt: skip

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from study.compare.comparison import Comparison, compare
-from study.compare.comparison_report import rung as ladder_step
+from study.compare.comparison_report import rung as history_step
 from study.compare.missing_force import MissingForce, missing_force
 from study.diagnose import candidates
 from study.diagnose.candidates import Candidate
@@ -22,42 +22,24 @@ from study.equations.model import Model
 from study.equations.terms import LIBRARY, Term, custom
 from study.identify.time_domain.fit_model import continued, settled
 from study.records.prepared import Prepared
-from study.support.errors import StudyError
+from study.support.errors import StudyError, expect
 
 Step = dict[str, Any]
-Told = Callable[[str], None]
+Progress = Callable[[str], None]
 SHOWN = 8  # candidates
 
 
 @dataclass(frozen=True)
 class Rung:
-    """A model and what was found of it.
+    """A model and what was found of it."""
 
-    Attributes
-    ----------
-    model : Model
-        Values that it gives are held.
-    label : str
-        What was done to arrive at it.
-    added : str or None
-        The term that is new in it.
-    comparison : Comparison
-        How good it is, and where it fails.
-    diagnosis : Diagnosis or None
-        What is missing; None as long as nobody has asked.
-    said : str
-        The diagnosis in words.
-    would : dict
-        By the name of a candidate: the force that the model would lack with it.
-    """
-
-    model: Model
-    label: str
-    added: str | None
+    model: Model  # values that it gives are held
+    label: str  # what was done to arrive at it
+    added: str | None  # the term that is new in it
     comparison: Comparison
-    diagnosis: Diagnosis | None = None
-    said: str = ""
-    would: Mapping[str, MissingForce] = field(default_factory=dict[str, MissingForce])
+    diagnosis: Diagnosis | None = None  # None as long as nobody has asked
+    said: str = ""  # the diagnosis in words
+    would: Mapping[str, MissingForce] = field(default_factory=dict[str, MissingForce])  # with a candidate, by its name
 
     @property
     def shown(self) -> tuple[Ranked, ...]:
@@ -73,24 +55,12 @@ class Rung:
 
 @dataclass(frozen=True)
 class Session:
-    """A record, and the models tried on it.
-
-    Attributes
-    ----------
-    prepared : Prepared
-        The record, and what is fitted and judged of it.
-    rungs : tuple of Rung
-        From the model as given to the present one.
-    own : tuple of Term
-        The user's own candidates.
-    earlier : tuple of dict
-        Steps of the ladder that was kept beside the model file.
-    """
+    """A record, and the models tried on it."""
 
     prepared: Prepared
-    rungs: tuple[Rung, ...]
-    own: tuple[Term, ...] = ()
-    earlier: tuple[Step, ...] = ()
+    rungs: tuple[Rung, ...]  # from the model as given to the present one
+    own: tuple[Term, ...] = ()  # the user's own candidates
+    earlier: tuple[Step, ...] = ()  # of the history that was kept beside the model file
 
     @property
     def now(self) -> Rung:
@@ -99,27 +69,17 @@ class Session:
 
     @property
     def steps(self) -> list[Step]:
-        """The ladder, the steps before this session included."""
-        own = [ladder_step(r.comparison, r.added) for r in self.rungs]
+        """The history, the steps before this session included."""
+        own = [history_step(r.comparison, r.added) for r in self.rungs]
         last = self.earlier[-1] if self.earlier else None
         known = last is not None and last["terms"] == own[0]["terms"] and last["record"] == own[0]["record"]
         return [*self.earlier, *own[1 if known else 0 :]]
 
 
 def begin(
-    model: Model,
-    prepared: Prepared,
-    *,
-    earlier: Sequence[Step] = (),
-    progress: Told | None = None,
+    model: Model, prepared: Prepared, *, earlier: Sequence[Step] = (), progress: Progress | None = None
 ) -> Session:
-    """A session with the model as given.
-
-    Raises
-    ------
-    StudyError
-        If the model cannot be compared with the record.
-    """
+    """A session with the model as given."""
     comparison = compare(model, prepared, progress=progress)
     return Session(prepared, (Rung(model, "as given", None, comparison),), earlier=tuple(earlier))
 
@@ -130,18 +90,12 @@ def climbed(session: Session, comparison: Comparison, label: str, added: str | N
 
 
 def candidate(session: Session, name: str) -> Ranked:
-    """A candidate of the present diagnosis.
-
-    Raises
-    ------
-    StudyError
-        If there is none of this name.
-    """
-    found = session.now.diagnosis
-    for row in found.candidates if found is not None else ():
+    """The candidate of this name in the present diagnosis, which must have one."""
+    diagnosis = session.now.diagnosis
+    for row in diagnosis.candidates if diagnosis is not None else ():
         if row.name == name:
             return row
-    raise StudyError(f"{name!r} is no candidate of the present model; one of the list is right")
+    raise StudyError(f"{name!r} is no candidate of the present model; expected one of the list")
 
 
 def with_added(session: Session, name: str) -> Session:
@@ -158,20 +112,12 @@ def undone(session: Session) -> Session:
 
 
 def with_held(session: Session, key: str, hold: bool) -> Session:
-    """The session with a value held where it stands, or freed.
-
-    Raises
-    ------
-    StudyError
-        If the model has no such value, or it is held, or free, already.
-    """
+    """The session with a value held where it stands, or freed; it must not be so already."""
     values = session.now.model.values
-    if key not in values:
-        raise StudyError(f"{key!r} is no value of this model; it has {', '.join(values)}")
-    if (values[key] is not None) == hold:
-        raise StudyError(f"{key} is {'held' if hold else 'free'} already")
-    if not hold and key == "m" and len(session.now.model.terms) == 1:
-        raise StudyError("m alone cannot be freed; a model of inertia alone has nothing to be fitted to")
+    expect(key in values, f"{key!r} is no value of this model; it has {', '.join(values)}")
+    expect((values[key] is None) == hold, f"{key} is {'held' if hold else 'free'} already")
+    alone = key == "m" and len(session.now.model.terms) == 1
+    expect(hold or not alone, "m alone cannot be freed; a model of inertia alone has nothing to be fitted to")
     now = session.now.values
     model = session.now.model.with_values({**values, key: now[key] if hold else None})
     comparison = compare(model, session.prepared, start=now)
@@ -180,8 +126,8 @@ def with_held(session: Session, key: str, hold: bool) -> Session:
 
 def examined(session: Session, progress: Callable[[int], None] | None = None) -> tuple[Rung, Diagnosis]:
     """The present rung with what is missing, in words too, and what each candidate would leave; and the diagnosis."""
-    found = diagnose(session.now.comparison, extra=session.own, progress=progress)
-    return _foreseen(replace(session.now, diagnosis=found, said=in_words(found))), found
+    diagnosis = diagnose(session.now.comparison, extra=session.own, progress=progress)
+    return _foreseen(replace(session.now, diagnosis=diagnosis, said=in_words(diagnosis))), diagnosis
 
 
 def lacking_with(row: Ranked) -> MissingForce:
@@ -211,13 +157,7 @@ def with_rung(session: Session, rung: Rung) -> Session:
 
 
 def own_term(session: Session, text: str) -> Term:
-    """A user's formula, or ``NAME=FORMULA``, as a term.
-
-    Raises
-    ------
-    StudyError
-        If it is no formula of the whitelisted kind, or the name is taken.
-    """
+    """A user's formula of the whitelisted kind, or ``NAME=FORMULA`` with a name that is not taken, as a term."""
     name, sign, formula = text.partition("=")
     taken = {t.name for t in (*session.own, *session.now.model.terms)}
     if not sign:
@@ -226,26 +166,17 @@ def own_term(session: Session, text: str) -> Term:
     term = custom(name.strip(), formula.strip())
     known = ("u", "v", "t", *session.prepared.record.extra)
     for used in formulas.names(formula.strip()):
-        if used not in known:
-            raise StudyError(
-                f"the expression {formula.strip()!r} uses the name {used!r}; it may use {', '.join(known)}"
-            )
-    if term.name in taken:
-        raise StudyError(f"the name {term.name!r} is taken; another name is right")
+        uses = f"the expression {formula.strip()!r} uses the name {used!r}"
+        expect(used in known, f"{uses}; it may use {', '.join(known)}")
+    expect(term.name not in taken, f"the name {term.name!r} is taken; expected another")
     return term
 
 
-def _no_response(term: Term) -> StudyError:
-    return StudyError(f"the expression {term.components[0].shape!r} has no finite response on this record")
-
-
-def _attempted(term: Term, session: Session) -> Candidate:
-    """The present model with a term, fitted as the candidates of its diagnosis were."""
+def _attempted(term: Term, session: Session) -> Candidate | None:
+    """The present model with a term, fitted as the candidates of its diagnosis were; None if it cannot run."""
     prepared = session.prepared
-    candidate = candidates.attempt(term, search_base(session.now.comparison), prepared.shortened(SEARCHED))
-    if candidate is None:
-        raise _no_response(term)
-    return candidates.all_settled([candidate], prepared)[0]
+    attempt = candidates.attempt(term, search_base(session.now.comparison), prepared.shortened(SEARCHED))
+    return None if attempt is None else candidates.all_settled([attempt], prepared)[0]
 
 
 def tried(session: Session, text: str) -> Session:
@@ -259,14 +190,17 @@ def tried(session: Session, text: str) -> Session:
         If the formula is refused, or has no finite response on this record.
     """
     term, now = own_term(session, text), session.now
-    found = now.diagnosis
-    if found is None:
+    if now.diagnosis is None:
         raise StudyError("the present model is still being diagnosed; a formula can be tried when that is done")
-    known = [Candidate(r.term, r.fit, r.prediction) for r in found.candidates]
+    known = [Candidate(r.term, r.fit, r.prediction) for r in now.diagnosis.candidates]
+    silent = f"the expression {term.components[0].shape!r} has no finite response on this record"
     try:
         with np.errstate(all="ignore"):  # a formula may overflow: then it has no finite response
-            rows = rank([*known, _attempted(term, session)], now.comparison.prediction.residual, session.prepared)
+            attempt = _attempted(term, session)
+            if attempt is None:
+                raise StudyError(silent)
+            rows = rank([*known, attempt], now.comparison.prediction.residual, session.prepared)
     except np.linalg.LinAlgError:
-        raise _no_response(term) from None
-    ranked = replace(found, candidates=tuple(rows))
+        raise StudyError(silent) from None
+    ranked = replace(now.diagnosis, candidates=tuple(rows))
     return replace(with_rung(session, _foreseen(replace(now, diagnosis=ranked))), own=(*session.own, term))

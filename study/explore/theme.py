@@ -3,26 +3,16 @@
 from collections.abc import Sequence
 from typing import Any
 
-from bokeh.models import (
-    BoxAnnotation,
-    BoxSelectTool,
-    DataRange1d,
-    Legend,
-    LegendItem,
-    PanTool,
-    Range1d,
-    ResetTool,
-    SaveTool,
-    Title,
-    WheelZoomTool,
-)
+from bokeh.models import BoxAnnotation, DataRange1d, Legend, LegendItem, Range1d, Title
+from bokeh.models.tools import BoxSelectTool, PanTool, ResetTool, SaveTool, WheelZoomTool
 from bokeh.plotting import figure
 
 FONT = "Helvetica Neue, Helvetica, Arial, Liberation Sans, sans-serif"
-INK, QUIET, RULE = "#1f2933", "#5c6873", "#e4e7eb"
+INK, QUIET, RULE, AXIS = "#1f2933", "#5c6873", "#e4e7eb", "#9aa5b1"
+BLUE, ORANGE = "#0b5394", "#d1600a"
 MEASURED: dict[str, Any] = {"line_color": "#a3adb7", "line_width": 2.4}
-PREDICTED: dict[str, Any] = {"line_color": "#0b5394", "line_width": 1.2}
-DIFFERENCE: dict[str, Any] = {"line_color": "#d1600a", "line_width": 1.0}
+PREDICTED: dict[str, Any] = {"line_color": BLUE, "line_width": 1.2}
+DIFFERENCE: dict[str, Any] = {"line_color": ORANGE, "line_width": 1.0}
 NOISE: dict[str, Any] = {"line_color": "#000000", "line_width": 1.3, "line_dash": "dotted"}
 WOULD: dict[str, Any] = {"line_color": "#111111", "line_width": 1.3}
 PICKED: dict[str, Any] = {"line_color": "#7a1fa2", "line_width": 2.0, "line_dash": "dashed"}
@@ -31,34 +21,14 @@ PASSING = ("candidate", "selected")  # entries of legends
 
 
 def panel(
-    name: str,
-    height: int,
-    x: str,
-    y: str,
-    *,
-    select: str = "",
-    ranges: tuple[Any, Any] = (None, None),
-    narrow: bool = False,
-    **more: Any,
-) -> Any:
+    name: str, height: int, x: str, y: str, *, select: bool = False, ranges: tuple[Any, Any] = (None, None),
+    narrow: bool = False, **more: Any,
+) -> Any:  # fmt: skip
     """A figure in the page's style.
 
-    Parameters
-    ----------
-    name : str
-        Of its place in the page, where the figure is ``panel_name`` and its axes ``name_x`` and ``name_y``.
-    height : int
-        In pixels; the width is that of its place.
-    x, y : str
-        Labels, units included.
-    select : str
-        ``width`` if a range of x can be selected.
-    ranges : pair
-        Ranges of x and y; found from the data if None.
-    narrow : bool
-        Whether the panel shares its row: fewer ticks.
-    more : keyword arguments
-        Of ``bokeh.plotting.figure``.
+    Its place in the page is called ``name``, the figure ``panel_name``, its axes ``name_x`` and ``name_y``; ``x`` and
+    ``y`` are their labels. The width is that of its place, the height in pixels. With ``select``, a range of x can be
+    selected; ``ranges`` of x and y that are None follow the data. A ``narrow`` panel shares its row: fewer ticks.
     """
     tools: list[Any] = [PanTool(dimensions="width"), WheelZoomTool(dimensions="width"), ResetTool(), SaveTool()]
     if select:
@@ -68,14 +38,10 @@ def panel(
         x_axis_label=x, y_axis_label=y, x_range=ranges[0] or DataRange1d(range_padding=0.0),
         y_range=ranges[1] or DataRange1d(range_padding=0.06),
         active_drag=tools[0] if select else None, active_scroll=None, toolbar_location="right", toolbar_inner=True,
-        min_border_right=8,
-        **more,
+        min_border_right=8, outline_line_color=None, background_fill_color=None, border_fill_color=None, **more,
     )  # fmt: skip
     drawn.toolbar.autohide = True
     drawn.toolbar.logo = None
-    drawn.outline_line_color = None
-    drawn.background_fill_color = None
-    drawn.border_fill_color = None
     for axis, side in ((drawn.xaxis[0], "x"), (drawn.yaxis[0], "y")):
         _axis(axis, f"{name}_{side}")
     if narrow and "x_axis_type" not in more:
@@ -96,7 +62,7 @@ def _axis(axis: Any, name: str) -> None:
     axis.axis_label_text_font_size, axis.major_label_text_font_size = "12px", "11px"
     axis.axis_label_text_color, axis.major_label_text_color = INK, QUIET
     axis.axis_label_standoff = 4
-    axis.axis_line_color = axis.major_tick_line_color = "#9aa5b1"
+    axis.axis_line_color = axis.major_tick_line_color = AXIS
     axis.minor_tick_line_color = None
     axis.major_tick_in, axis.major_tick_out = 0, 4
 

@@ -1,4 +1,4 @@
-"""What a rung shows, as columns by the name of their source: numbers in the units of the axes, ready to be drawn."""
+"""What a page shows of a model, as columns by the name of their source: numbers in the units of the axes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,92 +10,55 @@ from numpy.typing import NDArray
 from study.compare.comparison import Comparison
 from study.compare.force_map import CELLS, curve, surface
 from study.compare.links import links
-from study.diagnose.constancy import Curve as Steadiness
 from study.diagnose.ranking import Ranked
 from study.explore import decimate, preview, words
-from study.explore.page_units import Scale, in_text, length, power, rate
+from study.explore.axis_scales import Columns, Floats, Scales, heard, least_force, scales_of, within
+from study.explore.page_units import Scale, in_text
 from study.explore.session import Rung
 from study.figures.labels import power_of_ten
 
-Floats = NDArray[np.float64]
-Columns = dict[str, Any]
 NINETY_FIVE = 1.96  # standard errors to each side
-LEAST = 0.005  # of the rms force
 DASH = 5.0  # pixels
+DASHES = ("solid", "dashed", "dotdash", "dotted", "dashdot")
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#333333", "#E69F00")
 SURE = 2.0  # standard errors: cells whose mean is below may be noise
 
 
 @dataclass(frozen=True)
-class Scales:
-    """How the axes of a rung are scaled."""
-
-    response: Scale
-    difference: Scale
-    displacement: Scale
-    velocity: Scale
-    force: Scale
-
-
-@dataclass(frozen=True)
 class View:
-    """A rung as it is drawn.
+    """A model of the session as it is drawn."""
 
-    Attributes
-    ----------
-    columns : dict
-        Columns of each source.
-    scales : Scales
-        Units of the axes.
-    highest : float
-        Frequency in hertz at which the axes of frequency end.
-    quantity : str
-        The measured motion.
-    limits : (float, float)
-        Ends of the axis of the force.
-    least : float
-        Missing force, in the unit of its axis, down to which axes are drawn: below lies nothing to be seen.
-    """
-
-    columns: dict[str, Columns]
+    columns: dict[str, Columns]  # of each source
     scales: Scales
-    highest: float
-    quantity: str
-    limits: tuple[float, float]
-    least: float
+    highest: float  # frequency in hertz at which the axes of frequency end
+    quantity: str  # the measured motion
+    limits: tuple[float, float]  # of the axis of the force
+    least: float  # missing force, in the unit of its axis, below which nothing is to be seen
 
 
 def view(rung: Rung, step: int, live: bool = True) -> View:
-    """The columns of one rung.
-
-    Parameters
-    ----------
-    rung : Rung
-        A model with its comparison and, perhaps, its diagnosis.
-    step : int
-        Its number in the session.
-    live : bool
-        Whether the page can act (a saved one cannot).
-    """
-    found, scales = rung.comparison, scales_of(rung.comparison)
-    rows = rung.shown
+    """The columns of a model, by its number in the session; only a ``live`` page can act."""
+    comparison, scales = rung.comparison, scales_of(rung.comparison)
+    rows, force, least = rung.shown, scales.force, least_force(rung.comparison)
+    u, v, missing = within(comparison.missing_force)
     columns = {
-        "time": over_time(found, scales),
-        "close": _close(found, scales),
-        "noise": _noise(found, scales),
-        "force": _force(found),
-        "coherence": _coherence(found),
-        "spectrum": _spectrum(found, scales),
-        "plane": _plane(found, scales),
-        "against_u": _against(found, "displacement", scales.displacement, scales.force),
-        "against_v": _against(found, "velocity", scales.velocity, scales.force),
+        "time": over_time(comparison, scales),
+        "close": _close(comparison, scales),
+        "noise": _noise(comparison, scales),
+        "force": _force(comparison),
+        "coherence": _coherence(comparison),
+        "spectrum": _spectrum(comparison, scales),
+        "plane": _plane(comparison, scales),
+        "against_u": _against(u, missing, scales.displacement, force, least),
+        "against_v": _against(v, missing, scales.velocity, force, least),
         "constancy": _constancy(rows),
         **preview.columns(rung, scales),
-        **_links(found, scales),
-        "words": words.words(rung, rows, step, live, scales.force.unit),
+        **_links(comparison, scales),
+        "words": words.words(rung, rows, step, live, force.unit),
     }
-    least = least_force(found) / scales.force.factor
     small = {name: _small(c) for name, c in columns.items()}
-    return View(small, scales, found.force.highest, found.plan.response, force_limits(found), least)
+    limits, highest = force_limits(comparison), comparison.force.highest
+    return View(small, scales, highest, comparison.plan.response, limits, least / force.factor)
 
 
 def _small(columns: Columns) -> Columns:
@@ -107,30 +70,9 @@ def _small(columns: Columns) -> Columns:
         }
 
 
-def least_force(found: Comparison) -> float:
-    """Missing force down to which axes are drawn: below lies nothing to be seen."""
-    return LEAST * float(np.std(found.record["force"]))
-
-
-def scales_of(found: Comparison) -> Scales:
-    """Units in which the numbers of a comparison are easy to read."""
-    units, lacking = found.record.units, found.missing_force
-    u, v = (float(np.max(np.abs(x))) for x in (lacking.displacement, lacking.velocity))
-    least = least_force(found)
-    motion = rate if found.plan.response != "displacement" else length
-    unit = units.get(found.plan.response, "")
-    return Scales(
-        response=motion(unit, float(np.max(np.abs(found.prediction.measured)))),
-        difference=motion(unit, float(np.max(np.abs(found.prediction.residual)))),
-        displacement=length(units.get("displacement", ""), u),
-        velocity=rate(units.get("velocity", ""), v),
-        force=power(units.get("force", ""), float(np.max(np.abs(lacking.force[lacking.inner]), initial=least))),
-    )
-
-
-def over_time(found: Comparison, scales: Scales, span: tuple[float, float] | None = None) -> Columns:
+def over_time(comparison: Comparison, scales: Scales, span: tuple[float, float] | None = None) -> Columns:
     """Measured and predicted response and their difference, over a span of time in seconds or all that is judged."""
-    judged, part = found.prediction, within(found, span)
+    judged, part = comparison.prediction, stretch(comparison, span)
     return {
         "t": decimate.times(judged.time[part]),
         "measured": decimate.extremes(judged.measured[part]) / scales.response.factor,
@@ -139,85 +81,72 @@ def over_time(found: Comparison, scales: Scales, span: tuple[float, float] | Non
     }
 
 
-def _close(found: Comparison, scales: Scales) -> Columns:
+def _close(comparison: Comparison, scales: Scales) -> Columns:
     """Every sample of the stretch where the model misses most."""
-    judged, near = found.prediction, found.prediction.closeup
-    factor = scales.response.factor
-    return {
-        "t": judged.time[near], "measured": judged.measured[near] / factor, "predicted": judged.predicted[near] / factor
-    }  # fmt: skip
+    judged, near, factor = comparison.prediction, comparison.prediction.closeup, scales.response.factor
+    return {"t": judged.time[near], "measured": judged.measured[near] / factor,
+            "predicted": judged.predicted[near] / factor}  # fmt: skip
 
 
-def within(found: Comparison, span: tuple[float, float] | None) -> slice:
+def stretch(comparison: Comparison, span: tuple[float, float] | None) -> slice:
     """The samples of the judging part in a span of time and half of it to either side."""
     if span is None:
         return slice(None)
-    time, reach = found.prediction.time, 0.5 * (span[1] - span[0])
+    time, reach = comparison.prediction.time, 0.5 * (span[1] - span[0])
     first, last = (int(i) for i in np.searchsorted(time, [span[0] - reach, span[1] + reach]))
     return slice(max(0, min(first, len(time) - 2)), max(last, 2))
 
 
-def _noise(found: Comparison, scales: Scales) -> Columns:
+def _noise(comparison: Comparison, scales: Scales) -> Columns:
     """Twice the rms of the noise to either side, as two horizontal lines."""
-    level = 2.0 * found.prediction.noise.rms / scales.difference.factor
-    ends = [float(found.prediction.time[0]), float(found.prediction.time[-1])]
+    level = 2.0 * comparison.prediction.noise.rms / scales.difference.factor
+    ends = [float(comparison.prediction.time[0]), float(comparison.prediction.time[-1])]
     return {"t": [ends, ends], "level": [[level, level], [-level, -level]]}
 
 
-def _heard(frequency: Floats, highest: float) -> NDArray[np.bool_]:
-    return (frequency > 0.0) & (frequency <= highest)
+def _force(comparison: Comparison) -> Columns:
+    force = comparison.force
+    keep = heard(comparison, force.frequency)
+    shares = {"unexplained": force.unexplained, "parametric": force.parametric, "noise": force.noise}
+    columns = {name: 100.0 * np.maximum(share[keep], 1e-9) for name, share in shares.items()}
+    return {"f": force.frequency[keep], **columns}
 
 
-def _force(found: Comparison) -> Columns:
-    force = found.force
-    keep = _heard(force.frequency, force.highest)
-    share = {"unexplained": force.unexplained, "parametric": force.parametric, "noise": force.noise}
-    return {
-        "f": force.frequency[keep],
-        **{name: 100.0 * np.maximum(values[keep], 1e-9) for name, values in share.items()},
-    }
-
-
-def force_limits(found: Comparison) -> tuple[float, float]:
+def force_limits(comparison: Comparison) -> tuple[float, float]:
     """Ends of the axis of the force in per cent: where the motion is lost in noise, shares leave the panel."""
-    force = found.force
-    keep = _heard(force.frequency, force.highest)
-    inside = np.concatenate([force.parametric[force.band], force.unexplained[force.band]])
-    least = np.concatenate([force.parametric[keep], force.unexplained[keep], force.noise[keep]])
-    return 50.0 * max(float(np.min(least)), 1e-9), max(200.0, 150.0 * float(np.max(inside)))
+    force = comparison.force
+    keep = heard(comparison, force.frequency)
+    least = min(float(np.min(share[keep])) for share in (force.parametric, force.unexplained, force.noise))
+    most = max(float(np.max(share[force.band])) for share in (force.parametric, force.unexplained))
+    return 50.0 * max(least, 1e-9), max(200.0, 150.0 * most)
 
 
-def _coherence(found: Comparison) -> Columns:
-    force = found.force
-    keep = _heard(force.frequency, force.highest)
+def _coherence(comparison: Comparison) -> Columns:
+    force = comparison.force
+    keep = heard(comparison, force.frequency)
     rows = [np.asarray(c[keep], dtype=np.float32) for c in force.cumulative]
-    dashes = ("solid", "dashed", "dotdash", "dotted", "dashdot")
     return {
         "f": [np.asarray(force.frequency[keep], dtype=np.float32)] * len(rows),
         "share": rows,
         "name": [in_text(i.shape) for i in force.inputs],
-        "dash": [dashes[k % len(dashes)] for k in range(len(rows))],
-        "colour": [("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#333333", "#E69F00")[k % 6] for k in range(len(rows))],
+        "dash": [DASHES[k % len(DASHES)] for k in range(len(rows))],
+        "colour": [COLOURS[k % len(COLOURS)] for k in range(len(rows))],
     }
 
 
-def _spectrum(found: Comparison, scales: Scales) -> Columns:
-    noise, factor = found.prediction.noise, scales.difference.factor
-    keep = _heard(noise.frequency, found.force.highest)
-    return {
-        "f": noise.frequency[keep],
-        "difference": np.sqrt(noise.residual[keep]) / factor,
-        "noise": np.sqrt(noise.density[keep]) / factor,
-    }
+def _spectrum(comparison: Comparison, scales: Scales) -> Columns:
+    noise, factor = comparison.prediction.noise, scales.difference.factor
+    keep = heard(comparison, noise.frequency)
+    densities = {"difference": noise.residual, "noise": noise.density}
+    return {"f": noise.frequency[keep]} | {name: np.sqrt(d[keep]) / factor for name, d in densities.items()}
 
 
-def _plane(found: Comparison, scales: Scales) -> Columns:
+def _plane(comparison: Comparison, scales: Scales) -> Columns:
     """Every cell of the map; those where the motion hardly came have no mean."""
-    lacking = found.missing_force
-    plane = surface(*(x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force)))
+    plane = surface(*within(comparison.missing_force))
     left, right = (np.repeat(e, CELLS) for e in (plane.displacement[:-1], plane.displacement[1:]))
     low, high = (np.tile(e, CELLS) for e in (plane.velocity[:-1], plane.velocity[1:]))
-    tiny = 1e-9 * float(np.std(found.record["force"]))  # rounding
+    tiny = 1e-9 * float(np.std(comparison.record["force"]))  # rounding
     missing = plane.mean.ravel()
     mean, size, speed = missing / scales.force.factor, scales.displacement.factor, scales.velocity.factor
     return {
@@ -230,57 +159,47 @@ def _plane(found: Comparison, scales: Scales) -> Columns:
     }  # fmt: skip
 
 
-def _against(found: Comparison, of: str, scale: Scale, force: Scale) -> Columns:
-    lacking = found.missing_force
-    values = lacking.displacement if of == "displacement" else lacking.velocity
-    line = curve(values[lacking.inner], lacking.force[lacking.inner])
+def _against(motion: Floats, force: Floats, scale: Scale, unit: Scale, least: float) -> Columns:
+    line = curve(motion, force)
     half = NINETY_FIVE * line.error
-    at = line.at / scale.factor
-    return {
-        "at": at, "mean": line.mean / force.factor, "low": (line.mean - half) / force.factor,
-        "high": (line.mean + half) / force.factor,
-        "reach": np.resize([-1.0, 1.0], len(at)) * least_force(found) / force.factor,
-    }  # fmt: skip
+    ends = {"mean": line.mean, "low": line.mean - half, "high": line.mean + half}
+    reach = np.resize([-least, least], len(line.at))
+    return {"at": line.at / scale.factor} | {name: y / unit.factor for name, y in (ends | {"reach": reach}).items()}
 
 
 def _constancy(rows: Sequence[Ranked]) -> Columns:
     """A_j(f) of every candidate whose coefficient was followed, one below the other; ``row`` tells whose it is."""
-    parts = [(i, row, row.flatness) for i, row in enumerate(rows) if row.flatness is not None]
-    return {
-        "row": np.concatenate([np.full(len(c.at), float(i)) for i, _, c in parts] or [np.zeros(0)]),
-        "f": np.concatenate([c.at for _, _, c in parts] or [np.zeros(0)]),
-        **{name: np.concatenate([_relative(c, r, k) for _, r, c in parts] or [np.zeros(0)])
-           for name, k in (("value", 0.0), ("low", -NINETY_FIVE), ("high", NINETY_FIVE))},
-    }  # fmt: skip
+    columns: dict[str, list[Floats]] = {name: [np.zeros(0)] for name in ("row", "f", "value", "low", "high")}
+    for i, row in enumerate(rows):
+        if (line := row.flatness) is None:
+            continue
+        unit = power_of_ten(abs(row.coefficient))[0]  # of its axis
+        bounds = {"low": -NINETY_FIVE, "value": 0.0, "high": NINETY_FIVE}
+        values = {name: (line.value.real + errors * line.error) / unit for name, errors in bounds.items()}
+        for name, column in {"row": np.full(len(line.at), float(i)), "f": line.at, **values}.items():
+            columns[name].append(column)
+    return {name: np.concatenate(parts) for name, parts in columns.items()}
 
 
-def _relative(line: Steadiness, row: Ranked, errors: float) -> Floats:
-    """The coefficient along frequency, some standard errors up or down, in the unit of its axis."""
-    return (line.value.real + errors * line.error) / power_of_ten(abs(row.coefficient))[0]
-
-
-def _links(found: Comparison, scales: Scales) -> dict[str, Columns]:
+def _links(comparison: Comparison, scales: Scales) -> dict[str, Columns]:
     """The tables that join selections: rows are blocks of time, columns lines, classes or cells."""
-    tied = links(found)
-    keep = _heard(tied.frequency, found.force.highest)
-    middle = 0.5 * (tied.edges[1:] + tied.edges[:-1])
-    found_links: dict[str, Columns] = {
+    tied = links(comparison)
+    keep = heard(comparison, tied.frequency)
+    left, right = tied.edges[:-1], tied.edges[1:]
+    columns: dict[str, Columns] = {
         "blocks": {
-            "left": tied.edges[:-1], "right": tied.edges[1:], "middle": middle, "weight": np.zeros(len(middle)),
-            "all": np.ones(len(middle)),
+            "left": left, "right": right, "middle": 0.5 * (right + left), "weight": np.zeros(len(left)),
+            "all": np.ones(len(left)),
         },
         "lines": {"f": tied.frequency[keep]} | _rows("p", tied.power[:, keep] / scales.difference.factor**2),
         "cells": _rows("n", np.minimum(tied.cells, 255).astype(np.uint8)),
     }  # fmt: skip
-    for name, classes, scale in (
-        ("classes_u", tied.displacement, scales.displacement), ("classes_v", tied.velocity, scales.velocity)
-    ):  # fmt: skip
-        bounds = classes.edges / scale.factor
-        found_links[name] = {
-            "left": bounds[:-1], "right": bounds[1:],
-            **_rows("n", classes.visits), **_rows("s", classes.force / scales.force.factor),
-        }  # fmt: skip
-    return found_links
+    motions = {"u": (tied.displacement, scales.displacement), "v": (tied.velocity, scales.velocity)}
+    for name, (classes, scale) in motions.items():
+        bounds, force = classes.edges / scale.factor, classes.force / scales.force.factor
+        table = _rows("n", classes.visits) | _rows("s", force)
+        columns[f"classes_{name}"] = {"left": bounds[:-1], "right": bounds[1:], **table}
+    return columns
 
 
 def _rows(prefix: str, table: NDArray[Any]) -> Columns:

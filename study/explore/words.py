@@ -24,16 +24,16 @@ TIES = 2  # that a row names
 
 
 def words(rung: Rung, rows: Sequence[Ranked], step: int, live: bool, force_unit: str) -> dict[str, Any]:
-    """Every fragment of a rung, as columns ``place`` and ``html``."""
-    found = rung.comparison
+    """Every fragment of a model, as columns ``place`` and ``html``."""
+    comparison = rung.comparison
     fragments = {
-        "figures": _figures(found),
-        "says": escape(says(found)),
+        "figures": _figures(comparison),
+        "says": escape(says(comparison)),
         "verdict": _verdict(rung, live),
         "candidates": _candidates(rung, rows, live),
-        "coefficients": _coefficients(found, live),
+        "coefficients": _coefficients(comparison, live),
         "equation": equation(rung),
-        "notes": escape("; ".join(found.notes)),
+        "notes": escape("; ".join(comparison.notes)),
         "step": escape(name(rung, step)),
         "force-unit": escape(in_text(force_unit)),
     }
@@ -41,7 +41,7 @@ def words(rung: Rung, rows: Sequence[Ranked], step: int, live: bool, force_unit:
 
 
 def name(rung: Rung, step: int) -> str:
-    """A rung as the ladder names it."""
+    """A model as the history names it."""
     return f"{step} {in_words(rung.label)}"
 
 
@@ -60,19 +60,19 @@ def equation(rung: Rung) -> str:
     return " + ".join(parts) + " = F(t)"
 
 
-def _figures(found: Comparison) -> str:
-    size = found.prediction.error * found.prediction.size
-    scaled = length if found.plan.response == "displacement" else rate
-    shown = scaled(found.record.units.get(found.plan.response, ""), size)
+def _figures(comparison: Comparison) -> str:
+    size = comparison.prediction.error * comparison.prediction.size
+    scaled = length if comparison.plan.response == "displacement" else rate
+    shown = scaled(comparison.record.units.get(comparison.plan.response, ""), size)
     rms = f"rms {size / shown.factor:.3g} {in_text(shown.unit)}"
     cells = (
-        ("error", "Error of the response", percent(found.prediction.error), f"{rms}, free run, held out"),
-        ("floor", "Noise floor", percent(found.prediction.floor), "what no model could explain"),
-        ("force", "Error of the force", percent(found.force.total), "share of its power unexplained"),
+        ("error", "Error of the response", percent(comparison.prediction.error), f"{rms}, free run, held out"),
+        ("floor", "Noise floor", percent(comparison.prediction.floor), "what no model could explain"),
+        ("force", "Error of the force", percent(comparison.force.total), "share of its power unexplained"),
     )
     return "".join(
-        f'<div class="figure" id="figure-{key}"><span>{what}</span><b>{value}</b><small>{escape(about)}</small></div>'
-        for key, what, value, about in cells
+        f'<div class="figure" id="figure-{key}"><span>{title}</span><b>{value}</b><small>{escape(about)}</small></div>'
+        for key, title, value, about in cells
     )
 
 
@@ -87,8 +87,8 @@ def _candidates(rung: Rung, rows: Sequence[Ranked], live: bool) -> str:
     if rung.diagnosis is None:
         return ""
     scale = "".join(f"<span style='left:{x}%'>{x}</span>" for x in (0, 50, 100))
-    what = "effect, and the share of the difference that it explains / %"
-    head = f"<li class='scale'><span class='head'>{what}</span><i class='axis'>{scale}</i></li>"
+    heading = "effect, and the share of the difference that it explains / %"
+    head = f"<li class='scale'><span class='head'>{heading}</span><i class='axis'>{scale}</i></li>"
     more = len(rung.diagnosis.candidates) - len(rows)
     rest = f"<li class='more'>{more} more explain less</li>" if more > 0 else ""
     return f"<ol>{head}{''.join(_row(i, row, rung, live) for i, row in enumerate(rows))}{rest}</ol>"
@@ -100,12 +100,12 @@ def _row(place: int, row: Ranked, rung: Rung, live: bool) -> str:
     add = f"<button data-act='add' data-name='{escape(row.name)}'>Add</button>" if live else ""
     explained = f"{round(100.0 * row.gain.explained, 1) + 0.0:.1f} ± {100.0 * row.gain.error:.1f} %"
     formula = escape(in_text(row.term.formula))
-    what = f"<b>{escape(in_words(row.name))}</b>"
+    title = f"<b>{escape(in_words(row.name))}</b>"
     meaning = row.term.meaning[0].upper() + row.term.meaning[1:]
     size = f"{number(row.coefficient)} ± {number(1.96 * row.error, 2)} {in_text(unit)}"
     return (
         f"<li class='candidate' data-candidate='{place}' data-label='{escape(_label(row, unit))}' tabindex='0'>"
-        f"<span class='rank'>{_rank(place, row, rung)}</span><span class='name'>{what}</span>"
+        f"<span class='rank'>{_rank(place, row, rung)}</span><span class='name'>{title}</span>"
         f"{_bar(row)}<span class='explained'>{explained}</span>{add}"
         f"<small>{_ties(row)}<i>{formula}</i>; <em>{escape(size)}</em>, error with it {percent(row.response_error)}. "
         f"{escape(meaning)}; common cause: {escape(row.term.cause)}.</small></li>"
@@ -147,18 +147,18 @@ def _bar(row: Ranked) -> str:
     )
 
 
-def _coefficients(found: Comparison, live: bool) -> str:
+def _coefficients(comparison: Comparison, live: bool) -> str:
     head = "<tr><th></th><th>term</th><th>value</th><th>95 % interval</th><th>unit</th><th></th></tr>"
-    return f"<table>{head}{''.join(_coefficient(c, live) for c in found.coefficients)}</table>"
+    return f"<table>{head}{''.join(_coefficient(c, live) for c in comparison.coefficients)}</table>"
 
 
-def _coefficient(found: Coefficient, live: bool) -> str:
-    half = "held" if found.error is None else f"± {number(1.96 * found.error, 2)}"
-    act, label = ("free", "Free") if found.held else ("hold", "Hold")
-    button = f"<button data-act='{act}' data-name='{escape(found.key)}'>{label}</button>" if live else ""
+def _coefficient(coefficient: Coefficient, live: bool) -> str:
+    half = "held" if coefficient.error is None else f"± {number(1.96 * coefficient.error, 2)}"
+    act, label = ("free", "Free") if coefficient.held else ("hold", "Hold")
+    button = f"<button data-act='{act}' data-name='{escape(coefficient.key)}'>{label}</button>" if live else ""
     return (
-        f"<tr data-key='{escape(found.key)}'><td><i>{escape(found.key.rpartition('.')[2])}</i></td>"
-        f"<td>{escape(in_words(found.term))}</td>"
-        f"<td class='number'>{number(found.value, 5)}</td><td>{half}</td><td>{escape(in_text(found.unit))}</td>"
-        f"<td>{button}</td></tr>"
+        f"<tr data-key='{escape(coefficient.key)}'><td><i>{escape(coefficient.key.rpartition('.')[2])}</i></td>"
+        f"<td>{escape(in_words(coefficient.term))}</td>"
+        f"<td class='number'>{number(coefficient.value, 5)}</td><td>{half}</td>"
+        f"<td>{escape(in_text(coefficient.unit))}</td><td>{button}</td></tr>"
     )

@@ -9,32 +9,21 @@ from study.support.errors import StudyError
 
 
 def rests_on(script: Path, *, also: Iterable[str] = (), without: Collection[str] = ()) -> list[str]:
-    """Files of the package that a script imports, directly or through one another.
+    """Sorted paths of the files of the package that a script imports, directly or through one another.
 
-    Parameters
-    ----------
-    script : Path
-        A Python file; the package stands in the folder above its own.
-    also : iterable of str
-        Modules that are imported by name while the script runs, such as ``estimators.miso``.
-    without : collection of str
-        Modules that are not followed: what the script imports along with what it needs, and does not use.
-
-    Returns
-    -------
-    list of str
-        Sorted paths relative to the working directory.
+    ``also`` names modules that are imported while the script runs, such as ``estimators.miso``; those in ``without``
+    are not followed: what the script imports along with what it needs, and does not use.
     """
     root = script.parent.parent
-    found: set[Path] = set()
+    reached: set[Path] = set()
     waiting = [script, *(path for name in also for path in _files(name, root))]
     skipped = {path for name in without for path in _files(name, root)}
     while waiting:
         path = waiting.pop()
-        if path not in found and path not in skipped:
-            found.add(path)
+        if path not in reached and path not in skipped:
+            reached.add(path)
             waiting += [other for name in _imported(path) for other in _files(name, root)]
-    return sorted(str(path) for path in found - {script})
+    return sorted(str(path) for path in reached - {script})
 
 
 @cache

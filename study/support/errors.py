@@ -1,4 +1,4 @@
-"""The one exception a user may see: a sentence that names the file, the value and what would be right."""
+"""The one exception a user may see: a sentence that names the file, the value and what was expected."""
 
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -9,13 +9,7 @@ class StudyError(Exception):
 
 
 class DivergenceError(StudyError):
-    """A simulation left the range of finite numbers.
-
-    Attributes
-    ----------
-    time : float
-        Time in seconds at which the first non-finite sample stands.
-    """
+    """A simulation left the range of finite numbers; ``time`` is that of its first non-finite sample in seconds."""
 
     def __init__(self, message: str, time: float) -> None:
         super().__init__(message)
@@ -32,12 +26,6 @@ def at(where: object) -> Generator[None, None, None]:
 
 
 def expect(holds: object, sentence: str) -> None:
-    """Refuse what does not hold.
-
-    Raises
-    ------
-    StudyError
-        With the sentence, which says what was given and what would be right.
-    """
+    """Refuse what does not hold, with a sentence that says what was given and what was expected."""
     if not holds:
         raise StudyError(sentence)

@@ -5,25 +5,17 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
-from study.support.errors import StudyError
+from study.support.errors import StudyError, expect
 from study.support.files import reason, replacing
 
 
 def check_folder(folder: Path) -> None:
-    """See that a folder can be written to, or made, before any work is done; nothing is made yet.
-
-    Raises
-    ------
-    StudyError
-        If not.
-    """
-    if "\0" in str(folder):
-        raise StudyError(f"{str(folder)!r}: no folder has such a name; another --out is right")
+    """See that a folder can be written to, or made, before any work is done; nothing is made yet."""
+    expect("\0" not in str(folder), f"{str(folder)!r}: no folder has such a name; expected another --out")
     there = next((p for p in (folder, *folder.absolute().parents) if p.exists()), Path("/"))
+    why = "it is write-protected" if there.is_dir() else "it is no folder"
     usable = there.is_dir() and os.access(there, os.W_OK | os.X_OK)
-    if not usable:
-        why = "it is write-protected" if there.is_dir() else "it is no folder"
-        raise StudyError(f"{folder}: cannot be written to ({there}: {why}); a writable folder is right")
+    expect(usable, f"{folder}: cannot be written to ({there}: {why}); expected a writable folder")
 
 
 def write_files(folder: Path, files: Mapping[str, bytes]) -> None:
@@ -40,12 +32,7 @@ def write_files(folder: Path, files: Mapping[str, bytes]) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise StudyError(f"{folder}: cannot be made ({reason(error)}); a writable folder is right") from None
+        raise StudyError(f"{folder}: cannot be made ({reason(error)}); expected a writable folder") from None
     with ExitStack() as stack:
         for name, content in files.items():
-            beside = stack.enter_context(replacing(folder / name))
-            try:
-                beside.write_bytes(content)
-            except OSError as error:
-                why = f"cannot be written ({reason(error)}) and is as it was"
-                raise StudyError(f"{folder / name}: {why}; a writable folder with free space is right") from None
+            stack.enter_context(replacing(folder / name)).write_bytes(content)

@@ -8,21 +8,14 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
-from study.support.errors import StudyError
+from study.support.errors import StudyError, expect
 
 BESIDE = ".study-"  # begins the name of a file that is still being written
 LARGEST = 1_000_000  # bytes; the longest sensible text file of a user has a few kilobytes
 
 
 def read_text(path: Path, wanted: str) -> str:
-    """The text of a file that may be anything.
-
-    Parameters
-    ----------
-    path : Path
-        What the user gave.
-    wanted : str
-        What would be right, for messages.
+    """The text of a file that may be anything; a message names what was ``wanted``.
 
     Raises
     ------
@@ -30,33 +23,25 @@ def read_text(path: Path, wanted: str) -> str:
         If it is missing, no regular file, unreadable, over 1 MB, or not UTF-8.
     """
     try:
-        kind = path.stat().st_mode
-        if not stat.S_ISREG(kind):
-            what = "a folder" if stat.S_ISDIR(kind) else "not a regular file"
-            raise StudyError(f"{path}: this is {what}; {wanted} is right")
+        mode = path.stat().st_mode
+        kind = "a folder" if stat.S_ISDIR(mode) else "not a regular file"
+        expect(stat.S_ISREG(mode), f"{path}: this is {kind}; expected {wanted}")
         with path.open("rb") as stream:
             data = stream.read(LARGEST + 1)
     except FileNotFoundError:
-        raise StudyError(f"{path}: there is no such file; {wanted} is right") from None
+        raise StudyError(f"{path}: there is no such file; expected {wanted}") from None
     except (OSError, ValueError) as error:  # ValueError: a path with a null byte
-        raise StudyError(f"{path}: cannot be read ({reason(error)}); {wanted} is right") from None
-    if len(data) > LARGEST:
-        raise StudyError(f"{path}: the file has more than {LARGEST} bytes; {wanted} is right")
+        raise StudyError(f"{path}: cannot be read ({reason(error)}); expected {wanted}") from None
+    expect(len(data) <= LARGEST, f"{path}: the file has more than {LARGEST} bytes; expected {wanted}")
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as error:
         byte = f"byte {error.start} is {data[error.start]:#04x}"
-        raise StudyError(f"{path}: this is no UTF-8 text ({byte}); {wanted} is right") from None
+        raise StudyError(f"{path}: this is no UTF-8 text ({byte}); expected {wanted}") from None
 
 
 def replace_file(path: Path, data: bytes) -> None:
-    """Write a file in one step, as :func:`replacing` does.
-
-    Raises
-    ------
-    StudyError
-        If it cannot be written.
-    """
+    """Write a file in one step, as :func:`replacing` does."""
     with replacing(path) as beside:
         beside.write_bytes(data)
 
@@ -90,7 +75,7 @@ def replacing(path: Path) -> Generator[Path, None, None]:
             beside.unlink(missing_ok=True)
     except OSError as error:
         why = f"cannot be written ({reason(error)}) and is as it was"
-        raise StudyError(f"{path}: {why}; a writable folder with free space is right") from None
+        raise StudyError(f"{path}: {why}; expected a writable folder with free space") from None
 
 
 def reason(error: Exception) -> str:

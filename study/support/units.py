@@ -8,7 +8,8 @@ import math
 import re
 from dataclasses import dataclass
 
-from study.support.errors import StudyError
+from study.support.errors import StudyError, expect
+from study.support.yaml_text import short
 
 Powers = tuple[int, int, int, int]  # of force, length, time, voltage
 FORCE: Powers = (1, 0, 0, 0)
@@ -21,28 +22,13 @@ STANDARD_GRAVITY = 9.80665  # m/s^2, exact by definition (3rd CGPM, 1901)
 POUND_FORCE = 0.45359237 * STANDARD_GRAVITY  # N, exact by definition
 
 BASES: dict[str, tuple[float, Powers]] = {
-    "N": (1.0, FORCE),
-    "lbf": (POUND_FORCE, FORCE),
-    "lb": (POUND_FORCE, FORCE),
-    "kip": (1000.0 * POUND_FORCE, FORCE),
-    "kgf": (STANDARD_GRAVITY, FORCE),
-    "dyn": (1e-5, FORCE),
-    "kg": (1.0, (1, -1, 2, 0)),
-    "m": (1.0, LENGTH),
-    "in": (0.0254, LENGTH),
-    "inch": (0.0254, LENGTH),
-    "mil": (0.0254e-3, LENGTH),
-    "ft": (0.3048, LENGTH),
-    "s": (1.0, TIME),
-    "sec": (1.0, TIME),
-    "min": (60.0, TIME),
-    "h": (3600.0, TIME),
-    "V": (1.0, VOLTAGE),
-    "g": (STANDARD_GRAVITY, ACCELERATION),
-    "gn": (STANDARD_GRAVITY, ACCELERATION),
-    "g_n": (STANDARD_GRAVITY, ACCELERATION),
-    "Gal": (0.01, ACCELERATION),
-}
+    "N": (1.0, FORCE), "lbf": (POUND_FORCE, FORCE), "lb": (POUND_FORCE, FORCE), "kip": (1000.0 * POUND_FORCE, FORCE),
+    "kgf": (STANDARD_GRAVITY, FORCE), "dyn": (1e-5, FORCE), "kg": (1.0, (1, -1, 2, 0)),
+    "m": (1.0, LENGTH), "in": (0.0254, LENGTH), "inch": (0.0254, LENGTH), "mil": (0.0254e-3, LENGTH),
+    "ft": (0.3048, LENGTH), "s": (1.0, TIME), "sec": (1.0, TIME), "min": (60.0, TIME), "h": (3600.0, TIME),
+    "V": (1.0, VOLTAGE), "Gal": (0.01, ACCELERATION),
+    **dict.fromkeys(("g", "gn", "g_n"), (STANDARD_GRAVITY, ACCELERATION)),
+}  # fmt: skip
 PREFIXES = {"M": 1e6, "k": 1e3, "d": 1e-1, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
 PREFIXED = ("N", "m", "s", "V", "g", "gn")
 PLAIN = str.maketrans({
@@ -60,40 +46,22 @@ ROLES: dict[str, tuple[Powers, str]] = {
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit that was understood.
+    """A unit that was understood."""
 
-    Attributes
-    ----------
-    text : str
-        As records, tables and figures write it (``m/s^2``, ``um``).
-    factor : float
-        How many SI units (N, m, s, V) it is.
-    powers : tuple of int
-        Powers of force, length, time and voltage.
-    """
-
-    text: str
-    factor: float
+    text: str  # as records, tables and figures write it (``m/s^2``, ``um``)
+    factor: float  # how many SI units (N, m, s, V) it is
     powers: Powers
 
 
 def parse_unit(text: str) -> Unit:
-    """Understand a unit.
-
-    Raises
-    ------
-    StudyError
-        If it is none, naming it and some that are.
-    """
+    """Understand a unit; of what is none, a ``StudyError`` names some that are."""
     plain = text.strip().replace("**", "^").translate(PLAIN).replace("^-^", "^-")
     plain = re.sub(r"\s*([/^])\s*", r"\1", " ".join(plain.replace("(", " ").replace(")", " ").split()))
     factor, powers = 1.0, (0, 0, 0, 0)
     for position, group in enumerate(plain.split("/")):
-        if not group:
-            raise _unknown(text)
-        for token in group.split():
+        sign = -1 if position else 1
+        for token in group.split() or [""]:
             size, own = (1.0, (0, 0, 0, 0)) if (token, position) == ("1", 0) else _factor(token, text)
-            sign = -1 if position else 1
             factor *= size**sign
             powers = tuple(p + sign * o for p, o in zip(powers, own, strict=True))
     if not math.isfinite(factor) or factor <= 0.0:
@@ -103,21 +71,15 @@ def parse_unit(text: str) -> Unit:
 
 
 def _factor(token: str, text: str) -> tuple[float, tuple[int, ...]]:
-    found = FACTOR.fullmatch(token)
-    if found is None:
+    parts = FACTOR.fullmatch(token)
+    if parts is None:
         raise _unknown(text)
-    name, power = found[1], int(found[2] or "1")
-    size, powers = _base(name, text)
-    return size**power, tuple(power * p for p in powers)
-
-
-def _base(name: str, text: str) -> tuple[float, Powers]:
-    if name in BASES:
-        return BASES[name]
-    if name[:1] in PREFIXES and name[1:] in PREFIXED:
-        size, powers = BASES[name[1:]]
-        return PREFIXES[name[0]] * size, powers
-    raise _unknown(text)
+    name, power = parts[1], int(parts[2] or "1")
+    prefix, base = (1.0, name) if name in BASES else (PREFIXES.get(name[0], 0.0), name[1:])
+    if name not in BASES and not (prefix and base in PREFIXED):
+        raise _unknown(text)
+    size, powers = BASES[base]
+    return (prefix * size) ** power, tuple(power * p for p in powers)
 
 
 def _written(plain: str) -> str:
@@ -128,19 +90,14 @@ def _written(plain: str) -> str:
 
 
 def _unknown(text: str) -> StudyError:
-    shown = text if len(text) <= 40 else f"{text[:37]}..."
-    return StudyError(f"there is no unit {shown!r}; N, kN, lbf, m, mm, um, in, m/s, m/s^2, g, s, ms and V are known")
+    known = "N, kN, lbf, m, mm, um, in, m/s, m/s^2, g, s, ms and V are known"
+    return StudyError(f"there is no unit {short(text, 40)!r}; {known}")
 
 
 def role_unit(role: str, text: str) -> Unit:
-    """The unit of a channel, checked against what the channel is.
+    """The unit of a channel such as ``force`` or ``time``, checked against what the channel is.
 
-    Parameters
-    ----------
-    role : str
-        ``force``, ``displacement``, ``velocity``, ``acceleration`` or ``time``.
-    text : str
-        As the user or the file wrote it. Volts are accepted for all but time: an uncalibrated sensor.
+    Volts are accepted for all but time: an uncalibrated sensor.
 
     Raises
     ------
@@ -148,10 +105,9 @@ def role_unit(role: str, text: str) -> Unit:
         If there is no such unit, or it cannot be a unit of this.
     """
     unit = parse_unit(text)
-    powers, right = ROLES[role]
-    signal = role != "time" and unit.powers[3] == 1
-    if unit.powers != powers and not signal:
-        raise StudyError(f"{text!r} is no unit of {role}; {right} is right")
+    powers, expected = ROLES[role]
+    uncalibrated = role != "time" and unit.powers[3] == 1
+    expect(unit.powers == powers or uncalibrated, f"{text!r} is no unit of {role}; expected {expected}")
     return unit
 
 

@@ -24,21 +24,15 @@ def one_sentence() -> Generator[None, None, None]:
 
 
 def alone(path: Path) -> TextIO:
-    """A lock on a file, held until the process ends, in whatever way: nothing is left to be removed by hand.
-
-    Raises
-    ------
-    StudyError
-        If another process holds it.
-    """
+    """A lock on a file, held until the process ends, in whatever way: nothing is left to be removed by hand."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    held = path.open("w", encoding="utf-8")
+    lock = path.open("w", encoding="utf-8")
     try:
-        fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
-        held.close()
+        lock.close()
         raise StudyError(f"another run is at work in {Path.cwd()}; wait for its end, or stop it") from None
-    return held
+    return lock
 
 
 def sweep(*folders: Path) -> None:

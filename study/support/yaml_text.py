@@ -5,17 +5,16 @@ and aliases (which can grow without bound) and tags (which call for Python objec
 """
 
 import json
-from collections.abc import Iterator
 from typing import Any, cast
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
 
-from study.support.errors import StudyError
+from study.support.errors import StudyError, expect
 
 MOST_EVENTS = 10_000  # names, numbers and brackets in one text
 DEEPEST = 8
-RIGHT = "a mapping such as 'name: rig' is right"
+EXPECTED = "expected a mapping such as 'name: rig'"
 
 
 def _yaml() -> Any:
@@ -37,10 +36,10 @@ def read_plain(text: str) -> object:
     except StudyError:
         raise
     except MarkedYAMLError as error:
-        raise StudyError(f"is not YAML ({_problem(error)}); {RIGHT}") from None
+        raise StudyError(f"is not YAML ({_problem(error)}); {EXPECTED}") from None
     except Exception as error:  # whatever else a parser trips over in hostile text means the same to the user
         problem = (str(error) or type(error).__name__).splitlines()[0]
-        raise StudyError(f"is not YAML ({short(problem)}); {RIGHT}") from None
+        raise StudyError(f"is not YAML ({short(problem)}); {EXPECTED}") from None
 
 
 def _problem(error: Any) -> str:
@@ -51,23 +50,19 @@ def _problem(error: Any) -> str:
 def _screen(text: str) -> None:
     """Refuse what could grow when built, or call for Python objects, before anything is built."""
     depth = 0
-    for count, event in enumerate(_events(text)):
+    for count, event in enumerate(_yaml().parse(text)):
         kind, line = type(event).__name__, event.start_mark.line + 1
         depth += kind in ("SequenceStartEvent", "MappingStartEvent")
         depth -= kind in ("SequenceEndEvent", "MappingEndEvent")
-        if depth > DEEPEST or count > MOST_EVENTS:
-            raise StudyError(f"is too large or too deeply nested (line {line}); a short list is right")
+        small = depth <= DEEPEST and count <= MOST_EVENTS
+        expect(small, f"is too large or too deeply nested (line {line}); expected a short list")
         if getattr(event, "anchor", None) is not None:  # an alias has one too: the name it repeats
             raise StudyError(f"uses the YAML anchor or alias {event.anchor!r} in line {line}; write the value itself")
         if getattr(event, "tag", None) is not None:
             tag = short(repr(str(event.tag)))
-            raise StudyError(f"uses the YAML tag {tag} in line {line}; plain names and numbers are right")
+            raise StudyError(f"uses the YAML tag {tag} in line {line}; expected plain names and numbers")
         if getattr(event, "version", None) not in (None, (1, 2)):
             raise StudyError(f"asks for another YAML version before line {line}; leave the %YAML line out")
-
-
-def _events(text: str) -> Iterator[Any]:
-    yield from _yaml().parse(text)
 
 
 def as_mapping(value: object) -> dict[object, object] | None:
@@ -88,9 +83,9 @@ def shown(value: object) -> str:
         return "a number of too many digits"
 
 
-def short(text: str) -> str:
+def short(text: str, most: int = 60) -> str:
     """A text that fits in a message."""
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
 def scalar(text: str) -> str:
@@ -100,19 +95,11 @@ def scalar(text: str) -> str:
 
 
 def with_entry(text: str, key: str, entry: str) -> str:
-    """The text with one entry more at the end of the top-level list ``key``; nothing else changes.
+    """The text with one entry, YAML on one line, more at the end of its top-level list ``key``; nothing else changes.
 
-    Parameters
-    ----------
-    text : str
-        YAML that :func:`read_plain` accepts, whose ``key`` is a list of at least one entry.
-    key : str
-        Name of the list.
-    entry : str
-        YAML on one line.
+    :func:`read_plain` must accept the text, and the list have an entry.
     """
-    root = _yaml().compose(text)
-    sequence = next(value for name, value in root.value if name.value == key)
+    sequence = _list(text, key)
     if sequence.flow_style:
         end = sequence.value[-1].end_mark.index
         return f"{text[:end]}, {entry}{text[end:]}"
@@ -120,29 +107,17 @@ def with_entry(text: str, key: str, entry: str) -> str:
     end = text.find("\n", last)
     newline = "\r\n" if "\r\n" in text else "\n"
     line = " " * sequence.start_mark.column + f"- {entry}"
-    if end < 0:
-        return f"{text}{newline}{line}"
-    return f"{text[: end + 1]}{line}{newline}{text[end + 1 :]}"
+    return f"{text}{newline}{line}" if end < 0 else f"{text[: end + 1]}{line}{newline}{text[end + 1 :]}"
 
 
 def with_changed(text: str, key: str, number: int, entry: str) -> str:
-    """The text with one entry of the top-level list ``key`` replaced; nothing around it changes.
-
-    Parameters
-    ----------
-    text : str
-        YAML that :func:`read_plain` accepts, whose ``key`` is a list.
-    key : str
-        Name of the list.
-    number : int
-        Which entry, counted from zero; comments between its own lines go with it.
-    entry : str
-        YAML on one line.
-    """
-    root = _yaml().compose(text)
-    sequence = next(value for name, value in root.value if name.value == key)
-    node = sequence.value[number]
+    """The text with one entry of that list, counted from zero, replaced; comments between its own lines go with it."""
+    node = _list(text, key).value[number]
     return text[: node.start_mark.index] + entry + text[_last_leaf(node).end_mark.index :]
+
+
+def _list(text: str, key: str) -> Any:
+    return next(value for name, value in _yaml().compose(text).value if name.value == key)
 
 
 def _last_leaf(node: Any) -> Any:

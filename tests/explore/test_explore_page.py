@@ -118,7 +118,7 @@ def test_a_session_from_the_first_verdict_to_the_saved_page(page: Page, address:
     page.click("[data-candidate='0'] button")
     until(page, f"parseFloat(document.querySelector('{ERROR}').textContent) < {0.5 * given}")
     reached = error(page)
-    assert page.evaluate("Bokeh.documents[0].get_model_by_name('range_ladder').factors.length") == 2
+    assert page.evaluate("Bokeh.documents[0].get_model_by_name('range_history').factors.length") == 2
     page.click("[data-act=undo]")
     until(page, f"parseFloat(document.querySelector('{ERROR}').textContent) === {given}")
     assert page.is_disabled("[data-act=undo]")

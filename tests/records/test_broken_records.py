@@ -66,7 +66,7 @@ WIDE = np.random.default_rng(1).standard_normal(2000)
 CLIPPED = np.clip(WIDE, -1.5, 1.5)
 LONG = 0.02 * np.arange(2000)
 TEXTS: dict[str, tuple[str, tuple[str, ...]]] = {
-    "empty": ("", ("empty", "right")),
+    "empty": ("", ("empty", "expected")),
     "only blanks": ("\n \n\t\n", ("empty",)),
     "only a header": (HEADER + "\n", ("no line with numbers",)),
     "only words": ("once upon a time\nthere was a rig\n" * 20, ("no line with numbers",)),
@@ -97,7 +97,7 @@ TEXTS: dict[str, tuple[str, tuple[str, ...]]] = {
                                ("'time'", "'0,00'", "line 2")),
     "a comment hides cells": (table(change={0: "0.0,1.0 # , 2.0"}), ("line 2", "cells")),
     "comments hide cells": ("\n".join([HEADER, *[x.replace(",", " #,", 2).replace(" #", "", 1) for x in lines()]]),
-                            ("line 2", "2 cells", "3 are right")),
+                            ("line 2", "2 cells", "expected 3")),
     "time runs backwards": (table(HEADER, TIME[::-1], FORCE, MOTION), ("backwards", "line 3")),
     "time jumps back": (table(HEADER, with_values(TIME, _40=0.1), FORCE, MOTION), ("backwards", "line 42")),
     "time stands still": (table(HEADER, 0.0 * TIME, FORCE, MOTION), ("stands still", "line 3")),

@@ -13,7 +13,7 @@ from study.records.readers.roles import assign, own_unit
 from study.records.readers.sampling import even_interval
 from study.records.readers.table import Column, Table
 from study.records.record import MOTIONS, SI_UNITS, Record
-from study.support.errors import StudyError
+from study.support.errors import StudyError, at, expect
 from study.support.units import ROLES, is_unit, parse_unit, role_unit
 
 Floats = NDArray[np.float64]
@@ -22,19 +22,12 @@ AGAIN = 0.7  # of its rms: a force that changes by more after a period does not 
 
 
 def record_from(path: Path, table: Table, options: ReadOptions) -> Record:
-    """The record that a table holds.
-
-    Raises
-    ------
-    StudyError
-        If columns, units, times or values do not make one.
-    """
-    if options.group and all("/" not in c.name for c in table.columns):
-        raise StudyError(f"{path}: a group {options.group!r} is asked for and this file has none; leave it out")
+    """The record that a table holds; its columns, units, times and values have to make one."""
+    grouped = not options.group or any("/" in column.name for column in table.columns)
+    expect(grouped, f"{path}: a group {options.group!r} is asked for and this file has none; leave it out")
     roles = assign(path, table, options)
     for column in roles.values():
-        if column.fault:
-            raise StudyError(f"{path}: {column.fault}")
+        expect(not column.fault, f"{path}: {column.fault}")
     _check_lengths(path, roles, options)
     units = _units(path, roles, options)
     first, last = _range(path, len(roles["force"].values), options)
@@ -54,13 +47,12 @@ def _name(path: Path, options: ReadOptions) -> str:
 
 
 def _check_lengths(path: Path, roles: Mapping[str, Column], options: ReadOptions) -> None:
-    lengths = {f"{role} ({c.name!r})": len(c.values) for role, c in roles.items()}
-    if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{role} has {n}" for role, n in lengths.items())
-        raise StudyError(f"{path}: channels differ in length: {told} samples; the same number for all is right")
-    unknown = [role for role in options.units if role not in roles and role != "time"]
-    if unknown:
-        raise StudyError(f"{path}: a unit is given for {unknown[0]!r}; {', '.join(roles)} are the channels")
+    lengths = {len(column.values) for column in roles.values()}
+    each = ", ".join(f"{role} ({column.name!r}) has {len(column.values)}" for role, column in roles.items())
+    expect(len(lengths) == 1, f"{path}: channels differ in length: {each} samples; expected the same number for all")
+    for role in options.units:
+        known = role in (*roles, "time")
+        expect(known, f"{path}: a unit is given for {role!r}; {', '.join(roles)} are the channels")
 
 
 def _units(path: Path, roles: Mapping[str, Column], options: ReadOptions) -> dict[str, str]:
@@ -68,26 +60,22 @@ def _units(path: Path, roles: Mapping[str, Column], options: ReadOptions) -> dic
     units: dict[str, str] = {}
     for role, column in roles.items():
         text = options.units.get(role) or own_unit(column, role)
-        if not text:
-            continue
-        if role not in ROLES:
+        if text and role in ROLES:
+            with at(f"{path}: column {column.name!r}"):
+                units[role] = role_unit(role, text).text
+        elif text:
             units[role] = parse_unit(text).text if is_unit(text) else text
-            continue
-        try:
-            units[role] = role_unit(role, text).text
-        except StudyError as error:
-            raise StudyError(f"{path}: column {column.name!r}: {error}") from None
     return units
 
 
 def _range(path: Path, length: int, options: ReadOptions) -> tuple[int, int]:
     first, last = options.samples or (0, None)
     end = length if last is None else last
-    if first >= length or end > length:
-        told = f"from {first} on" if last is None else f"{first} to {last}"
-        raise StudyError(f"{path}: samples {told} are asked for; the record has {length}, counted from 0")
-    if end - first < checks.FEWEST_SAMPLES:
-        raise StudyError(f"{path}: {end - first} samples are too few; {checks.FEWEST_SAMPLES} or more are right")
+    asked = f"from {first} on" if last is None else f"{first} to {last}"
+    inside = first < length and end <= length
+    expect(inside, f"{path}: samples {asked} are asked for; the record has {length}, counted from 0")
+    few = f"{path}: {end - first} samples are too few; expected {checks.FEWEST_SAMPLES} or more"
+    expect(end - first >= checks.FEWEST_SAMPLES, few)
     return first, end
 
 
@@ -119,11 +107,11 @@ def _sampling(
         if stated is None:
             return even_interval(path, time, table.place)
         step = float(np.median(np.diff(time)))
-        if not abs(step / stated - 1.0) < AGREE:
-            raise StudyError(
-                f"{path}: an interval of {stated:g} s is given (--fs or --dt), its times step by {step:g} s; leave the "
-                "option out, or say with --unit time=UNIT what the times are in"
-            )
+        differ = (
+            f"{path}: an interval of {stated:g} s is given (--fs or --dt), its times step by {step:g} s; leave the "
+            "option out, or say with --unit time=UNIT what the times are in"
+        )
+        expect(abs(step / stated - 1.0) < AGREE, differ)
         return stated, float(time[0])
     dt = stated if stated is not None else table.dt
     if dt is None:
@@ -135,15 +123,12 @@ def _sampling(
 
 
 def _period(path: Path, roles: Mapping[str, Column], force: Floats, options: ReadOptions) -> int | None:
-    length = len(roles["force"].values)
-    if options.period is None:
+    length, period = len(roles["force"].values), options.period
+    if period is None:
         return roles["force"].period
-    if options.period > length:
-        raise StudyError(f"{path}: a period of {options.period} samples is given; the record has {length}")
-    change = checks.change_after(force, options.period)
-    if change > AGAIN:
-        raise StudyError(
-            f"{path}: a period of {options.period} samples is given, and the force {options.period} samples later "
-            f"differs by {100.0 * change:.0f} % of its rms; the number of samples after which it repeats is right"
-        )
-    return options.period
+    given = f"{path}: a period of {period} samples is given"
+    expect(period <= length, f"{given}; the record has {length}")
+    change = checks.change_after(force, period)
+    differs = f"the force {period} samples later differs by {100.0 * change:.0f} % of its rms"
+    expect(change <= AGAIN, f"{given}, and {differs}; expected the number of samples after which it repeats")
+    return period

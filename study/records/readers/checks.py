@@ -20,16 +20,16 @@ def not_finite(values: Floats, place: Callable[[int], str]) -> str | None:
     bad = np.flatnonzero(~np.isfinite(values))
     if not len(bad):
         return None
-    what = "no number" if np.isnan(values[bad[0]]) else "an infinite value"
+    value = "no number" if np.isnan(values[bad[0]]) else "an infinite value"
     more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
-    return f"has {what} in {place(int(bad[0]))}{more}; fill the gap, or cut it away by 'samples: [first, last]'"
+    return f"has {value} in {place(int(bad[0]))}{more}; fill the gap, or cut it away by 'samples: [first, last]'"
 
 
 def constant(values: Floats) -> str | None:
     """A sentence on a channel that does not move."""
     if np.ptp(values) > 0.0:
         return None
-    return f"is {values[0] + 0.0:g} throughout; a signal that moves is right"
+    return f"is {values[0] + 0.0:g} throughout; expected a signal that moves"
 
 
 def change_after(values: Floats, period: int) -> float:
@@ -58,6 +58,6 @@ def saturated(values: Floats) -> str | None:
         if count > CLIPPED_RATIO * usual:
             return (
                 f"rests at its {side} value {extreme:g} for {count} of {len(values)} samples, as a saturated channel "
-                "does; a wider measuring range is right (or 'accept_saturated: true' if the signal is like that)"
+                "does; expected a wider measuring range (or 'accept_saturated: true' if the signal is like that)"
             )
     return None

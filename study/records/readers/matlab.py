@@ -7,26 +7,14 @@ from typing import Any, cast
 import numpy as np
 from scipy.io import loadmat
 
-from study.records.readers.hdf5 import in_group
-from study.records.readers.table import Table, from_arrays
-from study.support.errors import StudyError
+from study.records.readers.table import Table, from_arrays, in_group
 
 
 def read(path: Path, group: str | None) -> Table:
-    """Read the arrays of a file, or of one structure in it.
-
-    Raises
-    ------
-    StudyError
-        If the structure is not there.
-    """
+    """Read the arrays of a file, or of one structure in it."""
     loaded: dict[str, Any] = loadmat(str(path), simplify_cells=True, appendmat=False)
     arrays = dict(_flat({k: v for k, v in loaded.items() if not k.startswith("__")}, ""))
-    chosen = {name: value for name, value in arrays.items() if in_group(name, group)}
-    if group is not None and not chosen:
-        groups = sorted({n.rsplit("/", 1)[0] for n in arrays if "/" in n})
-        raise StudyError(f"{path}: there is no structure {group!r}; it holds {', '.join(groups) or 'none'}")
-    return from_arrays(path, chosen, {})
+    return from_arrays(path, {name: arrays[name] for name in in_group(path, arrays, group, "structure")}, {})
 
 
 def _flat(fields: dict[str, Any], prefix: str) -> Iterator[tuple[str, object]]:

@@ -9,7 +9,7 @@ from study.records.readers.table import NONE, Column, Table, split_unit
 from study.support.extras import needed
 
 
-def read(path: Path) -> Table:
+def read(path: Path, _group: str | None = None) -> Table:
     """Read every column; moments in time become seconds from the first."""
     parquet: Any = needed("pyarrow.parquet", f"{path}: reading Parquet", "formats")
     table: Any = parquet.ParquetFile(path).read()  # one file, with nothing inferred from the folder's name
@@ -22,6 +22,5 @@ def _column(heading: str, data: Any) -> Column:
     if values.dtype.kind == "M":
         values = (values - values[:1]) / np.timedelta64(1, "s")
     if values.dtype.kind not in "biuf":
-        fault = f"column {name!r} holds {data.type}; real numbers are right"
-        return Column(name, NONE, unit, fault=fault)
+        return Column(name, NONE, unit, fault=f"column {name!r} holds {data.type}; expected real numbers")
     return Column(name, values.astype(np.float64), unit)

@@ -5,13 +5,14 @@ different people and are never guessed.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from study.records.readers.options import BESIDE, ReadOptions
 from study.records.readers.table import Column, Table
 from study.records.record import MOTIONS
-from study.support.errors import StudyError
+from study.support.errors import StudyError, expect
 from study.support.units import ROLES, parse_unit
 
 NAMES: dict[str, tuple[str, ...]] = {
@@ -21,80 +22,58 @@ NAMES: dict[str, tuple[str, ...]] = {
     "acceleration": ("a", "acceleration", "acc", "accel", "accelerometer"),
     "time": ("t", "time", "seconds"),
 }
-SUFFIX = re.compile(r"(.+)_([A-Za-z0-9]+)")
 
 
 def assign(path: Path, table: Table, options: ReadOptions) -> dict[str, Column]:
     """Column of each channel, in the file's order; extra channels keep their names.
 
-    Parameters
-    ----------
-    path : Path
-        For messages.
-    table : Table
-        What the file holds.
-    options : ReadOptions
-        What the user says; its ``columns`` come before any guess.
-
-    Raises
-    ------
-    StudyError
-        If a column is missing, named twice or could be several things; lists the columns.
+    What the user says in ``columns`` comes before any guess. If a column is missing, named twice or could be several
+    things, the fault lists the columns.
     """
-    named = {role: _find(path, table, role, wanted) for role, wanted in options.columns.items()}
-    rest = [c for c in table.columns if all(c is not n for n in named.values())]
-    if "force" not in named or not any(m in named for m in MOTIONS):
+    named = {role: _named(path, table, role, wanted) for role, wanted in options.columns.items()}
+    complete = "force" in named and any(m in named for m in MOTIONS)
+    if not complete:
         _check_duplicates(path, table)
-        named |= _guessed(path, table, rest, set(named))
-    elif "time" not in named:
-        named |= {role: c for role, c in _guessed(path, table, rest, set(named)).items() if role == "time"}
-    missing = _missing(named)
-    if missing:
+    rest = [c for c in table.columns if all(c is not n for n in named.values())]
+    if not complete or "time" not in named:
+        guesses = _guessed(path, table, rest, named)
+        named |= {role: column for role, column in guesses.items() if role == "time" or not complete}
+    motion = any(m in named for m in MOTIONS)
+    if "force" not in named or not motion:
+        missing = "displacement, velocity or acceleration" if "force" in named else "force"
         raise _ask(path, table, f"no column is known to be the {missing}")
     place = {id(c): k for k, c in enumerate(table.columns)}
     return dict(sorted((named | _extra(table, named)).items(), key=lambda item: place[id(item[1])]))
 
 
-def _missing(named: Mapping[str, Column]) -> str:
-    if "force" not in named:
-        return "force"
-    return "" if any(m in named for m in MOTIONS) else "displacement, velocity or acceleration"
-
-
-def _find(path: Path, table: Table, role: str, wanted: str | int) -> Column:
+def _named(path: Path, table: Table, role: str, wanted: str | int) -> Column:
     """The column that the user names, by its name, the end of its path, or its number."""
-    found = [c for c in table.columns if c.name == wanted]
-    if not found and isinstance(wanted, str):
+    matches = [c for c in table.columns if c.name == wanted]
+    if not matches and isinstance(wanted, str):
         ending = "/" + wanted.replace(".", "/")
-        found = [c for c in table.columns if ("/" + c.name).endswith(ending)]
-    if not found and re.fullmatch(r"[0-9]{1,9}", str(wanted)):
-        number = int(wanted)
-        found = list(table.columns[number - 1 : number]) if number > 0 else []
-    if not found:
+        matches = [c for c in table.columns if ("/" + c.name).endswith(ending)]
+    if not matches and re.fullmatch(r"[0-9]{1,9}", str(wanted)):
+        matches = [c for k, c in enumerate(table.columns, start=1) if k == int(wanted)]
+    if not matches:
         raise _ask(path, table, f"there is no column {wanted!r} for {role}")
-    if len(found) > 1:
-        numbers = " and ".join(str(k) for k, c in enumerate(table.columns, start=1) if any(c is f for f in found))
-        raise _ask(path, table, f"the column {wanted!r} for {role} is there {len(found)} times, as {numbers}")
-    return found[0]
+    if len(matches) > 1:
+        numbers = " and ".join(str(k) for k, c in enumerate(table.columns, start=1) if any(c is m for m in matches))
+        raise _ask(path, table, f"the column {wanted!r} for {role} is there {len(matches)} times, as {numbers}")
+    return matches[0]
 
 
 def _check_duplicates(path: Path, table: Table) -> None:
-    names = [c.name for c in table.columns]
-    for name in names:
-        if name and names.count(name) > 1:
-            numbers = " and ".join(str(k) for k, n in enumerate(names, start=1) if n == name)
-            raise StudyError(
-                f"{path}: the column {name!r} is there {names.count(name)} times, as columns {numbers}; "
-                f"give columns by number, such as --column force={names.index(name) + 1}"
-            )
+    for name, count in Counter(c.name for c in table.columns if c.name).items():
+        numbers = [str(k) for k, c in enumerate(table.columns, start=1) if c.name == name]
+        twice = f"the column {name!r} is there {count} times, as columns {' and '.join(numbers)}"
+        expect(count == 1, f"{path}: {twice}; give columns by number, such as --column force={numbers[0]}")
 
 
-def _guessed(path: Path, table: Table, columns: Sequence[Column], known: set[str]) -> dict[str, Column]:
+def _guessed(path: Path, table: Table, columns: Sequence[Column], known: Collection[str]) -> dict[str, Column]:
     """Roles that names, and where these say nothing units, leave no doubt about."""
     possible: dict[str, list[Column]] = {}
     for role in (r for r in NAMES if r not in known):
-        exact = [c for c in columns if c.name == role]
-        possible[role] = exact or [c for c in columns if _role_of(c) == role]
+        possible[role] = [c for c in columns if c.name == role] or [c for c in columns if _role_of(c) == role]
     motions = [role for role in MOTIONS if role in possible]
     if any(_spelt_out(c, role) for role in motions for c in possible[role]):
         for role in motions:  # beside a motion that is spelt out, a column called v or a may be anything
@@ -113,13 +92,20 @@ def _spelt_out(column: Column, role: str) -> bool:
 
 def _role_of(column: Column) -> str:
     """What a column is by what the file says, its name, or its unit; empty if these do not tell."""
-    if column.role:
-        return column.role
-    name = _last(column)
-    suffixed = SUFFIX.fullmatch(name)
-    if suffixed and _plain_role(suffixed[1]) and _unit_role(suffixed[2]) == _plain_role(suffixed[1]):
-        return _plain_role(suffixed[1])
-    return _plain_role(name) or _unit_role(column.unit)
+    return column.role or _suffixed(column)[0] or _plain_role(_last(column)) or _unit_role(column.unit)
+
+
+def own_unit(column: Column, role: str) -> str:
+    """The unit that a file gives for a column, behind its name (``disp_mm``) or in a row of its own."""
+    suffixed, unit = _suffixed(column)
+    return column.unit or (unit if suffixed == role else "")
+
+
+def _suffixed(column: Column) -> tuple[str, str]:
+    """Role and unit of a name such as ``disp_mm``, whose parts agree; else two empty words."""
+    stem, _, unit = _last(column).rpartition("_")
+    role = _plain_role(stem)
+    return (role, unit) if role and unit.isalnum() and unit.isascii() and _unit_role(unit) == role else ("", "")
 
 
 def _last(column: Column) -> str:
@@ -140,31 +126,18 @@ def _unit_role(unit: str) -> str:
     return next((role for role, (own, _) in ROLES.items() if own == powers), "")
 
 
-def own_unit(column: Column, role: str) -> str:
-    """The unit that a file gives for a column, behind its name (``disp_mm``) or in a row of its own."""
-    suffixed = SUFFIX.fullmatch(_last(column))
-    if not column.unit and suffixed and _unit_role(suffixed[2]) == role == _plain_role(suffixed[1]):
-        return suffixed[2]
-    return column.unit
-
-
 def _extra(table: Table, named: Mapping[str, Column]) -> dict[str, Column]:
     """Further channels of the same length, under their own names."""
-    length = len(named["force"].values)
-    taken = [id(c) for c in named.values()]
-    names = [c.name for c in table.columns]
-    return {
-        c.name: c
-        for c in table.columns
-        if c.name and id(c) not in taken and c.name not in (*named, *NAMES) and not c.fault
-        and len(c.values) == length and names.count(c.name) == 1
-    }  # fmt: skip
+    length, taken = len(named["force"].values), [id(c) for c in named.values()]
+    counts = Counter(c.name for c in table.columns)
+    usable = [c for c in table.columns if not c.fault and len(c.values) == length and id(c) not in taken]
+    return {c.name: c for c in usable if c.name and counts[c.name] == 1 and c.name not in (*named, *NAMES)}
 
 
 def _ask(path: Path, table: Table, problem: str) -> StudyError:
     """The one sentence that shows the columns and the option to give."""
     if not table.columns:
-        return StudyError(f"{path}: {problem}, since the file holds no column of numbers; force and motion are right")
+        return StudyError(f"{path}: {problem}, since the file holds no column of numbers; expected force and motion")
     groups = sorted({c.name.rsplit("/", 1)[0] for c in table.columns if "/" in c.name})
     choose = f" and choose --group {groups[0]} or {groups[1]}" if len(groups) > 1 else ""
     return StudyError(

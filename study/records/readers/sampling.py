@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from study.support.errors import StudyError
+from study.support.errors import StudyError, expect
 
 Floats = NDArray[np.float64]
 JITTER = 0.01  # of the sampling interval: the unevenness of sampling that is taken for even
@@ -15,22 +15,10 @@ ROUNDING = 0.4  # of the sampling interval: the coarsest rounding of printed tim
 
 
 def even_interval(path: Path, time: Floats, place: Callable[[int], str]) -> tuple[float, float]:
-    """Sampling interval and first time, in seconds.
+    """Sampling interval and first time in seconds; ``place`` says where in the file a sample stands.
 
-    Parameters
-    ----------
-    path : Path
-        For messages.
-    time : array, shape (n,)
-        Times of the samples in seconds, n at least 2.
-    place : callable
-        Where in the file a sample stands.
-
-    Returns
-    -------
-    dt, start : float
-        The interval is the shortest decimal (of itself or of its inverse) that the times allow; times
-        that lie exactly on a grid are met to the last bit.
+    The interval is the shortest decimal (of itself or of its inverse) that the times allow; times that lie exactly on
+    a grid are met to the last bit.
 
     Raises
     ------
@@ -41,17 +29,14 @@ def even_interval(path: Path, time: Floats, place: Callable[[int], str]) -> tupl
     steps = np.diff(time)
     mean = float(time[-1] - time[0]) / (len(time) - 1)
     back = int(np.argmax(steps <= 0.0))
-    if steps[back] <= 0.0:
-        how = "stands still" if steps[back] == 0.0 else "runs backwards"
-        raise StudyError(
-            f"{path}: time {how} in {place(back + 1)} ({time[back]:.9g} s, then {time[back + 1]:.9g} s); "
-            "times that grow are right"
-        )
+    fault = "stands still" if steps[back] == 0.0 else "runs backwards"
+    times = f"{time[back]:.9g} s, then {time[back + 1]:.9g} s"
+    expect(steps[back] > 0.0, f"{path}: time {fault} in {place(back + 1)} ({times}); expected times that grow")
     grid = np.arange(len(time), dtype=np.float64)
     away = 0.5 * float(np.ptp(time - mean * grid))  # from the line that lies in the middle
     rounding = _rounding(time)
     if away > max(JITTER * mean, min(rounding, ROUNDING * mean)):
-        raise StudyError(f"{path}: {_uneven(time, steps, place)}; even sampling (within 1 % of the interval) is right")
+        raise StudyError(f"{path}: {_uneven(time, steps, place)}; expected even sampling (within 1 % of the interval)")
     exact = next((dt for dt in _candidates(mean) if np.array_equal(time[0] + dt * grid, time)), None)
     if exact is not None:
         return exact, float(time[0])

@@ -35,16 +35,8 @@ def suspect_swapped(record: Record) -> str | None:
     (4.25) of the report: it grows as f^2 above resonance, the response lags, and m and c are above zero. The
     record is read both ways, and suspected if only the other reading comes out so. What has no spring (force over
     acceleration a constant) looks the same both ways.
-
-    Parameters
-    ----------
-    record : Record
-        As read, before any motion is filled in. The measured motion nearest to displacement is used.
-
-    Returns
-    -------
-    str or None
-        None also where the record cannot tell: too short, or its band holds no resonance and no mass.
+    The measured motion nearest to displacement is used. A record that is too short, or whose band holds no resonance
+    and no mass, cannot tell.
     """
     motion = next(m for m in MOTIONS if m in record)
     length = min(LONGEST, 2 * len(record) // AVERAGES)
@@ -70,8 +62,8 @@ def suspect_swapped(record: Record) -> str | None:
     return (
         f"force and {motion} seem to be swapped: read the other way round, their ratio is that of a mass on a spring "
         f"to within {100.0 * swapped.error:.0f} %, as given it misses by {100.0 * given.error:.0f} % (mass "
-        f"{given.mass:.3g}, damping {given.damping:.3g}); --column force=... --column {motion}=... with the names "
-        "exchanged is right (or --accept-swapped, 'accept_swapped: true' beside the file, if the record is like that)"
+        f"{given.mass:.3g}, damping {given.damping:.3g}); expected --column force=... --column {motion}=... with "
+        "the names exchanged (or --accept-swapped, 'accept_swapped: true' beside the file, if the record is like that)"
     )
 
 
@@ -86,7 +78,8 @@ def _fit(omega: Floats, ratio: Complexes, weight: Floats) -> _Fit:
     powers = np.stack([-(x**2), 1j * x, np.ones_like(x)], axis=1)
     rows = powers * (np.sqrt(weight) / np.abs(ratio))[:, None]
     target = np.sqrt(weight) * ratio / np.abs(ratio)
-    stacked, wanted = np.concatenate([rows.real, rows.imag]), np.concatenate([target.real, target.imag])
-    found = np.linalg.lstsq(stacked, wanted, rcond=None)[0]
-    error = float(np.sqrt(np.sum((stacked @ found - wanted) ** 2) / np.sum(weight)))
-    return _Fit(float(found[0] / scale**2), float(found[1] / scale), float(found[2]), error)
+    stacked, goal = np.concatenate([rows.real, rows.imag]), np.concatenate([target.real, target.imag])
+    parameters = np.linalg.lstsq(stacked, goal, rcond=None)[0]
+    error = float(np.sqrt(np.sum((stacked @ parameters - goal) ** 2) / np.sum(weight)))
+    mass, damping, stiffness = (float(value) for value in parameters / [scale**2, scale, 1.0])
+    return _Fit(mass, damping, stiffness, error)

@@ -1,16 +1,17 @@
 """What every kind of file is read into: named columns, and what the file itself says about them."""
 
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from study.support.errors import StudyError
+from study.support.errors import StudyError, expect
 from study.support.units import is_unit
+from study.support.yaml_text import short
 
 Floats = NDArray[np.float64]
 Array = NDArray[Any]  # as a file holds it: of any kind of number, or of none
@@ -21,54 +22,24 @@ INTERVALS = ("dt", "ts", "samplingtime", "samplingperiod", "sampletime", "sampli
 
 @dataclass(frozen=True)
 class Column:
-    """A column as it stands in the file.
+    """A column as it stands in the file."""
 
-    Attributes
-    ----------
-    name : str
-        Its name, without the unit.
-    values : array, shape (n,)
-        Empty where ``fault`` says why there are none.
-    unit, role : str
-        What the file says it is; empty where it says nothing.
-    fault : str
-        A sentence for the user who asks for this column, if it cannot be used.
-    period : int, optional
-        Samples in a period, if the file holds periods side by side.
-    """
-
-    name: str
-    values: Floats
-    unit: str = ""
-    role: str = ""
-    fault: str = ""
-    period: int | None = None
-
-
-def _sample(index: int) -> str:
-    return f"sample {index}"
+    name: str  # without the unit
+    values: Floats  # empty where ``fault`` says why there are none
+    unit: str = ""  # what the file says it is; empty where it says nothing
+    role: str = ""  # the same
+    fault: str = ""  # a sentence for the user who asks for this column, if it cannot be used
+    period: int | None = None  # samples in a period, if the file holds periods side by side
 
 
 @dataclass(frozen=True)
 class Table:
-    """The columns of a file.
-
-    Attributes
-    ----------
-    columns : tuple of Column
-        In the file's order.
-    dt : float, optional
-        Sampling interval in seconds, if the file states one.
-    start : float
-        Time of the first sample in seconds, if the file states one.
-    place : callable
-        Where in the file a sample stands, in words: ``line 17``.
-    """
+    """The columns of a file in its order, and what it states about their sampling."""
 
     columns: tuple[Column, ...]
-    dt: float | None = None
-    start: float = 0.0
-    place: Callable[[int], str] = field(default=_sample)
+    dt: float | None = None  # sampling interval in seconds
+    start: float = 0.0  # time of the first sample in seconds
+    place: Callable[[int], str] = "sample {}".format  # where in the file a sample stands, in words: ``line 17``
 
     def from_sample(self, first: int) -> "Table":
         """The same table, places counted from a later sample on."""
@@ -80,12 +51,8 @@ class Table:
 
     def listing(self) -> str:
         """The columns as a message lists them."""
-        shown = [f"{k} {_short(c.name)!r}" for k, c in enumerate(self.columns[:12], start=1)]
+        shown = [f"{k} {short(c.name, 30)!r}" for k, c in enumerate(self.columns[:12], start=1)]
         return ", ".join(shown) + (f" and {len(self.columns) - 12} more" if len(self.columns) > 12 else "")
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= 30 else f"{text[:27]}..."
 
 
 def split_unit(text: str) -> tuple[str, str]:
@@ -95,29 +62,34 @@ def split_unit(text: str) -> tuple[str, str]:
     can be.
     """
     text = text.strip()
-    found = re.fullmatch(r"(.*?)\s*\[([^\[\]]*)\]", text)
-    if found and found[1]:
-        return found[1], found[2].strip()
+    heading = re.fullmatch(r"(.*?)\s*\[([^\[\]]*)\]", text)
+    if heading and heading[1]:
+        return heading[1], heading[2].strip()
     for pattern in (r"(.*?)\s*\((.*)\)", r"([^/]*?)\s*/\s*(.*)"):
-        found = re.fullmatch(pattern, text)
-        if found and found[1] and is_unit(found[2]):
-            return found[1], found[2].strip()
+        heading = re.fullmatch(pattern, text)
+        if heading and heading[1] and is_unit(heading[2]):
+            return heading[1], heading[2].strip()
     return text, ""
 
 
-def from_arrays(path: Path, arrays: Mapping[str, object], units: Mapping[str, str]) -> Table:
-    """Columns from the named arrays of a binary file; lone numbers named fs or dt give the sampling rate if they agree.
+def in_group(path: Path, names: Iterable[str], group: str | None, kind: str) -> list[str]:
+    """Those of some paths within a file that lie in the group that the user named, if any."""
+    names = list(names)
+    if group is None:
+        return names
+    chosen = [name for name in names if name.startswith(group.strip("/") + "/")]
+    groups = sorted({name.rsplit("/", 1)[0] for name in names if "/" in name})
+    expect(chosen, f"{path}: there is no {kind} {group!r}; it holds {', '.join(groups) or 'none'}")
+    return chosen
 
-    Raises
-    ------
-    StudyError
-        If the file states a sampling rate that cannot be.
-    """
-    found: dict[str, Array] = {name: np.asarray(value) for name, value in arrays.items()}
-    series = [name for name, array in found.items() if array.size > 1]
+
+def from_arrays(path: Path, arrays: Mapping[str, object], units: Mapping[str, str]) -> Table:
+    """Columns from the named arrays of a binary file; lone numbers named fs or dt give the rate if they agree."""
+    named: dict[str, Array] = {name: np.asarray(value) for name, value in arrays.items()}
+    series = [name for name, array in named.items() if array.size > 1]
     columns: list[Column] = []
     intervals: set[float] = set()
-    for name, array in found.items():
+    for name, array in named.items():
         stem = re.sub(r"[^a-z]", "", name.rsplit("/", 1)[-1].lower())
         if array.size == 1 and stem in (*RATES, *INTERVALS):
             intervals.add(_interval(path, name, array, inverse=stem in RATES))
@@ -132,7 +104,7 @@ def _interval(path: Path, name: str, array: Array, *, inverse: bool) -> float:
     value = complex(array.reshape(-1)[0]) if array.dtype.kind in "iufc" else 0j
     if value.imag or not np.isfinite(value.real) or value.real <= 0.0:
         shown = str(array.reshape(-1)[0])
-        raise StudyError(f"{path}: {name!r} is {shown}; a sampling rate or interval above zero is right")
+        raise StudyError(f"{path}: {name!r} is {shown}; expected a sampling rate or interval above zero")
     return 1.0 / value.real if inverse else value.real
 
 
@@ -144,18 +116,17 @@ def _matrix_columns(name: str, array: Array) -> list[Column]:
 
 def _column(name: str, array: Array, unit: str) -> Column:
     """One channel: a row of numbers, or (samples, periods) put end to end."""
-    shape = array.shape
-    if array.dtype.kind not in "biuf":
-        kind = "complex numbers" if array.dtype.kind == "c" else "text or objects"
-        return Column(name, NONE, unit, fault=f"column {name!r} holds {kind}; real numbers are right")
-    array = array.squeeze()
-    if array.ndim > 2:
-        fault = f"column {name!r} has the shape {shape}; (samples,) or (samples, periods) is right"
-        return Column(name, NONE, unit, fault=fault)
+    kind, shape, array = array.dtype.kind, array.shape, array.squeeze()
+    fault = ""
+    if kind not in "biuf":
+        fault = f"holds {'complex numbers' if kind == 'c' else 'text or objects'}; expected real numbers"
+    elif array.ndim > 2:
+        fault = f"has the shape {shape}; expected (samples,) or (samples, periods)"
+    elif array.ndim == 2 and array.shape[0] == array.shape[1]:
+        fault = f"has the shape {shape}, samples and periods cannot be told apart; put them end to end"
+    if fault:
+        return Column(name, NONE, unit, fault=f"column {name!r} {fault}")
     if array.ndim < 2:
         return Column(name, np.atleast_1d(array).astype(np.float64), unit)
-    if array.shape[0] == array.shape[1]:
-        fault = f"column {name!r} has the shape {shape}, samples and periods cannot be told apart; put them end to end"
-        return Column(name, NONE, unit, fault=fault)
     tall = array if array.shape[0] > array.shape[1] else array.T
     return Column(name, tall.T.reshape(-1).astype(np.float64), unit, period=tall.shape[0])

@@ -8,18 +8,21 @@ the header; numbers are then read by the compiled parser of pandas.
 import csv
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from io import BytesIO
+from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from study.records.readers.table import NONE, Column, Floats, Table, split_unit
-from study.support.errors import StudyError
+from study.records.readers.table import NONE, Column, Table, split_unit
+from study.support.errors import StudyError, expect
 from study.support.units import is_unit
+from study.support.yaml_text import short
 
 HEAD_BYTES = 200_000
 HEAD_LINES = 200
@@ -28,39 +31,26 @@ SPACE = " \t"  # what the compiled parser takes for blanks; Python knows more
 DIALECTS = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (BLANKS, "."), (BLANKS, ","))
 COMMENTS = ("#", "%", "!", "//")
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
-RIGHT = "a table with one line for each sample is right"
+EXPECTED = "expected a table with one line for each sample"
 NO_TEXT = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f]")  # control characters that no text file holds
+
+
+Place = Callable[[int], str]
 
 
 @dataclass(frozen=True)
 class Layout:
-    """How a text file is laid out.
+    """How a text file is laid out."""
 
-    Attributes
-    ----------
-    delimiter, decimal : str
-        Between cells; within numbers.
-    first : int
-        Line of the first sample, counted from 0.
-    names, units : tuple of str
-        One each column.
-    """
-
-    delimiter: str
-    decimal: str
-    first: int
+    delimiter: str  # between cells
+    decimal: str  # within numbers
+    first: int  # line of the first sample, counted from 0
     names: tuple[str, ...]
     units: tuple[str, ...]
 
 
 def read(path: Path, data: bytes) -> Table:
-    """Read the bytes of a text file.
-
-    Raises
-    ------
-    StudyError
-        If they are no text, hold no numbers, or a line has more cells than the others.
-    """
+    """Read the bytes of a text file, which must hold numbers, as many cells in each line."""
     data = _utf8(path, data.rstrip(b"\x1a"))  # some programs still end a text as CP/M did
     lines = data[:HEAD_BYTES].decode("utf-8", errors="replace").split("\n")
     if len(data) > HEAD_BYTES and len(lines) > 1:
@@ -74,12 +64,10 @@ def _utf8(path: Path, data: bytes) -> bytes:
     for mark, encoding in ((b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"), (b"\xef\xbb\xbf", "utf-8-sig")):
         if data.startswith(mark):
             data = data.decode(encoding, errors="replace").encode("utf-8")
-    if not data or data.isspace():
-        raise StudyError(f"{path}: the file is empty; {RIGHT}")
+    expect(data and not data.isspace(), f"{path}: the file is empty; {EXPECTED}")
     odd = NO_TEXT.search(data, 0, HEAD_BYTES)
     byte = odd.start() if odd is not None else data.find(b"\0")
-    if byte >= 0:
-        raise StudyError(f"{path}: this is no text (byte {byte} is {data[byte]:#04x}); {RIGHT}")
+    expect(byte < 0, f"{path}: this is no text (byte {byte} is {data[byte]:#04x}); {EXPECTED}")
     if not data.isascii():
         try:
             data.decode("utf-8")
@@ -140,37 +128,31 @@ def _reading(lines: Sequence[str], delimiter: str, decimal: str) -> _Reading:
         split = {k: _cells(x, delimiter) for k, x in enumerate(lines) if x.strip() and not _is_comment(x)}
     except csv.Error:  # a field too large, a stray quote: not this delimiter
         split = {}
-    full = {k: row for k, row in split.items() if any(_is_number(cell, decimal) for cell in row)}
-    width = max(
-        Counter(len(row) for row in full.values()).items(), key=lambda item: (item[1], item[0]), default=(0, 0)
-    )[0]
-    same = {k: row for k, row in split.items() if len(row) == width}
-    rows = [row for row in full.values() if len(row) == width]
+    full = [row for row in split.values() if any(_is_number(cell, decimal) for cell in row)]
+    widths = Counter(len(row) for row in full)
+    width = max(widths, key=lambda w: (widths[w], w), default=0)
+    rows = [row for row in full if len(row) == width]
     numeric = tuple(c for c in range(width) if 2 * sum(_is_number(row[c], decimal) for row in rows) > len(rows))
     score = sum(len(numeric) > 0 and all(_is_number(r[c], decimal) or not r[c] for c in numeric) for r in rows)
+    same = {k: row for k, row in split.items() if len(row) == width}
     others = {k: row for k, row in split.items() if len(row) != width}
     return _Reading(delimiter, decimal, same, others, width, numeric, score * (1 + (len(numeric) > 1)))
 
 
 def _layout(path: Path, lines: Sequence[str]) -> Layout:
-    readings = [_reading(lines, *dialect) for dialect in DIALECTS]
-    best = max(readings, key=lambda r: r.score)
+    best = max((_reading(lines, *dialect) for dialect in DIALECTS), key=lambda r: r.score)
     samples = [k for k in best.cells if best.is_sample(k)]
-    if best.score == 0 or not samples:
-        raise StudyError(f"{path}: no line with numbers is found among the first {len(lines)}; {RIGHT}")
+    expect(best.score and samples, f"{path}: no line with numbers is found among the first {len(lines)}; {EXPECTED}")
     above = [k for k in best.cells if k < samples[0]]
     words = [k for k in above if best.numbers(k) == 0 and any(best.cells[k])]
-    units: list[str] = []
-    if len(words) > 1 and _is_units_row(best.cells[words[-1]]):
-        units = best.cells[words[-1]]
-        words = words[:-1]
-    header = best.cells[words[-1]] if words else _commented(lines[: samples[0]], best)
-    first = min((k for k in above if k > (words[-1] if words else -1) and best.numbers(k)), default=samples[0])
-    odd = next((k for k in best.others if k < first and (k > words[-1] if words else best.is_numbers(k))), None)
+    units = best.cells[words.pop()] if len(words) > 1 and _is_units_row(best.cells[words[-1]]) else []
+    heading = words[-1] if words else -1
+    header = best.cells[heading] if words else _commented(lines[: samples[0]], best)
+    first = min((k for k in above if k > heading and best.numbers(k)), default=samples[0])
+    odd = next((k for k in best.others if heading < k < first and (words or best.is_numbers(k))), None)
     if odd is not None:  # a sample with a cell too many or too few must not be taken for a heading
-        raise StudyError(f"{path}: line {odd + 1} has {len(best.others[odd])} cells; {best.width} are right")
-    names, found = _headings(header, units, best.width)
-    return Layout(best.delimiter, best.decimal, first, names, found)
+        raise StudyError(f"{path}: line {odd + 1} has {len(best.others[odd])} cells; expected {best.width}")
+    return Layout(best.delimiter, best.decimal, first, *_headings(header, units, best.width))
 
 
 def _headings(header: Sequence[str], units: Sequence[str], width: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -199,19 +181,28 @@ def _commented(lines: Sequence[str], best: _Reading) -> list[str]:
 
 
 def _table(path: Path, body: bytes, layout: Layout) -> Table:
-    place = _Place(body, layout.first)
+    place, width = partial(_line, body, layout.first), len(layout.names)
     try:
-        frame = _parse(body, layout, "float64")
-    except pd.errors.ParserError as error:
-        raise StudyError(f"{path}: {_ragged(str(error), place, len(layout.names))}") from None
-    except (ValueError, OverflowError):  # text in a cell: find which
-        return _with_text(path, body, layout, place)
-    _check_width(path, frame, layout)
-    columns = [
-        Column(name, frame[k].to_numpy(dtype=np.float64), unit)
-        for k, (name, unit) in enumerate(zip(layout.names, layout.units, strict=True))
-    ]
-    return Table(_without_empty(columns), place=place)
+        frame, read = _frame(body, layout)
+    except ValueError as error:
+        raise StudyError(f"{path}: {_ragged(str(error), layout, place(0))}") from None
+    hidden = f"{path}: line {layout.first + 1} has {frame.shape[1]} cells of numbers; expected {width}"
+    expect(frame.shape[1] == width, hidden)  # a comment behind the first sample can hide some of its cells
+    headings = zip(layout.names, layout.units, strict=True)
+    columns = [read(name, unit, frame[k], layout.decimal, place) for k, (name, unit) in enumerate(headings)]
+    if read is _numbers:  # a delimiter at the end of each line leaves an unnamed column without a number
+        columns = [c for c in columns if c.name or not bool(np.isnan(c.values).all())]
+    return Table(tuple(columns), place=place)
+
+
+def _frame(body: bytes, layout: Layout) -> tuple[pd.DataFrame, Callable[..., Column]]:
+    """The cells, and how to make a column of them: as numbers at once, or where a cell holds text, cell by cell."""
+    try:
+        return _parse(body, layout, "float64"), _numbers
+    except pd.errors.ParserError:  # cells too many, which the slow road would not mend
+        raise
+    except (ValueError, OverflowError):
+        return _parse(body, layout, "str"), _checked
 
 
 def _parse(body: bytes, layout: Layout, dtype: str) -> pd.DataFrame:
@@ -222,63 +213,33 @@ def _parse(body: bytes, layout: Layout, dtype: str) -> pd.DataFrame:
     )  # fmt: skip
 
 
-def _check_width(path: Path, frame: pd.DataFrame, layout: Layout) -> None:
-    """A comment behind the first sample can hide some of its cells."""
-    if frame.shape[1] != len(layout.names):
-        told = f"line {layout.first + 1} has {frame.shape[1]} cells of numbers"
-        raise StudyError(f"{path}: {told}; {len(layout.names)} are right")
+def _numbers(name: str, unit: str, cells: "pd.Series[Any]", _decimal: str, _place: Place) -> Column:
+    return Column(name, cells.to_numpy(dtype=np.float64), unit)
 
 
-def _with_text(path: Path, body: bytes, layout: Layout, place: "_Place") -> Table:
-    """The slow road: each cell on its own; a column with text says where it stands if it is asked for."""
-    try:
-        frame = _parse(body, layout, "str")
-    except (ValueError, pd.errors.ParserError) as error:
-        raise StudyError(f"{path}: {_ragged(str(error), place, len(layout.names))}") from None
-    _check_width(path, frame, layout)
-    columns: list[Column] = []
-    for k, (name, unit) in enumerate(zip(layout.names, layout.units, strict=True)):
-        cells = [c.strip(SPACE) if isinstance(c, str) else "" for c in frame[k].tolist()]
-        wrong = next((i for i, c in enumerate(cells) if c and not _is_number(c, layout.decimal)), None)
-        if wrong is None:
-            columns.append(Column(name, _floats(cells, layout.decimal), unit))
-            continue
-        shown = cells[wrong] if len(cells[wrong]) <= 30 else f"{cells[wrong][:27]}..."
-        fault = f"column {name!r} holds {shown!r} in {place(wrong)}; a number is right"
-        columns.append(Column(name, NONE, unit, fault=fault))
-    return Table(tuple(columns), place=place)
+def _checked(name: str, unit: str, cells: "pd.Series[Any]", decimal: str, place: Place) -> Column:
+    """Each cell on its own; a column with text says where it stands if it is asked for."""
+    texts = [cell.strip(SPACE) if isinstance(cell, str) else "" for cell in cells.tolist()]
+    wrong = next((i for i, cell in enumerate(texts) if cell and not _is_number(cell, decimal)), None)
+    if wrong is not None:
+        fault = f"column {name!r} holds {short(texts[wrong], 30)!r} in {place(wrong)}; expected a number"
+        return Column(name, NONE, unit, fault=fault)
+    numbers = (cell.replace(",", ".") if decimal == "," else cell for cell in texts)
+    return Column(name, np.array([float(cell) if cell else np.nan for cell in numbers]), unit)
 
 
-def _floats(cells: Sequence[str], decimal: str) -> Floats:
-    text = [c.replace(",", ".") if decimal == "," else c for c in cells]
-    values: NDArray[np.float64] = np.array([float(c) if c else np.nan for c in text])
-    return values
+def _ragged(error: str, layout: Layout, top: str) -> str:
+    width = len(layout.names)
+    numbers = re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", error)
+    if numbers is None:
+        return f"the table cannot be read; {EXPECTED}"
+    if int(numbers[1]) != width:  # the first line is the odd one
+        return f"{top} has {numbers[1]} cells of numbers; expected {width}"
+    return f"line {int(numbers[2]) + layout.first} has {numbers[3]} cells; expected {width} as in the lines above"
 
 
-def _without_empty(columns: Sequence[Column]) -> tuple[Column, ...]:
-    """All but unnamed columns without a number: what a delimiter at the end of each line leaves."""
-    return tuple(c for c in columns if c.name or not bool(np.isnan(c.values).all()))
-
-
-def _ragged(error: str, place: "_Place", width: int) -> str:
-    found = re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", error)
-    if found is None:
-        return f"the table cannot be read; {RIGHT}"
-    if int(found[1]) != width:  # the first line is the odd one
-        return f"{place(0)} has {found[1]} cells of numbers; {width} are right"
-    return f"line {int(found[2]) + place.first} has {found[3]} cells; {width} as in the lines above are right"
-
-
-@dataclass(frozen=True)
-class _Place:
+def _line(body: bytes, first: int, index: int) -> str:
     """In which line of the file a sample stands."""
-
-    body: bytes
-    first: int
-
-    def __call__(self, index: int) -> str:
-        samples = (
-            k for k, line in enumerate(self.body.decode("utf-8", errors="replace").split("\n"))
-            if line.strip() and not _is_comment(line)
-        )  # fmt: skip
-        return f"line {next((k for i, k in enumerate(samples) if i == index), index) + self.first + 1}"
+    lines = enumerate(body.decode("utf-8", errors="replace").split("\n"))
+    samples = (k for k, line in lines if line.strip() and not _is_comment(line))
+    return f"line {next(islice(samples, index, None), index) + first + 1}"
