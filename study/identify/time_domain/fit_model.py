@@ -204,7 +204,8 @@ def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
         coarse, fine = (run_of(fit, prepared, finer=n).respond({}, fit.initial)[0] for n in (1, 2))
         moved = least_squares(jacobian, np.subtract(coarse, fine), 1e-12)
         deviations = np.sqrt(np.diag(clustered_covariance(jacobian, fit.residual)))
-        excess = float(np.max(np.abs(moved) / np.maximum(SHIFT * deviations, np.finfo(float).tiny)))
+        with np.errstate(over="ignore"):  # where nothing is left, any shift is beyond all measure
+            excess = float(np.max(np.abs(moved) / np.maximum(SHIFT * deviations, np.finfo(float).tiny)))
         if excess <= 1.0:
             break
         times = 2 ** max(1, math.ceil(math.log2(min(excess, FAR)) / ORDER))
