@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from study.compare.fitted_coefficients import Coefficient
 
@@ -61,7 +61,7 @@ def _level(force: tuple[float, ...], row: Sequence[Coefficient], tests: int) -> 
     error = np.array([c.error or 0.0 for c in row])
     weight = 1.0 / np.maximum(error, np.finfo(float).eps * np.max(np.abs(value))) ** 2
     mean = float(np.sum(weight * value) / np.sum(weight))
-    p_value = float(chi2.sf(np.sum(weight * (value - mean) ** 2), len(row) - 1))
+    p_value = float(chdtrc(len(row) - 1, np.sum(weight * (value - mean) ** 2)))
     change = float(np.ptp(value)) / abs(mean) if mean else 0.0
     return Level(
         row[0].key, row[0].unit, force, tuple(float(v) for v in value), tuple(float(e) for e in error),

@@ -1,7 +1,7 @@
 """A term added to a fitted model: the fit begins where the candidate ended, and never ends worse."""
 
 from study.compare.comparison import Comparison, compare
-from study.diagnose.verdict import SEARCHED, search_base
+from study.diagnose.verdict import search_base, search_part
 from study.equations.model import free
 from study.equations.terms import Term
 from study.identify.time_domain.fit_model import continued, settled, with_term
@@ -16,6 +16,6 @@ def added(comparison: Comparison, term: Term) -> Comparison:
         If the model with it has no finite response.
     """
     prepared, base = comparison.prepared, search_base(comparison)
-    fit = with_term(base.fit, free(term), base, prepared.shortened(SEARCHED))
+    fit = with_term(base.fit, free(term), base, search_part(prepared))
     fit = settled(continued(fit, prepared), prepared)
     return compare(comparison.model.with_term(term), prepared, fit=fit)

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import rfft, rfftfreq
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -42,7 +42,7 @@ class Curve:
         """Probability of values as different as these if the coefficient were a constant (chi square)."""
         weight = 1.0 / np.maximum(self.error, 1e-300) ** 2
         mean = np.sum(weight * self.value.real) / np.sum(weight)
-        return float(chi2.sf(np.sum(weight * (self.value.real - mean) ** 2), max(len(self.value) - 1, 1)))
+        return float(chdtrc(max(len(self.value) - 1, 1), np.sum(weight * (self.value.real - mean) ** 2)))
 
     def spread(self) -> float:
         """Root mean square deviation from the mean that its errors do not account for, relative to it."""

@@ -54,12 +54,13 @@ def best_pair(rows: Sequence[Ranked], base: Baseline, prepared: Prepared) -> Pai
         The record and which parts of it are fitted and judged.
     """
     order = {row.name: i for i, row in enumerate(rows)}
-    held = tuple(key for key in base.fit.model.values if key not in base.fit.keys)
 
     def one(start: PairStart) -> Pair | None:
         first, second = sorted(start.names, key=lambda name: order[name])
         try:
-            return pair_of((first, second), fit_part(start.model, prepared, held, max_iterations=TRIED), prepared)
+            return pair_of(
+                (first, second), fit_part(start.model, prepared, base.fit.held, max_iterations=TRIED), prepared
+            )
         except StudyError:
             return None
 

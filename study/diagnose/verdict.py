@@ -34,7 +34,7 @@ FORGIVEN = 0.1  # of the unexplained power: what explains less of a good model's
 ENOUGH = 0.99  # of the unexplained power: what explains so much is missing, whatever is missing besides
 LACK = 0.03  # held-out share of a residual that general shapes of the motion must explain to be more than chance
 CHANCE = 1e-3  # p value of a single one of these shapes, all of them accounted for
-SEARCHED = 16384  # samples of the fitting part that the search uses
+SHORT, LONG = 2048, 16384  # samples: a search uses half of the fitting part, within these limits
 SETTLED = 6  # of the candidates, the best: fitted on the whole fitting part and with enough steps
 PAIRED = 1  # the best so many candidates are tried together with every other
 
@@ -89,7 +89,7 @@ def diagnose(
     """
     prepared = comparison.prepared
     base = search_base(comparison)
-    look = prepared.shortened(SEARCHED)
+    look = search_part(prepared)
     tried = candidates.try_all(candidates.candidate_terms(base, extra, without), base, look, progress)
     rows = rank(with_best_settled(tried, prepared), comparison.prediction.residual, prepared)
     verdict, rows, left, pair = _decide(rows, base, comparison)
@@ -97,19 +97,24 @@ def diagnose(
     return Diagnosis(verdict, comparison, tuple(rows), left, pair, families)
 
 
+def search_part(prepared: Prepared) -> Prepared:
+    """The record with as much to fit as a search uses: enough to tell candidates apart, and sooner done."""
+    first, last = prepared.plan.fit
+    return prepared.shortened(int(np.clip((last - first) // 2, SHORT, LONG)))
+
+
 def search_base(comparison: Comparison) -> Baseline:
     """The fitted model as candidates are tried beside it: on no more samples, in no more steps, than a search takes."""
-    look = comparison.prepared.shortened(SEARCHED)
+    look = search_part(comparison.prepared)
     return shape_search.baseline(_at_search_steps(comparison.fit, look), look)
 
 
 def _at_search_steps(fit: FreeRunFit, look: Prepared) -> FreeRunFit:
     """A fit on the stretch that the search uses, from where it stands."""
-    held = tuple(key for key in fit.model.values if key not in fit.keys)
     try:
-        return fit_part(fit.model, look, held)
+        return fit_part(fit.model, look, fit.held)
     except DivergenceError:  # stiff: nothing runs with fewer steps
-        return fit_part(fit.model, look, held, steps=fit.steps_per_sample)
+        return fit_part(fit.model, look, fit.held, steps=fit.steps_per_sample)
 
 
 def with_best_settled(tried: Sequence[Candidate], prepared: Prepared) -> list[Candidate]:
@@ -166,7 +171,7 @@ def _explaining_pair(rows: list[Ranked], base: Baseline, prepared: Prepared) -> 
 
     First the best of those that the reverse system puts first; then the first candidates with every other.
     """
-    look = prepared.shortened(SEARCHED)
+    look = search_part(prepared)
     pair = pairs.best_pair(rows, base, look)
     if pair is not None and _explains(pair, rows, look):
         return pair
@@ -199,7 +204,7 @@ def _lack(fit: FreeRunFit, prediction: Prediction) -> float:
 
     Structure that is as broad as noise is not seen in a spectrum; it still depends on the motion.
     """
-    look = prediction.prepared.shortened(min(len(fit.residual), SEARCHED))
+    look = prediction.prepared.shortened(min(len(fit.residual), LONG))
     left = dependence.leftover(shape_search.baseline(continued(fit, look), look), look)
     shares = dependence.explained_by(left)
     share = max(share for name, share in shares.items() if name != "time")

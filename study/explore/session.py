@@ -16,7 +16,7 @@ from study.diagnose import candidates
 from study.diagnose.candidates import Candidate
 from study.diagnose.diagnosis_files import in_words
 from study.diagnose.ranking import Ranked, rank
-from study.diagnose.verdict import SEARCHED, Diagnosis, diagnose, search_base
+from study.diagnose.verdict import Diagnosis, diagnose, search_base, search_part
 from study.equations import formulas
 from study.equations.model import Model
 from study.equations.terms import LIBRARY, Term, custom
@@ -175,7 +175,7 @@ def own_term(session: Session, text: str) -> Term:
 def _attempted(term: Term, session: Session) -> Candidate | None:
     """The present model with a term, fitted as the candidates of its diagnosis were; None if it cannot run."""
     prepared = session.prepared
-    attempt = candidates.attempt(term, search_base(session.now.comparison), prepared.shortened(SEARCHED))
+    attempt = candidates.attempt(term, search_base(session.now.comparison), search_part(prepared))
     return None if attempt is None else candidates.all_settled([attempt], prepared)[0]
 
 

@@ -68,9 +68,11 @@ class Prepared:
         return replace(self, plan=replace(self.plan, fit=(first, last)))
 
     def shortened(self, samples: int) -> "Prepared":
-        """The same with no more than so many samples to fit."""
+        """The same with no more than so many samples to fit: those that the judging part follows, if it does."""
         first, last = self.plan.fit
-        return self if last - first <= samples else self.with_fit(first, first + samples)
+        if last - first <= samples:
+            return self
+        return self.with_fit(*((last - samples, last) if self.plan.judge[0] == last else (first, first + samples)))
 
 
 def prepare_record(record: Record, plan: Plan | None = None, cutoff: float | None = None) -> Prepared:

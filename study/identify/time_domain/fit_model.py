@@ -101,7 +101,6 @@ def with_term(fit: FreeRunFit, entry: ModelTerm, base: Baseline, prepared: Prepa
     StudyError
         If none of them has a finite response.
     """
-    held = tuple(key for key in fit.model.values if key not in fit.keys)
     given = {key: value for key, value in entry.values.items() if value is not None}
     known = fit.model.numbers()
     grown = fit.model.with_term(entry)
@@ -111,7 +110,7 @@ def with_term(fit: FreeRunFit, entry: ModelTerm, base: Baseline, prepared: Prepa
         anew = _reversed(grown.with_values(starts[0]), prepared) or base.linear
         starts.append(starts[0] | {k: v for k, v in anew.items() if k in (*fit.keys, *entry.term.symbols)} | given)
     try:
-        return best_fit(grown, prepared, starts, (*held, *given))
+        return best_fit(grown, prepared, starts, (*fit.held, *given))
     except StudyError:
         missing = ", ".join(key for key, value in entry.values.items() if value is None)
         raise StudyError(
@@ -150,10 +149,9 @@ def best_fit(
 
 def continued(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit on another part of the record, such as the whole fitting part behind a search, from where it stands."""
-    if len(fit.residual) == len(prepared.fitted):
+    if fit.span == prepared.plan.fit:
         return fit
-    held = tuple(key for key in fit.model.values if key not in fit.keys)
-    return fit_part(fit.model, prepared, held, steps=fit.steps_per_sample, max_iterations=KEPT)
+    return fit_part(fit.model, prepared, fit.held, steps=fit.steps_per_sample, max_iterations=KEPT)
 
 
 def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
@@ -161,21 +159,20 @@ def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     fit = with_enough_steps(fit, prepared)
     if _stands(fit, prepared):
         return fit
-    held = tuple(key for key in fit.model.values if key not in fit.keys)
     best = begin = fit
     if not is_chaotic(fit, prepared):  # which a fit at wrong values may not, where the true system does
-        near = _from_segments(fit.model, prepared, held, fit.steps_per_sample)
+        near = _from_segments(fit.model, prepared, fit.held, fit.steps_per_sample)
         best = _better(fit, near) or fit
         if near is None or _stands(best, prepared) or not is_chaotic(near, prepared):
             return best
         begin = near
     try:
         apart = fit_in_segments(
-            begin.model, prepared.record, held=held, response=prepared.response, span=prepared.plan.fit,
+            begin.model, prepared.record, held=fit.held, response=prepared.response, span=prepared.plan.fit,
             steps_per_sample=fit.steps_per_sample,
         )  # fmt: skip
         together = fit_part(
-            apart.model, prepared, held, steps=fit.steps_per_sample, initial=np.atleast_2d(apart.initial)[:1]
+            apart.model, prepared, fit.held, steps=fit.steps_per_sample, initial=np.atleast_2d(apart.initial)[:1]
         )
     except DivergenceError:  # where segments fail as well, the one free run is what there is
         return best
@@ -197,7 +194,6 @@ def _stands(fit: FreeRunFit, prepared: Prepared) -> bool:
 
 def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit with so many steps per sample that halving them shifts no coefficient by what its error shows."""
-    held = tuple(key for key in fit.model.values if key not in fit.keys)
     most = max(MOST_STEPS, needed_steps(fit.model, prepared.record, prepared.response).rough)
     while fit.keys and fit.steps_per_sample < most:
         jacobian = linearise(fit, prepared)
@@ -210,7 +206,7 @@ def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
             break
         times = 2 ** max(1, math.ceil(math.log2(min(excess, FAR)) / ORDER))
         fit = fit_part(
-            fit.model, prepared, held, steps=min(times * fit.steps_per_sample, most),
+            fit.model, prepared, fit.held, steps=min(times * fit.steps_per_sample, most),
             initial=np.atleast_2d(fit.initial),
         )  # fmt: skip
     return fit

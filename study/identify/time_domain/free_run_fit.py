@@ -48,6 +48,8 @@ class FreeRunFit:
         Free runs that were made.
     message : str
         How the fit ended, in a sentence.
+    first : int
+        Sample of the record at which the fitted part begins.
     restarts : tuple of int
         Samples of the record at which segments after the first begin.
     steps_per_sample : int
@@ -64,7 +66,18 @@ class FreeRunFit:
     iterations: int
     message: str
     restarts: tuple[int, ...] = ()
+    first: int = 0
     steps_per_sample: int = 2
+
+    @property
+    def span(self) -> tuple[int, int]:
+        """First sample of the record that was fitted, and the one after the last."""
+        return self.first, self.first + len(self.residual)
+
+    @property
+    def held(self) -> tuple[str, ...]:
+        """Keys of the model that were not estimated."""
+        return tuple(key for key in self.model.values if key not in self.keys)
 
     @property
     def rms(self) -> float:
@@ -144,7 +157,9 @@ def fit_free_run(
     positive = tuple(key for entry in model.terms for key in entry.term.positive if key in begin)
     problem = _Problem(run, measured, free, _weights(continuity, measured, states), positive)
     end = problem.search(np.array([*begin.values(), *states.ravel()]), max_iterations, offset)
-    return replace(_result(model, problem, end), restarts=tuple(restarts), steps_per_sample=steps_per_sample)
+    return replace(
+        _result(model, problem, end), restarts=tuple(restarts), first=first, steps_per_sample=steps_per_sample
+    )
 
 
 def _weights(continuity: float, measured: Floats, states: Floats) -> Floats | None:

@@ -85,8 +85,7 @@ def is_poor(fit: FreeRunFit, measured: Floats) -> bool:
 
 def is_chaotic(fit: FreeRunFit, prepared: Prepared) -> bool:
     """Whether disturbances of a fitted free run grow along the part that it was fitted to."""
-    record, response, first = prepared.record, prepared.response, prepared.plan.fit[0]
-    span = (first, first + len(fit.residual))
+    record, response, span = prepared.record, prepared.response, fit.span
     segments = ShootingSegments(record, response, span, even_restarts(record, response, span), fit.steps_per_sample)
     states = segments.passing(fit.model, fit.restarts, fit.initial)
     return bool(needed_restarts(fit.model, record, states, span, segments.restarts, fit.steps_per_sample))

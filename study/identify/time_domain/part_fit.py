@@ -46,10 +46,9 @@ def run_of(
     fit: FreeRunFit, prepared: Prepared, keys: Sequence[str] = (), *, motion: str | None = None, finer: int = 1
 ) -> FreeRun:
     """The free run of a fit along the samples that it was fitted to, ``finer`` times as many steps taken."""
-    first = prepared.plan.fit[0]
     return prepare(
         fit.model, prepared.record, keys, response=motion or prepared.response,
-        steps_per_sample=finer * fit.steps_per_sample, span=(first, first + len(fit.residual)), restarts=fit.restarts,
+        steps_per_sample=finer * fit.steps_per_sample, span=fit.span, restarts=fit.restarts,
     )  # fmt: skip
 
 
@@ -116,8 +115,8 @@ def judging_run(fit: FreeRunFit, prepared: Prepared) -> JudgingRun:
         If it leaves the range of finite numbers.
     """
     plan = prepared.plan
-    if plan.judge[0] == plan.fit[1] and not fit.restarts:
-        return JudgingRun(fit, prepared, plan.fit[0], fit.initial)
+    if plan.judge[0] == fit.span[1] and not fit.restarts:
+        return JudgingRun(fit, prepared, fit.first, fit.initial)
     again = fit_free_run(
         fit.model, prepared.record, held=tuple(fit.model.values), response=plan.response,
         steps_per_sample=fit.steps_per_sample, span=plan.judge,
