@@ -91,7 +91,7 @@ def missing_force(model: Model, keys: Sequence[str], prediction: Prediction) -> 
         Free run and measured response.
     """
     noise, prepared = prediction.noise, prediction.prepared
-    gate = above_noise(noise, prediction.low)
+    gate = above_noise(noise, prepared.band[0])
     motion = _motion(prediction, gate, noise.frequency)
     part = prepared.record.part(*prepared.plan.judge)
     named = part.with_channels(dict(zip(MOTIONS, motion, strict=True)))
@@ -114,7 +114,8 @@ def missing_force(model: Model, keys: Sequence[str], prediction: Prediction) -> 
 def _edge(prediction: Prediction, width: float) -> int:
     """Half the memory of the gate, and what an integration needs to settle; at most an eighth of all."""
     memory = 0.5 / (width * prediction.dt)
-    settling = SETTLED / (prediction.low * prediction.dt) if prediction.low > 0.0 else 0.0
+    low = prediction.prepared.band[0]
+    settling = SETTLED / (low * prediction.dt) if low > 0.0 else 0.0
     return min(round(max(memory, settling)), len(prediction.measured) // 8)
 
 
@@ -134,7 +135,7 @@ def _motion(prediction: Prediction, gate: NDArray[np.bool_], frequency: Floats) 
     parts: list[Floats] = []
     for row in range(3):
         order = row - prediction.row
-        low = prediction.low if order < 0 else 0.0
+        low = prediction.prepared.band[0] if order < 0 else 0.0
         moved = derivative(prediction.difference, prediction.dt, order, low) if order else prediction.difference
         parts.append(_filtered(moved, prediction.dt, frequency, gate.astype(np.float64)))
     return prediction.motion + np.stack(parts)

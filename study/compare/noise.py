@@ -81,7 +81,7 @@ def noise_of(difference: Floats, residual: Floats, prepared: Prepared, numerical
     numerical : float
         Rms error of the integration, below which no noise can be seen.
     """
-    low, dt = prepared.band[0], prepared.dt
+    low, dt = prepared.low, prepared.dt
     cut = segments_of(len(difference))
     frequency, density = autospectrum(difference, dt, cut)
     floor = noise_floor.floor(difference, dt, low)

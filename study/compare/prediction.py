@@ -51,8 +51,8 @@ class Prediction:
 
     @property
     def low(self) -> float:
-        """Frequency in hertz below which nothing is judged (the cut-off of an integration), or 0."""
-        return self.prepared.band[0]
+        """Frequency in hertz below which nothing is judged (the cut-off that was given), or 0."""
+        return self.prepared.low
 
     @property
     def row(self) -> int:

@@ -21,11 +21,14 @@ class Prepared:
     plan : Plan
         The measured response, the part to fit and the part to judge.
     band : (float, float)
-        Lowest and highest frequency in hertz at which all three motions are valid; judgements are limited to it.
+        Lowest and highest frequency in hertz at which all three motions are valid; the error of the force is
+        limited to it, that of the measured response is not.
     edge : int
         Samples at each end that derivatives and integrals leave uncertain.
     notes : tuple of str
         What was converted or computed, a sentence each.
+    low : float
+        Frequency in hertz below which the user wants nothing judged: the cut-off that was given, or 0.
     """
 
     record: Record
@@ -33,6 +36,7 @@ class Prepared:
     band: tuple[float, float]
     edge: int
     notes: tuple[str, ...] = ()
+    low: float = 0.0
 
     @property
     def response(self) -> str:
@@ -82,7 +86,8 @@ def prepare_record(record: Record, plan: Plan | None = None, cutoff: float | Non
     errors it raises.
     """
     completed = complete(record, cutoff)
-    return Prepared(completed.record, plan or make_plan(record), completed.band, completed.edge, completed.notes)
+    plan, low = plan or make_plan(record), cutoff or 0.0
+    return Prepared(completed.record, plan, completed.band, completed.edge, completed.notes, low)
 
 
 def whole(record: Record, response: str = "displacement") -> Prepared:
