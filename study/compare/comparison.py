@@ -35,48 +35,20 @@ CHAOTIC = (
 
 @dataclass(frozen=True)
 class Comparison:
-    """A model held against one record.
+    """A model held against one record."""
 
-    Attributes
-    ----------
-    model : Model
-        As it was given.
-    prepared : Prepared
-        The record with all three motions in consistent units; what was fitted and what is judged.
-    fit : FreeRunFit
-        The fit.
-    coefficients : tuple of Coefficient
-        Every value with its interval and unit.
-    prediction : Prediction
-        Measured and predicted response on the judging part, error and noise floor.
-    force : ForceError
-        The error in reverse.
-    bands : tuple of Band
-        Where in frequency most of the unexplained power of response and force lies.
-    missing_force : MissingForce
-        The force that the model lacks.
-    growths : Growths or None
-        What it grows with; None where nothing stands above the noise.
-    time : AlongTime
-        Whether the error changes along the record.
-    notes : tuple of str
-        What was converted, integrated or left out.
-    estimator : str
-        What found the coefficients.
-    """
-
-    model: Model
-    prepared: Prepared
+    model: Model  # as it was given
+    prepared: Prepared  # the record with all three motions in consistent units; what was fitted and what is judged
     fit: FreeRunFit
-    coefficients: tuple[Coefficient, ...]
-    prediction: Prediction
-    force: ForceError
-    bands: tuple[Band, ...]
-    missing_force: MissingForce
-    growths: Growths | None
-    time: AlongTime
-    notes: tuple[str, ...]
-    estimator: str = FREE_RUN
+    coefficients: tuple[Coefficient, ...]  # every value with its interval and unit
+    prediction: Prediction  # measured and predicted response on the judging part, error and noise floor
+    force: ForceError  # the error in reverse
+    bands: tuple[Band, ...]  # where in frequency most of the unexplained power of response and force lies
+    missing_force: MissingForce  # the force that the model lacks
+    growths: Growths | None  # what it grows with; None where nothing stands above the noise
+    time: AlongTime  # whether the error changes along the record
+    notes: tuple[str, ...]  # what was converted, integrated or left out
+    estimator: str = FREE_RUN  # what found the coefficients
 
     @property
     def record(self) -> Record:

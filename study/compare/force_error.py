@@ -28,36 +28,16 @@ ABOVE = 2.0  # the motion stands above its noise where its density is at least s
 
 @dataclass(frozen=True)
 class ForceError:
-    """Unexplained share of the force on the judging part; q inputs, arrays of shape (lines,).
+    """Unexplained share of the force on the judging part; q inputs, arrays of shape (lines,)."""
 
-    Attributes
-    ----------
-    frequency : array
-        In hertz.
-    force : array
-        Autospectral density of the force.
-    unexplained : array
-        1 - multiple coherence, corrected for the degrees of freedom that the inputs take.
-    parametric : array
-        Density of what the fitted coefficients leave of the force, over that of the force.
-    noise : array
-        Share that noise on the response alone makes of it, to first order: ``|A_u|^2 G_nn / G_FF``.
-    cumulative : array, shape (q, lines)
-        Cumulative coherences, one input after the other.
-    inputs : tuple of Input
-        What the inputs are.
-    band : bool array
-        Lines on which the motion stands above its noise and the force has power.
-    """
-
-    frequency: Floats
-    force: Floats
-    unexplained: Floats
-    parametric: Floats
-    noise: Floats
-    cumulative: Floats
+    frequency: Floats  # in hertz
+    force: Floats  # autospectral density of the force
+    unexplained: Floats  # 1 - multiple coherence, corrected for the degrees of freedom that the inputs take
+    parametric: Floats  # density of what the fitted coefficients leave of the force, over that of the force
+    noise: Floats  # share that noise on the response alone makes of it, to first order: ``|A_u|^2 G_nn / G_FF``
+    cumulative: Floats  # cumulative coherences, one input after the other; shape (q, lines)
     inputs: tuple[Input, ...]
-    band: NDArray[np.bool_]
+    band: NDArray[np.bool_]  # lines on which the motion stands above its noise and the force has power
 
     @property
     def highest(self) -> float:

@@ -33,40 +33,18 @@ LEAST_DAMPING = 0.02  # of critical, in the weight that a line has
 
 @dataclass(frozen=True)
 class MissingForce:
-    """The missing force on the judging part; n samples.
+    """The missing force on the judging part; n samples."""
 
-    Attributes
-    ----------
-    displacement, velocity : arrays, shape (n,)
-        The motion, free of noise.
-    force : array, shape (n,)
-        Measured force less inertia and all forces of the model, in the unit of force.
-    free : array, shape (n, p)
-        Derivatives of that by each coefficient that was fitted: what a refit could still take over.
-    gate : bool array, shape (lines,)
-        Lines of ``frequency`` on which the difference stands above the noise.
-    weight : array, shape (lines,)
-        Response of the best linear oscillator to a unit force: noise is white behind it.
-    frequency : array, shape (lines,)
-        In hertz.
-    noise : float
-        Mean square of the noise that is left in :meth:`weighted` ``force``.
-    dt : float
-        Sampling interval in seconds.
-    edge : int
-        Samples at each end which filters and integrals leave unsure.
-    """
-
-    displacement: Floats
-    velocity: Floats
-    force: Floats
-    free: Floats
-    gate: NDArray[np.bool_]
-    weight: Floats
-    frequency: Floats
-    noise: float
-    dt: float
-    edge: int
+    displacement: Floats  # free of noise; shape (n,)
+    velocity: Floats  # the same
+    force: Floats  # measured force less inertia and all forces of the model, in the unit of force; shape (n,)
+    free: Floats  # its derivatives by each fitted coefficient: what a refit could take over; shape (n, p)
+    gate: NDArray[np.bool_]  # lines of ``frequency`` on which the difference stands above the noise; shape (lines,)
+    weight: Floats  # response of the best linear oscillator to a unit force: noise is white behind it; shape (lines,)
+    frequency: Floats  # in hertz; shape (lines,)
+    noise: float  # mean square of the noise that is left in :meth:`weighted` ``force``
+    dt: float  # sampling interval in seconds
+    edge: int  # samples at each end which filters and integrals leave unsure
 
     @property
     def inner(self) -> slice:

@@ -23,21 +23,11 @@ NEVER_CANDIDATES = ("inertia",)
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A candidate as fitted.
+    """A candidate as fitted."""
 
-    Attributes
-    ----------
-    term : Term
-        The effect.
-    fit : FreeRunFit
-        The model with it, fitted on the fitting part.
-    prediction : Prediction
-        Its free run along the judging part.
-    """
-
-    term: Term
-    fit: FreeRunFit
-    prediction: Prediction
+    term: Term  # the effect
+    fit: FreeRunFit  # the model with it, fitted on the fitting part
+    prediction: Prediction  # its free run along the judging part
 
     @property
     def unphysical(self) -> bool:

@@ -34,31 +34,15 @@ LONGEST = 16384  # samples of either part that are looked at
 
 @dataclass(frozen=True)
 class Leftover:
-    """A free run and what it leaves unexplained, on the fitting part and then on the judging part.
+    """A free run and what it leaves unexplained, on the fitting part and then on the judging part."""
 
-    Attributes
-    ----------
-    displacement, velocity : array, shape (n,)
-        Of the free run, over their standard deviations.
-    residual : array, shape (n,)
-        Measured minus predicted response.
-    own : array, shape (n, p)
-        Derivatives of the response to the model's own coefficients and initial state.
-    shapes : dict of array, shape (n, shapes)
-        What forces that are functions of displacement, velocity and both add to the response.
-    split : int
-        Samples of the fitting part.
-    base : Baseline
-        Of the fitted model: its transfer passes other forces, its residual holds the lines.
-    """
-
-    displacement: Floats
-    velocity: Floats
-    residual: Floats
-    own: Floats
-    shapes: Mapping[str, Floats]
-    split: int
-    base: Baseline
+    displacement: Floats  # of the free run, over its standard deviation; shape (n,)
+    velocity: Floats  # the same
+    residual: Floats  # measured minus predicted response; shape (n,)
+    own: Floats  # derivatives of the response to the model's own coefficients and initial state; shape (n, p)
+    shapes: Mapping[str, Floats]  # what functions of displacement, velocity, both add to the response; (n, shapes)
+    split: int  # samples of the fitting part
+    base: Baseline  # of the fitted model: its transfer passes other forces, its residual holds the lines
 
 
 def leftover(base: Baseline, prepared: Prepared) -> Leftover:

@@ -29,18 +29,10 @@ TRIED = 10  # pairs that each of the two answers puts first
 
 @dataclass(frozen=True)
 class PairStart:
-    """Two candidates and where their fit begins.
+    """Two candidates and where their fit begins."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        The two.
-    model : Model
-        The model with both, every value given.
-    """
-
-    names: tuple[str, str]
-    model: Model
+    names: tuple[str, str]  # the two
+    model: Model  # the model with both, every value given
 
 
 def promising(rows: Sequence[Ranked], base: Baseline, prepared: Prepared) -> list[PairStart]:

@@ -24,21 +24,11 @@ SAME = 1e-4  # of the unexplained power: pairs that leave less than this leave n
 
 @dataclass(frozen=True)
 class Pair:
-    """Two candidates fitted together.
+    """Two candidates fitted together."""
 
-    Attributes
-    ----------
-    names : pair of str
-        The one that explains more alone comes first.
-    fit : FreeRunFit
-        The model with both.
-    prediction : Prediction
-        Its free run along the judging part.
-    """
-
-    names: tuple[str, str]
-    fit: FreeRunFit
-    prediction: Prediction
+    names: tuple[str, str]  # the one that explains more alone comes first
+    fit: FreeRunFit  # the model with both
+    prediction: Prediction  # its free run along the judging part
 
 
 def best_pair(rows: Sequence[Ranked], base: Baseline, prepared: Prepared) -> Pair | None:

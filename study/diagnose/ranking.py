@@ -33,44 +33,20 @@ EXAMINED = 6  # candidates whose coefficient is followed along frequency and amp
 
 @dataclass(frozen=True)
 class Ranked:
-    """One candidate.
+    """One candidate."""
 
-    Attributes
-    ----------
-    term : Term
-        The effect.
-    fit : FreeRunFit
-        The model with it.
-    gain : Gain
-        What it explains of the held-out residual, with the p value of one comparison.
-    p_value : float
-        The same with the number of candidates accounted for (Bonferroni).
-    coefficient, error : float
-        Its size (amplitude, for an effect of any phase) and standard error.
-    parameters : dict
-        Shape parameters, and the phase of an effect of any phase.
-    parameter_errors : dict
-        Their standard errors.
-    flatness : Curve or None
-        The coefficient along frequency, for the first few.
-    steadiness : Curve or None
-        The coefficient along amplitude.
-    tied_with : tuple of str
-        Candidates that this record cannot tell from it.
-    """
-
-    term: Term
-    fit: FreeRunFit
+    term: Term  # the effect
+    fit: FreeRunFit  # the model with it
     prediction: Prediction
-    gain: Gain
-    p_value: float
-    coefficient: float
-    error: float
-    parameters: dict[str, float]
-    parameter_errors: dict[str, float]
-    flatness: Curve | None
-    steadiness: Curve | None
-    tied_with: tuple[str, ...]
+    gain: Gain  # what it explains of the held-out residual, with the p value of one comparison
+    p_value: float  # the same with the number of candidates accounted for (Bonferroni)
+    coefficient: float  # its size: the amplitude, for an effect of any phase
+    error: float  # standard error of that
+    parameters: dict[str, float]  # shape parameters, and the phase of an effect of any phase
+    parameter_errors: dict[str, float]  # their standard errors
+    flatness: Curve | None  # the coefficient along frequency, for the first few
+    steadiness: Curve | None  # the coefficient along amplitude
+    tied_with: tuple[str, ...]  # candidates that this record cannot tell from it
 
     @property
     def name(self) -> str:

@@ -34,27 +34,13 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Order:
-    """A trial to be run.
+    """A trial to be run."""
 
-    Attributes
-    ----------
-    kind : str
-        ``single``, ``none``, ``pair`` or ``removed``.
-    seed : int
-        Of the trial.
-    hidden : tuple of str
-        Effects to hide.
-    noise : float
-        Mean square of the noise over that of the response.
-    response : str
-        What is measured.
-    """
-
-    kind: str
-    seed: int
-    hidden: tuple[str, ...]
-    noise: float
-    response: str
+    kind: str  # ``single``, ``none``, ``pair`` or ``removed``
+    seed: int  # of the trial
+    hidden: tuple[str, ...]  # effects to hide
+    noise: float  # mean square of the noise over that of the response
+    response: str  # what is measured
 
 
 def orders(settings: TrialSettings) -> list[Order]:

@@ -55,30 +55,16 @@ IN_WORDS = _names("""
 
 
 class Statement(Row):
-    """One row: a statement, with its number where it has one.
-
-    Attributes
-    ----------
-    id : str
-        A claim's name; further numbers of the same claim are ``<claim>.<name>``.
-    where : str
-        Section, figure or table.
-    what : str
-        The statement in a sentence, or what the number is.
-    value : float or None
-        The number.
-    unit : str
-        Its unit.
-    """
+    """One row: a statement, with its number where it has one."""
 
     id: Annotated[
         str,
         Field(pattern=r"^[a-z0-9_]+([.][a-z0-9_]+)*\Z", description="names of a to z, 0 to 9 and _ with dots between"),
-    ]
-    where: Text
-    what: Text
-    value: Annotated[float | None, BeforeValidator(lambda cell: None if cell == "" else cell)]
-    unit: str
+    ]  # a claim's name; further numbers of the same claim are ``<claim>.<name>``
+    where: Text  # section, figure or table
+    what: Text  # the statement in a sentence, or what the number is
+    value: Annotated[float | None, BeforeValidator(lambda cell: None if cell == "" else cell)]  # the number
+    unit: str  # its unit
 
     @model_validator(mode="after")
     def _bounded(self) -> Self:
