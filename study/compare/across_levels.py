@@ -29,12 +29,7 @@ class Level:
 def levels(force: Sequence[float], records: Sequence[Sequence[Coefficient]]) -> tuple[Level, ...]:
     """Hold the estimates of several records against each other; what was held is left out.
 
-    Parameters
-    ----------
-    force : sequence of float
-        Rms force of each record's fitting part.
-    records : sequence of sequences of Coefficient
-        The same model's coefficients in each record.
+    ``force`` is the rms force of each record's fitting part, ``records`` the same model's coefficients in each.
     """
     by_key = [c for c in zip(*records, strict=True) if not c[0].held]
     return tuple(_level(tuple(force), row, len(by_key)) for row in by_key)

@@ -77,21 +77,10 @@ def compare(
 ) -> Comparison:
     """Fit what a model leaves open to one part of a record and judge it on the other.
 
-    Parameters
-    ----------
-    model : Model
-        Values that it gives are held, the others fitted.
-    prepared : Prepared
-        The record and its parts.
-    start : mapping of float, optional
-        Values to begin the fit from, one for each that is fitted; searched for if left out.
-    fit : FreeRunFit, optional
-        The fit itself, where there is one already.
-    estimator : str
-        What finds the coefficients: the fit in free run, or one of ``study.identify.estimators``. With
-        ``local_polynomial`` the error of the force is free of leakage too.
-    progress : callable, optional
-        Called with what is being done, ``STEPS`` times.
+    ``start`` holds values to begin the fit from, one for each that is fitted (searched for if left out), ``fit`` the
+    fit itself where there is one already. ``estimator`` finds the coefficients: the fit in free run, or one of
+    ``study.identify.estimators``; with ``local_polynomial`` the error of the force is free of leakage too. ``progress``
+    is called with what is being done, ``STEPS`` times.
 
     Raises
     ------

@@ -67,13 +67,6 @@ class ForceError:
 def force_error(model: Model, prediction: Prediction) -> ForceError:
     """Judge a fitted model in reverse on the judging part.
 
-    Parameters
-    ----------
-    model : Model
-        Every value known.
-    prediction : Prediction
-        What the model predicts of the judging part, and its noise.
-
     Raises
     ------
     StudyError

@@ -50,13 +50,7 @@ class Growths:
 
 
 def growths(lacking: MissingForce) -> Growths | None:
-    """Hold the missing force against powers of displacement and velocity; None if there is nothing to explain.
-
-    Parameters
-    ----------
-    lacking : MissingForce
-        The missing force.
-    """
+    """Hold the missing force against powers of displacement and velocity; None if there is nothing to explain."""
     keep = lacking.inner
     wanted = lacking.weighted(lacking.force)[keep]
     basis = _basis([lacking.weighted(column)[keep] for column in lacking.free.T], len(wanted))

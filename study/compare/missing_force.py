@@ -59,14 +59,7 @@ class MissingForce:
 def missing_force(model: Model, keys: Sequence[str], prediction: Prediction) -> MissingForce:
     """The missing force on the judging part.
 
-    Parameters
-    ----------
-    model : Model
-        Every value known.
-    keys : sequence of str
-        What was fitted.
-    prediction : Prediction
-        Free run and measured response.
+    Every value of the model is known; ``keys`` are what was fitted of it.
     """
     noise, prepared = prediction.noise, prediction.prepared
     gate = above_noise(noise, prediction.low)

@@ -50,14 +50,9 @@ def segments_of(samples: int) -> Segments:
 def noise_of(difference: Floats, residual: Floats, prepared: Prepared, numerical: float) -> Noise:
     """Noise of the response on the judging part.
 
-    Parameters
-    ----------
-    difference, residual : array, shape (samples to judge,)
-        Measured minus predicted response, and the same without what lies below the frequencies that are judged.
-    prepared : Prepared
-        The whole record; its ``period``, if it has one, is made use of.
-    numerical : float
-        Rms error of the integration, below which no noise can be seen.
+    ``difference`` is the measured minus the predicted response, ``residual`` the same without what lies below the
+    frequencies that are judged; shape (samples to judge,). ``prepared`` is the whole record, whose ``period`` is made
+    use of; ``numerical`` is the rms error of the integration, below which no noise can be seen.
     """
     low, dt = prepared.band[0], prepared.dt
     cut = segments_of(len(difference))

@@ -42,10 +42,7 @@ def candidate_terms(base: Baseline, extra: Sequence[Term] = (), without: Sequenc
 
 
 def try_all(
-    terms: Sequence[Term],
-    base: Baseline,
-    prepared: Prepared,
-    progress: Callable[[int], None] | None = None,
+    terms: Sequence[Term], base: Baseline, prepared: Prepared, progress: Callable[[int], None] | None = None
 ) -> list[Candidate]:
     """Fit and judge every candidate; those that cannot be fitted are left out."""
     done: list[Candidate] = []

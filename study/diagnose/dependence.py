@@ -46,15 +46,7 @@ class Leftover:
 
 
 def leftover(base: Baseline, prepared: Prepared) -> Leftover:
-    """What a fitted model leaves; where its free run does not stay finite to the end, on the fitting part alone.
-
-    Parameters
-    ----------
-    base : Baseline
-        Of the fitted model.
-    prepared : Prepared
-        The record, and the parts that the fit was made on and is judged on.
-    """
+    """What a fitted model leaves; where its free run does not stay finite to the end, on the fitting part alone."""
     fit, (first, last) = base.fit, prepared.plan.judge
     prepared = replace(prepared, plan=replace(prepared.plan, judge=(first, min(last, first + LONGEST))))
     motions = [run_of(fit, prepared, motion=name).respond({}, fit.initial)[0] for name in MOTIONS[:2]]
@@ -100,20 +92,8 @@ def explained_by(left: Leftover) -> dict[str, float]:
 def significant(left: Leftover, level: float) -> float:
     """Largest held-out share that a single shape of the motion or its past explains, and not by chance.
 
-    One coefficient at a time sees less than a whole family may, but what little noise leaves to be seen it sees
-    sooner.
-
-    Parameters
-    ----------
-    left : Leftover
-        The residual and the motion.
-    level : float
-        Of the p value, all shapes accounted for.
-
-    Returns
-    -------
-    float
-        Zero where none is significant.
+    One coefficient at a time sees less than a whole family may, but what little noise leaves to be seen it sees sooner.
+    ``level`` is of the p value, all shapes accounted for; zero where none is significant.
     """
     columns = np.hstack([*left.shapes.values(), _passed(left, _states(left))])
     gains = [statistics.gain(*_held_out(left, column[:, None])) for column in columns.T]

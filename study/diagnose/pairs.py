@@ -34,14 +34,7 @@ class Pair:
 def best_pair(rows: Sequence[Ranked], base: Baseline, prepared: Prepared) -> Pair | None:
     """The pair that explains most for its number of unknowns, of those that the screening puts first.
 
-    Parameters
-    ----------
-    rows : sequence of Ranked
-        The candidates, best first, with their shape parameters.
-    base : Baseline
-        The fitted model without them.
-    prepared : Prepared
-        The record and which parts of it are fitted and judged.
+    ``rows`` are the candidates, best first, with their shape parameters; ``base`` is the fitted model without them.
     """
     order = {row.name: i for i, row in enumerate(rows)}
     held = tuple(key for key in base.fit.model.values if key not in base.fit.keys)

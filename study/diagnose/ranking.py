@@ -82,14 +82,7 @@ class Ranked:
 def rank(candidates: Sequence[Candidate], before: Floats, prepared: Prepared) -> list[Ranked]:
     """Candidates by what they leave of the held-out residual, ties by how few unknowns they need.
 
-    Parameters
-    ----------
-    candidates : sequence of Candidate
-        Every one, fitted and judged.
-    before : array, shape (samples to judge,)
-        Held-out residual without any of them.
-    prepared : Prepared
-        The record and which parts of it are fitted and judged.
+    ``before`` is the held-out residual without any of them, shape (samples to judge,).
     """
     rows = [_row(candidate, before, len(candidates), prepared) for candidate in candidates]
     rows.sort(key=lambda r: float(r.residual @ r.residual))

@@ -60,16 +60,8 @@ def diagnose(
 ) -> Diagnosis:
     """Find the effect that a model lacks.
 
-    Parameters
-    ----------
-    comparison : Comparison
-        The equation believed in, fitted to a record: what it holds is held, the rest is fitted.
-    extra : sequence of Term
-        The user's own candidates.
-    without : sequence of str
-        Terms of the library to leave out.
-    progress : callable, optional
-        Called with the number of candidates done.
+    What the comparison's model held is held, the rest is fitted. ``extra`` are the user's own candidates, ``without``
+    terms of the library to leave out; ``progress`` is called with the number of candidates done.
     """
     prepared = comparison.prepared
     base = search_base(comparison)

@@ -33,25 +33,10 @@ def page(
 ) -> tuple[Figure, list[Axes]]:  # fmt: skip
     """An empty page.
 
-    Parameters
-    ----------
-    title, subtitle : str
-        Stand at the top left, the system in bold and what is shown of it below.
-    rows, columns : int
-        Panels.
-    width, panel : float
-        Width of the page and height of a panel in inches.
-    legend_rows : int
-        Room to leave between title and panels.
-    headed : bool
-        Whether the first panels have headings of their own, which need room.
-    share : bool
-        Whether the panels of a column share their abscissa.
-
-    Returns
-    -------
-    Figure, list of Axes
-        The panels from left to right, then down.
+    Title (the system, in bold) and subtitle stand at the top left. There are ``rows`` times ``columns`` panels, from
+    left to right, then down; ``width`` of the page and height of a ``panel`` are in inches. ``legend_rows`` is the room
+    to leave between title and panels, ``headed`` whether the first panels have headings of their own, which need room,
+    ``share`` whether the panels of a column share their abscissa.
     """
     top = TITLE + LEGEND_ROW * legend_rows + (GAP if headed else GAP / 2.0)
     between = GAP if share else GAP + BOTTOM - 0.1

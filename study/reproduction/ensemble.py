@@ -98,12 +98,7 @@ def rates(table: pd.DataFrame) -> pd.DataFrame:
 def page(table: pd.DataFrame, noise: Mapping[str, float]) -> str:
     """What :func:`rates` found as a page: which MI/SO estimates of noise-free cases meet their tolerance too seldom.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Of all cases, as :func:`rates` gives it.
-    noise : mapping of float
-        Noise of each case.
+    ``noise`` is that of each case.
     """
     own = table[(table["estimator"] == "miso") & (table["case"].map(noise) == 0.0)]
     low = own[own["within_tolerance"] < WANTED].sort_values("within_tolerance")

@@ -59,15 +59,8 @@ def errors(estimates: pd.DataFrame) -> pd.DataFrame:
 def differing(own: pd.DataFrame, kept: pd.DataFrame) -> list[str]:
     """Cases whose first seeds do not come out as those of a kept table did: other settings or other code show there.
 
-    Parameters
-    ----------
-    own, kept : DataFrame
-        As :func:`errors` gives them; ``kept`` may have cases and estimators that ``own`` lacks.
-
-    Returns
-    -------
-    list of str
-        Those where a ``first_error`` is not in ``kept`` or is off by more than ``ALIKE``.
+    Both are as :func:`errors` gives them; ``kept`` may have cases and estimators that ``own`` lacks. A case differs
+    where a ``first_error`` is not in ``kept`` or is off by more than ``ALIKE``.
     """
     keys = ["case", "estimator", "parameter"]
     before = kept.set_index(keys).reindex(pd.MultiIndex.from_frame(own[keys])).reset_index()

@@ -46,21 +46,9 @@ def study(
 
     ``fine`` is the mean estimate from the finely integrated records, ``mean_error`` the mean over the seeds of the
     estimate less that of the fine record. ``diverged`` of the ``seeds`` left the range of finite numbers;
-    ``diverged_seeds`` says which, each with the time. ``parameter`` is empty where every run diverged.
-
-    Parameters
-    ----------
-    models : mapping of Model
-        Systems by name, every value known.
-    record : RecordSettings
-        How records are made.
-    estimation : Settings
-        How they are identified.
-    seeds : sequence of int
-        Of the forces.
-    readings : sequence of str
-        Readings of unit variance. The first is studied at every setting, the others (a force of twice
-        the variance, by and large) at the report's own: Adams-Bashforth-Moulton, one step a sample.
+    ``diverged_seeds`` says which, each with the time. ``parameter`` is empty where every run diverged. The first of the
+    ``readings`` of unit variance is studied at every setting, the others (a force of twice the variance, by and large)
+    at the report's own: Adams-Bashforth-Moulton, one step a sample.
     """
     rows: list[dict[str, Any]] = []
     for name, model in models.items():

@@ -97,14 +97,8 @@ def model_restoring_force(model: Model, displacement: Floats, velocity: Floats, 
 def harmonic_pattern(model: Model, amplitude: float, frequency: float, cycles: int = 1) -> Pattern:
     """Restoring force over displacement for ``u = U sin(2 pi f_0 t)``, (3.1) and (3.2).
 
-    Parameters
-    ----------
-    model : Model
-        Every value known.
-    amplitude, frequency : float
-        U, in the model's unit of length, and f_0 in hertz.
-    cycles : int
-        Periods of the motion. A stiffness that varies with time closes its pattern only after several.
+    ``amplitude`` is U, in the model's unit of length, ``frequency`` f_0 in hertz; a stiffness that varies with time
+    closes its pattern only after several ``cycles``.
 
     Raises
     ------

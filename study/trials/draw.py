@@ -45,16 +45,8 @@ def make_trial(
 ) -> Trial:
     """A trial of this seed; what is given is not drawn.
 
-    Parameters
-    ----------
-    seed : int
-        Everything else follows from it.
-    hidden : sequence of str, optional
-        Effects to hide; none with an empty sequence.
-    noise : float, optional
-        Mean square of the noise over that of the response.
-    response : str, optional
-        ``displacement``, ``velocity`` or ``acceleration``.
+    No effect is hidden with an empty sequence; ``noise`` is a mean square over that of the response, ``response`` is
+    ``displacement``, ``velocity`` or ``acceleration``.
 
     Raises
     ------

@@ -87,14 +87,8 @@ TARGETS: tuple[tuple[str, Callable[[Row], bool], Callable[[Row], float], str], .
 def summary(table: pd.DataFrame, wanted: Mapping[str, float]) -> pd.DataFrame:
     """Each target with the rate that was measured and its binomial standard error.
 
-    A trial that could not be made or diagnosed counts as failed.
-
-    Parameters
-    ----------
-    table : DataFrame
-        ``trials.csv``.
-    wanted : mapping
-        Wanted rates: ``first``, ``nothing``, ``both``, ``removed``.
+    A trial that could not be made or diagnosed counts as failed. ``wanted`` holds the rates ``first``, ``nothing``,
+    ``both``, ``removed``.
     """
     rows = rows_of(table)
     return pd.DataFrame([_rate(what, rows, member, score, wanted.get(key)) for what, member, score, key in TARGETS])

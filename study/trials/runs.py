@@ -44,14 +44,7 @@ class Order:
 
 
 def orders(settings: TrialSettings) -> list[Order]:
-    """Every trial of the published run: all effects at all noises and responses, each with a seed of its own.
-
-    Parameters
-    ----------
-    settings : TrialSettings
-        ``trials`` of the configuration: ``first_seed``, ``noises``, how many ``rounds`` of single effects and
-        of ``none`` at each noise and response, and how many ``pairs`` and ``removed`` trials of each effect.
-    """
+    """Every trial of the published run: all effects at all noises and responses, each with a seed of its own."""
     grid = [(noise, response) for noise in settings.noises for response in RESPONSES]
     wanted: list[tuple[str, tuple[str, ...], tuple[float, str]]] = []
     wanted += [(SINGLE, (name,), place) for _ in range(settings.rounds) for place in grid for name in HIDDEN]
