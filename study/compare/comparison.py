@@ -102,19 +102,11 @@ def compare(
     lacking = missing_force(fit.model, (*fit.keys, *(known.symbols if known else ())), prediction)
     report("what it grows with")
     return Comparison(
-        model=model,
-        prepared=prepared,
-        fit=fit,
-        coefficients=coefficients(fit, prepared, known),
-        prediction=prediction,
-        force=force,
-        bands=bands(prediction.noise, force, prediction.low),
-        missing_force=lacking,
-        growths=None if prediction.noise.alone else growths(lacking),
-        time=along_time(prediction),
-        notes=(*prepared.notes, *([CHAOTIC] if fit.restarts else [])),
-        estimator=estimator,
-    )
+        model=model, prepared=prepared, fit=fit, coefficients=coefficients(fit, prepared, known), prediction=prediction,
+        force=force, bands=bands(prediction.noise, force, prediction.low), missing_force=lacking,
+        growths=None if prediction.noise.alone else growths(lacking), time=along_time(prediction),
+        notes=(*prepared.notes, *([CHAOTIC] if fit.restarts else [])), estimator=estimator,
+    )  # fmt: skip
 
 
 def across(comparisons: Sequence[Comparison]) -> tuple[Level, ...]:

@@ -57,10 +57,7 @@ class MissingForce:
 
 
 def missing_force(model: Model, keys: Sequence[str], prediction: Prediction) -> MissingForce:
-    """The missing force on the judging part.
-
-    Every value of the model is known; ``keys`` are what was fitted of it.
-    """
+    """The missing force on the judging part. Every value of the model is known; ``keys`` are what was fitted of it."""
     noise, prepared = prediction.noise, prediction.prepared
     gate = above_noise(noise, prediction.low)
     motion = _motion(prediction, gate, noise.frequency)
@@ -69,17 +66,10 @@ def missing_force(model: Model, keys: Sequence[str], prediction: Prediction) -> 
     forces = unbalanced_force(model, keys, named)
     width = float(noise.frequency[1])
     return MissingForce(
-        displacement=motion[0],
-        velocity=motion[1],
-        force=forces[:, 0],
-        free=forces[:, 1:],
-        gate=gate,
-        weight=_weight(prepared, noise.frequency),
-        frequency=noise.frequency,
-        noise=float(np.sum(noise.density[gate]) * width),
-        dt=prediction.dt,
-        edge=_edge(prediction, width),
-    )
+        displacement=motion[0], velocity=motion[1], force=forces[:, 0], free=forces[:, 1:], gate=gate,
+        weight=_weight(prepared, noise.frequency), frequency=noise.frequency,
+        noise=float(np.sum(noise.density[gate]) * width), dt=prediction.dt, edge=_edge(prediction, width),
+    )  # fmt: skip
 
 
 def _edge(prediction: Prediction, width: float) -> int:

@@ -30,15 +30,10 @@ def _shown(place: int, row: Ranked, force: str, length: str) -> list[str]:
     unit = row.term.unit(row.term.symbols[0], force, length)
     half = 1.96 * row.error
     return [
-        str(place),
-        row.name,
-        percent(row.gain.explained, "z.1f", row.gain.error, ".1f"),
-        percent(row.response_error),
-        f"{row.coefficient:.4g} +- {half:.2g} {unit}",
-        f"{row.p_value:.1g}",
-        percent(row.unsteadiness, ".0f") if math.isfinite(row.unsteadiness) else "-",
-        _few(row.tied_with),
-    ]
+        str(place), row.name, percent(row.gain.explained, "z.1f", row.gain.error, ".1f"), percent(row.response_error),
+        f"{row.coefficient:.4g} +- {half:.2g} {unit}", f"{row.p_value:.1g}",
+        percent(row.unsteadiness, ".0f") if math.isfinite(row.unsteadiness) else "-", _few(row.tied_with),
+    ]  # fmt: skip
 
 
 def _few(names: tuple[str, ...]) -> str:

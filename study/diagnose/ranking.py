@@ -98,19 +98,10 @@ def _row(candidate: Candidate, before: Floats, count: int, prepared: Prepared) -
     covariance = statistics.clustered_covariance(linearise(fit, prepared), fit.residual)
     coefficient, error, parameters, errors = _amount(candidate, covariance)
     return Ranked(
-        term=candidate.term,
-        fit=fit,
-        prediction=candidate.prediction,
-        gain=gain,
-        p_value=min(1.0, gain.p_value * count),
-        coefficient=coefficient,
-        error=error,
-        parameters=parameters,
-        parameter_errors=errors,
-        flatness=None,
-        steadiness=None,
-        tied_with=(),
-    )
+        term=candidate.term, fit=fit, prediction=candidate.prediction, gain=gain,
+        p_value=min(1.0, gain.p_value * count), coefficient=coefficient, error=error, parameters=parameters,
+        parameter_errors=errors, flatness=None, steadiness=None, tied_with=(),
+    )  # fmt: skip
 
 
 def _amount(candidate: Candidate, covariance: Floats) -> tuple[float, float, dict[str, float], dict[str, float]]:

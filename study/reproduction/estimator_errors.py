@@ -35,24 +35,14 @@ def errors(estimates: pd.DataFrame) -> pd.DataFrame:
         signed = (group["estimate"].to_numpy(dtype=np.float64) - true) / (abs(true) or 1.0)
         median, error = middle(np.abs(signed), count)
         scatter = float(np.std(signed, ddof=1)) if len(signed) > 1 else math.nan
-        rows.append(
-            {
-                "case": case,
-                "estimator": estimator,
-                "parameter": parameter,
-                "true": true,
-                "kind": "relative" if true else "absolute",
-                "median_error": median,
-                "standard_error": error,
-                "bias": float(signed.mean()),
-                "bias_error": scatter / math.sqrt(len(signed)),
-                "scatter": scatter,
-                "seeds": count,
-                "found": len(group),
-                "noted": int(group["note"].astype(bool).sum()),
-                "first_error": middle(np.abs(signed[group["seed"].isin(first)]), len(first))[0],
-            }
-        )
+        row = {
+            "case": case, "estimator": estimator, "parameter": parameter, "true": true,
+            "kind": "relative" if true else "absolute", "median_error": median, "standard_error": error,
+            "bias": float(signed.mean()), "bias_error": scatter / math.sqrt(len(signed)), "scatter": scatter,
+            "seeds": count, "found": len(group), "noted": int(group["note"].astype(bool).sum()),
+            "first_error": middle(np.abs(signed[group["seed"].isin(first)]), len(first))[0],
+        }  # fmt: skip
+        rows.append(row)
     return with_gains(pd.DataFrame(rows, columns=COLUMNS))
 
 

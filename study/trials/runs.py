@@ -83,17 +83,12 @@ def _judged(order: Order, trial: Trial) -> Row:
     missing = diagnosis.verdict == MISSING
     after = added(before, first.term) if missing else before
     row: Row = {
-        "verdict": diagnosis.verdict,
-        "first": first.name,
-        "named": first.name if missing else "",
-        "tied_with": "+".join(first.tied_with),
-        "pair": "+".join(diagnosis.pair),
-        "error_before": before.prediction.error,
-        "error_after": after.prediction.error,
+        "verdict": diagnosis.verdict, "first": first.name, "named": first.name if missing else "",
+        "tied_with": "+".join(first.tied_with), "pair": "+".join(diagnosis.pair),
+        "error_before": before.prediction.error, "error_after": after.prediction.error,
         "error_true": error_of_truth(trial, prepared, after.fit.steps_per_sample),
-        "noise_floor": before.prediction.floor,
-        "left": diagnosis.left,
-    }
+        "noise_floor": before.prediction.floor, "left": diagnosis.left,
+    }  # fmt: skip
     if missing and order.kind == PAIR:
         row |= _second(after)
     if missing and order.kind == REMOVED and not first.tied_with:

@@ -44,11 +44,9 @@ def write(trial: Trial, folder: Path) -> tuple[Path, Path, Path]:
 def contents(trial: Trial) -> dict[str, Any]:
     """What the answer holds: hidden effects, their shares of the restoring force, the noise, and the true model."""
     return {
-        "hidden": list(trial.hidden),
-        "shares": list(trial.shares),
-        "noise": trial.noise,
+        "hidden": list(trial.hidden), "shares": list(trial.shares), "noise": trial.noise,
         "truth": format_model(trial.truth),
-    }
+    }  # fmt: skip
 
 
 def unseal(path: Path) -> dict[str, Any]:
