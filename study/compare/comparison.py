@@ -110,13 +110,7 @@ def compare(
 
 
 def across(comparisons: Sequence[Comparison]) -> tuple[Level, ...]:
-    """The coefficients of several records of one model by level of excitation; empty for one record.
-
-    Raises
-    ------
-    StudyError
-        If the records have different units.
-    """
+    """The coefficients of several records by level, none of one record; a ``StudyError`` if the units differ."""
     if len(comparisons) < 2:
         return ()
     ordered = sorted(comparisons, key=lambda c: c.level)

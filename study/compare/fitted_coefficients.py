@@ -37,13 +37,9 @@ class Coefficient:
         """95 % confidence interval, by Student's t; None if the value was held."""
         if self.error is None:
             return None
-        half = _quantile(self.freedom) * self.error
+        quantile = float(stdtrit(self.freedom, 0.975)) if math.isfinite(self.freedom) else float(ndtri(0.975))
+        half = quantile * self.error
         return self.value - half, self.value + half
-
-
-def _quantile(freedom: float) -> float:
-    """Standard errors on either side that hold 95 %."""
-    return float(stdtrit(freedom, 0.975)) if math.isfinite(freedom) else float(ndtri(0.975))
 
 
 def coefficients(fit: FreeRunFit, prepared: Prepared, known: Estimate | None = None) -> tuple[Coefficient, ...]:

@@ -65,13 +65,7 @@ class ForceError:
 
 
 def force_error(model: Model, prediction: Prediction) -> ForceError:
-    """Judge a fitted model in reverse on the judging part.
-
-    Raises
-    ------
-    StudyError
-        If the judging part is too short for so many inputs.
-    """
+    """Judge a fitted model in reverse on the judging part; a ``StudyError`` if it is too short for the inputs."""
     prepared, noise = prediction.prepared, prediction.noise
     record, (first, last) = prepared.record, prepared.inner(prepared.plan.judge)
     inputs = reverse_inputs(model)
@@ -80,7 +74,9 @@ def force_error(model: Model, prediction: Prediction) -> ForceError:
     matrix = cross_spectra(
         [*channels, record[prepared.response][first:last], record["force"][first:last]], record.dt, cut
     )
-    reverse, response = _without(matrix, len(inputs)), matrix.density[:, -2, -2].real
+    keep = [*range(len(inputs)), len(inputs) + 1]  # all but the response
+    reverse = replace(matrix, density=matrix.density[:, keep][:, :, keep])
+    response = matrix.density[:, -2, -2].real
     result = conditioned.analyse(reverse)
     freedom = result.averages / (result.averages - len(inputs))
     force = np.maximum(result.output, np.finfo(float).tiny)
@@ -103,11 +99,6 @@ def _segments(samples: int, inputs: int) -> Segments:
     while cut.length > 64 and cut.effective_averages(samples) < FEWEST_AVERAGES * inputs:
         cut = replace(cut, length=cut.length // 2)
     return cut
-
-
-def _without(matrix: SpectralMatrix, channel: int) -> SpectralMatrix:
-    keep = [i for i in range(matrix.density.shape[1]) if i != channel]
-    return replace(matrix, density=matrix.density[:, keep][:, :, keep])
 
 
 def _left(matrix: SpectralMatrix, inputs: Sequence[Input], model: Model) -> Floats:

@@ -118,7 +118,8 @@ def unbalanced_force(model: Model, keys: Sequence[str], record: Record) -> Float
         graph.program([slope, *(graph.derivative(slope, graph.input(key)) for key in keys)]), values
     )
     columns = [record["displacement"], record["velocity"], record.time, record["force"]]  # as the registers begin
-    columns += [record[name] for name in channels] + _states(model, record)
+    columns += [record[name] for name in channels]
+    columns += [history(item, record) for item in reverse_inputs(model) if item.state is not None]  # their memories
     out = np.empty((len(record), 1 + len(keys)))
     kernels.evaluate(
         program.code, program.first, program.registers.copy(), np.arange(len(columns)),
@@ -126,11 +127,6 @@ def unbalanced_force(model: Model, keys: Sequence[str], record: Record) -> Float
     )  # fmt: skip
     out[:, 0] -= record["acceleration"]
     return out * values["m"]
-
-
-def _states(model: Model, record: Record) -> list[Floats]:
-    """The memories of the terms along the record's motion."""
-    return [history(item, record) for item in reverse_inputs(model) if item.state is not None]
 
 
 def _weight(prepared: Prepared, frequency: Floats) -> Floats:

@@ -39,23 +39,19 @@ def best_pair(rows: Sequence[Ranked], base: Baseline, prepared: Prepared) -> Pai
     order = {row.name: i for i, row in enumerate(rows)}
     held = tuple(key for key in base.fit.model.values if key not in base.fit.keys)
 
-    def one(start: PairStart) -> Pair | None:
+    def fitted(start: PairStart) -> Pair | None:
         first, second = sorted(start.names, key=lambda name: order[name])
         try:
-            return pair_of((first, second), fit_part(start.model, prepared, held, max_iterations=TRIED), prepared)
+            fit = fit_part(start.model, prepared, held, max_iterations=TRIED)
+            prediction = predict(fit, prepared)
         except StudyError:
             return None
+        return None if prediction.diverged else Pair((first, second), fit, prediction)
 
     with ThreadPoolExecutor(cores()) as pool:
-        pairs = [pair for pair in pool.map(one, pair_screening.promising(rows, base, prepared)) if pair is not None]
+        pairs = [pair for pair in pool.map(fitted, pair_screening.promising(rows, base, prepared)) if pair is not None]
     power = float(np.mean(base.fit.residual**2))
     return min(pairs, key=lambda pair: _misfit(pair, power), default=None)
-
-
-def pair_of(names: tuple[str, str], fit: FreeRunFit, prepared: Prepared) -> Pair | None:
-    """Two effects fitted together, with their prediction; None where its free run does not stay finite."""
-    prediction = predict(fit, prepared)
-    return None if prediction.diverged else Pair(names, fit, prediction)
 
 
 def _misfit(pair: Pair, before: float) -> float:

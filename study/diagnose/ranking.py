@@ -256,12 +256,8 @@ def curves(fit: FreeRunFit, term: Term, prepared: Prepared) -> tuple[Curve | Non
         return None, None
     along = constancy.along_frequency(alone, fit.residual, size, prepared.dt)
     classes = constancy.along_amplitude(alone, fit.residual, size)
-    return _unless_empty(along), _unless_empty(classes)
-
-
-def _unless_empty(curve: Curve) -> Curve | None:
-    """A short record has not blocks enough for a class, or not lines enough for a band."""
-    return curve if len(curve.at) else None
+    # A short record has not lines enough for a band, or not blocks enough for a class.
+    return along if len(along.at) else None, classes if len(classes.at) else None
 
 
 def changes(*along: Curve | None) -> float:

@@ -7,7 +7,7 @@ engine would measure every text on every page, which costs more than drawing it.
 # Matplotlib leaves the **kwargs of its methods untyped.
 # pyright: reportUnknownMemberType=false
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from io import BytesIO
 
 from matplotlib.artist import Artist
@@ -101,3 +101,8 @@ def rendered(figure: Figure, kind: str) -> bytes:
     target = BytesIO()
     figure.savefig(target, format=kind, metadata=METADATA[kind])
     return target.getvalue()
+
+
+def files(figures: Mapping[str, Figure]) -> dict[str, bytes]:
+    """Figures, by the stem of their file name, as the content of files: each as PNG and as SVG."""
+    return {f"{stem}.{kind}": rendered(figure, kind) for stem, figure in figures.items() for kind in ("png", "svg")}

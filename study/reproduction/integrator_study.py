@@ -94,12 +94,10 @@ def _errors(name: str, true: float, kept: list[tuple[Mapping[str, float], Mappin
     error = np.array([r for _, r in pairs]) - fine
     mean = float(np.mean(error))
     return {
-        "true": true,
-        "fine": float(np.mean(fine)),
-        "mean_error": mean,
+        "true": true, "fine": float(np.mean(fine)), "mean_error": mean,
         "standard_error": float(np.std(error, ddof=1) / math.sqrt(len(error))) if len(error) > 1 else math.nan,
         "relative_error": mean / true if true != 0.0 else math.nan,
-    }
+    }  # fmt: skip
 
 
 def page(table: pd.DataFrame) -> str:

@@ -107,18 +107,14 @@ def _rate(
 
 def confusion(table: pd.DataFrame) -> pd.DataFrame:
     """Trials by what was hidden (rows: each effect alone, none) and what was said (columns)."""
-    said = [*HIDDEN, *_others(table), NOTHING, UNKNOWN]
+    never_hidden = sorted({row["named"] for row in rows_of(table)} - {"", *HIDDEN})
+    said = [*HIDDEN, *never_hidden, NOTHING, UNKNOWN]
     hidden = [*HIDDEN, NONE]
     counts = np.zeros((len(hidden), len(said)), dtype=np.int64)
     for row in rows_of(table):
         if row["kind"] in (SINGLE, NONE) and not row["trouble"]:
             counts[hidden.index(row["hidden"] or NONE), said.index(row["named"] or row["verdict"])] += 1
     return pd.DataFrame(counts, index=pd.Index(hidden, name="hidden"), columns=said).reset_index()
-
-
-def _others(table: pd.DataFrame) -> list[str]:
-    """Effects that are never hidden and were named all the same."""
-    return sorted({row["named"] for row in rows_of(table)} - {"", *HIDDEN})
 
 
 def ladder(table: pd.DataFrame) -> pd.DataFrame:

@@ -17,13 +17,7 @@ WANTED = "the answer file of a trial, as 'study trial' writes it"
 
 
 def write(trial: Trial, folder: Path) -> tuple[Path, Path, Path]:
-    """Write record, believed model and sealed answer; their paths in this order.
-
-    Raises
-    ------
-    StudyError
-        If a file cannot be written.
-    """
+    """Write record, believed model and sealed answer: their paths, or a ``StudyError`` if that cannot be."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -50,13 +44,7 @@ def contents(trial: Trial) -> dict[str, Any]:
 
 
 def unseal(path: Path) -> dict[str, Any]:
-    """The answer of a trial.
-
-    Raises
-    ------
-    StudyError
-        If the file is no answer.
-    """
+    """The answer of a trial; a ``StudyError`` if the file holds none."""
     text = read_text(path, WANTED)
     try:
         page: object = json.loads(text)
