@@ -80,12 +80,7 @@ def compare(
     ``start`` holds values to begin the fit from, one for each that is fitted (searched for if left out), ``fit`` the
     fit itself where there is one already. ``estimator`` finds the coefficients: the fit in free run, or one of
     ``study.identify.estimators``; with ``local_polynomial`` the error of the force is free of leakage too. ``progress``
-    is called with what is being done, ``STEPS`` times.
-
-    Raises
-    ------
-    StudyError
-        If the model cannot be fitted to this record.
+    is called with what is being done, ``STEPS`` times. A model that cannot be fitted raises a ``StudyError``.
     """
     report: Progress = progress or (lambda _: None)
     report("fit")
