@@ -25,7 +25,7 @@ WINDOW = 256  # samples in the spectrum of a block, at most
 class Classes:
     """Visits and missing force in classes of a quantity, block by block."""
 
-    edges: Floats  # of the classes: those of ``surface.curve``; shape (classes + 1,)
+    edges: Floats  # of the classes: those of ``force_map.curve``; shape (classes + 1,)
     visits: Floats  # samples in the class; shape (blocks, classes)
     force: Floats  # their sum of the missing force; shape (blocks, classes)
 
