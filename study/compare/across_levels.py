@@ -14,43 +14,22 @@ RESOLUTION = 1e-3  # of the coefficient: smaller differences are those of the nu
 
 @dataclass(frozen=True)
 class Level:
-    """One coefficient at several levels; one entry a record, in the order of the records.
-
-    Attributes
-    ----------
-    key, unit : str
-        Name and unit.
-    force : tuple of float
-        Rms force of the fitting part, in the record's unit.
-    value, error : tuple of float
-        Estimates and standard errors.
-    p_value : float
-        Probability of such differences if the coefficient is the same at all levels (chi-square).
-    moves : bool
-        Whether that is significant, the number of coefficients accounted for, and above numerical errors.
-    change : float
-        Largest less smallest estimate, over the size of their weighted mean.
-    """
+    """One coefficient at several levels; one entry a record, in the order of the records."""
 
     key: str
     unit: str
-    force: tuple[float, ...]
-    value: tuple[float, ...]
-    error: tuple[float, ...]
-    p_value: float
-    moves: bool
-    change: float
+    force: tuple[float, ...]  # rms force of the fitting part, in the record's unit
+    value: tuple[float, ...]  # the estimates
+    error: tuple[float, ...]  # their standard errors
+    p_value: float  # probability of such differences if the coefficient is the same at all levels (chi-square)
+    moves: bool  # whether that is significant, the number of coefficients accounted for, and above numerical errors
+    change: float  # largest less smallest estimate, over the size of their weighted mean
 
 
 def levels(force: Sequence[float], records: Sequence[Sequence[Coefficient]]) -> tuple[Level, ...]:
     """Hold the estimates of several records against each other; what was held is left out.
 
-    Parameters
-    ----------
-    force : sequence of float
-        Rms force of each record's fitting part.
-    records : sequence of sequences of Coefficient
-        The same model's coefficients in each record.
+    ``force`` is the rms force of each record's fitting part, ``records`` the same model's coefficients in each.
     """
     by_key = [c for c in zip(*records, strict=True) if not c[0].held]
     return tuple(_level(tuple(force), row, len(by_key)) for row in by_key)

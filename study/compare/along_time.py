@@ -17,52 +17,24 @@ APART = 6.0  # correlation times in a block, at least: then neighbours are nearl
 
 @dataclass(frozen=True)
 class Stretch:
-    """A stretch of the judging part.
+    """A stretch of the judging part."""
 
-    Attributes
-    ----------
-    begin, end : float
-        In seconds.
-    error : float
-        Rms residual over the rms response of the whole judging part.
-    response : float
-        Rms response over that of the whole judging part.
-    ratio : float
-        Power of the residual over what is usual at this level of the response.
-    """
-
-    begin: float
-    end: float
-    error: float
-    response: float
-    ratio: float
+    begin: float  # in seconds
+    end: float  # in seconds
+    error: float  # rms residual over the rms response of the whole judging part
+    response: float  # rms response over that of the whole judging part
+    ratio: float  # power of the residual over what is usual at this level of the response
 
 
 @dataclass(frozen=True)
 class AlongTime:
-    """The stretches and the test.
+    """The stretches and the test."""
 
-    Attributes
-    ----------
-    stretches : tuple of Stretch
-        In order of time.
-    p_value : float
-        Probability of such differences between stretches of equal level by chance; 1 where too few
-        blocks can be told apart for a test.
-    growth : float
-        Exponent with which the power of the residual grows with the power of the response, block by block.
-    growth_error : float
-        Its standard error.
-    confounded : bool
-        Whether the level of the response changes along the record so much that what changes with time
-        cannot be told from what grows with level.
-    """
-
-    stretches: tuple[Stretch, ...]
-    p_value: float
-    growth: float
-    growth_error: float
-    confounded: bool
+    stretches: tuple[Stretch, ...]  # in order of time
+    p_value: float  # of such differences between stretches of equal level; 1 with too few blocks for a test
+    growth: float  # exponent with which the power of the residual grows with the power of the response, block by block
+    growth_error: float  # its standard error
+    confounded: bool  # level and time change together, so that they cannot be told apart
 
 
 def along_time(prediction: Prediction) -> AlongTime:

@@ -15,22 +15,12 @@ CLEAR = 2.0  # standard errors above the noise, for a line to count
 
 @dataclass(frozen=True)
 class Band:
-    """The narrowest band that holds most of what is unexplained.
+    """The narrowest band that holds most of what is unexplained."""
 
-    Attributes
-    ----------
-    of : str
-        ``response`` or ``force``.
-    low, high : float
-        Its ends in hertz.
-    share : float
-        Share of the unexplained power that lies in it.
-    """
-
-    of: str
-    low: float
-    high: float
-    share: float
+    of: str  # ``response`` or ``force``
+    low: float  # in hertz
+    high: float  # in hertz
+    share: float  # share of the unexplained power that lies in it
 
 
 def bands(noise: Noise, force: ForceError, low: float) -> tuple[Band, ...]:

@@ -31,19 +31,8 @@ FOLLOWED, SMOOTHED = 0.5, 5  # coherence, over so many lines, up to the last of 
 def fit_by(name: str, model: Model, prepared: Prepared) -> tuple[FreeRunFit, Estimate]:
     """What an estimator finds on the fitting part, as a fit whose initial state alone was found in free run.
 
-    Parameters
-    ----------
-    name : str
-        Of the estimator.
-    model : Model
-        Coefficients open; shape parameters too, for estimators that find them.
-    prepared : Prepared
-        The record and what is fitted of it.
-
-    Returns
-    -------
-    FreeRunFit, Estimate
-        The fit, which has converged if the estimator's own search has, and what the estimator found.
+    ``model`` leaves coefficients open, and shape parameters for estimators that find them. The fit has converged if the
+    estimator's own search has; with it comes what the estimator found.
 
     Raises
     ------

@@ -35,48 +35,20 @@ CHAOTIC = (
 
 @dataclass(frozen=True)
 class Comparison:
-    """A model held against one record.
+    """A model held against one record."""
 
-    Attributes
-    ----------
-    model : Model
-        As it was given.
-    prepared : Prepared
-        The record with all three motions in consistent units; what was fitted and what is judged.
-    fit : FreeRunFit
-        The fit.
-    coefficients : tuple of Coefficient
-        Every value with its interval and unit.
-    prediction : Prediction
-        Measured and predicted response on the judging part, error and noise floor.
-    force : ForceError
-        The error in reverse.
-    bands : tuple of Band
-        Where in frequency most of the unexplained power of response and force lies.
-    missing_force : MissingForce
-        The force that the model lacks.
-    growths : Growths or None
-        What it grows with; None where nothing stands above the noise.
-    time : AlongTime
-        Whether the error changes along the record.
-    notes : tuple of str
-        What was converted, integrated or left out.
-    estimator : str
-        What found the coefficients.
-    """
-
-    model: Model
-    prepared: Prepared
+    model: Model  # as it was given
+    prepared: Prepared  # the record with all three motions in consistent units; what was fitted and what is judged
     fit: FreeRunFit
-    coefficients: tuple[Coefficient, ...]
-    prediction: Prediction
-    force: ForceError
-    bands: tuple[Band, ...]
-    missing_force: MissingForce
-    growths: Growths | None
-    time: AlongTime
-    notes: tuple[str, ...]
-    estimator: str = FREE_RUN
+    coefficients: tuple[Coefficient, ...]  # every value with its interval and unit
+    prediction: Prediction  # measured and predicted response on the judging part, error and noise floor
+    force: ForceError  # the error in reverse
+    bands: tuple[Band, ...]  # where in frequency most of the unexplained power of response and force lies
+    missing_force: MissingForce  # the force that the model lacks
+    growths: Growths | None  # what it grows with; None where nothing stands above the noise
+    time: AlongTime  # whether the error changes along the record
+    notes: tuple[str, ...]  # what was converted, integrated or left out
+    estimator: str = FREE_RUN  # what found the coefficients
 
     @property
     def record(self) -> Record:
@@ -105,26 +77,10 @@ def compare(
 ) -> Comparison:
     """Fit what a model leaves open to one part of a record and judge it on the other.
 
-    Parameters
-    ----------
-    model : Model
-        Values that it gives are held, the others fitted.
-    prepared : Prepared
-        The record and its parts.
-    start : mapping of float, optional
-        Values to begin the fit from, one for each that is fitted; searched for if left out.
-    fit : FreeRunFit, optional
-        The fit itself, where there is one already.
-    estimator : str
-        What finds the coefficients: the fit in free run, or one of ``study.identify.estimators``. With
-        ``local_polynomial`` the error of the force is free of leakage too.
-    progress : callable, optional
-        Called with what is being done, ``STEPS`` times.
-
-    Raises
-    ------
-    StudyError
-        If the model cannot be fitted to this record.
+    ``start`` holds values to begin the fit from, one for each that is fitted (searched for if left out), ``fit`` the
+    fit itself where there is one already. ``estimator`` finds the coefficients: the fit in free run, or one of
+    ``study.identify.estimators``; with ``local_polynomial`` the error of the force is free of leakage too. ``progress``
+    is called with what is being done, ``STEPS`` times. A model that cannot be fitted raises a ``StudyError``.
     """
     report: Progress = progress or (lambda _: None)
     report("fit")
@@ -141,29 +97,15 @@ def compare(
     lacking = missing_force(fit.model, (*fit.keys, *(known.symbols if known else ())), prediction)
     report("what it grows with")
     return Comparison(
-        model=model,
-        prepared=prepared,
-        fit=fit,
-        coefficients=coefficients(fit, prepared, known),
-        prediction=prediction,
-        force=force,
-        bands=bands(prediction.noise, force, prediction.low),
-        missing_force=lacking,
-        growths=None if prediction.noise.alone else growths(lacking),
-        time=along_time(prediction),
-        notes=(*prepared.notes, *([CHAOTIC] if fit.restarts else [])),
-        estimator=estimator,
-    )
+        model=model, prepared=prepared, fit=fit, coefficients=coefficients(fit, prepared, known), prediction=prediction,
+        force=force, bands=bands(prediction.noise, force, prediction.low), missing_force=lacking,
+        growths=None if prediction.noise.alone else growths(lacking), time=along_time(prediction),
+        notes=(*prepared.notes, *([CHAOTIC] if fit.restarts else [])), estimator=estimator,
+    )  # fmt: skip
 
 
 def across(comparisons: Sequence[Comparison]) -> tuple[Level, ...]:
-    """The coefficients of several records of one model by level of excitation; empty for one record.
-
-    Raises
-    ------
-    StudyError
-        If the records have different units.
-    """
+    """The coefficients of several records by level, none of one record; a ``StudyError`` if the units differ."""
     if len(comparisons) < 2:
         return ()
     ordered = sorted(comparisons, key=lambda c: c.level)

@@ -6,7 +6,6 @@
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -20,7 +19,6 @@ from study.figures.sheet import in_style
 from study.support.numbers import percent
 
 Floats = NDArray[np.float64]
-KINDS = ("png", "svg")
 WIDE = 7.2  # inches
 
 
@@ -31,7 +29,7 @@ def pictures(comparison: Comparison) -> dict[str, bytes]:
         "error_in_time": error_in_time,
     }  # fmt: skip
     with in_style():
-        return _bytes({name: draw(comparison) for name, draw in drawn.items()})
+        return page.files({name: draw(comparison) for name, draw in drawn.items()})
 
 
 def level_pictures(moving: Sequence[Level], force_unit: str) -> dict[str, bytes]:
@@ -39,11 +37,7 @@ def level_pictures(moving: Sequence[Level], force_unit: str) -> dict[str, bytes]
     if not moving:
         return {}
     with in_style():
-        return _bytes({"coefficients_by_level": by_level(moving, force_unit)})
-
-
-def _bytes(figures: Mapping[str, Figure]) -> dict[str, bytes]:
-    return {f"{name}.{kind}": page.rendered(figure, kind) for name, figure in figures.items() for kind in KINDS}
+        return page.files({"coefficients_by_level": by_level(moving, force_unit)})
 
 
 def response(comparison: Comparison) -> Figure:
@@ -131,10 +125,6 @@ def by_level(moving: Sequence[Level], force_unit: str) -> Figure:
         panels.coefficient_by_level(panel, level, force_unit)
         verdict = "moves" if level.moves else "does not move"
         panel.set_title(f"{level.key}: {verdict} (p = {level.p_value:.2g})")
-    _hide(axes[len(moving) :])
-    return figure
-
-
-def _hide(axes: Sequence[Axes]) -> None:
-    for panel in axes:
+    for panel in axes[len(moving) :]:
         panel.set_visible(False)
+    return figure

@@ -8,6 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 import pandas as pd
+from tabulate import tabulate
 
 from study.compare.across_levels import Level
 from study.compare.by_estimator import FREE_RUN
@@ -28,8 +29,8 @@ def document(comparisons: Sequence[Comparison], moving: Sequence[Level] = ()) ->
     ``records`` holds a document of each.
     """
     if len(comparisons) == 1:
-        return _one(comparisons[0])
-    rows = [_one(c) for c in comparisons]
+        return _of_record(comparisons[0])
+    rows = [_of_record(c) for c in comparisons]
     return {
         "model": rows[0]["model"],
         "error": {key: _mean([r["error"][key] for r in rows], key) for key in ("force", "response")},
@@ -49,7 +50,7 @@ def _mean(values: Sequence[float], key: str) -> float:
     return float(np.mean(values)) if key == "force" else float(np.sqrt(np.mean(np.square(values))))
 
 
-def _one(comparison: Comparison) -> Row:
+def _of_record(comparison: Comparison) -> Row:
     prediction = comparison.prediction
     return {
         "record": comparison.record.name,
@@ -124,16 +125,13 @@ def level_row(level: Level) -> Row:
 def rung(comparison: Comparison, added: str | None = None) -> Row:
     """A comparison as a rung of the ladder (``study.compare.history``); ``added`` names the term that is new in it."""
     return {
-        "terms": [t.name for t in comparison.model.terms],
-        "added": added,
-        "record": comparison.record.name,
+        "terms": [t.name for t in comparison.model.terms], "added": added, "record": comparison.record.name,
         "error": {"force": comparison.force.total, "response": comparison.prediction.error},
         "rms": float(comparison.prediction.error * comparison.prediction.size),
         "unit": comparison.record.units.get(comparison.plan.response, ""),
         "noise_floor": {"response": comparison.prediction.floor},
-        "converged": comparison.fit.converged,
-        "coefficients": [coefficient_row(c) for c in comparison.coefficients],
-    }
+        "converged": comparison.fit.converged, "coefficients": [coefficient_row(c) for c in comparison.coefficients],
+    }  # fmt: skip
 
 
 def as_json(content: Row) -> bytes:
@@ -154,17 +152,14 @@ def tables(comparisons: Sequence[Comparison], moving: Sequence[Level] = ()) -> d
     builders: dict[str, Callable[[Comparison], pd.DataFrame]] = {
         "comparison": _summary, "coefficients": _coefficients, "force_error": _force_error,
         "response_spectrum": _response_spectrum, "missing_force_curves": _curves, "missing_force_map": _map,
-        "growth": lambda c: pd.DataFrame(where(c)["amplitude"]), "error_in_time": lambda c: _rows(where(c)["time"]),
+        "growth": lambda c: pd.DataFrame(where(c)["amplitude"]),
+        "error_in_time": lambda c: pd.DataFrame(where(c)["time"]),
     }  # fmt: skip
     made = {name: _joined([(c.record.name, build(c)) for c in comparisons]) for name, build in builders.items()}
     if moving:
         names = [c.record.name for c in sorted(comparisons, key=lambda c: c.level)]
         made["coefficients_by_level"] = _csv(pd.concat([_by_level(level, names) for level in moving]))
     return made
-
-
-def _rows(rows: list[Row]) -> pd.DataFrame:
-    return pd.DataFrame(rows)
 
 
 def _joined(parts: Sequence[tuple[str, pd.DataFrame]]) -> bytes:
@@ -219,11 +214,8 @@ def _curves(comparison: Comparison) -> pd.DataFrame:
     lacking = comparison.missing_force
     inner = lacking.inner
     against = {"displacement": lacking.displacement[inner], "velocity": lacking.velocity[inner]}
-    frames: list[pd.DataFrame] = []
-    for name, values in against.items():
-        line = curve(values, lacking.force[inner])
-        frames.append(pd.DataFrame({"against": name, "at": line.at, "mean": line.mean, "error": line.error}))
-    return pd.concat(frames)
+    lines = {name: curve(values, lacking.force[inner]) for name, values in against.items()}
+    return pd.concat([pd.DataFrame({"against": name, **vars(line)}) for name, line in lines.items()])
 
 
 def _map(comparison: Comparison) -> pd.DataFrame:
@@ -245,8 +237,6 @@ def _by_level(level: Level, names: Sequence[str]) -> pd.DataFrame:
 
 def summary(comparisons: Sequence[Comparison], moving: Sequence[Level] = ()) -> str:
     """The table that a person reads in ten seconds, and the sentences below it."""
-    from tabulate import tabulate
-
     first = comparisons[0]
     heads = ["", "response error", "in units", "noise floor", "force error", "noise alone"]
     rows = [
@@ -277,8 +267,6 @@ def _headline(comparison: Comparison) -> str:
 
 
 def _values(comparison: Comparison) -> str:
-    from tabulate import tabulate
-
     rows = [[c.key, c.term, f"{c.value:.5g}", _interval(c), c.unit] for c in comparison.coefficients]
     return tabulate(rows, ["", "term", "value", "95 % interval", "unit"], tablefmt="simple", disable_numparse=True)
 
@@ -288,8 +276,6 @@ def _interval(coefficient: Coefficient) -> str:
 
 
 def _levels(moving: Sequence[Level], comparisons: Sequence[Comparison]) -> str:
-    from tabulate import tabulate
-
     unit = comparisons[0].record.units.get("force", "")
     heads = [f"rms force ({unit})", *(f"{x:.3g}" for x in moving[0].force), "moves?", "unit"]
     rows = [

@@ -18,28 +18,14 @@ from study.support.statistics import clustered_covariance
 
 @dataclass(frozen=True)
 class Coefficient:
-    """A coefficient or shape parameter of a fitted model.
-
-    Attributes
-    ----------
-    key, term : str
-        Its name, and that of the term it belongs to.
-    value : float
-        Estimate, or the value that was held.
-    error : float or None
-        Standard error, which allows for a residual that is no white noise; None if the value was held.
-    unit : str
-        In the units of the record.
-    freedom : float
-        Degrees of freedom of the standard error.
-    """
+    """A coefficient or shape parameter of a fitted model."""
 
     key: str
-    term: str
-    value: float
-    error: float | None
-    unit: str
-    freedom: float = math.inf
+    term: str  # the term it belongs to
+    value: float  # estimate, or the value that was held
+    error: float | None  # standard error, for a residual that need not be white; None if the value was held
+    unit: str  # in the units of the record
+    freedom: float = math.inf  # of the standard error
 
     @property
     def held(self) -> bool:
@@ -51,13 +37,9 @@ class Coefficient:
         """95 % confidence interval, by Student's t; None if the value was held."""
         if self.error is None:
             return None
-        half = _quantile(self.freedom) * self.error
+        quantile = float(stdtrit(self.freedom, 0.975)) if math.isfinite(self.freedom) else float(ndtri(0.975))
+        half = quantile * self.error
         return self.value - half, self.value + half
-
-
-def _quantile(freedom: float) -> float:
-    """Standard errors on either side that hold 95 %."""
-    return float(stdtrit(freedom, 0.975)) if math.isfinite(freedom) else float(ndtri(0.975))
 
 
 def coefficients(fit: FreeRunFit, prepared: Prepared, known: Estimate | None = None) -> tuple[Coefficient, ...]:

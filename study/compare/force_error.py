@@ -28,36 +28,16 @@ ABOVE = 2.0  # the motion stands above its noise where its density is at least s
 
 @dataclass(frozen=True)
 class ForceError:
-    """Unexplained share of the force on the judging part; q inputs, arrays of shape (lines,).
+    """Unexplained share of the force on the judging part; q inputs, arrays of shape (lines,)."""
 
-    Attributes
-    ----------
-    frequency : array
-        In hertz.
-    force : array
-        Autospectral density of the force.
-    unexplained : array
-        1 - multiple coherence, corrected for the degrees of freedom that the inputs take.
-    parametric : array
-        Density of what the fitted coefficients leave of the force, over that of the force.
-    noise : array
-        Share that noise on the response alone makes of it, to first order: ``|A_u|^2 G_nn / G_FF``.
-    cumulative : array, shape (q, lines)
-        Cumulative coherences, one input after the other.
-    inputs : tuple of Input
-        What the inputs are.
-    band : bool array
-        Lines on which the motion stands above its noise and the force has power.
-    """
-
-    frequency: Floats
-    force: Floats
-    unexplained: Floats
-    parametric: Floats
-    noise: Floats
-    cumulative: Floats
+    frequency: Floats  # in hertz
+    force: Floats  # autospectral density of the force
+    unexplained: Floats  # 1 - multiple coherence, corrected for the degrees of freedom that the inputs take
+    parametric: Floats  # density of what the fitted coefficients leave of the force, over that of the force
+    noise: Floats  # share that noise on the response alone makes of it, to first order: ``|A_u|^2 G_nn / G_FF``
+    cumulative: Floats  # cumulative coherences, one input after the other; shape (q, lines)
     inputs: tuple[Input, ...]
-    band: NDArray[np.bool_]
+    band: NDArray[np.bool_]  # lines on which the motion stands above its noise and the force has power
 
     @property
     def highest(self) -> float:
@@ -85,20 +65,7 @@ class ForceError:
 
 
 def force_error(model: Model, prediction: Prediction) -> ForceError:
-    """Judge a fitted model in reverse on the judging part.
-
-    Parameters
-    ----------
-    model : Model
-        Every value known.
-    prediction : Prediction
-        What the model predicts of the judging part, and its noise.
-
-    Raises
-    ------
-    StudyError
-        If the judging part is too short for so many inputs.
-    """
+    """Judge a fitted model in reverse on the judging part; a ``StudyError`` if it is too short for the inputs."""
     prepared, noise = prediction.prepared, prediction.noise
     record, (first, last) = prepared.record, prepared.inner(prepared.plan.judge)
     inputs = reverse_inputs(model)
@@ -107,7 +74,9 @@ def force_error(model: Model, prediction: Prediction) -> ForceError:
     matrix = cross_spectra(
         [*channels, record[prepared.response][first:last], record["force"][first:last]], record.dt, cut
     )
-    reverse, response = _without(matrix, len(inputs)), matrix.density[:, -2, -2].real
+    keep = [*range(len(inputs)), len(inputs) + 1]  # all but the response
+    reverse = replace(matrix, density=matrix.density[:, keep][:, :, keep])
+    response = matrix.density[:, -2, -2].real
     result = conditioned.analyse(reverse)
     freedom = result.averages / (result.averages - len(inputs))
     force = np.maximum(result.output, np.finfo(float).tiny)
@@ -130,11 +99,6 @@ def _segments(samples: int, inputs: int) -> Segments:
     while cut.length > 64 and cut.effective_averages(samples) < FEWEST_AVERAGES * inputs:
         cut = replace(cut, length=cut.length // 2)
     return cut
-
-
-def _without(matrix: SpectralMatrix, channel: int) -> SpectralMatrix:
-    keep = [i for i in range(matrix.density.shape[1]) if i != channel]
-    return replace(matrix, density=matrix.density[:, keep][:, :, keep])
 
 
 def _left(matrix: SpectralMatrix, inputs: Sequence[Input], model: Model) -> Floats:

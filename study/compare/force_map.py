@@ -14,37 +14,21 @@ REACH = 0.001  # quantile at each end where map and curves end
 
 @dataclass(frozen=True)
 class Curve:
-    """Mean missing force in classes of a quantity; arrays of shape (classes,).
+    """Mean missing force in classes of a quantity; arrays of shape (classes,)."""
 
-    Attributes
-    ----------
-    at : array
-        Mean of the quantity in the class.
-    mean, error : arrays
-        Mean of the force, and its standard error; a stay in a class counts once, however many samples it has.
-    """
-
-    at: Floats
-    mean: Floats
-    error: Floats
+    at: Floats  # mean of the quantity in the class
+    mean: Floats  # of the force
+    error: Floats  # standard error of the mean: a stay in a class counts once, however many samples it has
 
 
 @dataclass(frozen=True)
 class Surface:
-    """Mean missing force in cells of the (u, v) plane.
+    """Mean missing force in cells of the (u, v) plane."""
 
-    Attributes
-    ----------
-    displacement, velocity : arrays, shape (cells + 1,)
-        Edges of the cells.
-    mean, error : arrays, shape (cells, cells)
-        By displacement, then velocity; NaN where the motion hardly came.
-    """
-
-    displacement: Floats
-    velocity: Floats
-    mean: Floats
-    error: Floats
+    displacement: Floats  # edges of the cells; shape (cells + 1,)
+    velocity: Floats  # the same
+    mean: Floats  # by displacement, then velocity; NaN where the motion hardly came; shape (cells, cells)
+    error: Floats  # standard error of the mean; shape (cells, cells)
 
 
 def curve(at: Floats, force: Floats) -> Curve:

@@ -30,33 +30,15 @@ WAYS: dict[tuple[str, str], Callable[[Floats, Floats, float], Floats]] = {
 
 @dataclass(frozen=True)
 class Growth:
-    """How well a power of one quantity explains the missing force.
+    """How well a power of one quantity explains the missing force."""
 
-    Attributes
-    ----------
-    of : str
-        ``displacement``, ``velocity``, or ``damping by displacement``: |u|^p v.
-    parity : str
-        ``odd`` or ``even`` in displacement, velocity, or (damping) velocity.
-    power : float
-        The best power p.
-    power_error : float
-        Its standard error.
-    share : float
-        Share of what stands above the noise that it explains.
-    share_error : float
-        Its standard error.
-    coefficient : float
-        Of the shape with the best power, displacement and velocity in their own rms: its sign tells.
-    """
-
-    of: str
-    parity: str
-    power: float
-    power_error: float
-    share: float
-    share_error: float
-    coefficient: float
+    of: str  # ``displacement``, ``velocity``, or ``damping by displacement``: |u|^p v
+    parity: str  # ``odd`` or ``even`` in displacement, velocity, or (damping) velocity
+    power: float  # the best power p
+    power_error: float  # its standard error
+    share: float  # share of what stands above the noise that it explains
+    share_error: float  # its standard error
+    coefficient: float  # of the shape with the best power, displacement and velocity in their own rms: its sign tells
 
 
 @dataclass(frozen=True)
@@ -68,13 +50,7 @@ class Growths:
 
 
 def growths(lacking: MissingForce) -> Growths | None:
-    """Hold the missing force against powers of displacement and velocity; None if there is nothing to explain.
-
-    Parameters
-    ----------
-    lacking : MissingForce
-        The missing force.
-    """
+    """Hold the missing force against powers of displacement and velocity; None if there is nothing to explain."""
     keep = lacking.inner
     wanted = lacking.weighted(lacking.force)[keep]
     basis = _basis([lacking.weighted(column)[keep] for column in lacking.free.T], len(wanted))

@@ -17,13 +17,7 @@ def path_of(model: Path) -> Path:
 
 
 def read(model: Path) -> list[Step]:
-    """The steps so far, oldest first; none where nothing was added yet.
-
-    Raises
-    ------
-    StudyError
-        If the file is there and is no ladder.
-    """
+    """The steps so far, oldest first, none where nothing was added; a ``StudyError`` if the file is no ladder."""
     path = path_of(model)
     if not path.exists():
         return []

@@ -10,8 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from study.figures import page
-
-KINDS = ("png", "svg")
+from study.figures.sheet import in_style
 
 
 def ladder(axes: Axes, steps: Sequence[dict[str, Any]]) -> Axes:
@@ -32,8 +31,6 @@ def ladder(axes: Axes, steps: Sequence[dict[str, Any]]) -> Axes:
 
 def files(steps: Sequence[dict[str, Any]], name: str) -> dict[str, bytes]:
     """The picture by file name, in the project's style."""
-    from study.figures.sheet import in_style
-
     with in_style():
         figure, (axes,) = page.page(
             f"The ladder of {name}", "every model so far, judged on what was not fitted", panel=3.0, headed=False
@@ -41,4 +38,4 @@ def files(steps: Sequence[dict[str, Any]], name: str) -> dict[str, bytes]:
         figure.subplots_adjust(bottom=0.26)
         ladder(axes, steps)
         page.legend(figure, [axes])
-        return {f"ladder.{kind}": page.rendered(figure, kind) for kind in KINDS}
+        return page.files({"ladder": figure})

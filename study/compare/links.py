@@ -23,45 +23,23 @@ WINDOW = 256  # samples in the spectrum of a block, at most
 
 @dataclass(frozen=True)
 class Classes:
-    """Visits and missing force in classes of a quantity, block by block.
+    """Visits and missing force in classes of a quantity, block by block."""
 
-    Attributes
-    ----------
-    edges : array, shape (classes + 1,)
-        Of the classes: those of ``surface.curve``.
-    visits, force : arrays, shape (blocks, classes)
-        Samples in the class, and their sum of the missing force.
-    """
-
-    edges: Floats
-    visits: Floats
-    force: Floats
+    edges: Floats  # of the classes: those of ``force_map.curve``; shape (classes + 1,)
+    visits: Floats  # samples in the class; shape (blocks, classes)
+    force: Floats  # their sum of the missing force; shape (blocks, classes)
 
 
 @dataclass(frozen=True)
 class Links:
-    """Blocks of the judging part.
+    """Blocks of the judging part."""
 
-    Attributes
-    ----------
-    edges : array, shape (blocks + 1,)
-        Times in seconds.
-    frequency : array, shape (lines,)
-        In hertz.
-    power : array, shape (blocks, lines)
-        Autospectral density of the difference around the middle of each block.
-    displacement, velocity : Classes
-        What each block holds of the curves.
-    cells : array, shape (blocks, CELLS * CELLS)
-        Samples of each block in the cells of the map, by displacement, then velocity.
-    """
-
-    edges: Floats
-    frequency: Floats
-    power: Floats
-    displacement: Classes
+    edges: Floats  # times in seconds; shape (blocks + 1,)
+    frequency: Floats  # in hertz; shape (lines,)
+    power: Floats  # autospectral density of the difference around the middle of each block; shape (blocks, lines)
+    displacement: Classes  # what each block holds of the curves
     velocity: Classes
-    cells: Floats
+    cells: Floats  # samples in the cells of the map, by displacement, then velocity; shape (blocks, CELLS * CELLS)
 
 
 def links(comparison: Comparison) -> Links:

@@ -33,40 +33,18 @@ LEAST_DAMPING = 0.02  # of critical, in the weight that a line has
 
 @dataclass(frozen=True)
 class MissingForce:
-    """The missing force on the judging part; n samples.
+    """The missing force on the judging part; n samples."""
 
-    Attributes
-    ----------
-    displacement, velocity : arrays, shape (n,)
-        The motion, free of noise.
-    force : array, shape (n,)
-        Measured force less inertia and all forces of the model, in the unit of force.
-    free : array, shape (n, p)
-        Derivatives of that by each coefficient that was fitted: what a refit could still take over.
-    gate : bool array, shape (lines,)
-        Lines of ``frequency`` on which the difference stands above the noise.
-    weight : array, shape (lines,)
-        Response of the best linear oscillator to a unit force: noise is white behind it.
-    frequency : array, shape (lines,)
-        In hertz.
-    noise : float
-        Mean square of the noise that is left in :meth:`weighted` ``force``.
-    dt : float
-        Sampling interval in seconds.
-    edge : int
-        Samples at each end which filters and integrals leave unsure.
-    """
-
-    displacement: Floats
-    velocity: Floats
-    force: Floats
-    free: Floats
-    gate: NDArray[np.bool_]
-    weight: Floats
-    frequency: Floats
-    noise: float
-    dt: float
-    edge: int
+    displacement: Floats  # free of noise; shape (n,)
+    velocity: Floats  # the same
+    force: Floats  # measured force less inertia and all forces of the model, in the unit of force; shape (n,)
+    free: Floats  # its derivatives by each fitted coefficient: what a refit could take over; shape (n, p)
+    gate: NDArray[np.bool_]  # lines of ``frequency`` on which the difference stands above the noise; shape (lines,)
+    weight: Floats  # response of the best linear oscillator to a unit force: noise is white behind it; shape (lines,)
+    frequency: Floats  # in hertz; shape (lines,)
+    noise: float  # mean square of the noise that is left in :meth:`weighted` ``force``
+    dt: float  # sampling interval in seconds
+    edge: int  # samples at each end which filters and integrals leave unsure
 
     @property
     def inner(self) -> slice:
@@ -79,17 +57,7 @@ class MissingForce:
 
 
 def missing_force(model: Model, keys: Sequence[str], prediction: Prediction) -> MissingForce:
-    """The missing force on the judging part.
-
-    Parameters
-    ----------
-    model : Model
-        Every value known.
-    keys : sequence of str
-        What was fitted.
-    prediction : Prediction
-        Free run and measured response.
-    """
+    """The missing force on the judging part. Every value of the model is known; ``keys`` are what was fitted of it."""
     noise, prepared = prediction.noise, prediction.prepared
     gate = above_noise(noise, prepared.band[0])
     motion = _motion(prediction, gate, noise.frequency)
@@ -98,17 +66,10 @@ def missing_force(model: Model, keys: Sequence[str], prediction: Prediction) -> 
     forces = unbalanced_force(model, keys, named)
     width = float(noise.frequency[1])
     return MissingForce(
-        displacement=motion[0],
-        velocity=motion[1],
-        force=forces[:, 0],
-        free=forces[:, 1:],
-        gate=gate,
-        weight=_weight(prepared, noise.frequency),
-        frequency=noise.frequency,
-        noise=float(np.sum(noise.density[gate]) * width),
-        dt=prediction.dt,
-        edge=_edge(prediction, width),
-    )
+        displacement=motion[0], velocity=motion[1], force=forces[:, 0], free=forces[:, 1:], gate=gate,
+        weight=_weight(prepared, noise.frequency), frequency=noise.frequency,
+        noise=float(np.sum(noise.density[gate]) * width), dt=prediction.dt, edge=_edge(prediction, width),
+    )  # fmt: skip
 
 
 def _edge(prediction: Prediction, width: float) -> int:
@@ -158,7 +119,8 @@ def unbalanced_force(model: Model, keys: Sequence[str], record: Record) -> Float
         graph.program([slope, *(graph.derivative(slope, graph.input(key)) for key in keys)]), values
     )
     columns = [record["displacement"], record["velocity"], record.time, record["force"]]  # as the registers begin
-    columns += [record[name] for name in channels] + _states(model, record)
+    columns += [record[name] for name in channels]
+    columns += [history(item, record) for item in reverse_inputs(model) if item.state is not None]  # their memories
     out = np.empty((len(record), 1 + len(keys)))
     kernels.evaluate(
         program.code, program.first, program.registers.copy(), np.arange(len(columns)),
@@ -166,11 +128,6 @@ def unbalanced_force(model: Model, keys: Sequence[str], record: Record) -> Float
     )  # fmt: skip
     out[:, 0] -= record["acceleration"]
     return out * values["m"]
-
-
-def _states(model: Model, record: Record) -> list[Floats]:
-    """The memories of the terms along the record's motion."""
-    return [history(item, record) for item in reverse_inputs(model) if item.state is not None]
 
 
 def _weight(prepared: Prepared, frequency: Floats) -> Floats:

@@ -24,39 +24,17 @@ WHITE, SCATTER, EXACT = "quietest bands of the residual", "scatter between perio
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise on the response, and what stands above it in the residual; arrays of shape (lines,).
+    """Noise on the response, and what stands above it in the residual; arrays of shape (lines,)."""
 
-    Attributes
-    ----------
-    frequency : array
-        In hertz.
-    density : array
-        Autospectral density of the noise.
-    residual : array
-        That of the residual.
-    rms : float
-        Of the noise, above the frequency below which nothing is judged.
-    error : float
-        Standard error of ``rms``.
-    excess : float
-        Mean square of what stands above the noise in the residual.
-    significance : float
-        The excess in its own standard errors.
-    averages : float
-        Effective number of averages of the densities.
-    source : str
-        What the estimate rests on.
-    """
-
-    frequency: Floats
-    density: Floats
-    residual: Floats
-    rms: float
-    error: float
-    excess: float
-    significance: float
-    averages: float
-    source: str
+    frequency: Floats  # in hertz
+    density: Floats  # autospectral density of the noise
+    residual: Floats  # that of the residual
+    rms: float  # of the noise, above the frequency below which nothing is judged
+    error: float  # standard error of ``rms``
+    excess: float  # mean square of what stands above the noise in the residual
+    significance: float  # the excess in its own standard errors
+    averages: float  # effective number of averages of the densities
+    source: str  # what the estimate rests on
 
     @property
     def alone(self) -> bool:
@@ -72,14 +50,9 @@ def segments_of(samples: int) -> Segments:
 def noise_of(difference: Floats, residual: Floats, prepared: Prepared, numerical: float) -> Noise:
     """Noise of the response on the judging part.
 
-    Parameters
-    ----------
-    difference, residual : array, shape (samples to judge,)
-        Measured minus predicted response, and the same without what lies below the frequencies that are judged.
-    prepared : Prepared
-        The whole record; its ``period``, if it has one, is made use of.
-    numerical : float
-        Rms error of the integration, below which no noise can be seen.
+    ``difference`` is the measured minus the predicted response, ``residual`` the same without what lies below the
+    frequencies that are judged; shape (samples to judge,). ``prepared`` is the whole record, whose ``period`` is made
+    use of; ``numerical`` is the rms error of the integration, below which no noise can be seen.
     """
     low, dt = prepared.low, prepared.dt
     cut = segments_of(len(difference))

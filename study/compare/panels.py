@@ -150,17 +150,9 @@ def _rate(unit: str, values: Floats) -> tuple[float, str]:
 def error_in_time(axes: Axes, along: AlongTime, floor: float) -> Axes:
     """Error and level of the response, stretch by stretch, over the rms response of the whole judging part."""
     edges = [*(s.begin for s in along.stretches), along.stretches[-1].end]
-    axes.stairs(
-        [100.0 * s.response for s in along.stretches],
-        edges,
-        baseline=None,
-        color="0.35",
-        linewidth=1.4,
-        label="response",
-    )
-    axes.stairs(
-        [100.0 * s.error for s in along.stretches], edges, baseline=None, color="C1", linewidth=2.0, label="error"
-    )
+    response, error = [100.0 * s.response for s in along.stretches], [100.0 * s.error for s in along.stretches]
+    axes.stairs(response, edges, baseline=None, color="0.35", linewidth=1.4, label="response")
+    axes.stairs(error, edges, baseline=None, color="C1", linewidth=2.0, label="error")
     axes.axhline(100.0 * floor, label="noise floor", **NOISE)
     axes.set_yscale("log", subs=[])
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))

@@ -20,24 +20,12 @@ CYCLES = 12  # of the response, in a close-up
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Measured and predicted response on the judging part; n samples.
+    """Measured and predicted response on the judging part; n samples."""
 
-    Attributes
-    ----------
-    prepared : Prepared
-        The record and its parts.
-    run : JudgingRun or None
-        The free run; None where it does not stay finite: then nothing is predicted, and the error counts as 100 %.
-    predicted : array, shape (n,)
-        Response of the free run.
-    numerical : float
-        Rms error of the integration itself: the difference to a run with twice the steps.
-    """
-
-    prepared: Prepared
-    run: JudgingRun | None
-    predicted: Floats
-    numerical: float
+    prepared: Prepared  # the record and its parts
+    run: JudgingRun | None  # None where it does not stay finite: nothing is predicted, the error counts as 100 %
+    predicted: Floats  # response of the free run; shape (n,)
+    numerical: float  # rms error of the integration itself: the difference to a run with twice the steps
 
     @property
     def diverged(self) -> bool:

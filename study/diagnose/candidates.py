@@ -23,21 +23,11 @@ NEVER_CANDIDATES = ("inertia",)
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A candidate as fitted.
+    """A candidate as fitted."""
 
-    Attributes
-    ----------
-    term : Term
-        The effect.
-    fit : FreeRunFit
-        The model with it, fitted on the fitting part.
-    prediction : Prediction
-        Its free run along the judging part.
-    """
-
-    term: Term
-    fit: FreeRunFit
-    prediction: Prediction
+    term: Term  # the effect
+    fit: FreeRunFit  # the model with it, fitted on the fitting part
+    prediction: Prediction  # its free run along the judging part
 
     @property
     def unphysical(self) -> bool:
@@ -52,19 +42,16 @@ def candidate_terms(base: Baseline, extra: Sequence[Term] = (), without: Sequenc
 
 
 def try_all(
-    terms: Sequence[Term],
-    base: Baseline,
-    prepared: Prepared,
-    progress: Callable[[int], None] | None = None,
+    terms: Sequence[Term], base: Baseline, prepared: Prepared, progress: Callable[[int], None] | None = None
 ) -> list[Candidate]:
     """Fit and judge every candidate; those that cannot be fitted are left out."""
     done: list[Candidate] = []
 
-    def one(term: Term) -> Candidate | None:
+    def fitted(term: Term) -> Candidate | None:
         return attempt(term, base, prepared)
 
     with ThreadPoolExecutor(cores()) as pool:
-        for count, candidate in enumerate(pool.map(one, terms), start=1):
+        for count, candidate in enumerate(pool.map(fitted, terms), start=1):
             if candidate is not None:
                 done.append(candidate)
             if progress is not None:
@@ -89,7 +76,7 @@ def judged(term: Term, fit: FreeRunFit, prepared: Prepared) -> Candidate | None:
 def all_settled(candidates: Sequence[Candidate], prepared: Prepared) -> list[Candidate]:
     """Candidates fitted to the whole fitting part and with enough steps, as they would be if they were added."""
 
-    def one(candidate: Candidate) -> Candidate:
+    def settle(candidate: Candidate) -> Candidate:
         try:
             fit = settled(continued(candidate.fit, prepared), prepared)
             return judged(candidate.term, fit, prepared) or candidate
@@ -97,4 +84,4 @@ def all_settled(candidates: Sequence[Candidate], prepared: Prepared) -> list[Can
             return candidate
 
     with ThreadPoolExecutor(cores()) as pool:
-        return list(pool.map(one, candidates))
+        return list(pool.map(settle, candidates))

@@ -22,21 +22,11 @@ BLOCK = 64  # samples: long against a period, short against the swell of the amp
 
 @dataclass(frozen=True)
 class Curve:
-    """A coefficient along something.
+    """A coefficient along something."""
 
-    Attributes
-    ----------
-    at : array, shape (n,)
-        Centre frequency in Hz, or amplitude relative to the mean.
-    value : complex array, shape (n,)
-        The coefficient there (real along amplitude).
-    error : array, shape (n,)
-        Standard error of its real part.
-    """
-
-    at: Floats
-    value: Complexes
-    error: Floats
+    at: Floats  # centre frequency in Hz, or amplitude relative to the mean; shape (n,)
+    value: Complexes  # the coefficient there (real along amplitude); shape (n,)
+    error: Floats  # standard error of its real part; shape (n,)
 
     def p_value(self) -> float:
         """Probability of values as different as these if the coefficient were a constant (chi square)."""

@@ -34,43 +34,19 @@ LONGEST = 16384  # samples of either part that are looked at
 
 @dataclass(frozen=True)
 class Leftover:
-    """A free run and what it leaves unexplained, on the fitting part and then on the judging part.
+    """A free run and what it leaves unexplained, on the fitting part and then on the judging part."""
 
-    Attributes
-    ----------
-    displacement, velocity : array, shape (n,)
-        Of the free run, over their standard deviations.
-    residual : array, shape (n,)
-        Measured minus predicted response.
-    own : array, shape (n, p)
-        Derivatives of the response to the model's own coefficients and initial state.
-    shapes : dict of array, shape (n, shapes)
-        What forces that are functions of displacement, velocity and both add to the response.
-    split : int
-        Samples of the fitting part.
-    base : Baseline
-        Of the fitted model: its transfer passes other forces, its residual holds the lines.
-    """
-
-    displacement: Floats
-    velocity: Floats
-    residual: Floats
-    own: Floats
-    shapes: Mapping[str, Floats]
-    split: int
-    base: Baseline
+    displacement: Floats  # of the free run, over its standard deviation; shape (n,)
+    velocity: Floats  # the same
+    residual: Floats  # measured minus predicted response; shape (n,)
+    own: Floats  # derivatives of the response to the model's own coefficients and initial state; shape (n, p)
+    shapes: Mapping[str, Floats]  # what functions of displacement, velocity, both add to the response; (n, shapes)
+    split: int  # samples of the fitting part
+    base: Baseline  # of the fitted model: its transfer passes other forces, its residual holds the lines
 
 
 def leftover(base: Baseline, prepared: Prepared) -> Leftover:
-    """What a fitted model leaves; where its free run does not stay finite to the end, on the fitting part alone.
-
-    Parameters
-    ----------
-    base : Baseline
-        Of the fitted model.
-    prepared : Prepared
-        The record, and the parts that the fit was made on and is judged on.
-    """
+    """What a fitted model leaves; where its free run does not stay finite to the end, on the fitting part alone."""
     fit, (first, last) = base.fit, prepared.plan.judge
     prepared = replace(prepared, plan=replace(prepared.plan, judge=(first, min(last, first + LONGEST))))
     motions = [run_of(fit, prepared, motion=name).respond({}, fit.initial)[0] for name in MOTIONS[:2]]
@@ -116,20 +92,8 @@ def explained_by(left: Leftover) -> dict[str, float]:
 def significant(left: Leftover, level: float) -> float:
     """Largest held-out share that a single shape of the motion or its past explains, and not by chance.
 
-    One coefficient at a time sees less than a whole family may, but what little noise leaves to be seen it sees
-    sooner.
-
-    Parameters
-    ----------
-    left : Leftover
-        The residual and the motion.
-    level : float
-        Of the p value, all shapes accounted for.
-
-    Returns
-    -------
-    float
-        Zero where none is significant.
+    One coefficient at a time sees less than a whole family may, but what little noise leaves to be seen it sees sooner.
+    ``level`` is of the p value, all shapes accounted for; zero where none is significant.
     """
     columns = np.hstack([*left.shapes.values(), _passed(left, _states(left))])
     gains = [statistics.gain(*_held_out(left, column[:, None])) for column in columns.T]

@@ -7,7 +7,6 @@ from study.diagnose.verdict import Diagnosis
 from study.figures import page
 from study.figures.sheet import in_style
 
-KINDS = ("png", "svg")
 FOLLOWED = 3  # candidates whose coefficient is drawn along frequency and amplitude
 
 
@@ -32,5 +31,4 @@ def pages(diagnosis: Diagnosis, record: str) -> dict[str, Figure]:
 def files(diagnosis: Diagnosis, record: str) -> dict[str, bytes]:
     """The pictures by file name, in the project's style."""
     with in_style():
-        drawn = pages(diagnosis, record)
-        return {f"{name}.{kind}": page.rendered(figure, kind) for name, figure in drawn.items() for kind in KINDS}
+        return page.files(pages(diagnosis, record))

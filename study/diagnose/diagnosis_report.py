@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-import numpy as np
+from tabulate import tabulate
 
 from study.diagnose.ranking import Ranked
 from study.diagnose.verdict import Diagnosis
@@ -15,8 +15,6 @@ SHOWN = 8  # candidates in the table on the screen
 
 def table(diagnosis: Diagnosis) -> str:
     """The first candidates as a person reads them in ten seconds."""
-    from tabulate import tabulate
-
     head = ["", "effect", "explains", "error with it", "coefficient", "p", "changes by", "tied with"]
     units = diagnosis.comparison.record.units
     force, length = units.get("force", "N"), units.get("displacement", "m")
@@ -30,15 +28,10 @@ def _shown(place: int, row: Ranked, force: str, length: str) -> list[str]:
     unit = row.term.unit(row.term.symbols[0], force, length)
     half = 1.96 * row.error
     return [
-        str(place),
-        row.name,
-        percent(row.gain.explained, "z.1f", row.gain.error, ".1f"),
-        percent(row.response_error),
-        f"{row.coefficient:.4g} +- {half:.2g} {unit}",
-        f"{row.p_value:.1g}",
-        percent(row.unsteadiness, ".0f") if math.isfinite(row.unsteadiness) else "-",
-        _few(row.tied_with),
-    ]
+        str(place), row.name, percent(row.gain.explained, "z.1f", row.gain.error, ".1f"), percent(row.response_error),
+        f"{row.coefficient:.4g} +- {half:.2g} {unit}", f"{row.p_value:.1g}",
+        percent(row.unsteadiness, ".0f") if math.isfinite(row.unsteadiness) else "-", _few(row.tied_with),
+    ]  # fmt: skip
 
 
 def _few(names: tuple[str, ...]) -> str:
@@ -62,27 +55,22 @@ def fields(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _candidate(row: Ranked) -> dict[str, Any]:
-    low, high = row.interval
     return {
         "term": row.name,
-        "parameters": {key: _finite(value) for key, value in row.parameters.items()},
-        "parameter_errors": {key: _finite(value) for key, value in row.parameter_errors.items()},
+        "parameters": row.parameters,
+        "parameter_errors": row.parameter_errors,
         "coefficient": row.coefficient,
-        "interval": [_finite(low), _finite(high)],
+        "interval": list(row.interval),
         "response_error": row.response_error,
         "noise_floor": row.prediction.floor,
         "explained": row.gain.explained,
         "explained_error": row.gain.error,
         "p_value": row.p_value,
         "changes": {
-            "frequency": _finite(row.flatness.spread()) if row.flatness else None,
-            "amplitude": _finite(row.steadiness.spread()) if row.steadiness else None,
+            "frequency": row.flatness.spread() if row.flatness else None,
+            "amplitude": row.steadiness.spread() if row.steadiness else None,
         },
         "tied_with": list(row.tied_with),
         "unphysical": row.unphysical,
         "converged": row.fit.converged,
     }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

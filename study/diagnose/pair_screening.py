@@ -29,29 +29,16 @@ TRIED = 10  # pairs that each of the two answers puts first
 
 @dataclass(frozen=True)
 class PairStart:
-    """Two candidates and where their fit begins.
+    """Two candidates and where their fit begins."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        The two.
-    model : Model
-        The model with both, every value given.
-    """
-
-    names: tuple[str, str]
-    model: Model
+    names: tuple[str, str]  # the two
+    model: Model  # the model with both, every value given
 
 
 def promising(rows: Sequence[Ranked], base: Baseline, prepared: Prepared) -> list[PairStart]:
     """The best pairs of the reverse system and those of the sensitivities; the same pair may begin at both places.
 
-    Parameters
-    ----------
-    rows : sequence of Ranked
-        The candidates with their shape parameters.
-    base, prepared
-        As for :func:`study.diagnose.pairs.best_pair`.
+    ``rows`` are the candidates with their shape parameters.
     """
     entries = {r.name: next(t for t in r.fit.model.terms if t.name == r.name) for r in rows}
     return _of_the_reverse_system(entries, base, prepared) + _of_the_sensitivities(entries, base, prepared)

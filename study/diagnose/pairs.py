@@ -24,56 +24,33 @@ SAME = 1e-4  # of the unexplained power: pairs that leave less than this leave n
 
 @dataclass(frozen=True)
 class Pair:
-    """Two candidates fitted together.
+    """Two candidates fitted together."""
 
-    Attributes
-    ----------
-    names : pair of str
-        The one that explains more alone comes first.
-    fit : FreeRunFit
-        The model with both.
-    prediction : Prediction
-        Its free run along the judging part.
-    """
-
-    names: tuple[str, str]
-    fit: FreeRunFit
-    prediction: Prediction
+    names: tuple[str, str]  # the one that explains more alone comes first
+    fit: FreeRunFit  # the model with both
+    prediction: Prediction  # its free run along the judging part
 
 
 def best_pair(rows: Sequence[Ranked], base: Baseline, prepared: Prepared) -> Pair | None:
     """The pair that explains most for its number of unknowns, of those that the screening puts first.
 
-    Parameters
-    ----------
-    rows : sequence of Ranked
-        The candidates, best first, with their shape parameters.
-    base : Baseline
-        The fitted model without them.
-    prepared : Prepared
-        The record and which parts of it are fitted and judged.
+    ``rows`` are the candidates, best first, with their shape parameters; ``base`` is the fitted model without them.
     """
     order = {row.name: i for i, row in enumerate(rows)}
 
-    def one(start: PairStart) -> Pair | None:
+    def fitted(start: PairStart) -> Pair | None:
         first, second = sorted(start.names, key=lambda name: order[name])
         try:
-            return pair_of(
-                (first, second), fit_part(start.model, prepared, base.fit.held, max_iterations=TRIED), prepared
-            )
+            fit = fit_part(start.model, prepared, base.fit.held, max_iterations=TRIED)
+            prediction = predict(fit, prepared)
         except StudyError:
             return None
+        return None if prediction.diverged else Pair((first, second), fit, prediction)
 
     with ThreadPoolExecutor(cores()) as pool:
-        pairs = [pair for pair in pool.map(one, pair_screening.promising(rows, base, prepared)) if pair is not None]
+        pairs = [pair for pair in pool.map(fitted, pair_screening.promising(rows, base, prepared)) if pair is not None]
     power = float(np.mean(base.fit.residual**2))
     return min(pairs, key=lambda pair: _misfit(pair, power), default=None)
-
-
-def pair_of(names: tuple[str, str], fit: FreeRunFit, prepared: Prepared) -> Pair | None:
-    """Two effects fitted together, with their prediction; None where its free run does not stay finite."""
-    prediction = predict(fit, prepared)
-    return None if prediction.diverged else Pair(names, fit, prediction)
 
 
 def _misfit(pair: Pair, before: float) -> float:

@@ -33,44 +33,20 @@ EXAMINED = 6  # candidates whose coefficient is followed along frequency and amp
 
 @dataclass(frozen=True)
 class Ranked:
-    """One candidate.
+    """One candidate."""
 
-    Attributes
-    ----------
-    term : Term
-        The effect.
-    fit : FreeRunFit
-        The model with it.
-    gain : Gain
-        What it explains of the held-out residual, with the p value of one comparison.
-    p_value : float
-        The same with the number of candidates accounted for (Bonferroni).
-    coefficient, error : float
-        Its size (amplitude, for an effect of any phase) and standard error.
-    parameters : dict
-        Shape parameters, and the phase of an effect of any phase.
-    parameter_errors : dict
-        Their standard errors.
-    flatness : Curve or None
-        The coefficient along frequency, for the first few.
-    steadiness : Curve or None
-        The coefficient along amplitude.
-    tied_with : tuple of str
-        Candidates that this record cannot tell from it.
-    """
-
-    term: Term
-    fit: FreeRunFit
+    term: Term  # the effect
+    fit: FreeRunFit  # the model with it
     prediction: Prediction
-    gain: Gain
-    p_value: float
-    coefficient: float
-    error: float
-    parameters: dict[str, float]
-    parameter_errors: dict[str, float]
-    flatness: Curve | None
-    steadiness: Curve | None
-    tied_with: tuple[str, ...]
+    gain: Gain  # what it explains of the held-out residual, with the p value of one comparison
+    p_value: float  # the same with the number of candidates accounted for (Bonferroni)
+    coefficient: float  # its size: the amplitude, for an effect of any phase
+    error: float  # standard error of that
+    parameters: dict[str, float]  # shape parameters, and the phase of an effect of any phase
+    parameter_errors: dict[str, float]  # their standard errors
+    flatness: Curve | None  # the coefficient along frequency, for the first few
+    steadiness: Curve | None  # the coefficient along amplitude
+    tied_with: tuple[str, ...]  # candidates that this record cannot tell from it
 
     @property
     def name(self) -> str:
@@ -106,14 +82,7 @@ class Ranked:
 def rank(candidates: Sequence[Candidate], before: Floats, prepared: Prepared) -> list[Ranked]:
     """Candidates by what they leave of the held-out residual, ties by how few unknowns they need.
 
-    Parameters
-    ----------
-    candidates : sequence of Candidate
-        Every one, fitted and judged.
-    before : array, shape (samples to judge,)
-        Held-out residual without any of them.
-    prepared : Prepared
-        The record and which parts of it are fitted and judged.
+    ``before`` is the held-out residual without any of them, shape (samples to judge,).
     """
     rows = [_row(candidate, before, len(candidates), prepared) for candidate in candidates]
     rows.sort(key=lambda r: float(r.residual @ r.residual))
@@ -129,19 +98,10 @@ def _row(candidate: Candidate, before: Floats, count: int, prepared: Prepared) -
     covariance = statistics.clustered_covariance(linearise(fit, prepared), fit.residual)
     coefficient, error, parameters, errors = _amount(candidate, covariance)
     return Ranked(
-        term=candidate.term,
-        fit=fit,
-        prediction=candidate.prediction,
-        gain=gain,
-        p_value=min(1.0, gain.p_value * count),
-        coefficient=coefficient,
-        error=error,
-        parameters=parameters,
-        parameter_errors=errors,
-        flatness=None,
-        steadiness=None,
-        tied_with=(),
-    )
+        term=candidate.term, fit=fit, prediction=candidate.prediction, gain=gain,
+        p_value=min(1.0, gain.p_value * count), coefficient=coefficient, error=error, parameters=parameters,
+        parameter_errors=errors, flatness=None, steadiness=None, tied_with=(),
+    )  # fmt: skip
 
 
 def _amount(candidate: Candidate, covariance: Floats) -> tuple[float, float, dict[str, float], dict[str, float]]:
@@ -296,12 +256,8 @@ def curves(fit: FreeRunFit, term: Term, prepared: Prepared) -> tuple[Curve | Non
         return None, None
     along = constancy.along_frequency(alone, fit.residual, size, prepared.dt)
     classes = constancy.along_amplitude(alone, fit.residual, size)
-    return _unless_empty(along), _unless_empty(classes)
-
-
-def _unless_empty(curve: Curve) -> Curve | None:
-    """A short record has not blocks enough for a class, or not lines enough for a band."""
-    return curve if len(curve.at) else None
+    # A short record has not lines enough for a band, or not blocks enough for a class.
+    return along if len(along.at) else None, classes if len(classes.at) else None
 
 
 def changes(*along: Curve | None) -> float:

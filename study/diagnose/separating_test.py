@@ -43,16 +43,14 @@ def separating_level(one: Ranked, other: Ranked, prepared: Prepared) -> float | 
 
 def advice(rows: Sequence[Ranked], prepared: Prepared) -> str:
     """A sentence on the tie of the first candidate, or nothing if there is none."""
-    if not rows or not rows[0].tied_with:
-        return ""
-    rival = next((r for r in rows if r.name == rows[0].tied_with[0]), None)
+    tied = rows[0].tied_with[:1] if rows else ()
+    rival = next((r for r in rows if r.name in tied), None)
     if rival is None:
         return ""
     level = separating_level(rows[0], rival, prepared)
     names = f"{term_names(rows[0].name)} and {term_names(rival.name)}"
     if level is None:
-        other = (
-            "another kind of test" if prepared.response == "displacement" else "the displacement, its mean included,"
-        )
+        whole = prepared.response == "displacement"
+        other = "another kind of test" if whole else "the displacement, its mean included,"
         return f"No level from a quarter to five times this one would tell {names} apart; {other} is needed."
     return f"To tell {names} apart, excite at {level:g} times this level."

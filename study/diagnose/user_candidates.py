@@ -7,13 +7,7 @@ from study.support.errors import StudyError
 
 
 def own_candidates(given: Sequence[str]) -> list[Term]:
-    """``NAME=FORMULA`` as terms.
-
-    Raises
-    ------
-    StudyError
-        If one is not of this form, or its formula is refused.
-    """
+    """``NAME=FORMULA`` as terms; a ``StudyError`` if one is not of this form, or its formula is refused."""
     terms: list[Term] = []
     for text in given:
         name, sign, formula = text.partition("=")

@@ -41,30 +41,14 @@ PAIRED = 1  # the best so many candidates are tried together with every other
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What is missing.
+    """What is missing."""
 
-    Attributes
-    ----------
-    verdict : str
-        ``missing_effect``, ``nothing_missing`` or ``unknown_effect``.
-    comparison : Comparison
-        The model as it was given, with its fit, its error and its noise floor.
-    candidates : tuple of Ranked
-        Best first.
-    left : float
-        Rms of the structure that remains beside the best explanation, over the rms response.
-    pair : tuple of str
-        Two effects that explain together what none does alone; empty otherwise.
-    families : dict
-        For an unknown effect: held-out share that functions of displacement, velocity, ... explain.
-    """
-
-    verdict: str
-    comparison: Comparison
-    candidates: tuple[Ranked, ...]
-    left: float
-    pair: tuple[str, ...]
-    families: dict[str, float]
+    verdict: str  # ``missing_effect``, ``nothing_missing`` or ``unknown_effect``
+    comparison: Comparison  # the model as it was given, with its fit, its error and its noise floor
+    candidates: tuple[Ranked, ...]  # best first
+    left: float  # rms of the structure that remains beside the best explanation, over the rms response
+    pair: tuple[str, ...]  # two effects that explain together what none does alone; empty otherwise
+    families: dict[str, float]  # for an unknown effect: held-out share that functions of displacement, ... explain
 
 
 def diagnose(
@@ -76,16 +60,8 @@ def diagnose(
 ) -> Diagnosis:
     """Find the effect that a model lacks.
 
-    Parameters
-    ----------
-    comparison : Comparison
-        The equation believed in, fitted to a record: what it holds is held, the rest is fitted.
-    extra : sequence of Term
-        The user's own candidates.
-    without : sequence of str
-        Terms of the library to leave out.
-    progress : callable, optional
-        Called with the number of candidates done.
+    What the comparison's model held is held, the rest is fitted. ``extra`` are the user's own candidates, ``without``
+    terms of the library to leave out; ``progress`` is called with the number of candidates done.
     """
     prepared = comparison.prepared
     base = search_base(comparison)

@@ -9,11 +9,9 @@ import pandas as pd
 from study.equations import dimensions, formulas, terms
 
 DIMENSIONS: dict[str, dimensions.Dimensions] = {
-    "length": (Fraction(1), Fraction(0)),
-    "1/length": (Fraction(-1), Fraction(0)),
-    "time": (Fraction(0), Fraction(1)),
+    "length": (Fraction(1), Fraction(0)), "1/length": (Fraction(-1), Fraction(0)), "time": (Fraction(0), Fraction(1)),
     "frequency": (Fraction(0), Fraction(-1)),
-}
+}  # fmt: skip
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 SHAPE_UNITS = {"length": "m", "1/length": "1/m", "time": "s", "frequency": "Hz"}
 FREE_SHAPE = "miso_free_shape"  # the estimator that finds shape parameters too

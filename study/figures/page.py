@@ -7,7 +7,7 @@ engine would measure every text on every page, which costs more than drawing it.
 # Matplotlib leaves the **kwargs of its methods untyped.
 # pyright: reportUnknownMemberType=false
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from io import BytesIO
 
 from matplotlib.artist import Artist
@@ -33,25 +33,10 @@ def page(
 ) -> tuple[Figure, list[Axes]]:  # fmt: skip
     """An empty page.
 
-    Parameters
-    ----------
-    title, subtitle : str
-        Stand at the top left, the system in bold and what is shown of it below.
-    rows, columns : int
-        Panels.
-    width, panel : float
-        Width of the page and height of a panel in inches.
-    legend_rows : int
-        Room to leave between title and panels.
-    headed : bool
-        Whether the first panels have headings of their own, which need room.
-    share : bool
-        Whether the panels of a column share their abscissa.
-
-    Returns
-    -------
-    Figure, list of Axes
-        The panels from left to right, then down.
+    Title (the system, in bold) and subtitle stand at the top left. There are ``rows`` times ``columns`` panels, from
+    left to right, then down; ``width`` of the page and height of a ``panel`` are in inches. ``legend_rows`` is the room
+    to leave between title and panels, ``headed`` whether the first panels have headings of their own, which need room,
+    ``share`` whether the panels of a column share their abscissa.
     """
     top = TITLE + LEGEND_ROW * legend_rows + (GAP if headed else GAP / 2.0)
     between = GAP if share else GAP + BOTTOM - 0.1
@@ -116,3 +101,8 @@ def rendered(figure: Figure, kind: str) -> bytes:
     target = BytesIO()
     figure.savefig(target, format=kind, metadata=METADATA[kind])
     return target.getvalue()
+
+
+def files(figures: Mapping[str, Figure]) -> dict[str, bytes]:
+    """Figures, by the stem of their file name, as the content of files: each as PNG and as SVG."""
+    return {f"{stem}.{kind}": rendered(figure, kind) for stem, figure in figures.items() for kind in ("png", "svg")}

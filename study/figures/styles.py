@@ -18,12 +18,9 @@ class LineLook:
     def line(self) -> dict[str, Any]:
         """Keyword arguments for ``Axes.plot``."""
         return {
-            "color": self.colour,
-            "linestyle": self.dash,
-            "linewidth": self.width,
-            "zorder": self.level,
+            "color": self.colour, "linestyle": self.dash, "linewidth": self.width, "zorder": self.level,
             "label": self.label,
-        }
+        }  # fmt: skip
 
 
 EXACT = LineLook("exact", "black", "-", 0.8, 5.0)

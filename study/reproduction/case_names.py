@@ -16,12 +16,7 @@ def rules(project: Path) -> set[str]:
 def taken(project: Path, many: int) -> dict[str, str]:
     """Each name that a case may not have, with what it is the name of.
 
-    Parameters
-    ----------
-    project : Path
-        The folder of the Snakefile.
-    many : int
-        ``estimator_errors.many`` of the settings, which names a folder.
+    ``project`` is the folder of the Snakefile; ``many``, ``estimator_errors.many`` of the settings, names a folder.
     """
     folders = dict.fromkeys((*FOLDERS, f"estimators_{many}"), "a folder of results/")
     return folders | dict.fromkeys(rules(project), "a rule")

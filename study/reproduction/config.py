@@ -72,30 +72,20 @@ class StudyConfig:
         """What a case's record depends on; a job re-runs when it changes."""
         row = self.cases[case]
         return RecordSettings(
-            case=case,
-            excitation=self.settings.excitations[row.excitation],
-            level=row.level,
-            noise=row.noise,
-            noise_seed=self.settings.noise_seed if row.noise > 0.0 else None,
-            sampling=self.settings.sampling,
+            case=case, excitation=self.settings.excitations[row.excitation], level=row.level, noise=row.noise,
+            noise_seed=self.settings.noise_seed if row.noise > 0.0 else None, sampling=self.settings.sampling,
             integrator=self.settings.integrator,
-        )
+        )  # fmt: skip
 
     def identification_settings(self, case: str, estimators: tuple[str, ...] = ()) -> IdentificationSettings:
         """What a case's identification depends on beside its record; other estimators than the study's if named."""
         shared, tolerances = self.settings, self.settings.tolerances
         return IdentificationSettings(
-            case=case,
-            also_assumed=self.cases[case].also_assumed,
-            estimators=estimators or shared.estimators,
-            segments=shared.segments,
-            fit_band=shared.fit_band,
-            local_polynomial=shared.local_polynomial,
-            settle_periods=shared.settle_periods,
-            period=self.period(case),
-            relative={**tolerances.relative, **tolerances.of_case.get(case, {})},
-            absolute=tolerances.absolute,
-        )
+            case=case, also_assumed=self.cases[case].also_assumed, estimators=estimators or shared.estimators,
+            segments=shared.segments, fit_band=shared.fit_band, local_polynomial=shared.local_polynomial,
+            settle_periods=shared.settle_periods, period=self.period(case),
+            relative={**tolerances.relative, **tolerances.of_case.get(case, {})}, absolute=tolerances.absolute,
+        )  # fmt: skip
 
     def period(self, case: str) -> int | None:
         """Samples in a period of a case's force, where it repeats."""

@@ -76,34 +76,21 @@ def rates(table: pd.DataFrame) -> pd.DataFrame:
         rate = float(group["within_tolerance"].astype(bool).sum()) / count
         scatter = float(group["estimate"].std(ddof=1))
         error = float(group["standard_error"].mean())
-        rows.append(
-            {
-                "case": case,
-                "estimator": estimator,
-                "parameter": parameter,
-                "true": float(group["true"].iloc[0]),
-                "mean": float(group["estimate"].mean()),
-                "scatter": scatter,
-                "error_to_scatter": error / scatter if scatter > 0.0 else math.nan,
-                "tolerance": float(group["tolerance"].iloc[0]),
-                "seeds": count,
-                "found": len(group),
-                "within_tolerance": rate,
-                "rate_error": math.sqrt(rate * (1.0 - rate) / count),
-            }
-        )
+        row = {
+            "case": case, "estimator": estimator, "parameter": parameter, "true": float(group["true"].iloc[0]),
+            "mean": float(group["estimate"].mean()), "scatter": scatter,
+            "error_to_scatter": error / scatter if scatter > 0.0 else math.nan,
+            "tolerance": float(group["tolerance"].iloc[0]), "seeds": count, "found": len(group),
+            "within_tolerance": rate, "rate_error": math.sqrt(rate * (1.0 - rate) / count),
+        }  # fmt: skip
+        rows.append(row)
     return pd.DataFrame(rows)
 
 
 def page(table: pd.DataFrame, noise: Mapping[str, float]) -> str:
     """What :func:`rates` found as a page: which MI/SO estimates of noise-free cases meet their tolerance too seldom.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Of all cases, as :func:`rates` gives it.
-    noise : mapping of float
-        Noise of each case.
+    ``noise`` is that of each case.
     """
     own = table[(table["estimator"] == "miso") & (table["case"].map(noise) == 0.0)]
     low = own[own["within_tolerance"] < WANTED].sort_values("within_tolerance")

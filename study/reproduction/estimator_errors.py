@@ -35,39 +35,22 @@ def errors(estimates: pd.DataFrame) -> pd.DataFrame:
         signed = (group["estimate"].to_numpy(dtype=np.float64) - true) / (abs(true) or 1.0)
         median, error = middle(np.abs(signed), count)
         scatter = float(np.std(signed, ddof=1)) if len(signed) > 1 else math.nan
-        rows.append(
-            {
-                "case": case,
-                "estimator": estimator,
-                "parameter": parameter,
-                "true": true,
-                "kind": "relative" if true else "absolute",
-                "median_error": median,
-                "standard_error": error,
-                "bias": float(signed.mean()),
-                "bias_error": scatter / math.sqrt(len(signed)),
-                "scatter": scatter,
-                "seeds": count,
-                "found": len(group),
-                "noted": int(group["note"].astype(bool).sum()),
-                "first_error": middle(np.abs(signed[group["seed"].isin(first)]), len(first))[0],
-            }
-        )
+        row = {
+            "case": case, "estimator": estimator, "parameter": parameter, "true": true,
+            "kind": "relative" if true else "absolute", "median_error": median, "standard_error": error,
+            "bias": float(signed.mean()), "bias_error": scatter / math.sqrt(len(signed)), "scatter": scatter,
+            "seeds": count, "found": len(group), "noted": int(group["note"].astype(bool).sum()),
+            "first_error": middle(np.abs(signed[group["seed"].isin(first)]), len(first))[0],
+        }  # fmt: skip
+        rows.append(row)
     return with_gains(pd.DataFrame(rows, columns=COLUMNS))
 
 
 def differing(own: pd.DataFrame, kept: pd.DataFrame) -> list[str]:
     """Cases whose first seeds do not come out as those of a kept table did: other settings or other code show there.
 
-    Parameters
-    ----------
-    own, kept : DataFrame
-        As :func:`errors` gives them; ``kept`` may have cases and estimators that ``own`` lacks.
-
-    Returns
-    -------
-    list of str
-        Those where a ``first_error`` is not in ``kept`` or is off by more than ``ALIKE``.
+    Both are as :func:`errors` gives them; ``kept`` may have cases and estimators that ``own`` lacks. A case differs
+    where a ``first_error`` is not in ``kept`` or is off by more than ``ALIKE``.
     """
     keys = ["case", "estimator", "parameter"]
     before = kept.set_index(keys).reindex(pd.MultiIndex.from_frame(own[keys])).reset_index()

@@ -46,21 +46,9 @@ def study(
 
     ``fine`` is the mean estimate from the finely integrated records, ``mean_error`` the mean over the seeds of the
     estimate less that of the fine record. ``diverged`` of the ``seeds`` left the range of finite numbers;
-    ``diverged_seeds`` says which, each with the time. ``parameter`` is empty where every run diverged.
-
-    Parameters
-    ----------
-    models : mapping of Model
-        Systems by name, every value known.
-    record : RecordSettings
-        How records are made.
-    estimation : Settings
-        How they are identified.
-    seeds : sequence of int
-        Of the forces.
-    readings : sequence of str
-        Readings of unit variance. The first is studied at every setting, the others (a force of twice
-        the variance, by and large) at the report's own: Adams-Bashforth-Moulton, one step a sample.
+    ``diverged_seeds`` says which, each with the time. ``parameter`` is empty where every run diverged. The first of the
+    ``readings`` of unit variance is studied at every setting, the others (a force of twice the variance, by and large)
+    at the report's own: Adams-Bashforth-Moulton, one step a sample.
     """
     rows: list[dict[str, Any]] = []
     for name, model in models.items():
@@ -106,12 +94,10 @@ def _errors(name: str, true: float, kept: list[tuple[Mapping[str, float], Mappin
     error = np.array([r for _, r in pairs]) - fine
     mean = float(np.mean(error))
     return {
-        "true": true,
-        "fine": float(np.mean(fine)),
-        "mean_error": mean,
+        "true": true, "fine": float(np.mean(fine)), "mean_error": mean,
         "standard_error": float(np.std(error, ddof=1) / math.sqrt(len(error))) if len(error) > 1 else math.nan,
         "relative_error": mean / true if true != 0.0 else math.nan,
-    }
+    }  # fmt: skip
 
 
 def page(table: pd.DataFrame) -> str:

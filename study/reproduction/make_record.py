@@ -22,19 +22,8 @@ def make_record(
 ) -> Record:
     """Simulate a case, noise on the displacement included.
 
-    Parameters
-    ----------
-    model : Model
-        Every value known.
-    settings : RecordSettings or mapping
-        Of the case, or what it is as plain data.
-    seed, noise_seed : int, optional
-        In place of the configured seeds, for ensembles.
-
-    Returns
-    -------
-    Record
-        The velocity and acceleration are the noise-free ones: Section 2.2 adds noise to u(t) alone.
+    Velocity and acceleration are the noise-free ones: Section 2.2 adds noise to u(t) alone. ``settings`` are those of
+    the case, as plain data too; the seeds take the place of the configured ones, for ensembles.
 
     Raises
     ------

@@ -1,4 +1,8 @@
-"""What the jobs ask of the settings beyond the bounds of each value: none shall end in want of it."""
+"""What the jobs ask of the settings beyond the bounds of each value: none shall end in want of it.
+
+Each check raises a ``StudyError`` at the first fault, naming the value and what would be right; whose settings, force
+or model it is, the caller adds.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,13 +27,7 @@ LINES = 4  # of a segment, that the fit band spans at least
 
 
 def check_settings(settings: StudySettings) -> None:
-    """Whether values fit together, and names are known.
-
-    Raises
-    ------
-    StudyError
-        At the first that does not; the caller names the file.
-    """
+    """Whether values fit together, and names are known."""
     samples, dt, length = settings.sampling.samples, settings.sampling.dt, settings.segments.length
     expect(
         length <= samples,
@@ -74,13 +72,7 @@ def _check_excitation(place: str, excitation: ExcitationSettings, sampling: Samp
 
 
 def check_periods(excitation: ExcitationSettings, settings: StudySettings) -> None:
-    """Whether there are periods for those estimators that stand on them.
-
-    Raises
-    ------
-    StudyError
-        If there are too few; the caller says of which force.
-    """
+    """Whether there are periods for those estimators that stand on them."""
     needed, periods = settings.settle_periods + 4, excitation.periods or 1
     expect(
         "errors_in_variables" not in settings.estimators or periods >= needed,
@@ -90,13 +82,7 @@ def check_periods(excitation: ExcitationSettings, settings: StudySettings) -> No
 
 
 def check_reached(excitation: ExcitationSettings, settings: StudySettings) -> None:
-    """Whether a force reaches over the lines that parameters are fitted to: beyond it there is only leakage.
-
-    Raises
-    ------
-    StudyError
-        If it does not; the caller says whose force it is.
-    """
+    """Whether a force reaches over the lines that parameters are fitted to: beyond it there is only leakage."""
     force, high, line = excitation.at_level(1.0), settings.fit_band[1], settings.resolution
     begun = f"fit_band of config.yaml is {list(settings.fit_band)}; the excitation"
     expect(high <= force.highest, f"{begun} has nothing above {force.highest:g} Hz, where the band must end or before")
@@ -107,13 +93,7 @@ def check_reached(excitation: ExcitationSettings, settings: StudySettings) -> No
 
 
 def check_model(path: Path, also_assumed: str, settings: StudySettings) -> Model:
-    """A case's model, which can be simulated, and whose inputs the record can tell apart with a term more.
-
-    Raises
-    ------
-    StudyError
-        If a value or a formula lacks something, or the inputs are too many.
-    """
+    """A case's model, which can be simulated, and whose inputs the record can tell apart with a term more."""
     from study.identify.frequency_domain.local_polynomial_method import LocalPolynomial
 
     model = assumed = read_model(path)
@@ -140,13 +120,7 @@ def check_model(path: Path, also_assumed: str, settings: StudySettings) -> Model
 
 
 def check_tolerances(tolerances: Tolerances, models: Path, cases: Sequence[str]) -> None:
-    """Whether tolerances are of parameters that there are, and of cases or systems.
-
-    Raises
-    ------
-    StudyError
-        At the first that is of neither; the caller names the file.
-    """
+    """Whether tolerances are of parameters that there are, and of cases or systems."""
     systems = [path.stem for path in sorted(models.glob("*.yaml"))]
     for name in tolerances.of_case:
         neither = f"tolerances.of_case names {name!r}, which is neither a case nor a system"
@@ -163,13 +137,7 @@ def check_tolerances(tolerances: Tolerances, models: Path, cases: Sequence[str])
 
 
 def check_claims(settings: StudySettings) -> None:
-    """Whether the claims can be judged under these settings.
-
-    Raises
-    ------
-    StudyError
-        At the first thing that they lack, naming the value and what would be right; the caller names the file.
-    """
+    """Whether the claims can be judged under these settings."""
     known, force = ", ".join(settings.excitations), settings.excitations.get(JUDGED)
     if force is None:
         raise StudyError(f"excitations names {known}, not {JUDGED!r}; the claims judge a force of this name, a {KIND}")

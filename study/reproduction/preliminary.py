@@ -1,7 +1,8 @@
 """Preliminary analysis of measured data (the report's Section 3).
 
 Restoring force from force and acceleration, its patterns over displacement, the lines of a Mathieu
-system's response, and histograms beside the Gaussian.
+system's response, and histograms beside the Gaussian. What a record or a model lacks for one of them, a ``StudyError``
+says with what would be right.
 """
 
 import math
@@ -42,13 +43,7 @@ class Histogram:
 
 
 def restoring_force(record: Record, mass: float) -> Floats:
-    """``F - m d2u/dt2`` along a record, (2.2); shape (n,), in the record's unit of force.
-
-    Raises
-    ------
-    StudyError
-        If the record holds no acceleration or the mass is not above zero.
-    """
+    """``F - m d2u/dt2`` along a record, (2.2); shape (n,), in the record's unit of force."""
     if "acceleration" not in record:
         raise StudyError(f"{record.name} has no channel 'acceleration'; expected one for the restoring force F - m a")
     if not mass > 0.0:
@@ -57,13 +52,7 @@ def restoring_force(record: Record, mass: float) -> Floats:
 
 
 def random_pattern(record: Record, mass: float) -> Pattern:
-    """Restoring force over displacement under the force of a record (Figures 2b to 7b).
-
-    Raises
-    ------
-    StudyError
-        As :func:`restoring_force`, or if the record holds no displacement.
-    """
+    """Restoring force over displacement under the force of a record (Figures 2b to 7b)."""
     if "displacement" not in record:
         raise StudyError(f"{record.name} has no channel 'displacement'; expected one for a force/displacement pattern")
     return Pattern(record["displacement"], restoring_force(record, mass))
@@ -72,12 +61,8 @@ def random_pattern(record: Record, mass: float) -> Pattern:
 def model_restoring_force(model: Model, displacement: Floats, velocity: Floats, time: Floats) -> Floats:
     """Restoring force (2.3) of a model that is made to follow a motion, shape (n,).
 
-    It is what the model's own equation of motion gives: ``-m`` times the acceleration under no force.
-
-    Raises
-    ------
-    StudyError
-        If a value is missing, or a term remembers the past (its force is no function of this motion alone).
+    It is what the model's own equation of motion gives: ``-m`` times the acceleration under no force. A term that
+    remembers the past is refused: its force is no function of this motion alone.
     """
     from study.equations import kernels  # the compiled loops are slow to load; those who draw histograms need none
 
@@ -97,19 +82,8 @@ def model_restoring_force(model: Model, displacement: Floats, velocity: Floats, 
 def harmonic_pattern(model: Model, amplitude: float, frequency: float, cycles: int = 1) -> Pattern:
     """Restoring force over displacement for ``u = U sin(2 pi f_0 t)``, (3.1) and (3.2).
 
-    Parameters
-    ----------
-    model : Model
-        Every value known.
-    amplitude, frequency : float
-        U, in the model's unit of length, and f_0 in hertz.
-    cycles : int
-        Periods of the motion. A stiffness that varies with time closes its pattern only after several.
-
-    Raises
-    ------
-    StudyError
-        If amplitude or frequency is not above zero, and as :func:`model_restoring_force`.
+    ``amplitude`` is U, in the model's unit of length, ``frequency`` f_0 in hertz; a stiffness that varies with time
+    closes its pattern only after several ``cycles``.
     """
     for name, value in (("amplitude", amplitude), ("frequency", frequency)):
         if not value > 0.0:
@@ -138,13 +112,7 @@ def closing_cycles(model: Model, frequency: float) -> int:
 
 
 def natural_frequency(values: Mapping[str, float | None]) -> float:
-    """``sqrt(k/m) / (2 pi)`` in hertz, (4.4), from a model's ``values``.
-
-    Raises
-    ------
-    StudyError
-        If there is no positive mass and linear stiffness.
-    """
+    """``sqrt(k/m) / (2 pi)`` in hertz, (4.4), from a model's ``values``."""
     mass, stiffness = values.get("m"), values.get("k")
     if mass is None or stiffness is None or not mass > 0.0 or not stiffness > 0.0:
         raise StudyError(f"m = {mass} and k = {stiffness} give no natural frequency; expected both above zero")
@@ -160,13 +128,7 @@ def mathieu_lines(natural: float, modulation: float) -> dict[str, float]:
 
 
 def histogram(values: Floats, bins: int = 51) -> Histogram:
-    """Distribution of a quantity, shape (n,), over evenly spaced bins that reach its largest excursion.
-
-    Raises
-    ------
-    StudyError
-        If the quantity never changes.
-    """
+    """Distribution of a quantity, shape (n,), over evenly spaced bins that reach its largest excursion."""
     mean, deviation = float(np.mean(values)), float(np.std(values))
     if not deviation > 0.0:
         raise StudyError(f"all {len(values)} values are {mean:g}; expected values that differ, for a histogram")
@@ -176,12 +138,7 @@ def histogram(values: Floats, bins: int = 51) -> Histogram:
     z = (points - mean) / deviation
     scaled = (values - mean) / deviation
     return Histogram(
-        edges=edges,
-        density=density.astype(np.float64),
-        points=points,
-        gaussian=np.exp(-0.5 * z**2) / (deviation * math.sqrt(2.0 * math.pi)),
-        mean=mean,
-        deviation=deviation,
-        skewness=float(np.mean(scaled**3)),
-        kurtosis=float(np.mean(scaled**4)),
-    )
+        edges=edges, density=density.astype(np.float64), points=points,
+        gaussian=np.exp(-0.5 * z**2) / (deviation * math.sqrt(2.0 * math.pi)), mean=mean, deviation=deviation,
+        skewness=float(np.mean(scaled**3)), kurtosis=float(np.mean(scaled**4)),
+    )  # fmt: skip

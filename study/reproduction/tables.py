@@ -50,11 +50,10 @@ def parameters(
 
 def judge(name: str, true: float, estimate: float, settings: IdentificationSettings) -> dict[str, Any]:
     """Relative error, tolerance and verdict of one estimate."""
-    if true != 0.0:
-        error, tolerance = (estimate - true) / true, settings.relative.get(name, math.nan)
-        return {"relative_error": error, "tolerance": tolerance, "within_tolerance": abs(error) <= tolerance}
-    tolerance = settings.absolute.get(name, math.nan)
-    return {"relative_error": math.nan, "tolerance": tolerance, "within_tolerance": abs(estimate) <= tolerance}
+    relative = (estimate - true) / true if true else math.nan
+    tolerance = (settings.relative if true else settings.absolute).get(name, math.nan)
+    within = abs(relative if true else estimate) <= tolerance
+    return {"relative_error": relative, "tolerance": tolerance, "within_tolerance": within}
 
 
 def frequency_responses(model: Model, estimates: Mapping[str, Identified]) -> pd.DataFrame:

@@ -30,30 +30,14 @@ ATTEMPTS = 300  # systems drawn until one carries the effects at the wanted stre
 
 @dataclass(frozen=True)
 class Trial:
-    """A record, what its owner believes, and the truth.
+    """A record, what its owner believes, and the truth."""
 
-    Attributes
-    ----------
-    record : Record
-        Force and one measured motion.
-    believed : Model
-        The model without the hidden effects, nothing known of its coefficients.
-    truth : Model
-        The model that made the record.
-    hidden : tuple of str
-        Names of the hidden effects.
-    noise : float
-        Mean square of the noise over that of the response.
-    shares : tuple of float
-        Share of the restoring force that each hidden effect carries and no linear model can take over.
-    """
-
-    record: Record
-    believed: Model
-    truth: Model
-    hidden: tuple[str, ...]
-    noise: float
-    shares: tuple[float, ...]
+    record: Record  # force and one measured motion
+    believed: Model  # the model without the hidden effects, nothing known of its coefficients
+    truth: Model  # the model that made the record
+    hidden: tuple[str, ...]  # names of the hidden effects
+    noise: float  # mean square of the noise over that of the response
+    shares: tuple[float, ...]  # of the restoring force in each hidden effect, beyond any linear model
 
 
 def make_trial(
@@ -61,16 +45,8 @@ def make_trial(
 ) -> Trial:
     """A trial of this seed; what is given is not drawn.
 
-    Parameters
-    ----------
-    seed : int
-        Everything else follows from it.
-    hidden : sequence of str, optional
-        Effects to hide; none with an empty sequence.
-    noise : float, optional
-        Mean square of the noise over that of the response.
-    response : str, optional
-        ``displacement``, ``velocity`` or ``acceleration``.
+    No effect is hidden with an empty sequence; ``noise`` is a mean square over that of the response, ``response`` is
+    ``displacement``, ``velocity`` or ``acceleration``.
 
     Raises
     ------

@@ -87,14 +87,8 @@ TARGETS: tuple[tuple[str, Callable[[Row], bool], Callable[[Row], float], str], .
 def summary(table: pd.DataFrame, wanted: Mapping[str, float]) -> pd.DataFrame:
     """Each target with the rate that was measured and its binomial standard error.
 
-    A trial that could not be made or diagnosed counts as failed.
-
-    Parameters
-    ----------
-    table : DataFrame
-        ``trials.csv``.
-    wanted : mapping
-        Wanted rates: ``first``, ``nothing``, ``both``, ``removed``.
+    A trial that could not be made or diagnosed counts as failed. ``wanted`` holds the rates ``first``, ``nothing``,
+    ``both``, ``removed``.
     """
     rows = rows_of(table)
     return pd.DataFrame([_rate(what, rows, member, score, wanted.get(key)) for what, member, score, key in TARGETS])
@@ -113,18 +107,14 @@ def _rate(
 
 def confusion(table: pd.DataFrame) -> pd.DataFrame:
     """Trials by what was hidden (rows: each effect alone, none) and what was said (columns)."""
-    said = [*HIDDEN, *_others(table), NOTHING, UNKNOWN]
+    never_hidden = sorted({row["named"] for row in rows_of(table)} - {"", *HIDDEN})
+    said = [*HIDDEN, *never_hidden, NOTHING, UNKNOWN]
     hidden = [*HIDDEN, NONE]
     counts = np.zeros((len(hidden), len(said)), dtype=np.int64)
     for row in rows_of(table):
         if row["kind"] in (SINGLE, NONE) and not row["trouble"]:
             counts[hidden.index(row["hidden"] or NONE), said.index(row["named"] or row["verdict"])] += 1
     return pd.DataFrame(counts, index=pd.Index(hidden, name="hidden"), columns=said).reset_index()
-
-
-def _others(table: pd.DataFrame) -> list[str]:
-    """Effects that are never hidden and were named all the same."""
-    return sorted({row["named"] for row in rows_of(table)} - {"", *HIDDEN})
 
 
 def ladder(table: pd.DataFrame) -> pd.DataFrame:

@@ -34,38 +34,17 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Order:
-    """A trial to be run.
+    """A trial to be run."""
 
-    Attributes
-    ----------
-    kind : str
-        ``single``, ``none``, ``pair`` or ``removed``.
-    seed : int
-        Of the trial.
-    hidden : tuple of str
-        Effects to hide.
-    noise : float
-        Mean square of the noise over that of the response.
-    response : str
-        What is measured.
-    """
-
-    kind: str
-    seed: int
-    hidden: tuple[str, ...]
-    noise: float
-    response: str
+    kind: str  # ``single``, ``none``, ``pair`` or ``removed``
+    seed: int  # of the trial
+    hidden: tuple[str, ...]  # effects to hide
+    noise: float  # mean square of the noise over that of the response
+    response: str  # what is measured
 
 
 def orders(settings: TrialSettings) -> list[Order]:
-    """Every trial of the published run: all effects at all noises and responses, each with a seed of its own.
-
-    Parameters
-    ----------
-    settings : TrialSettings
-        ``trials`` of the configuration: ``first_seed``, ``noises``, how many ``rounds`` of single effects and
-        of ``none`` at each noise and response, and how many ``pairs`` and ``removed`` trials of each effect.
-    """
+    """Every trial of the published run: all effects at all noises and responses, each with a seed of its own."""
     grid = [(noise, response) for noise in settings.noises for response in RESPONSES]
     wanted: list[tuple[str, tuple[str, ...], tuple[float, str]]] = []
     wanted += [(SINGLE, (name,), place) for _ in range(settings.rounds) for place in grid for name in HIDDEN]
@@ -104,17 +83,12 @@ def _judged(order: Order, trial: Trial) -> Row:
     missing = diagnosis.verdict == MISSING
     after = added(before, first.term) if missing else before
     row: Row = {
-        "verdict": diagnosis.verdict,
-        "first": first.name,
-        "named": first.name if missing else "",
-        "tied_with": "+".join(first.tied_with),
-        "pair": "+".join(diagnosis.pair),
-        "error_before": before.prediction.error,
-        "error_after": after.prediction.error,
+        "verdict": diagnosis.verdict, "first": first.name, "named": first.name if missing else "",
+        "tied_with": "+".join(first.tied_with), "pair": "+".join(diagnosis.pair),
+        "error_before": before.prediction.error, "error_after": after.prediction.error,
         "error_true": error_of_truth(trial, prepared, after.fit.steps_per_sample),
-        "noise_floor": before.prediction.floor,
-        "left": diagnosis.left,
-    }
+        "noise_floor": before.prediction.floor, "left": diagnosis.left,
+    }  # fmt: skip
     if missing and order.kind == PAIR:
         row |= _second(after)
     if missing and order.kind == REMOVED and not first.tied_with:

@@ -17,13 +17,7 @@ WANTED = "the answer file of a trial, as 'study trial' writes it"
 
 
 def write(trial: Trial, folder: Path) -> tuple[Path, Path, Path]:
-    """Write record, believed model and sealed answer; their paths in this order.
-
-    Raises
-    ------
-    StudyError
-        If a file cannot be written.
-    """
+    """Write record, believed model and sealed answer: their paths, or a ``StudyError`` if that cannot be."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -44,21 +38,13 @@ def write(trial: Trial, folder: Path) -> tuple[Path, Path, Path]:
 def contents(trial: Trial) -> dict[str, Any]:
     """What the answer holds: hidden effects, their shares of the restoring force, the noise, and the true model."""
     return {
-        "hidden": list(trial.hidden),
-        "shares": list(trial.shares),
-        "noise": trial.noise,
+        "hidden": list(trial.hidden), "shares": list(trial.shares), "noise": trial.noise,
         "truth": format_model(trial.truth),
-    }
+    }  # fmt: skip
 
 
 def unseal(path: Path) -> dict[str, Any]:
-    """The answer of a trial.
-
-    Raises
-    ------
-    StudyError
-        If the file is no answer.
-    """
+    """The answer of a trial; a ``StudyError`` if the file holds none."""
     text = read_text(path, WANTED)
     try:
         page: object = json.loads(text)

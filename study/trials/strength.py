@@ -21,23 +21,9 @@ CLOSE = 0.05  # relative distance from the wanted share at which it ends
 def grown(model: Model, entry: ModelTerm, drive: Floats, dt: float, target: float) -> tuple[Model, float] | None:
     """The model with an effect that carries the target share, by iteration on the simulated motion.
 
-    Parameters
-    ----------
-    model : Model
-        The model without it, every value known.
-    entry : ModelTerm
-        The effect; its coefficients say in which proportion, and with which sign, they grow.
-    drive : array, shape (n,)
-        Force in N.
-    dt : float
-        Sampling interval in seconds.
-    target : float
-        Wanted share.
-
-    Returns
-    -------
-    Model and float, or None
-        With the share that was reached; None where the motion diverges or the share cannot be reached.
+    The coefficients of ``entry`` say in which proportion, and with which sign, they grow; ``drive`` is the force in N,
+    shape (n,), and ``target`` the wanted share. With the model comes the share that was reached; None where the motion
+    diverges or the share cannot be reached.
     """
     unit = tuple(c if c is not None else 1.0 for c in entry.coefficients)
     amount, share = 0.0, 0.0

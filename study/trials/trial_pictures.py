@@ -19,12 +19,7 @@ DARK = 0.6  # share from which a number is written in white
 def confusion(axes: Axes, counts: pd.DataFrame) -> Axes:
     """Shares of each row, in per cent: hidden effects down, what was said across.
 
-    Parameters
-    ----------
-    axes : Axes
-        Where to draw.
-    counts : DataFrame
-        As ``reach.confusion`` gives it.
+    ``counts`` are as ``reach.confusion`` gives them.
     """
     table = counts.set_index("hidden")
     names = [str(name).replace("_", " ") for name in table.columns]

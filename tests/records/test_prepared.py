@@ -41,10 +41,11 @@ def test_the_uncertain_ends_belong_to_no_inner_span(measured):
     assert prepared.inner((4000, 5000)) == (4000, 5000)
 
 
-def test_a_shorter_look_fits_the_first_samples_and_judges_as_before(measured):
-    prepared = prepare_record(measured, make_plan(measured, (1000, 5000), (5000, 8000)))
+@pytest.mark.parametrize(("judge", "fit"), [((5000, 8000), (4488, 5000)), ((6000, 8000), (1000, 1512))])
+def test_a_shorter_look_fits_the_samples_that_the_judging_part_follows(judge, fit, measured):
+    prepared = prepare_record(measured, make_plan(measured, (1000, 5000), judge))
     look = prepared.shortened(512)
-    assert look.plan == Plan("acceleration", (1000, 1512), (5000, 8000))
+    assert look.plan == Plan("acceleration", fit, judge)
     assert look.record is prepared.record
     assert prepared.shortened(4000) is prepared
 

@@ -209,14 +209,11 @@ def record_settings(settings: Table, drive: Drive) -> dict[str, Any]:
     if "report" not in settings["excitations"]:
         raise StudyError("config/config.yaml: expected an excitation 'report'; the claims judge that force history")
     return {
-        "case": drive.system,
-        "excitation": {**settings["excitations"]["report"], **dict(drive.excitation)},
-        "level": drive.level,
-        "noise": drive.noise,
-        **({"noise_seed": settings["noise_seed"]} if drive.noise > 0.0 else {}),
-        "sampling": settings["sampling"],
+        "case": drive.system, "excitation": {**settings["excitations"]["report"], **dict(drive.excitation)},
+        "level": drive.level, "noise": drive.noise,
+        **({"noise_seed": settings["noise_seed"]} if drive.noise > 0.0 else {}), "sampling": settings["sampling"],
         "integrator": settings["integrator"],
-    }
+    }  # fmt: skip
 
 
 def _analysis(identified: Identified, settings: Settings) -> Analysis:
@@ -224,14 +221,10 @@ def _analysis(identified: Identified, settings: Settings) -> Analysis:
     assert isinstance(result, MisoResult)  # both estimators give coherences
     keep = (result.frequency >= settings.band[0]) & (result.frequency <= settings.band[1])
     return Analysis(
-        frequency=result.frequency[keep],
-        response=result.response[:, keep],
-        cumulative=result.cumulative[:, keep],
-        averages=result.averages,
-        values={p.name: p.value for p in identified.parameters},
-        errors={p.name: p.error for p in identified.parameters},
-        read=read_curve(result, settings.band),
-    )
+        frequency=result.frequency[keep], response=result.response[:, keep], cumulative=result.cumulative[:, keep],
+        averages=result.averages, values={p.name: p.value for p in identified.parameters},
+        errors={p.name: p.error for p in identified.parameters}, read=read_curve(result, settings.band),
+    )  # fmt: skip
 
 
 def models_of(folder: Path) -> dict[str, Model]:

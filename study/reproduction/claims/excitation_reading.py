@@ -74,11 +74,10 @@ def _row(quantity: Quantity, evidence: Evidence, reported: Reported) -> dict[str
         drive = Drive(quantity.system, excitation=(("reading", reading),))
         sample = samples[reading] = quantity.read(evidence.ensemble(drive))
         row |= {
-            f"{reading}_mean": sample.mean,
-            f"{reading}_standard_error": sample.error,
+            f"{reading}_mean": sample.mean, f"{reading}_standard_error": sample.error,
             f"{reading}_distance": sample.mean - target,
             f"{reading}_in_scatter": (sample.mean - target) / sample.scatter,
-        }
+        }  # fmt: skip
     distances = {reading: abs(sample.mean - target) for reading, sample in samples.items()}
     first, second = (samples[reading] for reading in READINGS)
     apart = abs(distances[READINGS[0]] - distances[READINGS[1]])

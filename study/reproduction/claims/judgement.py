@@ -65,15 +65,10 @@ def conclude(reported: Reported, name: str, *conditions: Condition) -> Claim:
     statement = reported[name]
     conditions = tuple(sorted(conditions, key=lambda c: c.met))  # what fails decides, and stands first
     return Claim(
-        id=name,
-        where=statement.where,
-        claim=statement.what,
-        reported=reported.numbers(name),
-        measured=_joined(c.measured for c in conditions),
-        criterion=_joined(c.criterion for c in conditions),
-        verdict=verdict([c.met for c in conditions]),
-        why=_reasons([c for c in conditions if not c.met]),
-    )
+        id=name, where=statement.where, claim=statement.what, reported=reported.numbers(name),
+        measured=_joined(c.measured for c in conditions), criterion=_joined(c.criterion for c in conditions),
+        verdict=verdict([c.met for c in conditions]), why=_reasons([c for c in conditions if not c.met]),
+    )  # fmt: skip
 
 
 def _reasons(failed: Sequence[Condition]) -> str:

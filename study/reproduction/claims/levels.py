@@ -182,8 +182,7 @@ def noise_cubic(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     worst = noises(reported)[-1]
     k3, c3 = biases[worst]["k3"].mean, biases[worst]["c3"].mean
     measured = f"k3 {percent(k3, '+.3g')}, c3 {percent(c3, '+.3g')}"
-    larger = Condition(f"at {percent(worst)} noise the bias of c3 is the larger", measured, abs(c3) > abs(k3))
-    yield larger
+    yield Condition(f"at {percent(worst)} noise the bias of c3 is the larger", measured, abs(c3) > abs(k3))
 
 
 def _line_scatter(ensemble: Ensemble, imaginary: bool, reported: Reported) -> float:

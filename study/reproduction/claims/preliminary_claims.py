@@ -176,9 +176,8 @@ def mathieu_pattern(evidence: Evidence, reported: Reported) -> list[Condition]:
 def dead_band_pattern(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """The gap read off the pattern."""
     m, gap = reported.table_1("dead_band", "m"), reported.value("dead_band_pattern")
-    yield close(
-        "gap read off the pattern", evidence.each(Drive("dead_band"), lambda r: read_dead_band(r, m)), gap, BY_EYE
-    )
+    read = evidence.each(Drive("dead_band"), lambda r: read_dead_band(r, m))
+    yield close("gap read off the pattern", read, gap, BY_EYE)
 
 
 CLAIMS = claims(

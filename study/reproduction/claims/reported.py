@@ -1,4 +1,4 @@
-"""What the report states: ``config/reported.tsv``."""
+"""What the report states: ``config/reported.tsv``; a ``StudyError`` names the row or the value that is at fault."""
 
 import difflib
 import re
@@ -55,30 +55,16 @@ IN_WORDS = _names("""
 
 
 class Statement(Row):
-    """One row: a statement, with its number where it has one.
-
-    Attributes
-    ----------
-    id : str
-        A claim's name; further numbers of the same claim are ``<claim>.<name>``.
-    where : str
-        Section, figure or table.
-    what : str
-        The statement in a sentence, or what the number is.
-    value : float or None
-        The number.
-    unit : str
-        Its unit.
-    """
+    """One row: a statement, with its number where it has one."""
 
     id: Annotated[
         str,
         Field(pattern=r"^[a-z0-9_]+([.][a-z0-9_]+)*\Z", description="names of a to z, 0 to 9 and _ with dots between"),
-    ]
-    where: Text
-    what: Text
-    value: Annotated[float | None, BeforeValidator(lambda cell: None if cell == "" else cell)]
-    unit: str
+    ]  # a claim's name; further numbers of the same claim are ``<claim>.<name>``
+    where: Text  # section, figure or table
+    what: Text  # the statement in a sentence, or what the number is
+    value: Annotated[float | None, BeforeValidator(lambda cell: None if cell == "" else cell)]  # the number
+    unit: str  # its unit
 
     @model_validator(mode="after")
     def _bounded(self) -> Self:
@@ -107,25 +93,13 @@ class Reported:
     statements: Mapping[str, Statement]
 
     def __getitem__(self, name: str) -> Statement:
-        """One statement.
-
-        Raises
-        ------
-        StudyError
-            If there is none of this id.
-        """
+        """One statement."""
         if name not in self.statements:
             raise StudyError(f"config/reported.tsv has no row {name!r}")
         return self.statements[name]
 
     def value(self, name: str) -> float:
-        """The number of one statement.
-
-        Raises
-        ------
-        StudyError
-            If the statement has none.
-        """
+        """The number of one statement."""
         value = self[name].value
         if value is None:
             raise StudyError(f"config/reported.tsv gives no value for {name!r}")
@@ -147,13 +121,7 @@ class Reported:
 
 
 def check_complete(reported: Reported, path: Path) -> None:
-    """Whether the rows are those that the claims ask for, ``WITH_A_VALUE`` and ``IN_WORDS``.
-
-    Raises
-    ------
-    StudyError
-        At the first row that no claim asks for, that lacks its value, or that is not there.
-    """
+    """Whether the rows are those that the claims ask for, ``WITH_A_VALUE`` and ``IN_WORDS``."""
     known = [*WITH_A_VALUE, *IN_WORDS]
     for name in reported.statements:
         if name not in known:
@@ -169,13 +137,7 @@ def check_complete(reported: Reported, path: Path) -> None:
 
 
 def check_systems(reported: Reported, models: Path) -> None:
-    """Whether each system of Table 1 has its model.
-
-    Raises
-    ------
-    StudyError
-        At the first that has none, naming it.
-    """
+    """Whether each system of Table 1 has its model."""
     for name in reported.statements:
         where, _, rest = name.partition(".")
         system, _, parameter = rest.partition(".")
@@ -184,13 +146,7 @@ def check_systems(reported: Reported, models: Path) -> None:
 
 
 def load(path: Path) -> Reported:
-    """Read and check the table.
-
-    Raises
-    ------
-    StudyError
-        At the first fault, naming row and value.
-    """
+    """Read and check the table."""
     statements: dict[str, Statement] = {}
     for _, statement in read_rows(path, Statement):
         if statement.id in statements:

@@ -13,14 +13,7 @@ from study.reproduction.preliminary import Histogram
 def histogram(axes: Axes, counts: Histogram, quantity: str, unit: str) -> Axes:
     """Probability density of a quantity; skewness and kurtosis stand above the panel.
 
-    Parameters
-    ----------
-    axes : Axes
-        Where to draw.
-    counts : Histogram
-        Of the quantity, in ``unit``.
-    quantity, unit : str
-        For the axis; metres are shown as mm or µm where that reads better.
+    ``unit`` is that of ``counts``; metres are shown as mm or µm where that reads better.
     """
     factor, shown = labels.prefixed(unit, float(abs(counts.edges).max()))
     axes.stairs(counts.density * factor, counts.edges / factor, fill=True, facecolor="C4", alpha=0.55, label=quantity)
