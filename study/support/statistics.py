@@ -4,7 +4,6 @@ Where a residual is not white noise, formulas for independent samples give error
 over blocks much longer than the response's memory are practically independent.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,16 +70,18 @@ def difference(first: Floats, second: Floats) -> float:
 
 
 def _p_value(products: Floats) -> float:
-    """Signed-rank test (Wilcoxon, 1945), so that a few strong blocks do not decide alone; in its normal approximation.
+    """Signed-rank test (Wilcoxon, 1945), so that a few strong blocks do not decide alone; exact, one-sided.
 
     Here and not from ``scipy.stats``, which takes longer to load than a comparison takes.
     """
     if not np.any(products):
         return 1.0
     n, rank = len(products), np.argsort(np.argsort(np.abs(products))) + 1
-    above = float(np.sum(rank[products > 0.0])) - 0.5 - n * (n + 1) / 4
-    spread = math.sqrt(n * (n + 1) * (2 * n + 1) / 24)
-    return 0.5 * math.erfc(above / spread / math.sqrt(2.0))
+    ways = np.zeros(n * (n + 1) // 2 + 1)  # to choose ranks that sum to 0, 1, 2, ...
+    ways[0] = 1.0
+    for k in range(1, n + 1):
+        ways[k:] += ways[:-k].copy()
+    return float(np.sum(ways[int(np.sum(rank[products > 0.0])) :])) / 2.0**n
 
 
 def clustered_covariance(jacobian: Floats, residual: Floats, count: int = 2 * BLOCKS) -> Floats:

@@ -60,3 +60,17 @@ def test_one_error_and_one_floor(seed, hidden, noise, response, tmp_path, capsys
 def assert_same(one, other):
     for key in ("error", "noise_floor"):
         assert other[key]["response"] == pytest.approx(one[key]["response"], rel=ALIKE)
+
+
+def test_a_cut_off_is_heeded_by_all(tmp_path, capsys):
+    data, model, _ = write(make_trial(32, ("quadratic_damping",), 0.01, "acceleration"), tmp_path)
+    errors = {}
+    for cutoff in ((), ("--cutoff", "6")):
+        for command, name in (("compare", "comparison.json"), ("diagnose", "diagnosis.json")):
+            words = [command, str(data), "--model", str(model), "--out", str(tmp_path / "out"), *cutoff]
+            assert cli.main(words) == 0
+            errors[command, bool(cutoff)] = json.loads((tmp_path / "out" / name).read_text())["error"]["response"]
+    capsys.readouterr()
+    for given in (False, True):
+        assert errors["diagnose", given] == pytest.approx(errors["compare", given], rel=ALIKE)
+    assert errors["diagnose", True] != pytest.approx(errors["diagnose", False], rel=1e-3)

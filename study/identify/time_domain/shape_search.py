@@ -77,10 +77,19 @@ def baseline(fit: FreeRunFit, prepared: Prepared) -> Baseline:
     scale = np.linalg.norm(jacobian, axis=0)
     basis = np.linalg.qr(jacobian / np.where(scale > 0.0, scale, 1.0))[0]
     displacement, _ = run_of(fit, prepared, motion="displacement").respond({}, fit.initial)
-    row = MOTIONS.index(prepared.response)
-    return Baseline(
-        fit, basis, displacement, linear_start(fit.model, prepared), oscillator(prepared), prepared.dt, row
-    )  # fmt: skip
+    linear, approximation = _linear(fit, prepared)
+    return Baseline(fit, basis, displacement, linear, approximation, prepared.dt, MOTIONS.index(prepared.response))
+
+
+def _linear(fit: FreeRunFit, prepared: Prepared) -> tuple[dict[str, float], dict[str, float]]:
+    """Best linear approximation in the model's terms, and as an oscillator; of a stretch at rest what the fit has."""
+    try:
+        return linear_start(fit.model, prepared), oscillator(prepared)
+    except StudyError:
+        own = fit.model.numbers()
+        slowest = (2.0 * np.pi / (len(fit.residual) * prepared.dt)) ** 2
+        approximation = {"m": own["m"], "c": own.get("c", 0.0), "k": own.get("k") or own["m"] * slowest}
+        return {key: own[key] if key in approximation else 0.0 for key in own}, approximation
 
 
 def starts(term: Term, base: Baseline, prepared: Prepared) -> list[Start]:
