@@ -10,6 +10,7 @@ from study.compare.comparison import Comparison
 from study.compare.prediction import Prediction
 from study.diagnose import candidates, dependence, pairs
 from study.diagnose.candidates import Candidate
+from study.diagnose.credibility import ALPHA, credible
 from study.diagnose.pairs import Pair
 from study.diagnose.ranking import UNSTEADY, Ranked, changes, curves, rank, wavers
 from study.equations.terms import Term
@@ -25,9 +26,7 @@ from study.support.errors import DivergenceError
 
 Floats = NDArray[np.float64]
 MISSING, NOTHING, UNKNOWN = "missing_effect", "nothing_missing", "unknown_effect"
-LEVEL = 0.01  # of the p value, all candidates accounted for
 SIGNIFICANT = 5.0  # standard errors by which structure must stand above the noise floor
-SMALLEST_GAIN = 1e-3  # of the rms response: what a candidate must explain; less is the resolution of integration
 NEGLIGIBLE = 2e-3  # of the rms response: structure below this is no evidence that something is missing
 LEFT = 0.0075  # of the rms response: structure that may be left beside a candidate which counts as the explanation
 FORGIVEN = 0.1  # of the unexplained power: what explains less of a good model's must have a coefficient that stays
@@ -104,11 +103,11 @@ def _decide(
 ) -> tuple[str, list[Ranked], float, tuple[str, ...]]:
     """Verdict, candidates in their final order, what is left, and the pair that explains it if none does alone."""
     prediction = comparison.prediction
-    credible = [r for r in rows if _credible(r, prediction)]
-    if not credible:
+    believed = [r for r in rows if credible(prediction, r.prediction, r.interval, len(rows))]
+    if not believed:
         left = max(_left(prediction), _lack(comparison.fit, prediction))
         return (UNKNOWN if left > NEGLIGIBLE else NOTHING), rows, left, ()
-    first = credible[0]
+    first = believed[0]
     left = max(_left(first.prediction), _lack(first.fit, first.prediction))
     if first.gain.explained >= ENOUGH or (left <= LEFT and _steady(first)):
         return MISSING, rows, left, ()
@@ -129,11 +128,6 @@ def _steady(row: Ranked) -> bool:
     if row.response_error > LEFT:
         return not wavers(row.steadiness)
     return row.gain.explained >= FORGIVEN or row.unsteadiness <= UNSTEADY
-
-
-def _credible(row: Ranked, before: Prediction) -> bool:
-    gained = max(float(np.mean(before.residual**2) - np.mean(row.residual**2)), 0.0)
-    return row.p_value < LEVEL and gained > (SMALLEST_GAIN * before.size) ** 2
 
 
 def _left(prediction: Prediction) -> float:
@@ -165,7 +159,7 @@ def _explaining_pair(rows: list[Ranked], base: Baseline, prepared: Prepared) -> 
 def _explains(pair: Pair, rows: list[Ranked], prepared: Prepared) -> bool:
     """Whether a pair leaves no structure, does more than the first alone, and neither coefficient moves."""
     prediction = pair.prediction
-    more = statistics.gain(rows[0].residual, prediction.residual).p_value * len(rows) < LEVEL
+    more = statistics.gain(rows[0].residual, prediction.residual).p_value * len(rows) < ALPHA
     if not more or max(_left(prediction), _lack(pair.fit, prediction)) > LEFT:
         return False
     terms = [r.term for r in rows if r.name in pair.names]
