@@ -19,6 +19,7 @@ from study.equations.model import Model
 from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.weighted_fit import weighted
 from study.records.plan import Plan
 from study.records.prepared import Prepared
 from study.records.record import Record
@@ -87,7 +88,7 @@ def compare(
     known: Estimate | None = None
     if estimator != FREE_RUN:
         fit, known = fit_by(estimator, model, prepared)
-    fit = fit or fit_model(model, prepared, start)
+    fit = fit or weighted(fit_model(model, prepared, start), prepared)
     report("free run")
     prediction = predict(fit, prepared)
     report("force")

@@ -11,9 +11,8 @@ from study.equations.model import ModelTerm
 from study.equations.terms import QUANTITIES
 from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.part_fit import linearise
+from study.identify.time_domain.part_fit import linearise, uncertainty
 from study.records.prepared import Prepared
-from study.support.statistics import clustered_covariance
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,7 @@ def standard_errors(fit: FreeRunFit, prepared: Prepared) -> dict[str, float]:
         return {}
     if fit.restarts:
         return {key: fit.estimate.error(key) for key in fit.keys}
-    deviations = np.sqrt(np.diag(clustered_covariance(linearise(fit, prepared), fit.residual)))
+    deviations = np.sqrt(np.diag(uncertainty(fit, prepared, linearise(fit, prepared))))
     return dict(zip(fit.keys, deviations.tolist(), strict=False))
 
 

@@ -72,12 +72,12 @@ class Prediction:
     @cached_property
     def residual(self) -> Floats:
         """The difference without what lies below ``low``, shape (n,)."""
-        return self._above(self.difference)
+        return self.above(self.difference)
 
     @cached_property
     def size(self) -> float:
         """Rms of the measured response about its mean, without what lies below ``low``."""
-        return float(np.std(self._above(self.measured)))
+        return float(np.std(self.above(self.measured)))
 
     @property
     def error(self) -> float:
@@ -108,7 +108,8 @@ class Prediction:
         first = int(np.argmax(np.convolve(self.residual**2, np.ones(length), "valid")))
         return slice(first, first + length)
 
-    def _above(self, values: Floats) -> Floats:
+    def above(self, values: Floats) -> Floats:
+        """Values of the judging or fitting part without what lies below ``low``, shape (n,)."""
         return derivative(values, self.dt, 0, self.low) if self.low > 0.0 else values
 
 

@@ -4,7 +4,8 @@ from study.compare.comparison import Comparison, compare
 from study.diagnose.verdict import search_base, search_part
 from study.equations.model import free
 from study.equations.terms import Term
-from study.identify.time_domain.fit_model import continued, settled, with_term
+from study.identify.time_domain.fit_model import with_term
+from study.identify.time_domain.weighted_fit import finished
 
 
 def added(comparison: Comparison, term: Term) -> Comparison:
@@ -17,5 +18,5 @@ def added(comparison: Comparison, term: Term) -> Comparison:
     """
     prepared, base = comparison.prepared, search_base(comparison)
     fit = with_term(base.fit, free(term), base, search_part(prepared))
-    fit = settled(continued(fit, prepared), prepared)
+    fit = finished(fit, prepared)
     return compare(comparison.model.with_term(term), prepared, fit=fit)

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from study.compare.prediction import Prediction, predict
 from study.equations.model import free
 from study.equations.terms import LIBRARY, Term
-from study.identify.time_domain.fit_model import continued, settled, with_term
+from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.shape_search import Baseline
+from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import Prepared
 from study.support.cores import cores
 from study.support.errors import StudyError
@@ -78,7 +79,7 @@ def all_settled(candidates: Sequence[Candidate], prepared: Prepared) -> list[Can
 
     def settle(candidate: Candidate) -> Candidate:
         try:
-            fit = settled(continued(candidate.fit, prepared), prepared)
+            fit = finished(candidate.fit, prepared)
             return judged(candidate.term, fit, prepared) or candidate
         except StudyError:
             return candidate

@@ -5,6 +5,7 @@ free run to the coefficient is held against the residual e(t) in bands of freque
 amplitude, ``delta = sum(S* e) / sum(S* S)``: by how much the coefficient would have to change there.
 """
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -13,8 +14,15 @@ from numpy.typing import NDArray
 from scipy.fft import rfft, rfftfreq
 from scipy.special import chdtrc
 
+from study.equations.term import Term
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.records.prepared import Prepared
+
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+UNSTEADY = 0.3  # relative change of its coefficient at which a candidate is no longer believed
+INDISTINCT = 1e-6
+CERTAIN, STILL = 1e-4, 0.01  # p value, and relative change with the amplitude, of a coefficient that moves
 BANDS = 8
 CLASSES = 4
 BLOCK = 64  # samples: long against a period, short against the swell of the amplitude
@@ -98,3 +106,37 @@ def _noise(own: Floats, cross: Floats) -> float:
     """Mean square of the residual as all blocks show it: the scatter of a few strong ones may be small by chance."""
     change = float(np.sum(cross)) / float(np.sum(own))
     return float(np.mean((cross - change * own) ** 2 / np.maximum(own, np.finfo(float).tiny)))
+
+
+def curves(fit: FreeRunFit, term: Term, prepared: Prepared, jacobian: Floats) -> tuple[Curve | None, Curve | None]:
+    """The coefficient of a term in a fitted model along frequency and along amplitude.
+
+    ``jacobian`` is :func:`linearise` of the fit. None where the coefficient is zero, or the model's others could do all
+    that it does.
+    """
+    columns = [fit.keys.index(s) for s in term.symbols]
+    direction = fit.values[columns]
+    size = float(np.linalg.norm(direction))
+    if size == 0.0:
+        return None, None
+    own = jacobian[:, columns] @ (direction / size)
+    scale = np.linalg.norm(jacobian, axis=0)
+    others = np.delete(jacobian / np.where(scale > 0.0, scale, 1.0), columns, axis=1)
+    basis = np.linalg.qr(others)[0]
+    alone = own - basis @ (basis.T @ own)
+    if np.linalg.norm(alone) <= INDISTINCT * np.linalg.norm(own):
+        return None, None
+    bands = along_frequency(alone, fit.residual, size, prepared.dt)
+    classes = along_amplitude(alone, fit.residual, size)
+    # A short record has not lines enough for a band, or not blocks enough for a class.
+    return bands if len(bands.at) else None, classes if len(classes.at) else None
+
+
+def changes(*along: Curve | None) -> float:
+    """The largest relative change of a coefficient along any of these; nan where it was followed along none."""
+    return max((c.spread() for c in along if c is not None), default=math.nan)
+
+
+def wavers(steady: Curve | None) -> bool:
+    """Whether a coefficient moves with the amplitude for certain, and by more than integration makes of it."""
+    return steady is not None and steady.p_value() < CERTAIN and steady.spread() > STILL

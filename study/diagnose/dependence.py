@@ -25,6 +25,7 @@ from study.records.record import MOTIONS
 from study.support import statistics
 from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares
+from study.support.statistics import Gain
 
 Floats = NDArray[np.float64]
 DEGREE = 7
@@ -85,19 +86,35 @@ def _with_shapes(fit: FreeRunFit, texts: Sequence[str]) -> FreeRunFit:
 
 def explained_by(left: Leftover) -> dict[str, float]:
     """Held-out share of the residual that each family of shapes explains; at most one, negative for nothing."""
-    families = {**left.shapes, "past": _passed(left, _states(left)), "time": _passed(left, _times(left))}
-    return {name: statistics.gain(*_held_out(left, columns)).explained for name, columns in families.items()}
+    return {name: gain.explained for name, gain in _families(left).items()}
 
 
 def significant(left: Leftover, level: float) -> float:
-    """Largest held-out share that a single shape of the motion or its past explains, and not by chance.
+    """Largest held-out share that shapes of the motion, its past or time explain, and not by chance.
 
-    One coefficient at a time sees less than a whole family may, but what little noise leaves to be seen it sees sooner.
-    ``level`` is of the p value, all shapes accounted for; zero where none is significant.
+    All families of shapes are asked, and each shape of the motion and its past by itself: one coefficient sees less
+    than a whole family may, but what little noise leaves to be seen it sees sooner. ``level`` is of the p value, all
+    that was asked accounted for; zero where nothing is significant.
     """
     columns = np.hstack([*left.shapes.values(), _passed(left, _states(left))])
-    gains = [statistics.gain(*_held_out(left, column[:, None])) for column in columns.T]
-    return max((g.explained for g in gains if g.p_value * len(gains) < level), default=0.0)
+    gains = [*_families(left).values(), *_one_by_one(left, columns)]
+    return max((0.0, *(g.explained for g in gains if g.p_value * len(gains) < level)))
+
+
+def _families(left: Leftover) -> dict[str, Gain]:
+    families = {**left.shapes, "past": _passed(left, _states(left)), "time": _passed(left, _times(left))}
+    return {name: statistics.gain(*_held_out(left, columns)) for name, columns in families.items()}
+
+
+def _one_by_one(left: Leftover, columns: Floats) -> list[Gain]:
+    """What each column explains by itself beside the model's own (Frisch and Waugh, 1933: one regression for all)."""
+    both = np.column_stack([left.residual, columns])
+    amounts = np.column_stack([least_squares(left.own[: left.split], x, 1e-6) for x in both[: left.split].T])
+    freed = both - left.own @ amounts
+    early, late = freed[: left.split], freed[left.split :]
+    power = np.sum(early[:, 1:] ** 2, axis=0)
+    each = early[:, 1:].T @ early[:, 0] / np.where(power > 0.0, power, np.inf)
+    return [statistics.gain(left.residual[left.split :], late[:, 0] - a * late[:, i]) for i, a in enumerate(each, 1)]
 
 
 def _formulas(u: float, v: float) -> dict[str, list[str]]:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from study.diagnose.ranking import Ranked
+from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import Diagnosis
 
 SHOWN = 10

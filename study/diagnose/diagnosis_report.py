@@ -5,7 +5,7 @@ from typing import Any
 
 from tabulate import tabulate
 
-from study.diagnose.ranking import Ranked
+from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import Diagnosis
 from study.support.numbers import percent
 

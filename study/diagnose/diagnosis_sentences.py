@@ -2,7 +2,8 @@
 
 import math
 
-from study.diagnose.ranking import UNSTEADY, Ranked, wavers
+from study.diagnose.constancy import UNSTEADY, wavers
+from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
 from study.figures.labels import term_names
 from study.support.numbers import percent

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.fft import rfft, rfftfreq
 from scipy.signal import get_window
 
-from study.diagnose.ranking import Ranked
+from study.diagnose.ranked import Ranked
 from study.equations.model import Model, ModelTerm
 from study.identify.frequency_domain.inputs import history, reverse_inputs
 from study.identify.frequency_domain.starting_values import FAINT

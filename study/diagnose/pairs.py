@@ -10,7 +10,7 @@ import numpy as np
 from study.compare.prediction import Prediction, predict
 from study.diagnose import pair_screening
 from study.diagnose.pair_screening import PairStart
-from study.diagnose.ranking import Ranked
+from study.diagnose.ranked import Ranked
 from study.identify.time_domain.fit_model import TRIED
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from study.diagnose.ranking import Ranked
+from study.diagnose.ranked import Ranked
 from study.equations.free_run import prepare
 from study.figures.labels import term_names
 from study.records.prepared import Prepared

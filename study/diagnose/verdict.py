@@ -10,29 +10,28 @@ from study.compare.comparison import Comparison
 from study.compare.prediction import Prediction
 from study.diagnose import candidates, dependence, pairs
 from study.diagnose.candidates import Candidate
+from study.diagnose.constancy import UNSTEADY, changes, curves, wavers
 from study.diagnose.credibility import ALPHA, credible
 from study.diagnose.pairs import Pair
-from study.diagnose.ranking import UNSTEADY, Ranked, changes, curves, rank, wavers
+from study.diagnose.ranked import Ranked
+from study.diagnose.ranking import rank
 from study.equations.terms import Term
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.fit_model import continued
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.part_fit import fit_part
+from study.identify.time_domain.part_fit import fit_part, linearise
 from study.identify.time_domain.shape_search import Baseline
-from study.records import noise_floor
 from study.records.prepared import Prepared
 from study.support import statistics
 from study.support.errors import DivergenceError
 
 Floats = NDArray[np.float64]
 MISSING, NOTHING, UNKNOWN = "missing_effect", "nothing_missing", "unknown_effect"
-SIGNIFICANT = 5.0  # standard errors by which structure must stand above the noise floor
 NEGLIGIBLE = 2e-3  # of the rms response: structure below this is no evidence that something is missing
 LEFT = 0.0075  # of the rms response: structure that may be left beside a candidate which counts as the explanation
 FORGIVEN = 0.1  # of the unexplained power: what explains less of a good model's must have a coefficient that stays
 ENOUGH = 0.99  # of the unexplained power: what explains so much is missing, whatever is missing besides
-LACK = 0.03  # held-out share of a residual that general shapes of the motion must explain to be more than chance
-CHANCE = 1e-3  # p value of a single one of these shapes, all of them accounted for
+CHANCE = 1e-3  # p value of shapes of the motion that explain a residual, all of them accounted for
 SHORT, LONG = 2048, 16384  # samples: a search uses half of the fitting part, within these limits
 SETTLED = 6  # of the candidates, the best: fitted on the whole fitting part and with enough steps
 PAIRED = 1  # the best so many candidates are tried together with every other
@@ -66,7 +65,7 @@ def diagnose(
     base = search_base(comparison)
     look = search_part(prepared)
     tried = candidates.try_all(candidates.candidate_terms(base, extra, without), base, look, progress)
-    rows = rank(with_best_settled(tried, prepared), comparison.prediction.residual, prepared)
+    rows = rank(with_best_settled(tried, prepared), comparison)
     verdict, rows, left, pair = _decide(rows, base, comparison)
     families = dependence.explained_by(dependence.leftover(base, look)) if verdict == UNKNOWN else {}
     return Diagnosis(verdict, comparison, tuple(rows), left, pair, families)
@@ -105,10 +104,11 @@ def _decide(
     prediction = comparison.prediction
     believed = [r for r in rows if credible(prediction, r.prediction, r.interval, len(rows))]
     if not believed:
-        left = max(_left(prediction), _lack(comparison.fit, prediction))
+        left = _left(comparison.fit, prediction)
         return (UNKNOWN if left > NEGLIGIBLE else NOTHING), rows, left, ()
     first = believed[0]
-    left = max(_left(first.prediction), _lack(first.fit, first.prediction))
+    left = _left(first.fit, first.prediction)
+    rows = [first] + [r for r in rows if r is not first]
     if first.gain.explained >= ENOUGH or (left <= LEFT and _steady(first)):
         return MISSING, rows, left, ()
     slight = first.response_error <= LEFT  # two effects that explain little alone explain little together
@@ -116,7 +116,7 @@ def _decide(
     if pair is None:
         return UNKNOWN, rows, left, ()
     first = next(r for r in rows if r.name == pair.names[0])
-    return MISSING, [first] + [r for r in rows if r is not first], _left(pair.prediction), pair.names
+    return MISSING, [first] + [r for r in rows if r is not first], _left(pair.fit, pair.prediction), pair.names
 
 
 def _steady(row: Ranked) -> bool:
@@ -128,12 +128,6 @@ def _steady(row: Ranked) -> bool:
     if row.response_error > LEFT:
         return not wavers(row.steadiness)
     return row.gain.explained >= FORGIVEN or row.unsteadiness <= UNSTEADY
-
-
-def _left(prediction: Prediction) -> float:
-    """Rms of the structure in a residual over the rms response; zero where noise alone would show as much."""
-    floor = noise_floor.floor(prediction.difference, prediction.dt, prediction.low)
-    return float(np.sqrt(floor.excess)) / prediction.size if floor.significance > SIGNIFICANT else 0.0
 
 
 def _explaining_pair(rows: list[Ranked], base: Baseline, prepared: Prepared) -> Pair | None:
@@ -160,22 +154,21 @@ def _explains(pair: Pair, rows: list[Ranked], prepared: Prepared) -> bool:
     """Whether a pair leaves no structure, does more than the first alone, and neither coefficient moves."""
     prediction = pair.prediction
     more = statistics.gain(rows[0].residual, prediction.residual).p_value * len(rows) < ALPHA
-    if not more or max(_left(prediction), _lack(pair.fit, prediction)) > LEFT:
+    if not more or _left(pair.fit, prediction) > LEFT:
         return False
     terms = [r.term for r in rows if r.name in pair.names]
-    followed = [curves(pair.fit, term, prepared) for term in terms]
+    jacobian = linearise(pair.fit, prepared)
+    followed = [curves(pair.fit, term, prepared, jacobian) for term in terms]
     if prediction.error <= LEFT:
         return all(changes(*both) <= UNSTEADY for both in followed)
     return not any(wavers(steadiness) for _, steadiness in followed)
 
 
-def _lack(fit: FreeRunFit, prediction: Prediction) -> float:
-    """Rms over that of the response which general shapes of the motion and of its past explain of a residual.
+def _left(fit: FreeRunFit, prediction: Prediction) -> float:
+    """Rms over that of the response which shapes of the motion, of its past and of time explain of a residual.
 
-    Structure that is as broad as noise is not seen in a spectrum; it still depends on the motion.
+    Noise may have any colour; what physics leaves depends on the motion.
     """
     look = prediction.prepared.shortened(min(len(fit.residual), LONG))
     left = dependence.leftover(shape_search.baseline(continued(fit, look), look), look)
-    shares = dependence.explained_by(left)
-    share = max(share for name, share in shares.items() if name != "time")
-    return prediction.error * float(np.sqrt(max(share if share > LACK else 0.0, dependence.significant(left, CHANCE))))
+    return prediction.error * float(np.sqrt(dependence.significant(left, CHANCE)))

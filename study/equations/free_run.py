@@ -23,6 +23,7 @@ from study.support.errors import DivergenceError, StudyError
 
 SHARED = 4096  # steps from which on two threads share the segments; with fewer, a thread costs more than it saves
 REMEMBERED = 4  # channels whose values between the samples are cached
+COMPILED = 128  # programs that are cached
 SIDE = "side of v"  # the input that stands for sgn v during a step
 
 
@@ -237,14 +238,21 @@ def _differentiated(model: Model, channels: tuple[str, ...], keys: tuple[str, ..
         raise StudyError(f"model {model.name!r} gives no value for {', '.join(missing)}; a free run needs all")
     if unknown := [key for key in keys if key not in model.values]:
         raise StudyError(f"model {model.name!r} has no {', '.join(unknown)}; it has {', '.join(model.values)}")
+    program, slots, side = _compiled(model.with_values(dict.fromkeys(model.values)), channels, keys)
+    values = {key: value for key, value in held.items() if value is not None}
+    return with_registers(program, values), slots, side
+
+
+@lru_cache(maxsize=COMPILED)
+def _compiled(model: Model, channels: tuple[str, ...], keys: tuple[str, ...]) -> tuple[Program, Ints, int]:
+    """As :func:`_differentiated`, of a model without values: a diagnosis runs each of its models many times."""
     forward = forward_graph(model, channels)
     graph = forward.graph
     by = (*forward.states, *(graph.input(key) for key in keys))
     rows = [[slope, *(graph.derivative(slope, node) for node in by)] for slope in forward.slopes]
     graph.input(SIDE)
     program, side = _with_side(graph.program([node for row in rows for node in row]), graph.program(forward.slopes))
-    values = {key: value for key, value in held.items() if value is not None}
-    return with_registers(program, values), program.outputs.reshape(len(rows), 1 + len(by)), side
+    return program, program.outputs.reshape(len(rows), 1 + len(by)), side
 
 
 def _with_side(program: Program, slopes: Program) -> tuple[Program, int]:

@@ -7,7 +7,7 @@ import numpy as np
 from study.compare.comparison import Comparison
 from study.compare.force_map import CLASSES, curve, surface
 from study.compare.noise import segments_of
-from study.diagnose.ranking import Ranked
+from study.diagnose.ranked import Ranked
 from study.explore import decimate
 from study.explore.axis_scales import Columns, Floats, Scales, heard, within
 from study.explore.session import Rung

@@ -15,12 +15,13 @@ from study.compare.missing_force import MissingForce, missing_force
 from study.diagnose import candidates
 from study.diagnose.candidates import Candidate
 from study.diagnose.diagnosis_files import in_words
-from study.diagnose.ranking import Ranked, rank
+from study.diagnose.ranked import Ranked
+from study.diagnose.ranking import rank
 from study.diagnose.verdict import Diagnosis, diagnose, search_base, search_part
 from study.equations import formulas
 from study.equations.model import Model
 from study.equations.terms import LIBRARY, Term, custom
-from study.identify.time_domain.fit_model import continued, settled
+from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import Prepared
 from study.support.errors import StudyError, expect
 
@@ -101,7 +102,7 @@ def candidate(session: Session, name: str) -> Ranked:
 def with_added(session: Session, name: str) -> Session:
     """The session with a candidate added to the model, as its diagnosis fitted it."""
     row, prepared = candidate(session, name), session.prepared
-    fit = settled(continued(row.fit, prepared), prepared)
+    fit = finished(row.fit, prepared)
     comparison = compare(session.now.model.with_term(row.term), prepared, fit=fit)
     return climbed(session, comparison, f"+ {name}", name)
 
@@ -199,7 +200,7 @@ def tried(session: Session, text: str) -> Session:
             attempt = _attempted(term, session)
             if attempt is None:
                 raise StudyError(silent)
-            rows = rank([*known, attempt], now.comparison.prediction.residual, session.prepared)
+            rows = rank([*known, attempt], now.comparison)
     except np.linalg.LinAlgError:
         raise StudyError(silent) from None
     ranked = replace(now.diagnosis, candidates=tuple(rows))

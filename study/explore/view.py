@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from study.compare.comparison import Comparison
 from study.compare.force_map import CELLS, curve, surface
 from study.compare.links import links
-from study.diagnose.ranking import Ranked
+from study.diagnose.ranked import Ranked
 from study.explore import decimate, preview, words
 from study.explore.axis_scales import Columns, Floats, Scales, heard, least_force, scales_of, within
 from study.explore.page_units import Scale, in_text

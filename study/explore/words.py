@@ -7,7 +7,7 @@ from typing import Any
 from study.compare.comparison import Comparison
 from study.compare.comparison_sentences import says
 from study.compare.fitted_coefficients import Coefficient
-from study.diagnose.ranking import Ranked
+from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, NOTHING
 from study.explore.page_units import in_text, length, number, rate
 from study.explore.session import Rung

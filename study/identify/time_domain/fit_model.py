@@ -21,13 +21,11 @@ from study.identify.frequency_domain.starting_values import linear_start, revers
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.multiple_shooting import POOR, fit_in_segments, is_chaotic, is_poor
-from study.identify.time_domain.part_fit import STEPS, fit_part, linearise, run_of
+from study.identify.time_domain.part_fit import STEPS, covariance_of, fit_part, integration_shift, linearise
 from study.identify.time_domain.shape_search import Baseline
 from study.records.prepared import Prepared
 from study.records.states import angular_rate
 from study.support.errors import DivergenceError, StudyError
-from study.support.least_squares import least_squares
-from study.support.statistics import clustered_covariance
 
 Floats = NDArray[np.float64]
 Values = Mapping[str, float]
@@ -197,9 +195,8 @@ def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     most = max(MOST_STEPS, needed_steps(fit.model, prepared.record, prepared.response).rough)
     while fit.keys and fit.steps_per_sample < most:
         jacobian = linearise(fit, prepared)
-        coarse, fine = (run_of(fit, prepared, finer=n).respond({}, fit.initial)[0] for n in (1, 2))
-        moved = least_squares(jacobian, np.subtract(coarse, fine), 1e-12)
-        deviations = np.sqrt(np.diag(clustered_covariance(jacobian, fit.residual)))
+        moved = integration_shift(fit, prepared, jacobian)
+        deviations = np.sqrt(np.diag(covariance_of(fit, jacobian)))
         with np.errstate(over="ignore"):  # where nothing is left, any shift is beyond all measure
             excess = float(np.max(np.abs(moved) / np.maximum(SHIFT * deviations, np.finfo(float).tiny)))
         if excess <= 1.0:

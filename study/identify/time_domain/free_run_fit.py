@@ -7,7 +7,7 @@ minimised by the method of Levenberg and Marquardt (``levenberg_marquardt``) wit
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,9 +17,12 @@ from study.identify.frequency_domain.coefficients import Estimate
 from study.records.record import Record
 from study.records.states import starting_states
 from study.support.arrays import Floats
+from study.support.autoregression import whitened
 from study.support.block_normal import ContinuityGaps
 from study.support.errors import DivergenceError, StudyError
 from study.support.levenberg_marquardt import OFFSET, End, Point, minimise, point_at
+
+WHITE = np.ones(1)  # autoregressive coefficients of white noise
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,8 @@ class FreeRunFit:
         Samples of the record at which segments after the first begin.
     steps_per_sample : int
         Runge-Kutta steps that were taken in each sampling interval.
+    noise : array, shape (order + 1,)
+        Autoregressive coefficients of the noise that the residual was weighted with; 1 alone for white noise.
     """
 
     model: Model
@@ -68,6 +73,7 @@ class FreeRunFit:
     restarts: tuple[int, ...] = ()
     first: int = 0
     steps_per_sample: int = 2
+    noise: Floats = field(default_factory=lambda: WHITE)
 
     @property
     def span(self) -> tuple[int, int]:
@@ -104,6 +110,7 @@ def fit_free_run(
     initial: str | Floats = "estimate",
     continuity: float = 0.0,
     offset: float = OFFSET,
+    noise: Floats = WHITE,
 ) -> FreeRunFit:
     """Fit a model in free run.
 
@@ -127,6 +134,9 @@ def fit_free_run(
         states, the residual as a share of the response's. From 100 on the segments are one motion, all but exactly.
     offset : float
         Length of the next step, in standard errors, at which a search has converged.
+    noise : array, shape (order + 1,)
+        Autoregressive coefficients of the noise, as :func:`study.support.autoregression.autoregression` gives them; the
+        residual filtered with them is minimised. White noise by default, and wherever there are restarts.
 
     Raises
     ------
@@ -155,11 +165,12 @@ def fit_free_run(
         states[:, :2] = starting_states(record, response, (first, *restarts))
     measured = record[response][first : first + run.samples]
     positive = tuple(key for entry in model.terms for key in entry.term.positive if key in begin)
-    problem = _Problem(run, measured, free, _weights(continuity, measured, states), positive)
+    problem = _Problem(run, measured, free, _weights(continuity, measured, states), positive, noise)
     end = problem.search(np.array([*begin.values(), *states.ravel()]), max_iterations, offset)
     return replace(
-        _result(model, problem, end), restarts=tuple(restarts), first=first, steps_per_sample=steps_per_sample
-    )
+        _result(model, problem, end), restarts=tuple(restarts), first=first, steps_per_sample=steps_per_sample,
+        noise=noise,
+    )  # fmt: skip
 
 
 def _weights(continuity: float, measured: Floats, states: Floats) -> Floats | None:
@@ -194,6 +205,7 @@ class _Problem:
     free_states: int
     weights: Floats | None
     positive: tuple[str, ...]
+    noise: Floats
 
     def states(self, x: Floats) -> Floats:
         """Initial states in the variables, shape (segments, states)."""
@@ -215,7 +227,15 @@ class _Problem:
         if self.weights is not None:
             gaps = self.weights * (arrivals[:, :, 0] - states[1:])
             continuity = ContinuityGaps(gaps, self.weights[:, None] * arrivals[:, :, 1:], self.weights)
-        return point_at(x, self.measured - response, jacobian, len(self.run.keys), (0, *self.run.cuts), continuity)
+        residual = self.measured - response
+        if len(self.noise) > 1:
+            residual, jacobian = whitened(residual, self.noise), whitened(jacobian, self.noise)
+        return point_at(x, residual, jacobian, len(self.run.keys), (0, *self.run.cuts), continuity)
+
+    def residual(self, x: Floats) -> Floats:
+        """Measured minus predicted response at x, shape (samples,)."""
+        values = dict(zip(self.run.keys, (float(v) for v in x), strict=False))
+        return self.measured - self.run.respond(values, self.states(x))[0]
 
     def search(self, x: Floats, max_iterations: int, offset: float) -> End:
         """The minimum near x."""
@@ -238,7 +258,7 @@ def _result(model: Model, problem: _Problem, end: End) -> FreeRunFit:
         values=point.x[: len(keys)],
         covariance=point.covariance(),
         initial=states if problem.run.cuts else states[0],
-        residual=point.residual[: problem.run.samples],
+        residual=point.residual[: problem.run.samples] if len(problem.noise) == 1 else problem.residual(point.x),
         converged=end.converged,
         iterations=end.iterations,
         message=message,

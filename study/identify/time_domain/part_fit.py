@@ -8,9 +8,12 @@ from numpy.typing import NDArray
 
 from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model
-from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
+from study.identify.time_domain.free_run_fit import WHITE, FreeRunFit, fit_free_run
 from study.records.prepared import Prepared
+from study.support.autoregression import whitened
+from study.support.least_squares import least_squares
 from study.support.levenberg_marquardt import OFFSET
+from study.support.statistics import clustered_covariance, influence
 
 Floats = NDArray[np.float64]
 STEPS = 2  # Runge-Kutta steps in a sampling interval while a search compares models
@@ -26,6 +29,7 @@ def fit_part(
     max_iterations: int = 60,
     initial: Floats | None = None,
     offset: float = OFFSET,
+    noise: Floats = WHITE,
 ) -> FreeRunFit:
     """Fit what is not held on the fitting part, from ``start`` where it has a value and from the model elsewhere.
 
@@ -38,7 +42,7 @@ def fit_part(
     return fit_free_run(
         model, prepared.record, start=begin, held=held, response=prepared.response, steps_per_sample=steps,
         span=prepared.plan.fit, max_iterations=max_iterations, offset=offset,
-        initial="estimate" if initial is None else initial,
+        initial="estimate" if initial is None else initial, noise=noise,
     )  # fmt: skip
 
 
@@ -56,6 +60,31 @@ def linearise(fit: FreeRunFit, prepared: Prepared) -> Floats:
     """Derivatives of the response on the samples that were fitted, shape (n, keys + 2): keys, then initial states."""
     values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
     return run_of(fit, prepared, fit.keys).respond(values, fit.initial, 2)[1]
+
+
+def influence_of(fit: FreeRunFit, jacobian: Floats) -> Floats:
+    """What each block of time adds to the error of a fit's estimates, shape (blocks, keys + 2), weighted as it was."""
+    return influence(whitened(jacobian, fit.noise), whitened(fit.residual, fit.noise))
+
+
+def covariance_of(fit: FreeRunFit, jacobian: Floats) -> Floats:
+    """Covariance of a fit's estimates that holds whatever the residual is, shape (keys + 2, keys + 2).
+
+    ``jacobian`` is what :func:`linearise` gives of the fit.
+    """
+    return clustered_covariance(whitened(jacobian, fit.noise), whitened(fit.residual, fit.noise))
+
+
+def integration_shift(fit: FreeRunFit, prepared: Prepared, jacobian: Floats) -> Floats:
+    """By how much halving the steps would move the estimates, shape (keys + 2,), by one step of Gauss and Newton."""
+    coarse, fine = (run_of(fit, prepared, finer=n).respond({}, fit.initial)[0] for n in (1, 2))
+    return least_squares(whitened(jacobian, fit.noise), whitened(np.subtract(coarse, fine), fit.noise))
+
+
+def uncertainty(fit: FreeRunFit, prepared: Prepared, jacobian: Floats) -> Floats:
+    """Covariance of a fit's estimates, shape (keys + 2, keys + 2): of the noise, and of the integration's own error."""
+    moved = integration_shift(fit, prepared, jacobian)
+    return covariance_of(fit, jacobian) + np.outer(moved, moved)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,104 @@
+"""One candidate with what an engineer needs to believe or doubt it."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study.compare.prediction import Prediction
+from study.diagnose.candidates import Candidate
+from study.diagnose.constancy import Curve, changes, curves
+from study.diagnose.held_out import HeldOut, held_out
+from study.equations.terms import Term
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.part_fit import linearise, uncertainty
+from study.support import statistics
+from study.support.statistics import Gain
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """One candidate."""
+
+    term: Term  # the effect
+    fit: FreeRunFit  # the model with it
+    prediction: Prediction
+    gain: Gain  # what it explains of the held-out residual, with the p value of one comparison
+    p_value: float  # that of both parts of the record, with the number of candidates accounted for (Bonferroni)
+    coefficient: float  # its size: the amplitude, for an effect of any phase
+    error: float  # standard error of that
+    parameters: dict[str, float]  # shape parameters, and the phase of an effect of any phase
+    parameter_errors: dict[str, float]  # their standard errors
+    flatness: Curve | None  # the coefficient along frequency
+    steadiness: Curve | None  # the coefficient along amplitude
+    held_out: HeldOut  # its residuals on both parts of the record
+    tied_with: tuple[str, ...] = ()  # candidates that this record cannot tell from it
+    distance: float = math.inf  # standard errors by which it leaves more than the first; 0 for the first
+
+    @property
+    def name(self) -> str:
+        """Name of the term."""
+        return self.term.name
+
+    @property
+    def residual(self) -> Floats:
+        """Held-out residual."""
+        return self.prediction.residual
+
+    @property
+    def response_error(self) -> float:
+        """Rms of the held-out residual over that of the response."""
+        return self.prediction.error
+
+    @property
+    def unphysical(self) -> str:
+        """Why it is no physical effect as fitted, in a sentence; empty if it is one."""
+        return self.term.physical(self.fit.model.values)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % confidence interval of the coefficient."""
+        return self.coefficient - 1.96 * self.error, self.coefficient + 1.96 * self.error
+
+    @property
+    def unsteadiness(self) -> float:
+        """By how much, relative to itself, the coefficient changes with frequency or amplitude."""
+        return changes(self.flatness, self.steadiness)
+
+
+def examined(candidate: Candidate, before: Prediction) -> Ranked:
+    """A candidate with its coefficient's error and constancy; ``before`` is the prediction without it."""
+    fit, prepared = candidate.fit, before.prepared
+    jacobian = linearise(fit, prepared)
+    coefficient, error, parameters, errors = _amount(candidate, uncertainty(fit, prepared, jacobian))
+    flatness, steadiness = curves(fit, candidate.term, prepared, jacobian)
+    return Ranked(
+        term=candidate.term, fit=fit, prediction=candidate.prediction,
+        gain=statistics.gain(before.residual, candidate.prediction.residual), p_value=1.0,
+        coefficient=coefficient, error=error, parameters=parameters, parameter_errors=errors,
+        flatness=flatness, steadiness=steadiness, held_out=held_out(fit, candidate.prediction, jacobian, prepared),
+    )  # fmt: skip
+
+
+def _amount(candidate: Candidate, covariance: Floats) -> tuple[float, float, dict[str, float], dict[str, float]]:
+    """Coefficient and shape parameters of the candidate with standard errors."""
+    fit, term = candidate.fit, candidate.term
+    place = {key: i for i, key in enumerate(fit.keys)}
+    values = {key: float(fit.values[i]) for key, i in place.items()}
+    errors = {key: math.sqrt(max(float(covariance[i, i]), 0.0)) for key, i in place.items()}
+    names = {p.name: f"{term.name}.{p.name}" for p in term.parameters}
+    parameters = {name: values[key] for name, key in names.items() if key in values}
+    parameter_errors = {name: errors[key] for name, key in names.items() if key in values}
+    if len(term.symbols) == 1:
+        return values[term.symbols[0]], errors[term.symbols[0]], parameters, parameter_errors
+    a, b = (values[s] for s in term.symbols)
+    size = math.hypot(a, b)
+    direction = np.array([a, b]) / size if size > 0.0 else np.array([1.0, 0.0])
+    block = covariance[np.ix_([place[s] for s in term.symbols], [place[s] for s in term.symbols])]
+    across = np.array([direction[1], -direction[0]])
+    parameters["phase"] = math.atan2(-b, a)
+    parameter_errors["phase"] = math.sqrt(max(float(across @ block @ across), 0.0)) / size if size > 0.0 else math.inf
+    return size, math.sqrt(max(float(direction @ block @ direction), 0.0)), parameters, parameter_errors
