@@ -1,15 +1,16 @@
 """When an effect is believed: what it gains is no chance, its coefficient is not zero, and the gain can be seen."""
 
+import math
+
 from study.compare.prediction import Prediction
 from study.support.numbers import percent
-from study.support.statistics import gain
 
-ALPHA = 0.01  # probability of believing in an effect that is not there, all that were asked for together
-SMALLEST_GAIN = 1e-3  # of the rms response: what an effect must explain; less is the resolution of integration
+ALPHA = 0.01  # probability of believing in what is not there, all that was asked for together
+TOLERANCE = 2e-3  # of the rms response: what is practically nothing
 
 
-def credible(before: Prediction, after: Prediction, interval: tuple[float, float], asked: int = 1) -> bool:
-    """Whether a model with an effect is better than one without, of which so many were asked for.
+def credible(before: Prediction, after: Prediction, interval: tuple[float, float], p_value: float) -> bool:
+    """Whether a model with an effect is better than one without.
 
     Parameters
     ----------
@@ -17,14 +18,10 @@ def credible(before: Prediction, after: Prediction, interval: tuple[float, float
         Held-out predictions of the model without the effect and with it.
     interval : pair of float
         95 % confidence interval of the effect's coefficient.
-    asked : int
-        Effects that were asked for: the p value is multiplied by it (Bonferroni).
+    p_value : float
+        Of what it explains, all effects that were asked for accounted for.
     """
-    fallen = gain(before.residual, after.residual)
-    gained = max(before.error**2 - after.error**2, 0.0)
-    return (
-        fallen.p_value * asked < ALPHA
-        and not interval[0] <= 0.0 <= interval[1]
-        and gained > SMALLEST_GAIN**2
-        and percent(before.error) != percent(after.error)
-    )
+    gained = math.sqrt(max(before.error**2 - after.error**2, 0.0))
+    zero = interval[0] <= 0.0 <= interval[1]
+    seen = percent(before.error) != percent(after.error)
+    return p_value < ALPHA and not zero and gained > TOLERANCE and seen

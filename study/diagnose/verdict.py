@@ -11,7 +11,7 @@ from study.compare.prediction import Prediction
 from study.diagnose import candidates, dependence, pairs
 from study.diagnose.candidates import Candidate
 from study.diagnose.constancy import UNSTEADY, changes, curves, wavers
-from study.diagnose.credibility import ALPHA, credible
+from study.diagnose.credibility import ALPHA, TOLERANCE, credible
 from study.diagnose.pairs import Pair
 from study.diagnose.ranked import Ranked
 from study.diagnose.ranking import rank
@@ -27,11 +27,8 @@ from study.support.errors import DivergenceError
 
 Floats = NDArray[np.float64]
 MISSING, NOTHING, UNKNOWN = "missing_effect", "nothing_missing", "unknown_effect"
-NEGLIGIBLE = 2e-3  # of the rms response: structure below this is no evidence that something is missing
-LEFT = 0.0075  # of the rms response: structure that may be left beside a candidate which counts as the explanation
-FORGIVEN = 0.1  # of the unexplained power: what explains less of a good model's must have a coefficient that stays
+GOOD = 0.0075  # of the rms response: what models of real structures leave, however complete
 ENOUGH = 0.99  # of the unexplained power: what explains so much is missing, whatever is missing besides
-CHANCE = 1e-3  # p value of shapes of the motion that explain a residual, all of them accounted for
 SHORT, LONG = 2048, 16384  # samples: a search uses half of the fitting part, within these limits
 SETTLED = 6  # of the candidates, the best: fitted on the whole fitting part and with enough steps
 PAIRED = 1  # the best so many candidates are tried together with every other
@@ -102,16 +99,16 @@ def _decide(
 ) -> tuple[str, list[Ranked], float, tuple[str, ...]]:
     """Verdict, candidates in their final order, what is left, and the pair that explains it if none does alone."""
     prediction = comparison.prediction
-    believed = [r for r in rows if credible(prediction, r.prediction, r.interval, len(rows))]
+    believed = [r for r in rows if credible(prediction, r.prediction, r.interval, r.p_value)]
     if not believed:
         left = _left(comparison.fit, prediction)
-        return (UNKNOWN if left > NEGLIGIBLE else NOTHING), rows, left, ()
+        return (UNKNOWN if left > TOLERANCE else NOTHING), rows, left, ()
     first = believed[0]
     left = _left(first.fit, first.prediction)
     rows = [first] + [r for r in rows if r is not first]
-    if first.gain.explained >= ENOUGH or (left <= LEFT and _steady(first)):
+    if (first.gain.explained >= ENOUGH or left <= GOOD) and _steady(first):
         return MISSING, rows, left, ()
-    slight = first.response_error <= LEFT  # two effects that explain little alone explain little together
+    slight = first.response_error <= GOOD  # two effects that explain little alone explain little together
     pair = None if slight else _explaining_pair(rows, base, comparison.prepared)
     if pair is None:
         return UNKNOWN, rows, left, ()
@@ -122,12 +119,12 @@ def _decide(
 def _steady(row: Ranked) -> bool:
     """Whether the coefficient stays where a true term's would.
 
-    Where the model is as good as models are, its own faults move the coefficient of what is added to it: that is
-    forgiven to what explains a good share, and to nothing else.
+    Where little is left, the faults of the rest of the model move the coefficient of what is added to it: it may change
+    by a share of itself then.
     """
-    if row.response_error > LEFT:
-        return not wavers(row.steadiness)
-    return row.gain.explained >= FORGIVEN or row.unsteadiness <= UNSTEADY
+    if row.response_error <= GOOD or row.gain.explained >= ENOUGH:
+        return not row.unsteadiness > UNSTEADY
+    return not wavers(row.steadiness)
 
 
 def _explaining_pair(rows: list[Ranked], base: Baseline, prepared: Prepared) -> Pair | None:
@@ -154,12 +151,12 @@ def _explains(pair: Pair, rows: list[Ranked], prepared: Prepared) -> bool:
     """Whether a pair leaves no structure, does more than the first alone, and neither coefficient moves."""
     prediction = pair.prediction
     more = statistics.gain(rows[0].residual, prediction.residual).p_value * len(rows) < ALPHA
-    if not more or _left(pair.fit, prediction) > LEFT:
+    if not more or _left(pair.fit, prediction) > GOOD:
         return False
     terms = [r.term for r in rows if r.name in pair.names]
     jacobian = linearise(pair.fit, prepared)
     followed = [curves(pair.fit, term, prepared, jacobian) for term in terms]
-    if prediction.error <= LEFT:
+    if prediction.error <= GOOD:
         return all(changes(*both) <= UNSTEADY for both in followed)
     return not any(wavers(steadiness) for _, steadiness in followed)
 
@@ -171,4 +168,4 @@ def _left(fit: FreeRunFit, prediction: Prediction) -> float:
     """
     look = prediction.prepared.shortened(min(len(fit.residual), LONG))
     left = dependence.leftover(shape_search.baseline(continued(fit, look), look), look)
-    return prediction.error * float(np.sqrt(dependence.significant(left, CHANCE)))
+    return prediction.error * float(np.sqrt(dependence.significant(left, ALPHA)))
