@@ -54,6 +54,8 @@ class FreeRunFit:
         Samples of the record at which segments after the first begin.
     steps_per_sample : int
         Runge-Kutta steps that were taken in each sampling interval.
+    elsewhere : tuple of FreeRunFit
+        Where the other starts of the search led whose best this is, as far as they were followed (``rivals``).
     """
 
     model: Model
@@ -68,6 +70,7 @@ class FreeRunFit:
     restarts: tuple[int, ...] = ()
     first: int = 0
     steps_per_sample: int = 2
+    elsewhere: tuple["FreeRunFit", ...] = ()
 
     @property
     def span(self) -> tuple[int, int]:
