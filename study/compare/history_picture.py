@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import LogLocator
 
 from study.figures import page
 from study.figures.sheet import in_style
@@ -21,7 +22,9 @@ def errors_by_step(axes: Axes, steps: Sequence[dict[str, Any]]) -> Axes:
         axes.plot(place, values, style, color=colour, label=f"error of the {key}")
     floor = [100.0 * s["noise_floor"]["response"] for s in steps]
     axes.plot(place, floor, ":", color="0.1", label="noise floor")
-    axes.set_yscale("log")
+    axes.set_yscale("log", subs=[])
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     names = [f"+ {s['added']}".replace("_", " ") if s.get("added") else "as given" for s in steps]
     axes.set_xticks(place, names, rotation=20, ha="right")
     axes.set_ylabel("held-out error (%)")

@@ -104,7 +104,7 @@ def frame(seen: View) -> Columns:
     )
     labels = {
         "response": f"{seen.quantity} / {y}", "close": f"{seen.quantity} / {y}", "difference": f"difference / {d}",
-        "spectrum": f"amplitude density / {d}/√Hz", "plane": f"velocity / {v}", "against_u": f"missing force / {f}",
+        "spectrum": f"density / ({d}/√Hz)", "plane": f"velocity / {v}", "against_u": f"missing force / {f}",
         "against_v": f"missing force / {f}",
     }  # fmt: skip
     motions = {"plane": f"displacement / {u}", "against_u": f"displacement / {u}", "against_v": f"velocity / {v}"}
