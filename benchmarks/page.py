@@ -60,10 +60,10 @@ def on_the_page(url: str) -> dict[str, float]:
 def alone(trial: Any) -> float:
     """Seconds of the fit and of the page's columns, without a page."""
     now = session.begin(trial.believed, prepare_record(trial.record))
-    rung, _ = session.examined(now)
-    now = session.with_rung(now, rung)
+    stage, _ = session.examined(now)
+    now = session.with_stage(now, stage)
     start = time.perf_counter()
-    after = session.with_added(now, rung.shown[0].name)
+    after = session.with_added(now, stage.shown[0].name)
     view(after.now, 1)
     return time.perf_counter() - start
 

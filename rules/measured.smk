@@ -1,7 +1,7 @@
 # Measured records of config/measurements.tsv. Their data are no part of the project, so `rule all` asks for none:
 #   snakemake -j2 results/silverbox/comparison.json    how good is the model, and where does it fail
 #   snakemake -j2 results/silverbox/diagnosis.json     which effect is missing
-#   snakemake -j2 silverbox_climb                      diagnose, add, and again; the ladder, and climb.html to step through it
+#   snakemake -j2 silverbox_climb                      diagnose, add, and again; the history, and climb.html to step through it
 #   snakemake -j2 gallery                              all of that, with pictures, for every record
 from study.commands import measurements
 
@@ -18,7 +18,7 @@ SEEN = {
 
 def climbed(name):
     """What a climb leaves beside its steps."""
-    return [f"results/{name}/{file}" for file in ("history.json", "ladder.png", "ladder.svg", "reached.yaml", "climb.html")]
+    return [f"results/{name}/{file}" for file in ("history.json", "history.png", "history.svg", "reached.yaml", "climb.html")]
 
 
 for _name, _row in MEASUREMENTS.items():
@@ -50,7 +50,7 @@ for _name, _row in MEASUREMENTS.items():
             code=CODE["measured"],
         output:
             history=f"results/{_name}/history.json",
-            pictures=[f"results/{_name}/ladder.{ending}" for ending in ENDINGS],
+            pictures=[f"results/{_name}/history.{ending}" for ending in ENDINGS],
             reached=f"results/{_name}/reached.yaml",
             page=f"results/{_name}/climb.html",
         params:

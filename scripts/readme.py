@@ -33,7 +33,7 @@ def main(results: Path, figures: Path, readme: Path, tool: Path) -> None:
         document.put(tool, "reach", [reach(pd.read_csv(reached)), said])
         shutil.copyfile(figures / CONFUSION, tool.parent / CONFUSION)
     if (history := results / "silverbox" / "history.json").is_file():
-        document.put(tool, "ladder", [ladder(json.loads(history.read_text(encoding="utf-8"))["steps"])])
+        document.put(tool, "history", [errors_by_step(json.loads(history.read_text(encoding="utf-8"))["steps"])])
 
 
 def reach(table: pd.DataFrame) -> document.Block:
@@ -45,7 +45,7 @@ def reach(table: pd.DataFrame) -> document.Block:
     return document.table(("reach", "trials", "measured", "wanted"), rows)
 
 
-def ladder(steps: list[dict]) -> document.Block:
+def errors_by_step(steps: list[dict]) -> document.Block:
     rows = [
         ("linear oscillator" if step["added"] is None else f"+ {step['added'].replace('_', ' ')}",
          f"{100.0 * step['error']['response']:.3g} %", f"{1000.0 * step['rms']:.3f} mV")

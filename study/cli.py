@@ -55,7 +55,7 @@ def _run(argv: Sequence[str] | None) -> None:
 def _file_trouble(error: OSError) -> str:
     where = f"{error.filename}: " if error.filename is not None else ""
     why = error.strerror or str(error)
-    return f"{where}{why}; a readable file, and a writable folder with free space, are right"
+    return f"{where}{why}; expected a readable file, and a writable folder with free space"
 
 
 def _place(error: Exception) -> str:

@@ -31,7 +31,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> None:
     from study.compare import history
     from study.compare.comparison import compare
-    from study.compare.comparison_report import as_json, document, rung, summary
+    from study.compare.comparison_report import as_json, document, history_step, summary
     from study.diagnose.adding import added
     from study.equations.model_file import add_term, read_model
     from study.support.file_sets import write_files
@@ -50,7 +50,7 @@ def _run(arguments: argparse.Namespace) -> None:
             pairs.append((before, added(before, term)))
             step("")
     for before, after in pairs:
-        steps = history.climbed(steps, rung(before), rung(after, term.name))
+        steps = history.climbed(steps, history_step(before), history_step(after, term.name))
     history.write(arguments.model, steps)
     add_term(arguments.model, term)
     write_files(folder, {"comparison.json": as_json(document([after for _, after in pairs]))})

@@ -55,4 +55,4 @@ def _diagnosed(session: Session, folder: Path) -> tuple[Session, Diagnosis]:
     print(diagnosis_report.table(diagnosis))
     print(f"\n{now.said}\n", flush=True)
     write_files(folder, diagnosis_files(diagnosis, now.said))
-    return sessions.with_rung(session, now), diagnosis
+    return sessions.with_stage(session, now), diagnosis

@@ -13,12 +13,14 @@ from study.compare.fitted_coefficients import Coefficient, coefficients
 from study.compare.force_error import ForceError, force_error
 from study.compare.growth import Growths, growths
 from study.compare.local_force_error import local_force_error
+from study.compare.minima import rivals_note
 from study.compare.missing_force import MissingForce, missing_force
 from study.compare.prediction import Prediction, predict
 from study.equations.model import Model
 from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.rivals import best_first, rivals
 from study.identify.time_domain.weighted_fit import weighted
 from study.records.plan import Plan
 from study.records.prepared import Prepared
@@ -88,7 +90,11 @@ def compare(
     known: Estimate | None = None
     if estimator != FREE_RUN:
         fit, known = fit_by(estimator, model, prepared)
-    fit = fit or weighted(fit_model(model, prepared, start), prepared)
+    if fit is None:
+        fit, *alike = best_first(fit_model(model, prepared, start), prepared)
+        fit = weighted(fit, prepared)
+    else:
+        alike = rivals(fit, prepared)
     report("free run")
     prediction = predict(fit, prepared)
     report("force")
@@ -97,11 +103,12 @@ def compare(
     report("where it fails")
     lacking = missing_force(fit.model, (*fit.keys, *(known.symbols if known else ())), prediction)
     report("what it grows with")
+    said = [CHAOTIC if fit.restarts else None, rivals_note(fit, alike, prediction)]
     return Comparison(
         model=model, prepared=prepared, fit=fit, coefficients=coefficients(fit, prepared, known), prediction=prediction,
         force=force, bands=bands(prediction.noise, force, prediction.low), missing_force=lacking,
         growths=None if prediction.noise.alone else growths(lacking), time=along_time(prediction),
-        notes=(*prepared.notes, *([CHAOTIC] if fit.restarts else [])), estimator=estimator,
+        notes=(*prepared.notes, *(note for note in said if note)), estimator=estimator,
     )  # fmt: skip
 
 
@@ -116,7 +123,7 @@ def across(comparisons: Sequence[Comparison]) -> tuple[Level, ...]:
             if other.record.units.get(channel) != first.units.get(channel):
                 raise StudyError(
                     f"{channel} is in {first.units.get(channel)} in {first.name} and in "
-                    f"{other.record.units.get(channel)} in {other.record.name}; the same unit in all records is right"
+                    f"{other.record.units.get(channel)} in {other.record.name}; expected the same unit in all records"
                 )
     return levels([c.level for c in ordered], [c.coefficients for c in ordered])
 

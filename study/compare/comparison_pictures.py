@@ -52,7 +52,7 @@ def response(comparison: Comparison) -> Figure:
     panels.residual(axes[1], prediction.time, prediction.residual, comparison.prediction.noise.rms, unit)
     near = prediction.closeup
     panels.response(axes[2], prediction.time[near], prediction.measured[near], prediction.predicted[near], unit)
-    page.letter(axes, ("all that is prediction", "the difference", "close-up of (a) where the difference is largest"))
+    page.letter(axes, ("all that was predicted", "the difference", "close-up of (a) where the difference is largest"))
     page.legend(figure, axes, columns=2)
     return figure
 
@@ -75,7 +75,8 @@ def force_error(comparison: Comparison) -> Figure:
     ]
     coherence.cumulative(axes[1], shares)
     axes[1].set_xlim(0.0, highest)
-    axes[1].legend(loc="lower right", frameon=True, framealpha=0.85, edgecolor="none")
+    axes[1].set_ylabel("cumulative coherence")  # in full it is longer than the panel
+    axes[1].legend(loc="lower left", frameon=True, framealpha=0.85, edgecolor="none")
     page.letter(axes, ("what is left of the force", "what the inputs explain, one after the other"))
     page.legend(figure, axes[:1], columns=2)
     return figure

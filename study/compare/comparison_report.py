@@ -122,8 +122,8 @@ def level_row(level: Level) -> Row:
     }  # fmt: skip
 
 
-def rung(comparison: Comparison, added: str | None = None) -> Row:
-    """A comparison as a rung of the ladder (``study.compare.history``); ``added`` names the term that is new in it."""
+def history_step(comparison: Comparison, added: str | None = None) -> Row:
+    """A comparison as a step of the history (``study.compare.history``); ``added`` names the term that is new in it."""
     return {
         "terms": [t.name for t in comparison.model.terms], "added": added, "record": comparison.record.name,
         "error": {"force": comparison.force.total, "response": comparison.prediction.error},

@@ -1,4 +1,4 @@
-"""The ladder: every model tried on a record so far, its errors, and the noise floor, kept beside the model file."""
+"""The history: every model tried on a record so far, its errors, and the noise floor, kept beside the model file."""
 
 import json
 from pathlib import Path
@@ -12,23 +12,23 @@ Step = dict[str, Any]
 
 
 def path_of(model: Path) -> Path:
-    """Where the ladder of a model file is kept: ``rig.yaml`` has ``rig.history.json`` beside it."""
+    """Where the history of a model file is kept: ``rig.yaml`` has ``rig.history.json`` beside it."""
     return model.with_name(f"{model.stem}.history.json")
 
 
 def read(model: Path) -> list[Step]:
-    """The steps so far, oldest first, none where nothing was added; a ``StudyError`` if the file is no ladder."""
+    """The steps so far, oldest first, none where nothing was added; a ``StudyError`` if the file is no history."""
     path = path_of(model)
     if not path.exists():
         return []
-    wanted = "a ladder as 'study add' writes it"
+    wanted = "the steps as 'study add' writes them"
     try:
         content: object = json.loads(read_text(path, wanted))
     except json.JSONDecodeError as error:
-        raise StudyError(f"{path}: line {error.lineno} is not JSON; {wanted} is right") from None
+        raise StudyError(f"{path}: line {error.lineno} is not JSON; expected {wanted}") from None
     steps = cast(Step, content).get("steps") if isinstance(content, dict) else None
     if not isinstance(steps, list) or not all(_is_step(s) for s in cast(list[object], steps)):
-        raise StudyError(f"{path}: it holds no list of steps with terms, record and errors; {wanted} is right")
+        raise StudyError(f"{path}: it holds no list of steps with terms, record and errors; expected {wanted}")
     return cast(list[Step], steps)
 
 
@@ -47,13 +47,13 @@ def as_bytes(steps: list[Step]) -> bytes:
 
 
 def climbed(steps: list[Step], before: Step, after: Step) -> list[Step]:
-    """The ladder with a step more; it begins with the model before it, unless that is where it stands."""
+    """The history with a step more; it begins with the model before it, unless that is where it stands."""
     known = steps and steps[-1]["terms"] == before["terms"] and steps[-1]["record"] == before["record"]
     return [*steps, *([] if known else [before]), after]
 
 
 def table(steps: list[Step]) -> str:
-    """The ladder for people, one line a model."""
+    """The history for people, one line a model."""
     from tabulate import tabulate
 
     rows: list[list[str]] = []

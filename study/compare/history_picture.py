@@ -1,4 +1,4 @@
-"""The ladder as a picture: the error of the response falling towards the noise floor."""
+"""The history as a picture: the error of the response falling towards the noise floor."""
 
 # Matplotlib leaves the **kwargs of its methods untyped.
 # pyright: reportUnknownMemberType=false
@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import LogLocator
 
 from study.figures import page
 from study.figures.sheet import in_style
 
 
-def ladder(axes: Axes, steps: Sequence[dict[str, Any]]) -> Axes:
+def errors_by_step(axes: Axes, steps: Sequence[dict[str, Any]]) -> Axes:
     """Held-out error of the response and of the force by model, on a logarithmic scale, noise floor dotted."""
     place = np.arange(len(steps))
     for key, style, colour in (("response", "-o", "0.1"), ("force", "--s", "0.5")):
@@ -21,7 +22,9 @@ def ladder(axes: Axes, steps: Sequence[dict[str, Any]]) -> Axes:
         axes.plot(place, values, style, color=colour, label=f"error of the {key}")
     floor = [100.0 * s["noise_floor"]["response"] for s in steps]
     axes.plot(place, floor, ":", color="0.1", label="noise floor")
-    axes.set_yscale("log")
+    axes.set_yscale("log", subs=[])
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     names = [f"+ {s['added']}".replace("_", " ") if s.get("added") else "as given" for s in steps]
     axes.set_xticks(place, names, rotation=20, ha="right")
     axes.set_ylabel("held-out error (%)")
@@ -33,9 +36,9 @@ def files(steps: Sequence[dict[str, Any]], name: str) -> dict[str, bytes]:
     """The picture by file name, in the project's style."""
     with in_style():
         figure, (axes,) = page.page(
-            f"The ladder of {name}", "every model so far, judged on what was not fitted", panel=3.0, headed=False
+            f"The history of {name}", "every model so far, judged on what was not fitted", panel=3.0, headed=False
         )
         figure.subplots_adjust(bottom=0.26)
-        ladder(axes, steps)
+        errors_by_step(axes, steps)
         page.legend(figure, [axes])
-        return page.files({"ladder": figure})
+        return page.files({"history": figure})

@@ -17,9 +17,9 @@ from study.diagnose.ranked import Ranked
 from study.diagnose.ranking import rank
 from study.equations.terms import Term
 from study.identify.time_domain import shape_search
-from study.identify.time_domain.fit_model import continued
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part, linearise
+from study.identify.time_domain.settling import continued
 from study.identify.time_domain.shape_search import Baseline
 from study.records.prepared import Prepared
 from study.support import statistics

@@ -132,9 +132,9 @@ class Desk:
 
         try:
             self._tell(diagnosing="diagnosing")
-            rung, _ = sessions.examined(asked, count)
+            stage, _ = sessions.examined(asked, count)
             with self._lock:
-                self._tell(sessions.with_rung(self.session, rung), diagnosing="")
+                self._tell(sessions.with_stage(self.session, stage), diagnosing="")
         except OvertakenError:
             self._tell(diagnosing="")
         except StudyError as error:

@@ -81,11 +81,11 @@ def history_height(steps: int) -> int:
     return 84 + 27 * max(steps, 2)
 
 
-def ladder_columns(session: Session) -> Columns:
+def history_columns(session: Session) -> Columns:
     """The history as columns: errors and noise floor in per cent by the name of the step."""
     steps = session.steps
     earlier = [f"+ {step['added']}" if step.get("added") else "as given" for step in steps]
-    named = [*earlier[: len(steps) - len(session.rungs)], *(rung.label for rung in session.rungs)]
+    named = [*earlier[: len(steps) - len(session.stages)], *(stage.label for stage in session.stages)]
     return {
         "name": [f"{i} {words.in_words(label)}" for i, label in enumerate(named)],
         "response": [100.0 * step["error"]["response"] for step in steps],
@@ -104,7 +104,7 @@ def frame(seen: View) -> Columns:
     )
     labels = {
         "response": f"{seen.quantity} / {y}", "close": f"{seen.quantity} / {y}", "difference": f"difference / {d}",
-        "spectrum": f"amplitude density / {d}/√Hz", "plane": f"velocity / {v}", "against_u": f"missing force / {f}",
+        "spectrum": f"density / ({d}/√Hz)", "plane": f"velocity / {v}", "against_u": f"missing force / {f}",
         "against_v": f"missing force / {f}",
     }  # fmt: skip
     motions = {"plane": f"displacement / {u}", "against_u": f"displacement / {u}", "against_v": f"velocity / {v}"}
@@ -128,8 +128,8 @@ def variables(session: Session, live: bool) -> dict[str, Any]:
     return {
         "record": session.prepared.record.name, "model": session.now.model.name, "live": live,
         "style": _text("page.css"), "script": _text("page.js"),
-        "steps": [words.name(r, i) for i, r in enumerate(session.rungs)],
-        "diagnosed": live or any(r.diagnosis is not None for r in session.rungs),
+        "steps": [words.name(r, i) for i, r in enumerate(session.stages)],
+        "diagnosed": live or any(r.diagnosis is not None for r in session.stages),
     }  # fmt: skip
 
 

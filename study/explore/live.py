@@ -23,7 +23,7 @@ class Watcher:
         self.shown = desk.session
         self.asked = ColumnDataSource({"act": [], "name": [], "count": []}, name="asked")
         self.state = ColumnDataSource(self._state(), name="state")
-        self.page = html_page.build(self._view(), html_page.ladder_columns(self.shown), [self.asked, self.state])
+        self.page = html_page.build(self._view(), html_page.history_columns(self.shown), [self.asked, self.state])
         self.span: tuple[float, float] | None = None
         self._lay()
         desk.watch(self, self._changed)
@@ -42,11 +42,11 @@ class Watcher:
         self.page.panels["response"].on_event(RangesUpdate, self._zoomed)
 
     def _view(self) -> View:
-        rungs = self.shown.rungs
-        return view(rungs[-1], len(rungs) - 1)
+        stages = self.shown.stages
+        return view(stages[-1], len(stages) - 1)
 
     def _state(self) -> dict[str, Any]:
-        state, many = self.desk.state, len(self.shown.rungs) > 1
+        state, many = self.desk.state, len(self.shown.stages) > 1
         return {
             "busy": [state.busy], "doing": [state.busy or state.diagnosing], "answer": [state.answer],
             "accepted": [state.accepted], "notice": [state.notice], "undo": [many],
@@ -61,7 +61,7 @@ class Watcher:
         self.document.hold("combine")
         if session is not self.shown:
             self.shown = session
-            self.page.show(self._view(), html_page.ladder_columns(session))
+            self.page.show(self._view(), html_page.history_columns(session))
             if self.span is not None:
                 self._refine(self.span)
         self.state.data = self._state()
@@ -84,8 +84,8 @@ class Watcher:
 
     def _refine(self, span: tuple[float, float]) -> None:
         self.span = span
-        rung = self.shown.now
-        comparison, scales = rung.comparison, scales_of(rung.comparison)
+        stage = self.shown.now
+        comparison, scales = stage.comparison, scales_of(stage.comparison)
         part = stretch(comparison, span)
-        self.page.sources["would_time"].data = preview.difference(rung.shown, scales, part)
+        self.page.sources["would_time"].data = preview.difference(stage.shown, scales, part)
         self.page.sources["time"].data = over_time(comparison, scales, span)

@@ -6,7 +6,7 @@ window.study = (() => {
   const put = (name, data) => { model(name).data = data }
   const place = (id) => document.getElementById(id)
 
-  // ---- words and axes of the present rung
+  // ---- words and axes of the present stage
   function words() {
     const source = model("words"), places = source.get_column("place"), html = source.get_column("html")
     for (let i = 0; i < places.length; i++) {

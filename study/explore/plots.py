@@ -55,7 +55,7 @@ def _blocks(drawn: Any, s: Sources) -> None:
 def force(s: Sources, frequency: Any, share: Any) -> Any:
     """Unexplained share of the force with the noise floor."""
     drawn = theme.panel(
-        "force", 222, "frequency / Hz", "unexplained share of the force / %", select=True, ranges=(frequency, share),
+        "force", 222, "frequency / Hz", "unexplained share / %", select=True, ranges=(frequency, share),
         narrow=True, y_axis_type="log",
     )  # fmt: skip
     left = drawn.line("f", "parametric", source=s["force"], line_color=theme.BLUE, line_width=1.6)
@@ -72,7 +72,7 @@ def coherence(s: Sources, frequency: Any) -> Any:
     drawn = theme.panel("coherence", 222, "frequency / Hz", "cumulative coherence / 1", select=True, ranges=ranges,
                         narrow=True)  # fmt: skip
     lines = drawn.multi_line("f", "share", source=s["coherence"], line_color="colour", line_dash="dash", line_width=1.5)
-    theme.legend(drawn, [({"field": "name"}, [lines])], "bottom_right")
+    theme.legend(drawn, [({"field": "name"}, [lines])], "bottom_left")
     theme.chosen(drawn, "box_coherence")
     return drawn
 
@@ -96,6 +96,7 @@ def spectrum(s: Sources, frequency: Any) -> Any:
 def plane(s: Sources) -> Any:
     """The missing force over displacement and velocity; negative cells bear a dash, dots may be noise."""
     drawn = theme.panel("plane", 250, "displacement", "velocity", narrow=True)
+    drawn.xaxis[0].ticker.desired_num_ticks = 3  # beside the colour bar there is little room
     mapper = LinearColorMapper(palette=RdBu11, low=-1.0, high=1.0, name="mapper", nan_color="rgba(0,0,0,0)")
     cells = drawn.quad(
         "left", "right", "top", "bottom", source=s["plane"], fill_color={"field": "mean", "transform": mapper},

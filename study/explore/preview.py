@@ -10,17 +10,17 @@ from study.compare.noise import segments_of
 from study.diagnose.ranked import Ranked
 from study.explore import decimate
 from study.explore.axis_scales import Columns, Floats, Scales, heard, within
-from study.explore.session import Rung
+from study.explore.session import Stage
 from study.records.spectra import autospectrum
 
 
-def columns(rung: Rung, scales: Scales) -> dict[str, Columns]:
+def columns(stage: Stage, scales: Scales) -> dict[str, Columns]:
     """For each candidate what it would leave, under its place: difference, its spectrum, and the missing force."""
-    rows, force = rung.shown, scales.force.factor
-    lacking = [within(rung.would[row.name]) for row in rows]
+    rows, force = stage.shown, scales.force.factor
+    lacking = [within(stage.would[row.name]) for row in rows]
     return {
         "would_time": difference(rows, scales),
-        "would_spectrum": {str(i): _spectrum(rung.comparison, row, scales) for i, row in enumerate(rows)},
+        "would_spectrum": {str(i): _spectrum(stage.comparison, row, scales) for i, row in enumerate(rows)},
         "would_u": _curves([(u, f) for u, _, f in lacking], scales.displacement.factor, force),
         "would_v": _curves([(v, f) for _, v, f in lacking], scales.velocity.factor, force),
         "would_plane": {str(i): surface(u, v, f).mean.ravel() / force for i, (u, v, f) in enumerate(lacking)},

@@ -12,7 +12,7 @@ from bokeh.resources import Resources
 from study.compare.comparison import Comparison
 from study.explore import html_page
 from study.explore.axis_scales import Columns
-from study.explore.session import Rung, Session
+from study.explore.session import Session, Stage
 from study.explore.view import view
 
 EMBED = "Bokeh.safely(() => Bokeh.embed.embed_items({docs}, {items}))"
@@ -20,8 +20,8 @@ EMBED = "Bokeh.safely(() => Bokeh.embed.embed_items({docs}, {items}))"
 
 def saved(session: Session) -> bytes:
     """The whole session as a file that a browser opens; it shows the last model first."""
-    views = [view(rung, number, live=False) for number, rung in enumerate(session.rungs)]
-    history = html_page.ladder_columns(session)
+    views = [view(stage, number, live=False) for number, stage in enumerate(session.stages)]
+    history = html_page.history_columns(session)
     stores: list[ColumnDataSource] = []
     if len(views) > 1:
         for number, seen in enumerate(views):
@@ -50,8 +50,8 @@ def saved(session: Session) -> bytes:
 
 def of_comparison(comparison: Comparison) -> bytes:
     """The same of a comparison alone, which nobody has diagnosed."""
-    rung = Rung(comparison.model, "as given", None, comparison)
-    return saved(Session(comparison.prepared, (rung,)))
+    stage = Stage(comparison.model, "as given", None, comparison)
+    return saved(Session(comparison.prepared, (stage,)))
 
 
 def _marked(history: Columns, place: int) -> Columns:

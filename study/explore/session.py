@@ -1,6 +1,6 @@
 """The state of a session: the models tried so far and what was found of each. Nothing here knows of a browser.
 
-Every function gives a new session; what was found of a model stays with its rung, so that undoing computes nothing.
+Every function gives a new session; what was found of a model stays with its stage, so that undoing computes nothing.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from study.compare.comparison import Comparison, compare
-from study.compare.comparison_report import rung as history_step
+from study.compare.comparison_report import history_step
 from study.compare.missing_force import MissingForce, missing_force
 from study.diagnose import candidates
 from study.diagnose.candidates import Candidate
@@ -31,7 +31,7 @@ SHOWN = 8  # candidates
 
 
 @dataclass(frozen=True)
-class Rung:
+class Stage:
     """A model and what was found of it."""
 
     model: Model  # values that it gives are held
@@ -59,19 +59,19 @@ class Session:
     """A record, and the models tried on it."""
 
     prepared: Prepared
-    rungs: tuple[Rung, ...]  # from the model as given to the present one
+    stages: tuple[Stage, ...]  # from the model as given to the present one
     own: tuple[Term, ...] = ()  # the user's own candidates
     earlier: tuple[Step, ...] = ()  # of the history that was kept beside the model file
 
     @property
-    def now(self) -> Rung:
+    def now(self) -> Stage:
         """The present model."""
-        return self.rungs[-1]
+        return self.stages[-1]
 
     @property
     def steps(self) -> list[Step]:
         """The history, the steps before this session included."""
-        own = [history_step(r.comparison, r.added) for r in self.rungs]
+        own = [history_step(r.comparison, r.added) for r in self.stages]
         last = self.earlier[-1] if self.earlier else None
         known = last is not None and last["terms"] == own[0]["terms"] and last["record"] == own[0]["record"]
         return [*self.earlier, *own[1 if known else 0 :]]
@@ -82,12 +82,12 @@ def begin(
 ) -> Session:
     """A session with the model as given."""
     comparison = compare(model, prepared, progress=progress)
-    return Session(prepared, (Rung(model, "as given", None, comparison),), earlier=tuple(earlier))
+    return Session(prepared, (Stage(model, "as given", None, comparison),), earlier=tuple(earlier))
 
 
 def climbed(session: Session, comparison: Comparison, label: str, added: str | None) -> Session:
     """The session with a model more."""
-    return replace(session, rungs=(*session.rungs, Rung(comparison.model, label, added, comparison)))
+    return replace(session, stages=(*session.stages, Stage(comparison.model, label, added, comparison)))
 
 
 def candidate(session: Session, name: str) -> Ranked:
@@ -109,7 +109,7 @@ def with_added(session: Session, name: str) -> Session:
 
 def undone(session: Session) -> Session:
     """The session before its last change; the model as given stays."""
-    return replace(session, rungs=session.rungs[:-1]) if len(session.rungs) > 1 else session
+    return replace(session, stages=session.stages[:-1]) if len(session.stages) > 1 else session
 
 
 def with_held(session: Session, key: str, hold: bool) -> Session:
@@ -125,8 +125,8 @@ def with_held(session: Session, key: str, hold: bool) -> Session:
     return climbed(session, comparison, f"{key} {'held' if hold else 'free'}", None)
 
 
-def examined(session: Session, progress: Callable[[int], None] | None = None) -> tuple[Rung, Diagnosis]:
-    """The present rung with what is missing, in words too, and what each candidate would leave; and the diagnosis."""
+def examined(session: Session, progress: Callable[[int], None] | None = None) -> tuple[Stage, Diagnosis]:
+    """The present stage with what is missing, in words too, and what each candidate would leave; and the diagnosis."""
     diagnosis = diagnose(session.now.comparison, extra=session.own, progress=progress)
     return _foreseen(replace(session.now, diagnosis=diagnosis, said=in_words(diagnosis))), diagnosis
 
@@ -136,25 +136,25 @@ def lacking_with(row: Ranked) -> MissingForce:
     return missing_force(row.fit.model, (), row.prediction)
 
 
-def _foreseen(rung: Rung) -> Rung:
-    """The rung with what each candidate that is shown would leave; one that cannot run leaves what there is."""
-    would = dict(rung.would)
-    for row in rung.shown:
+def _foreseen(stage: Stage) -> Stage:
+    """The stage with what each candidate that is shown would leave; one that cannot run leaves what there is."""
+    would = dict(stage.would)
+    for row in stage.shown:
         if row.name not in would:
             try:
                 would[row.name] = lacking_with(row)
             except StudyError:
-                would[row.name] = rung.comparison.missing_force
-    return replace(rung, would=would)
+                would[row.name] = stage.comparison.missing_force
+    return replace(stage, would=would)
 
 
-def with_rung(session: Session, rung: Rung) -> Session:
-    """The session with a diagnosed rung in place of those of its model; unchanged if that was undone meanwhile."""
-    rungs = (
-        replace(r, diagnosis=rung.diagnosis, said=rung.said, would=rung.would) if r.model == rung.model else r
-        for r in session.rungs
+def with_stage(session: Session, stage: Stage) -> Session:
+    """The session with a diagnosed stage in place of those of its model; unchanged if that was undone meanwhile."""
+    stages = (
+        replace(r, diagnosis=stage.diagnosis, said=stage.said, would=stage.would) if r.model == stage.model else r
+        for r in session.stages
     )
-    return replace(session, rungs=tuple(rungs))
+    return replace(session, stages=tuple(stages))
 
 
 def own_term(session: Session, text: str) -> Term:
@@ -204,4 +204,4 @@ def tried(session: Session, text: str) -> Session:
     except np.linalg.LinAlgError:
         raise StudyError(silent) from None
     ranked = replace(now.diagnosis, candidates=tuple(rows))
-    return replace(with_rung(session, _foreseen(replace(now, diagnosis=ranked))), own=(*session.own, term))
+    return replace(with_stage(session, _foreseen(replace(now, diagnosis=ranked))), own=(*session.own, term))

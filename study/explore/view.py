@@ -14,7 +14,7 @@ from study.diagnose.ranked import Ranked
 from study.explore import decimate, preview, words
 from study.explore.axis_scales import Columns, Floats, Scales, heard, least_force, scales_of, within
 from study.explore.page_units import Scale, in_text
-from study.explore.session import Rung
+from study.explore.session import Stage
 from study.figures.labels import power_of_ten
 
 NINETY_FIVE = 1.96  # standard errors to each side
@@ -36,10 +36,10 @@ class View:
     least: float  # missing force, in the unit of its axis, below which nothing is to be seen
 
 
-def view(rung: Rung, step: int, live: bool = True) -> View:
+def view(stage: Stage, step: int, live: bool = True) -> View:
     """The columns of a model, by its number in the session; only a ``live`` page can act."""
-    comparison, scales = rung.comparison, scales_of(rung.comparison)
-    rows, force, least = rung.shown, scales.force, least_force(rung.comparison)
+    comparison, scales = stage.comparison, scales_of(stage.comparison)
+    rows, force, least = stage.shown, scales.force, least_force(stage.comparison)
     u, v, missing = within(comparison.missing_force)
     columns = {
         "time": over_time(comparison, scales),
@@ -52,9 +52,9 @@ def view(rung: Rung, step: int, live: bool = True) -> View:
         "against_u": _against(u, missing, scales.displacement, force, least),
         "against_v": _against(v, missing, scales.velocity, force, least),
         "constancy": _constancy(rows),
-        **preview.columns(rung, scales),
+        **preview.columns(stage, scales),
         **_links(comparison, scales),
-        "words": words.words(rung, rows, step, live, force.unit),
+        "words": words.words(stage, rows, step, live, force.unit),
     }
     small = {name: _small(c) for name, c in columns.items()}
     limits, highest = force_limits(comparison), comparison.force.highest

@@ -10,7 +10,7 @@ from study.compare.fitted_coefficients import Coefficient
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, NOTHING
 from study.explore.page_units import in_text, length, number, rate
-from study.explore.session import Rung
+from study.explore.session import Stage
 from study.figures.labels import power_of_ten, term_names
 from study.support.numbers import percent
 
@@ -23,26 +23,26 @@ NOT_ASKED = (
 TIES = 2  # that a row names
 
 
-def words(rung: Rung, rows: Sequence[Ranked], step: int, live: bool, force_unit: str) -> dict[str, Any]:
+def words(stage: Stage, rows: Sequence[Ranked], step: int, live: bool, force_unit: str) -> dict[str, Any]:
     """Every fragment of a model, as columns ``place`` and ``html``."""
-    comparison = rung.comparison
+    comparison = stage.comparison
     fragments = {
         "figures": _figures(comparison),
         "says": escape(says(comparison)),
-        "verdict": _verdict(rung, live),
-        "candidates": _candidates(rung, rows, live),
+        "verdict": _verdict(stage, live),
+        "candidates": _candidates(stage, rows, live),
         "coefficients": _coefficients(comparison, live),
-        "equation": equation(rung),
+        "equation": equation(stage),
         "notes": escape("; ".join(comparison.notes)),
-        "step": escape(name(rung, step)),
+        "step": escape(name(stage, step)),
         "force-unit": escape(in_text(force_unit)),
     }
     return {"place": list(fragments), "html": list(fragments.values())}
 
 
-def name(rung: Rung, step: int) -> str:
+def name(stage: Stage, step: int) -> str:
     """A model as the history names it."""
-    return f"{step} {in_words(rung.label)}"
+    return f"{step} {in_words(stage.label)}"
 
 
 def in_words(label: str) -> str:
@@ -50,10 +50,10 @@ def in_words(label: str) -> str:
     return term_names(label)
 
 
-def equation(rung: Rung) -> str:
+def equation(stage: Stage) -> str:
     """The equation of motion with its symbols."""
     parts: list[str] = []
-    for entry in rung.model.terms:
+    for entry in stage.model.terms:
         symbols = ", ".join(f"<i>{escape(s)}</i>" for s in entry.term.symbols)
         shape = escape(in_text(entry.term.formula).replace("d2u/dt2", "d²u/dt²"))
         parts.append(f"{symbols} {shape}" if shape.isalpha() or "d²" in shape else f"{symbols} [{shape}]")
@@ -76,26 +76,26 @@ def _figures(comparison: Comparison) -> str:
     )
 
 
-def _verdict(rung: Rung, live: bool) -> str:
-    if rung.diagnosis is None:
+def _verdict(stage: Stage, live: bool) -> str:
+    if stage.diagnosis is None:
         return f"<p class='waiting'>{WAITING if live else NOT_ASKED}</p>"
-    head = VERDICTS.get(rung.diagnosis.verdict, UNKNOWN)
-    return f"<h3 class='{rung.diagnosis.verdict}'>{head}</h3><p>{escape(rung.said)}</p>"
+    head = VERDICTS.get(stage.diagnosis.verdict, UNKNOWN)
+    return f"<h3 class='{stage.diagnosis.verdict}'>{head}</h3><p>{escape(stage.said)}</p>"
 
 
-def _candidates(rung: Rung, rows: Sequence[Ranked], live: bool) -> str:
-    if rung.diagnosis is None:
+def _candidates(stage: Stage, rows: Sequence[Ranked], live: bool) -> str:
+    if stage.diagnosis is None:
         return ""
     scale = "".join(f"<span style='left:{x}%'>{x}</span>" for x in (0, 50, 100))
     heading = "effect, and the share of the difference that it explains / %"
     head = f"<li class='scale'><span class='head'>{heading}</span><i class='axis'>{scale}</i></li>"
-    more = len(rung.diagnosis.candidates) - len(rows)
+    more = len(stage.diagnosis.candidates) - len(rows)
     rest = f"<li class='more'>{more} more explain less</li>" if more > 0 else ""
-    return f"<ol>{head}{''.join(_row(i, row, rung, live) for i, row in enumerate(rows))}{rest}</ol>"
+    return f"<ol>{head}{''.join(_row(i, row, stage, live) for i, row in enumerate(rows))}{rest}</ol>"
 
 
-def _row(place: int, row: Ranked, rung: Rung, live: bool) -> str:
-    units = rung.comparison.record.units
+def _row(place: int, row: Ranked, stage: Stage, live: bool) -> str:
+    units = stage.comparison.record.units
     unit = row.term.unit(row.term.symbols[0], units.get("force", "N"), units.get("displacement", "m"))
     add = f"<button data-act='add' data-name='{escape(row.name)}'>Add</button>" if live else ""
     explained = f"{round(100.0 * row.gain.explained, 1) + 0.0:.1f} ± {100.0 * row.gain.error:.1f} %"
@@ -105,7 +105,7 @@ def _row(place: int, row: Ranked, rung: Rung, live: bool) -> str:
     size = f"{number(row.coefficient)} ± {number(1.96 * row.error, 2)} {in_text(unit)}"
     return (
         f"<li class='candidate' data-candidate='{place}' data-label='{escape(_label(row, unit))}' tabindex='0'>"
-        f"<span class='rank'>{_rank(place, row, rung)}</span><span class='name'>{title}</span>"
+        f"<span class='rank'>{_rank(place, row, stage)}</span><span class='name'>{title}</span>"
         f"{_bar(row)}<span class='explained'>{explained}</span>{add}"
         f"<small>{_ties(row)}<i>{formula}</i>; <em>{escape(size)}</em>, error with it {percent(row.response_error)}. "
         f"{escape(meaning)}; common cause: {escape(row.term.cause)}.</small></li>"
@@ -119,9 +119,9 @@ def _label(row: Ranked, unit: str) -> str:
     return f"{symbol} / {in_text(power_of_ten(abs(row.coefficient))[1] + unit)}"
 
 
-def _rank(place: int, row: Ranked, rung: Rung) -> str:
+def _rank(place: int, row: Ranked, stage: Stage) -> str:
     """The place; a tie with the first is no place of its own."""
-    ties = next((r.tied_with for r in (rung.diagnosis.candidates if rung.diagnosis else ())), ())
+    ties = next((r.tied_with for r in (stage.diagnosis.candidates if stage.diagnosis else ())), ())
     return "=" if place and row.name in ties else str(place + 1)
 
 

@@ -1,6 +1,6 @@
 """What the jobs ask of the settings beyond the bounds of each value: none shall end in want of it.
 
-Each check raises a ``StudyError`` at the first fault, naming the value and what would be right; whose settings, force
+Each check raises a ``StudyError`` at the first fault, naming the value and what was expected; whose settings, force
 or model it is, the caller adds.
 """
 
@@ -113,7 +113,7 @@ def check_model(path: Path, also_assumed: str, settings: StudySettings) -> Model
     expect(
         worth > inputs,
         f"{begun} that are worth {worth:.3g} averages, as they overlap; {inputs} inputs need more than {inputs}: "
-        "shorter segments are right",
+        "expected shorter segments",
     )
     LocalPolynomial(**settings.local_polynomial.model_dump()).check(inputs)
     return model
@@ -183,7 +183,7 @@ def _check_segments(settings: StudySettings) -> None:
     right = length // 2
     while right >= SHORTEST and not enough(right):
         right //= 2
-    advice = f"{right} is right" if right >= SHORTEST else "a longer record is right"
+    advice = f"expected {right}" if right >= SHORTEST else "expected a longer record"
     raise StudyError(
         f"segments.length is {length}; the claims cut segments of {LONGER} times that too, which a "
         f"record of {samples} samples must hold for more than {INPUTS} averages: {advice}"

@@ -2,7 +2,7 @@
 
 Restoring force from force and acceleration, its patterns over displacement, the lines of a Mathieu
 system's response, and histograms beside the Gaussian. What a record or a model lacks for one of them, a ``StudyError``
-says with what would be right.
+says with what was expected.
 """
 
 import math

@@ -133,7 +133,7 @@ def _sentence(fault: Mapping[str, Any], kind: type[Section]) -> str:
         return f"{place} {numbers['error']}".strip()
     near = [words for begin, words in EXPECTED.items() if code.startswith(begin)]
     expected = near[0].format(**numbers) if near else str(fault["msg"])
-    if code in ("string_pattern_mismatch", "string_too_long"):  # a pattern tells nobody what would be right
+    if code in ("string_pattern_mismatch", "string_too_long"):  # a pattern tells nobody what was expected
         expected = _at(kind, path[:-1]).model_fields[path[-1]].description or expected
     return f"{place} is {shown(fault['input'])}; expected {expected}"
 

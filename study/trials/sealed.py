@@ -22,7 +22,7 @@ def write(trial: Trial, folder: Path) -> tuple[Path, Path, Path]:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StudyError(
-            f"{folder}: no such folder can be made ({error.strerror}); a writable place is right"
+            f"{folder}: no such folder can be made ({error.strerror}); expected a writable place"
         ) from None
     stem = trial.record.name
     record, model, answer = (folder / f"{stem}{ending}" for ending in (".csv", ".yaml", ".answer.json"))
@@ -51,9 +51,9 @@ def unseal(path: Path) -> dict[str, Any]:
         sealed = cast(dict[str, Any], page)["answer"]
         answer: object = json.loads(base64.b64decode(sealed, validate=True))
     except (ValueError, KeyError, TypeError, RecursionError, binascii.Error):
-        raise StudyError(f"{path}: this holds no sealed answer; {WANTED} is right") from None
+        raise StudyError(f"{path}: this holds no sealed answer; expected {WANTED}") from None
     if not isinstance(answer, dict) or set(cast(dict[str, Any], answer)) != {"hidden", "shares", "noise", "truth"}:
-        raise StudyError(f"{path}: the answer in it is not that of a trial; {WANTED} is right")
+        raise StudyError(f"{path}: the answer in it is not that of a trial; expected {WANTED}")
     return cast(dict[str, Any], answer)
 
 

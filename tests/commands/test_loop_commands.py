@@ -40,7 +40,7 @@ def test_diagnose_add_history(rig, capsys):
     capsys.readouterr()
     assert cli.main(["history", "rig.yaml", "--out", "found"]) == 0
     assert "+ quadratic_damping" in capsys.readouterr().out
-    assert (rig / "found" / "ladder.png").stat().st_size > 5_000
+    assert (rig / "found" / "history.png").stat().st_size > 5_000
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_bad_input_is_one_sentence_and_changes_nothing(rig, capsys, words, said)
     assert not history.path_of(rig / "rig.yaml").exists()
 
 
-def test_a_broken_ladder_is_refused_before_the_model_is_touched(rig, capsys):
+def test_a_broken_history_is_refused_before_the_model_is_touched(rig, capsys):
     history.path_of(rig / "rig.yaml").write_text("{not json")
     before = (rig / "rig.yaml").read_bytes()
     assert cli.main(["add", "rig.yaml", "quadratic_damping", "--data", "rig.csv"]) == 2

@@ -49,7 +49,7 @@ def test_the_silverbox_is_first_of_all_a_duffing_oscillator(silverbox):
 
 @present
 def test_the_silverbox_hides_a_damping_effect(silverbox):
-    """The climb's last rung on the arrow, in millivolts: published physical models stop at 0.39."""
+    """The climb's last step on the arrow, in millivolts: published physical models stop at 0.39."""
     names = ("cubic_stiffness", "constant_force", "quadratic_stiffness", "quadratic_damping")
     prepared = prepare_record(silverbox, make_plan(silverbox, (40650, 57034), (100, 40575)))
     rms = []

@@ -115,7 +115,7 @@ def test_where_pieces_fail_too_the_free_run_stands(
     def fails(*_: object, **__: object) -> None:
         raise DivergenceError("nothing in common", 0.0)
 
-    where = "study.identify.time_domain.fit_model"
+    where = "study.identify.time_domain.settling"
     monkeypatch.setattr(f"{where}.is_poor", lambda *_: True)
     monkeypatch.setattr(f"{where}.is_chaotic", lambda *_: chaotic)
     monkeypatch.setattr(f"{where}.fit_in_segments", fails)

@@ -40,7 +40,7 @@ def test_one_error_and_one_floor(seed, hidden, noise, response, tmp_path, capsys
 
     page = sessions.begin(read_model(model), prepare_record(read_record(data)))
     assert_same(compared, document([page.now.comparison]))
-    page = sessions.with_rung(page, sessions.examined(page)[0])
+    page = sessions.with_stage(page, sessions.examined(page)[0])
     grown = document([sessions.with_added(page, hidden).now.comparison])
 
     told("add", model, hidden, "--data", data, "--out", tmp_path / "added")

@@ -47,7 +47,7 @@ def begun(trial: trials.Trial) -> sessions.Session:
 
 @pytest.fixture(scope="module")
 def asked(begun: sessions.Session) -> sessions.Session:
-    return sessions.with_rung(begun, sessions.examined(begun)[0])
+    return sessions.with_stage(begun, sessions.examined(begun)[0])
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +88,7 @@ def test_adding_what_is_missing_lets_the_error_fall_and_undoing_brings_it_back(a
 
 def test_an_added_term_is_what_add_would_have_found(grown):
     error = grown.now.comparison.prediction.error
-    after = added(grown.rungs[0].comparison, get("quadratic_damping"))
+    after = added(grown.stages[0].comparison, get("quadratic_damping"))
     assert error == pytest.approx(after.prediction.error, rel=1e-3)
     anew = compare(grown.now.model, grown.prepared)
     assert error == pytest.approx(anew.prediction.error, rel=1e-3)
@@ -135,7 +135,7 @@ def test_a_bad_formula_gets_its_sentence(asked, text, said):
 
 
 def test_links_add_up_to_the_curves_and_the_map(grown):
-    comparison = grown.rungs[0].comparison
+    comparison = grown.stages[0].comparison
     tied, lacking = links(comparison), comparison.missing_force
     u, v, force = (x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force))
     for classes, values in ((tied.displacement, u), (tied.velocity, v)):
@@ -161,11 +161,11 @@ def test_what_a_candidate_would_leave_is_what_its_diagnosis_found(asked):
     assert with_it < 0.1 * without
 
 
-def test_the_ladder_goes_on_where_the_file_left_it(begun):
+def test_the_history_goes_on_where_the_file_left_it(begun):
     step = begun.steps[0]
     earlier = ({**step, "terms": ["inertia"]}, {**step, "added": "linear_damping"})
     assert len(replace(begun, earlier=earlier).steps) == 2
-    names = html_page.ladder_columns(replace(begun, earlier=earlier[:1]))["name"]
+    names = html_page.history_columns(replace(begun, earlier=earlier[:1]))["name"]
     assert names == ["0 as given", "1 as given"]
 
 
@@ -180,9 +180,9 @@ def test_the_saved_page_is_the_same_twice_and_asks_for_nothing(grown):
     assert [f"{i} {what}" in text for i, what in enumerate(("as given", "+ quadratic damping"))] == [True, True]
 
 
-def test_the_saved_page_stays_small_however_long_record_and_ladder(asked):
-    """Judged are 2,048 samples, drawn at most 2,400: seven rungs take what they would of a record of 131,072."""
-    seven = replace(asked, rungs=asked.rungs * 7)
+def test_the_saved_page_stays_small_however_long_record_and_history(asked):
+    """Judged are 2,048 samples, drawn at most 2,400: seven stages take what they would of a record of 131,072."""
+    seven = replace(asked, stages=asked.stages * 7)
     assert len(saved(seven)) < 5e6
     long = np.zeros(131072)
     assert len(decimate.extremes(long)) == 2 * decimate.BUCKETS
@@ -193,7 +193,7 @@ def test_what_a_user_named_cannot_leave_its_place(asked):
     record = asked.prepared.record
     prepared = replace(asked.prepared, record=replace(record, name=evil, units={**record.units, "force": "<b>N"}))
     now = replace(asked.now, comparison=replace(asked.now.comparison, prepared=prepared))
-    hostile = saved(replace(asked, prepared=prepared, rungs=(now,))).decode()
+    hostile = saved(replace(asked, prepared=prepared, stages=(now,))).decode()
     assert "alert(1)</script>" not in hostile
     assert "<b>N" not in hostile
     assert "&lt;b&gt;N" in hostile or "\\u003cb>N" in hostile
@@ -211,13 +211,13 @@ def test_units_are_written_as_people_write_them():
 
 
 def test_the_missing_force_has_one_unit_everywhere(asked):
-    rung, factor = asked.now, 1e-5
-    comparison, lacking = rung.comparison, rung.comparison.missing_force
+    stage, factor = asked.now, 1e-5
+    comparison, lacking = stage.comparison, stage.comparison.missing_force
     record = comparison.record.with_channels({"force": comparison.record["force"] * factor})
     prepared = replace(comparison.prepared, record=record)
     lacking = replace(lacking, force=lacking.force * factor)
-    small = view.view(replace(rung, comparison=replace(comparison, prepared=prepared, missing_force=lacking)), 0)
-    usual = view.view(rung, 0)
+    small = view.view(replace(stage, comparison=replace(comparison, prepared=prepared, missing_force=lacking)), 0)
+    usual = view.view(stage, 0)
     assert usual.scales.force.factor == 1.0
     assert small.scales.force.factor < 0.01
     for source, column in (("plane", "mean"), ("against_u", "mean"), ("against_v", "high")):
@@ -230,8 +230,8 @@ def test_the_missing_force_has_one_unit_everywhere(asked):
 def test_ties_are_shown_as_ties(asked):
     rows = asked.now.diagnosis.candidates[:2]
     tied = (replace(rows[0], tied_with=(rows[1].name,)), replace(rows[1], tied_with=(rows[0].name,)))
-    rung = replace(asked.now, diagnosis=replace(asked.now.diagnosis, candidates=tied))
-    html = dict(zip(*words.words(rung, tied, 0, True, "N").values(), strict=True))["candidates"]
+    stage = replace(asked.now, diagnosis=replace(asked.now.diagnosis, candidates=tied))
+    html = dict(zip(*words.words(stage, tied, 0, True, "N").values(), strict=True))["candidates"]
     assert re.findall(r"class='rank'>(.)<", html) == ["1", "="]
     assert html.count("class='tie'") == 2
 
@@ -246,9 +246,9 @@ def test_saving_keeps_the_users_comments(asked, grown, tmp_path):
     ]
     assert text.startswith("# the rig in hall 3\n")
     assert "# weighed" in text
-    own = model_file.format_model(asked.rungs[0].model)
+    own = model_file.format_model(asked.stages[0].model)
     made = files(grown, "rig.yaml", own)
-    assert {"rig.yaml", "rig.history.json", "comparison.json", PAGE, "response.png", "ladder.png"} <= set(made)
+    assert {"rig.yaml", "rig.history.json", "comparison.json", PAGE, "response.png", "history.png"} <= set(made)
     for name, content in made.items():
         (tmp_path / name).write_bytes(content)
     assert model_file.read_model(tmp_path / "rig.yaml") == grown.now.model
@@ -256,7 +256,7 @@ def test_saving_keeps_the_users_comments(asked, grown, tmp_path):
 
 
 def test_the_desk_does_one_thing_at_a_time_and_says_what_went_wrong(asked, tmp_path):
-    desk = Desk(asked, tmp_path / "rig.yaml", model_file.format_model(asked.rungs[0].model), tmp_path / "out")
+    desk = Desk(asked, tmp_path / "rig.yaml", model_file.format_model(asked.stages[0].model), tmp_path / "out")
     done = threading.Event()
     busy: list[str] = []
 

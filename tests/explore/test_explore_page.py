@@ -195,7 +195,7 @@ def _hostile(page: Page, rig: Path) -> None:
 
 def _saved(rig: Path) -> None:
     names = {path.name for path in (rig / "saved").iterdir()}
-    assert {"rig.yaml", "rig.history.json", "explore.html", "response.png", "ladder.svg"} <= names
+    assert {"rig.yaml", "rig.history.json", "explore.html", "response.png", "history.svg"} <= names
     text = (rig / "saved" / "rig.yaml").read_text()
     assert text == (rig / "rig.yaml").read_text() + "  - quadratic_damping\n"
     assert "quadratic_damping" in model_file.read_model(rig / "saved" / "rig.yaml")

@@ -1,4 +1,4 @@
-"""A record that cannot be used is refused in one sentence that names file and place and says what would be right."""
+"""A record that cannot be used is refused in one sentence that names file and place and says what was expected."""
 
 import os
 from collections.abc import Callable

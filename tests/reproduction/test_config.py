@@ -201,7 +201,7 @@ def test_faults_of_a_row(folder, new, says):
             "it must begin at 1.902 Hz or below and end at 4 Hz or above",
         ),
         ("length: 512", "length: 2048", "segments.length is 2048; the claims cut segments of 4 times that too"),
-        ("length: 512", "length: 2048", "a record of 8192 samples must hold for more than 2 averages: 1024 is right"),
+        ("length: 512", "length: 2048", "a record of 8192 samples must hold for more than 2 averages: expected 1024"),
         (
             "without_noise: [siso, miso, local_polynomial, miso_free_shape]",
             "without_noise: [miso_hand_read]",

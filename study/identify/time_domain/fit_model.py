@@ -6,7 +6,6 @@ and the sum of squares has local minima there; so every search has several start
 them brings to a minimum is begun anew from multiple shooting, within whose segments nothing drifts far.
 """
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
@@ -20,24 +19,17 @@ from study.identify.frequency_domain.inputs import history, reverse_inputs
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.multiple_shooting import POOR, fit_in_segments, is_chaotic, is_poor
-from study.identify.time_domain.part_fit import STEPS, covariance_of, fit_part, integration_shift, linearise
+from study.identify.time_domain.part_fit import STEPS, fit_part
+from study.identify.time_domain.settling import KEPT, better, continued, from_segments, settled
 from study.identify.time_domain.shape_search import Baseline
 from study.records.prepared import Prepared
-from study.records.states import angular_rate
-from study.support.errors import DivergenceError, StudyError
+from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
 Values = Mapping[str, float]
 SEARCHED = 4096  # samples, at most, that a search for open shape parameters looks at
-PERIODS = 50.0  # of the motion, in the stretch that multiple shooting starts a search from
-SHORTEST, LONGEST = 512, 2048  # samples in that stretch
-TRIED, KEPT = 15, 40  # free runs of a fit that tries a start, and of one that is kept
+TRIED = 15  # free runs of a fit that tries a start
 NEAR = 0.01  # standard errors: as near a minimum as the fit of a search has to come
-SHIFT = 0.3  # standard errors by which the integration may shift a coefficient
-ORDER = 4  # of the integrator: what it shifts falls with this power of the steps
-FAR = 1e6  # times the shift that would matter: more asks for no more steps than this
-MOST_STEPS = 8  # in a sampling interval, unless the model's own rates ask for more
 
 
 def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> FreeRunFit:
@@ -108,18 +100,19 @@ def with_term(fit: FreeRunFit, entry: ModelTerm, base: Baseline, prepared: Prepa
         anew = _reversed(grown.with_values(starts[0]), prepared) or base.linear
         starts.append(starts[0] | {k: v for k, v in anew.items() if k in (*fit.keys, *entry.term.symbols)} | given)
     try:
-        return best_fit(grown, prepared, starts, (*fit.held, *given))
+        best = best_fit(grown, prepared, starts, (*fit.held, *given))
     except StudyError:
         missing = ", ".join(key for key, value in entry.values.items() if value is None)
         raise StudyError(
             f"no values of {missing} let {entry.name} follow {prepared.record.name}; give them in the model file"
         ) from None
+    return replace(best, elsewhere=(*best.elsewhere, *fit.elsewhere))
 
 
 def best_fit(
     model: Model, prepared: Prepared, starts: Iterable[Values], held: Sequence[str] | None = None
 ) -> FreeRunFit:  # fmt: skip
-    """The best of fits from several starts.
+    """The best of fits from several starts; the others stay with it (``elsewhere``).
 
     With open shape parameters each start is first fitted with these held: the misfit along a dead band or a gap has
     kinks and local minima in which a fit of everything at once gets stuck.
@@ -131,82 +124,19 @@ def best_fit(
     """
     held = model.held_keys if held is None else tuple(held)
     shapes = tuple(key for key in model.values if "." in key and key not in held)
-    first = [_tried(model, prepared, (*held, *shapes), start, TRIED) for start in starts]
-    best = min((fit for fit in first if fit is not None), key=lambda fit: fit.rms, default=None)
+    tried = (_tried(model, prepared, (*held, *shapes), start, TRIED) for start in starts)
+    first = sorted((fit for fit in tried if fit is not None), key=lambda fit: fit.rms)
+    best = first[0] if first else None
     if best is not None and (shapes or not best.converged):
         best = _freed(best, prepared, held)
     if best is None or not best.converged:
-        apart = _from_segments(best.model if best else model, prepared, (*held, *shapes))
+        apart = from_segments(best.model if best else model, prepared, (*held, *shapes))
         if apart is not None and shapes:
             apart = _freed(apart, prepared, held)
-        best = _better(best, apart)
+        best = better(best, apart)
     if best is None:
         raise StudyError(f"{model.name!r} has no finite response to the force of {prepared.record.name!r}")
-    return best
-
-
-def continued(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
-    """The fit on another part of the record, such as the whole fitting part behind a search, from where it stands."""
-    if fit.span == prepared.plan.fit:
-        return fit
-    return fit_part(fit.model, prepared, fit.held, steps=fit.steps_per_sample, max_iterations=KEPT)
-
-
-def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
-    """The fit at its minimum with enough steps; in segments where a chaotic system loses the motion in one run."""
-    fit = with_enough_steps(fit, prepared)
-    if _stands(fit, prepared):
-        return fit
-    best = begin = fit
-    if not is_chaotic(fit, prepared):  # which a fit at wrong values may not, where the true system does
-        near = _from_segments(fit.model, prepared, fit.held, fit.steps_per_sample)
-        best = _better(fit, near) or fit
-        if near is None or _stands(best, prepared) or not is_chaotic(near, prepared):
-            return best
-        begin = near
-    try:
-        apart = fit_in_segments(
-            begin.model, prepared.record, held=fit.held, response=prepared.response, span=prepared.plan.fit,
-            steps_per_sample=fit.steps_per_sample,
-        )  # fmt: skip
-        together = fit_part(
-            apart.model, prepared, fit.held, steps=fit.steps_per_sample, initial=np.atleast_2d(apart.initial)[:1]
-        )
-    except DivergenceError:  # where segments fail as well, the one free run is what there is
-        return best
-    if _stands(together, prepared):
-        return together
-    return apart if apart.converged or (begin is fit and is_poor(fit, prepared.fitted)) else best
-
-
-def _stands(fit: FreeRunFit, prepared: Prepared) -> bool:
-    """Whether one free run may be believed: at a minimum, and at none of the many that a chaotic system has.
-
-    What leaves next to nothing has no rival; what leaves more may be any of them, and the sharp curvature of one tells
-    an error far below the distance to the next.
-    """
-    if is_poor(fit, prepared.fitted):
-        return False
-    return fit.rms < POOR * prepared.spread or not is_chaotic(fit, prepared)
-
-
-def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
-    """The fit with so many steps per sample that halving them shifts no coefficient by what its error shows."""
-    most = max(MOST_STEPS, needed_steps(fit.model, prepared.record, prepared.response).rough)
-    while fit.keys and fit.steps_per_sample < most:
-        jacobian = linearise(fit, prepared)
-        moved = integration_shift(fit, prepared, jacobian)
-        deviations = np.sqrt(np.diag(covariance_of(fit, jacobian)))
-        with np.errstate(over="ignore"):  # where nothing is left, any shift is beyond all measure
-            excess = float(np.max(np.abs(moved) / np.maximum(SHIFT * deviations, np.finfo(float).tiny)))
-        if excess <= 1.0:
-            break
-        times = 2 ** max(1, math.ceil(math.log2(min(excess, FAR)) / ORDER))
-        fit = fit_part(
-            fit.model, prepared, fit.held, steps=min(times * fit.steps_per_sample, most),
-            initial=np.atleast_2d(fit.initial),
-        )  # fmt: skip
-    return fit
+    return replace(best, elsewhere=tuple(first[1:]))
 
 
 def _rough(model: Model, prepared: Prepared, start: Values) -> int:
@@ -232,28 +162,6 @@ def _freed(fit: FreeRunFit, prepared: Prepared, held: Sequence[str]) -> FreeRunF
     Whoever took the other then, for its smaller residual, would hold what the model leaves open.
     """
     return _tried(fit.model, prepared, held, fit.model.numbers(), KEPT, np.atleast_2d(fit.initial))
-
-
-def _better(one: FreeRunFit | None, other: FreeRunFit | None) -> FreeRunFit | None:
-    """The fit with the smaller residual; of two alike the later one, which knows more errors."""
-    if one is None or other is None:
-        return one or other
-    return other if other.rms <= one.rms else one
-
-
-def _from_segments(model: Model, prepared: Prepared, held: Sequence[str], steps: int = STEPS) -> FreeRunFit | None:
-    """A fit that begins where multiple shooting ends; None where the model cannot run even in segments."""
-    length = round(PERIODS * 2.0 * np.pi / (angular_rate(prepared.fitted, prepared.dt) * prepared.dt))
-    stretch = prepared.shortened(int(np.clip(length, SHORTEST, LONGEST)))
-    try:
-        linear = linear_start(model, prepared)  # a short stretch may hold hardly any motion
-        start = {key: value for key, value in linear.items() if key not in held and "." not in key}
-        near = fit_in_segments(
-            model, prepared.record, start=start, held=held, response=prepared.response, span=stretch.plan.fit
-        )
-        return fit_part(near.model, prepared, held, steps=steps)
-    except StudyError:
-        return None
 
 
 def _reversed(model: Model, prepared: Prepared) -> dict[str, float]:

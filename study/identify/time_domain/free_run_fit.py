@@ -59,6 +59,8 @@ class FreeRunFit:
         Runge-Kutta steps that were taken in each sampling interval.
     noise : array, shape (order + 1,)
         Autoregressive coefficients of the noise that the residual was weighted with; 1 alone for white noise.
+    elsewhere : tuple of FreeRunFit
+        Where the other starts of the search led whose best this is, as far as they were followed (``rivals``).
     """
 
     model: Model
@@ -74,6 +76,7 @@ class FreeRunFit:
     first: int = 0
     steps_per_sample: int = 2
     noise: Floats = field(default_factory=lambda: WHITE)
+    elsewhere: tuple["FreeRunFit", ...] = ()
 
     @property
     def span(self) -> tuple[int, int]:

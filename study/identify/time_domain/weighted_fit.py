@@ -5,12 +5,14 @@ at some frequencies alone. The residual of a wrong model is no noise: weighted w
 than their errors (Hausman, 1978), and the plain fit stands.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.special import chdtrc
 
-from study.identify.time_domain.fit_model import continued, settled
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part, influence_of, linearise
+from study.identify.time_domain.settling import continued, settled
 from study.records.prepared import Prepared
 from study.support.autoregression import autoregression
 from study.support.errors import DivergenceError
@@ -36,6 +38,7 @@ def weighted(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
         )  # fmt: skip
     except DivergenceError:
         return fit
+    again = replace(again, elsewhere=fit.elsewhere)
     return again if again.converged and _agree(fit, again, prepared) else fit
 
 

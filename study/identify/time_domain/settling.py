@@ -1,0 +1,121 @@
+"""A fit brought to its minimum on the whole fitting part: enough steps, local minima, chaos."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from study.equations.model import Model
+from study.equations.substeps import needed_steps
+from study.identify.frequency_domain.starting_values import linear_start
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.multiple_shooting import POOR, fit_in_segments, is_chaotic, is_poor
+from study.identify.time_domain.part_fit import STEPS, covariance_of, fit_part, integration_shift, linearise
+from study.records.prepared import Prepared
+from study.records.states import angular_rate
+from study.support.errors import DivergenceError, StudyError
+
+PERIODS = 50.0  # of the motion, in the stretch that multiple shooting starts a search from
+SHORTEST, LONGEST = 512, 2048  # samples in that stretch
+SHIFT = 0.3  # standard errors by which the integration may shift a coefficient
+ORDER = 4  # of the integrator: what it shifts falls with this power of the steps
+FAR = 1e6  # times the shift that would matter: more asks for no more steps than this
+MOST_STEPS = 8  # in a sampling interval, unless the model's own rates ask for more
+KEPT = 40  # free runs of a fit that is kept
+
+
+def continued(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
+    """The fit on another part of the record, such as the whole fitting part behind a search, from where it stands."""
+    if fit.span == prepared.plan.fit:
+        return fit
+    again = fit_part(fit.model, prepared, fit.held, steps=fit.steps_per_sample, max_iterations=KEPT)
+    return replace(again, elsewhere=fit.elsewhere)
+
+
+def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
+    """The fit at its minimum with enough steps; in segments where a chaotic system loses the motion in one run."""
+    return replace(_settled(with_enough_steps(fit, prepared), prepared), elsewhere=fit.elsewhere)
+
+
+def _settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
+    if _stands(fit, prepared):
+        return fit
+    if is_chaotic(fit, prepared):
+        apart = _in_segments(fit, prepared)
+        return apart if apart is not None and (apart.converged or is_poor(fit, prepared.fitted)) else fit
+    near = from_segments(fit.model, prepared, fit.held, fit.steps_per_sample)
+    best = better(fit, near) or fit
+    if near is None or _stands(best, prepared) or not is_chaotic(near, prepared):
+        return best
+    apart = _in_segments(near, prepared)  # a fit at wrong values may be regular where the true system is chaotic
+    return apart if apart is not None and apart.converged else best
+
+
+def _in_segments(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit | None:
+    """Multiple shooting from where a fit stands, made one free run where that stands; None where it fails as well."""
+    try:
+        apart = fit_in_segments(
+            fit.model, prepared.record, held=fit.held, response=prepared.response, span=prepared.plan.fit,
+            steps_per_sample=fit.steps_per_sample,
+        )  # fmt: skip
+        together = fit_part(
+            apart.model, prepared, fit.held, steps=fit.steps_per_sample, initial=np.atleast_2d(apart.initial)[:1]
+        )
+    except DivergenceError:
+        return None
+    if _stands(together, prepared):
+        return together
+    return apart if apart.rms <= fit.rms else None  # with a state for each segment, what ends worse is lost
+
+
+def _stands(fit: FreeRunFit, prepared: Prepared) -> bool:
+    """Whether one free run may be believed: at a minimum, and at none of the many that a chaotic system has.
+
+    What leaves next to nothing has no rival; what leaves more may be any of them, and the sharp curvature of one tells
+    an error far below the distance to the next.
+    """
+    if is_poor(fit, prepared.fitted):
+        return False
+    return fit.rms < POOR * prepared.spread or not is_chaotic(fit, prepared)
+
+
+def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
+    """The fit with so many steps per sample that halving them shifts no coefficient by what its error shows."""
+    most = max(MOST_STEPS, needed_steps(fit.model, prepared.record, prepared.response).rough)
+    while fit.keys and fit.steps_per_sample < most:
+        jacobian = linearise(fit, prepared)
+        moved = integration_shift(fit, prepared, jacobian)
+        deviations = np.sqrt(np.diag(covariance_of(fit, jacobian)))
+        with np.errstate(over="ignore"):  # where nothing is left, any shift is beyond all measure
+            excess = float(np.max(np.abs(moved) / np.maximum(SHIFT * deviations, np.finfo(float).tiny)))
+        if excess <= 1.0:
+            break
+        times = 2 ** max(1, math.ceil(math.log2(min(excess, FAR)) / ORDER))
+        fit = fit_part(
+            fit.model, prepared, fit.held, steps=min(times * fit.steps_per_sample, most),
+            initial=np.atleast_2d(fit.initial),
+        )  # fmt: skip
+    return fit
+
+
+def better(one: FreeRunFit | None, other: FreeRunFit | None) -> FreeRunFit | None:
+    """The fit with the smaller residual; of two alike the later one, which knows more errors."""
+    if one is None or other is None:
+        return one or other
+    return other if other.rms <= one.rms else one
+
+
+def from_segments(model: Model, prepared: Prepared, held: Sequence[str], steps: int = STEPS) -> FreeRunFit | None:
+    """A fit that begins where multiple shooting ends; None where the model cannot run even in segments."""
+    length = round(PERIODS * 2.0 * np.pi / (angular_rate(prepared.fitted, prepared.dt) * prepared.dt))
+    stretch = prepared.shortened(int(np.clip(length, SHORTEST, LONGEST)))
+    try:
+        linear = linear_start(model, prepared)  # a short stretch may hold hardly any motion
+        start = {key: value for key, value in linear.items() if key not in held and "." not in key}
+        near = fit_in_segments(
+            model, prepared.record, start=start, held=held, response=prepared.response, span=stretch.plan.fit
+        )
+        return fit_part(near.model, prepared, held, steps=steps)
+    except StudyError:
+        return None
