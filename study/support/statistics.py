@@ -99,7 +99,11 @@ def clustered_covariance(jacobian: Floats, residual: Floats, count: int = 2 * BL
     blocks = np.einsum(
         "bsp,bs->bp", j[: size * count].reshape(count, size, -1), residual[: size * count].reshape(count, size)
     )
-    sandwich = inverse @ (blocks.T @ blocks) @ inverse * count / (count - 1)
-    white = inverse * float(residual @ residual) / max(len(residual) - j.shape[1], 1)
-    larger = np.sqrt(np.maximum(np.diag(sandwich), np.diag(white)) / np.maximum(np.diag(sandwich), 1e-300))
-    return sandwich * np.outer(larger, larger) / np.outer(scale, scale)
+    steps = blocks @ inverse  # what each block moves the estimates by: of their products no variance is negative
+    sandwich = steps.T @ steps * count / (count - 1)
+    variance = np.diag(sandwich)
+    white = np.diag(inverse) * float(residual @ residual) / max(len(residual) - j.shape[1], 1)
+    larger = np.sqrt(np.maximum(variance, white) / np.maximum(variance, np.finfo(float).tiny))
+    covariance = sandwich * np.outer(larger, larger)
+    np.fill_diagonal(covariance, np.maximum(variance, white))  # one that a single sample decides has no scatter at all
+    return covariance / np.outer(scale, scale)
