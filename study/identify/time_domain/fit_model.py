@@ -191,6 +191,8 @@ def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
         return best
     if _stands(together, prepared):
         return together
+    if apart.rms > best.rms:  # with a state for each segment besides, no fit ends worse: it is lost
+        return best
     return apart if apart.converged or (begin is fit and is_poor(fit, prepared.fitted)) else best
 
 
