@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: study report test checks lint picture readme estimators clean
+.PHONY: study report test checks lint picture readme estimators trials clean
 
 study: $(READY)
 	$(BIN)/snakemake -j2
@@ -30,10 +30,15 @@ picture: $(READY)
 
 readme: study
 	$(BIN)/python scripts/readme.py
+	$(BIN)/python scripts/trial_docs.py
 
 estimators: $(READY)
 	$(BIN)/snakemake -j2 estimators
 	$(BIN)/python scripts/estimator_docs.py
+
+trials: $(READY)
+	$(BIN)/snakemake -j2 trials
+	$(BIN)/python scripts/trial_docs.py results/trials/trials.csv figures/trials_confusion.png
 
 $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \

@@ -1,4 +1,5 @@
-# Trials with hidden effects, the proof of diagnose: `snakemake -j2 trials`, not part of `all`.
+# Trials with hidden effects, the proof of diagnose: `snakemake -j2 trials`, not part of `all`;
+# `make trials` writes docs/trials.csv and the tables of docs/tool.md of them.
 TRIALS = STUDY.settings.trials
 TRIAL_CODE = {name: rests_on(Path(f"scripts/{name}.py")) for name in ("trials", "trial_summary")}
 
@@ -28,6 +29,8 @@ rule trials:
         confusion="results/trials/confusion.csv",
         summary="results/trials/summary.csv",
         ladder="results/trials/ladder.csv",
+        alpha="results/trials/alpha.csv",
+        k="results/trials/k.csv",
         confusion_figure=pictures("trials_confusion"),
         ladder_figure=pictures("trials_ladder"),
     params:

@@ -1,10 +1,10 @@
 """Write measured numbers into README.md and docs/tool.md from the tables of results/: ``make readme``.
 
-The trials and the Silverbox are targets of their own; a table that is not there leaves its place as it is.
+The Silverbox is a target of its own; where its history is not there, its place is left as it is. ``trial_docs.py``
+writes what is said of the trials.
 """
 
 import json
-import shutil
 from pathlib import Path
 
 import pandas as pd
@@ -19,30 +19,16 @@ SHOWN = (
     "mathieu_side_resonances", "mathieu_stiffness", "dead_band_stiffness", "dead_band_error", "dead_band_share",
     "levels_invariant", "levels_siso", "error_free", "noise_random_only",
 )  # fmt: skip
-CONFUSION = "trials_confusion.png"
 
 
-def main(results: Path, figures: Path, readme: Path, tool: Path) -> None:
+def main(results: Path, readme: Path, tool: Path) -> None:
     claims = results / "claims.csv"
     if not claims.is_file():
         raise StudyError(f"{claims}: there is no such file; run 'make study' first")
     table = pd.read_csv(claims, keep_default_na=False).set_index("id").loc[list(SHOWN)].reset_index()
     document.put(readme, "numbers", [summary.statements(table)])
-    if (reached := results / "trials" / "summary.csv").is_file():
-        said = document.Image("What was hidden, and what was said", CONFUSION)
-        document.put(tool, "reach", [reach(pd.read_csv(reached)), said])
-        shutil.copyfile(figures / CONFUSION, tool.parent / CONFUSION)
     if (history := results / "silverbox" / "history.json").is_file():
         document.put(tool, "history", [errors_by_step(json.loads(history.read_text(encoding="utf-8"))["steps"])])
-
-
-def reach(table: pd.DataFrame) -> document.Block:
-    rows = [
-        (row["reach"], row["trials"], f"{100.0 * row['rate']:.1f} +- {100.0 * row['standard_error']:.1f} %",
-         "" if pd.isna(row["wanted"]) else f"{100.0 * row['wanted']:.0f} %")
-        for row in table.to_dict("records")
-    ]  # fmt: skip
-    return document.table(("reach", "trials", "measured", "wanted"), rows)
 
 
 def errors_by_step(steps: list[dict]) -> document.Block:
@@ -56,4 +42,4 @@ def errors_by_step(steps: list[dict]) -> document.Block:
 
 if __name__ == "__main__":
     with one_sentence():
-        main(Path("results"), Path("figures"), Path("README.md"), Path("docs/tool.md"))
+        main(Path("results"), Path("README.md"), Path("docs/tool.md"))

@@ -12,18 +12,21 @@ from study.figures import page
 from study.reproduction import tables
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
-from study.trials import reach, trial_pictures
+from study.trials import constants_table, reach, trial_pictures
 
 KINDS = {"single": "one effect hidden", "pair": "two effects hidden"}
 
 
 def main(
-    parts: Sequence[str], wanted: Mapping[str, float], outputs: Mapping[str, str],
+    parts: Sequence[str], wanted: Mapping[str, Sequence[float]], outputs: Mapping[str, str],
     drawings: Mapping[str, Sequence[str]], style: Path,
 ) -> None:  # fmt: skip
     table = pd.concat([pd.read_csv(path) for path in parts], ignore_index=True).sort_values("seed")
     summary, confusion, ladder = reach.summary(table, wanted), reach.confusion(table), reach.ladder(table)
-    found = {"trials": table, "summary": summary, "confusion": confusion, "ladder": ladder}
+    found = {
+        "trials": table, "summary": summary, "confusion": confusion, "ladder": ladder,
+        "alpha": constants_table.against_alpha(table), "k": constants_table.against_k(table),
+    }  # fmt: skip
     for name, path in outputs.items():
         tables.write_csv(found[name], Path(path))
     print(summary.to_string(index=False), file=sys.stderr)
@@ -59,6 +62,6 @@ if "snakemake" in globals():
     with one_sentence():
         main(
             step.input.parts, step.params.wanted,
-            {name: step.output[name] for name in ("trials", "summary", "confusion", "ladder")},
+            {name: step.output[name] for name in ("trials", "summary", "confusion", "ladder", "alpha", "k")},
             {"confusion": step.output.confusion_figure, "ladder": step.output.ladder_figure}, Path(step.input.style),
         )  # fmt: skip

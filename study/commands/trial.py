@@ -25,16 +25,21 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--response", choices=("displacement", "velocity", "acceleration"), help="what is measured; drawn if left out"
     )
+    parser.add_argument(
+        "--fault", default="none", metavar="NAME",
+        help="a fault of the measurement, such as delay; 'any' for one in half of the seeds (default: none)",
+    )  # fmt: skip
     parser.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="folder (default: this one)")
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    from study.trials import make_trial, sealed
+    from study.trials import WIDE, make_trial, sealed
 
     if arguments.open is not None:
         print(sealed.sentences(sealed.unseal(arguments.open)))
         return
-    trial = make_trial(arguments.seed, _names(arguments.hidden), arguments.noise, arguments.response)
+    hidden, noise, response = _names(arguments.hidden), arguments.noise, arguments.response
+    trial = make_trial(arguments.seed, hidden, noise, response, arguments.fault, WIDE)
     print(_written(trial, *sealed.write(trial, arguments.out)))
 
 
@@ -45,9 +50,8 @@ def _names(text: str | None) -> tuple[str, ...] | None:
 
 
 def _written(trial: "Trial", record: Path, model: Path, answer: Path) -> str:
-    response = next(name for name in trial.record.channels if name != "force")
     return (
-        f"{record}: force and {response}, {len(trial.record)} samples at {trial.record.dt:.4g} s\n"
+        f"{record}: force and {trial.response}, {len(trial.record)} samples at {trial.record.dt:.4g} s\n"
         f"{model}: the model its owner believes in ({', '.join(t.name for t in trial.believed.terms)})\n"
         f"{answer}: the answer, sealed; 'study trial --open {answer}' shows it\n\n"
         f"Try: study diagnose {record} --model {model}"
@@ -57,6 +61,7 @@ def _written(trial: "Trial", record: Path, model: Path, answer: Path) -> str:
 COMMAND = Command(
     "trial", "write a record with a hidden effect, and its answer sealed apart",
     "study trial --seed 7\n  study trial --seed 7 --hidden quadratic_damping --noise 0.05 --out trials\n"
+    "  study trial --seed 8 --fault any\n"
     "  study trial --open trial_7.answer.json",
     _arguments, _run,
 )  # fmt: skip

@@ -34,6 +34,8 @@ Rate = Annotated[float, Field(ge=0.0, le=1.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 Names = Annotated[tuple[str, ...], Field(min_length=1, strict=False), AfterValidator(_each_once)]
 Band = Annotated[tuple[NotNegative, ...], Field(min_length=2, max_length=2, strict=False)]
+RatePair = Annotated[tuple[Rate, ...], Field(min_length=2, max_length=2, strict=False)]
+RateOne = Annotated[tuple[Rate, ...], Field(min_length=1, max_length=1, strict=False)]
 Limits = dict[str, Positive]
 
 
@@ -124,21 +126,29 @@ class EstimatorErrors(MonteCarlo):
 
 
 class Wanted(Section):
-    """Rates that the trials are to reach."""
+    """Rates that the trials are to reach, and sizes of tie sets: without a fault of the measurement, and with one."""
 
-    first: Rate
-    nothing: Rate
-    both: Rate
-    removed: Rate
+    first: RatePair
+    first_in_noise: RatePair
+    tied: RatePair
+    size: Band
+    size_in_noise: Band
+    nothing: RatePair
+    both: RatePair
+    removed: RateOne
+    fault: RateOne
+    held: RatePair
+    held_most: RatePair
 
 
 class TrialSettings(Section):
-    """Trials with hidden effects; there are 136 pairs of effects."""
+    """Trials with hidden effects, as many with a fault of the measurement; there are 136 pairs of effects."""
 
     first_seed: Seed
     noises: Annotated[tuple[NotNegative, ...], Field(min_length=1, strict=False), AfterValidator(_each_once)]
     rounds: Count
     none: Count
+    completed: Count
     pairs: Annotated[int, Field(ge=1, le=136)]
     removed: Count
     jobs: Count

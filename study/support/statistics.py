@@ -115,9 +115,12 @@ def clustered_covariance(jacobian: Floats, residual: Floats) -> Floats:
     scale, inverse = _inverse(jacobian)
     each = influence(jacobian, residual) * scale
     sandwich = each.T @ each
-    white = inverse * float(residual @ residual) / max(len(residual) - len(scale), 1)
-    larger = np.sqrt(np.maximum(np.diag(sandwich), np.diag(white)) / np.maximum(np.diag(sandwich), 1e-300))
-    return sandwich * np.outer(larger, larger) / np.outer(scale, scale)
+    variance = np.diag(sandwich)
+    white = np.diag(inverse) * float(residual @ residual) / max(len(residual) - len(scale), 1)
+    larger = np.sqrt(np.maximum(variance, white) / np.maximum(variance, np.finfo(float).tiny))
+    covariance = sandwich * np.outer(larger, larger)
+    np.fill_diagonal(covariance, np.maximum(variance, white))  # one that a single sample decides has no scatter at all
+    return covariance / np.outer(scale, scale)
 
 
 def _inverse(jacobian: Floats) -> tuple[Floats, Floats]:

@@ -1,31 +1,31 @@
-"""A trial: a system, an excitation, a hidden effect (or none, or two) and a sensor, all drawn from one seed."""
+"""A trial: an experiment, a hidden effect (or none, or two), a sensor and its fault, all drawn from one seed."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.equations.free_run import predict
 from study.equations.model import Model, ModelTerm, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.term import Parameter, Term
 from study.equations.terms import LIBRARY, get
-from study.records.excitation import Excitation, displacement_noise, force
+from study.records.excitation import displacement_noise, force
 from study.records.record import MOTIONS, Record
+from study.support.arrays import Floats
 from study.support.errors import DivergenceError, StudyError
+from study.trials.experiment import LINEAR, REPORT_LIKE, Experiment, Ranges
 from study.trials.strength import SHARE, grown, share_of
 
-Floats = NDArray[np.float64]
-LINEAR = ("inertia", "linear_damping", "linear_stiffness")  # what a linear model has: it cannot be hidden behind one
 HIDDEN = tuple(name for name in LIBRARY if name not in LINEAR)
 NOISES = (0.0, 0.01, 0.05, 0.10)
 KNOWN = ("none", "none", "cubic_stiffness", "van_der_pol_damping")  # of which one is drawn
 KNOWN_SHARE = 0.15
-SAMPLES = 8192
-STEPS, ACCURATE = 32, 1e-3  # steps per sample of the record, and by how much halving them may change it
-PUSH, FORGOTTEN = 20, 1e-3  # samples at the start; share of the motion in the second half
+STEPS = 32  # per sample of the record, and more where there are few samples a period
+PUSH, FORGOTTEN = 20, 1e-3  # samples at the start, at most half a period; share of the motion in the second half
 ATTEMPTS = 300  # systems drawn until one carries the effects at the wanted strength and stays finite
+ANY, NO_FAULT = "any", "none"  # what may be said of the fault beside its name
 
 
 @dataclass(frozen=True)
@@ -38,20 +38,50 @@ class Trial:
     hidden: tuple[str, ...]  # names of the hidden effects
     noise: float  # mean square of the noise over that of the response
     shares: tuple[float, ...]  # of the restoring force in each hidden effect, beyond any linear model
+    experiment: Experiment  # the linear system, its excitation and how it was sampled
+    fault: Mapping[str, Any] = field(default_factory=dict[str, Any])  # of the measurement: its name, channel and value
+
+    @property
+    def response(self) -> str:
+        """The measured motion."""
+        return next(c for c in self.record.channels if c != "force")
+
+    @property
+    def completed(self) -> Model:
+        """What its owner believes after adding all that was hidden, nothing known of the coefficients."""
+        return _nothing_known(self.truth, self.believed.name)
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """What a trial is to be."""
+
+    seed: int
+    hidden: tuple[str, ...]
+    noise: float
+    response: str
+    ranges: Ranges
 
 
 def make_trial(
-    seed: int, hidden: Sequence[str] | None = None, noise: float | None = None, response: str | None = None
+    seed: int,
+    hidden: Sequence[str] | None = None,
+    noise: float | None = None,
+    response: str | None = None,
+    fault: str = NO_FAULT,
+    ranges: Ranges = REPORT_LIKE,
 ) -> Trial:
     """A trial of this seed; what is given is not drawn.
 
     No effect is hidden with an empty sequence; ``noise`` is a mean square over that of the response, ``response`` is
-    ``displacement``, ``velocity`` or ``acceleration``.
+    ``displacement``, ``velocity`` or ``acceleration``. ``fault`` is one of ``study.faults.imposed.FAULTS``, ``any`` for
+    one that is drawn in half of the trials, or ``none``. It comes last and has a stream of its own: the trial without
+    it is the same record before the fault.
 
     Raises
     ------
     StudyError
-        If an effect cannot be hidden, or the response is no motion.
+        If an effect cannot be hidden, the response is no motion, or there is no such fault.
     DivergenceError
         If no system was found that stays finite with these effects.
     """
@@ -61,14 +91,29 @@ def make_trial(
         hidden = tuple(str(n) for n in rng.choice(HIDDEN, count, replace=False))
     _check(hidden, response)
     drawn_noise = float(rng.choice(NOISES))
-    drawn_response = str(rng.choice(["displacement", "acceleration"]))
+    drawn_response = str(rng.choice(ranges.responses))
     noise = drawn_noise if noise is None else noise
-    response = response or drawn_response
+    wanted = _Wanted(seed, tuple(hidden), noise, response or drawn_response, ranges)
     for _ in range(ATTEMPTS):
-        trial = _attempt(rng, seed, tuple(hidden), noise, response)
+        trial = _attempt(rng, wanted)
         if trial is not None:
-            return trial
+            return _with_fault(trial, fault, seed)
     raise DivergenceError(f"no system of trial {seed} stays finite with {', '.join(hidden)}", 0.0)
+
+
+def _with_fault(trial: Trial, fault: str, seed: int) -> Trial:
+    if fault == NO_FAULT:
+        return trial
+    from study.faults.imposed import FAULTS, impose  # most trials have none
+
+    rng = np.random.default_rng([2026, seed, 1])
+    if fault == ANY:
+        fault = str(rng.choice([*FAULTS, *[NO_FAULT] * len(FAULTS)]))
+        return _with_fault(trial, fault, seed)
+    if fault not in FAULTS:
+        raise StudyError(f"fault is {fault!r}; expected {ANY}, {NO_FAULT} or one of {', '.join(FAULTS)}")
+    record, what = impose(trial.record, trial.response, fault, rng)
+    return replace(trial, record=record, fault=what)
 
 
 def _check(hidden: Sequence[str], response: str | None) -> None:
@@ -81,36 +126,46 @@ def _check(hidden: Sequence[str], response: str | None) -> None:
         raise StudyError(f"response is {response!r}; it must be one of {', '.join(MOTIONS)}")
 
 
-def _attempt(rng: np.random.Generator, seed: int, hidden: tuple[str, ...], noise: float, response: str) -> Trial | None:
-    base, dt = _system(rng)
-    excitation = Excitation(level=float(10.0 ** rng.uniform(-1.0, 5.0)), reading="filtered", cutoff=0.25 / dt)
-    drive = force(excitation, SAMPLES, dt, seed)
+def _attempt(rng: np.random.Generator, wanted: _Wanted) -> Trial | None:
+    experiment = wanted.ranges.experiment(rng)
+    drive = force(experiment.excitation, experiment.samples, experiment.dt, wanted.seed)
     try:
-        quiet = simulate(base, drive, dt, Integrator("rk4", 4))
-        scale = float(np.std(quiet["displacement"]))
-        base, quiet = _with_own_nonlinearity(rng, base, hidden, drive, dt, quiet)
-        if _unseen(base, hidden, response):
+        quiet = _simulated(experiment.system, drive, experiment, 4)
+        base, known = _with_own_nonlinearity(rng, wanted.hidden, drive, experiment, quiet)
+        if _unseen(base, wanted.hidden, wanted.response):
             return None
-        truth = _with_effects(rng, base, hidden, quiet, drive, dt)
+        truth = _with_effects(rng, base, wanted.hidden, known, drive, experiment)
         if truth is None:
             return None
-        record = simulate(truth, drive, dt, Integrator("rk4", 8))
-        forgets = _forgets(truth, drive, dt)
+        record = _simulated(truth, drive, experiment, 8)
+        if not _of_this_size(record, quiet) or not _forgets(truth, drive, experiment):
+            return None
     except DivergenceError:
         return None
-    shares = tuple(share_of(truth, name, record) for name in hidden)
-    if not forgets or not 0.1 * scale < np.std(record["displacement"]) < 10.0 * scale:
-        return None
+    shares = tuple(share_of(truth, name, record) for name in wanted.hidden)
     if any(not SHARE[0] <= share <= SHARE[1] for share in shares):
         return None
-    values = _measured(truth, record, response)
+    values = _measured(truth, record, experiment, wanted)
     if values is None:
         return None
-    if noise > 0.0:
-        values = values + displacement_noise(values, noise, seed)
-    measured = Record(dt, {"force": drive, response: values}, record.units, f"trial_{seed}")
-    believed = replace(base, name=f"trial_{seed}").with_values(dict.fromkeys(base.values, None))
-    return Trial(measured, believed, truth, hidden, noise, shares)
+    if wanted.noise > 0.0:
+        values = values + displacement_noise(values, wanted.noise, wanted.seed)
+    name = f"trial_{wanted.seed}"
+    measured = Record(experiment.dt, {"force": drive, wanted.response: values}, record.units, name)
+    return Trial(measured, _nothing_known(base, name), truth, wanted.hidden, wanted.noise, shares, experiment)
+
+
+def _nothing_known(model: Model, name: str) -> Model:
+    return replace(model, name=name).with_values(dict.fromkeys(model.values, None))
+
+
+def _simulated(model: Model, drive: Floats, experiment: Experiment, steps: int) -> Record:
+    return simulate(model, drive, experiment.dt, Integrator("rk4", experiment.steps(steps)))
+
+
+def _of_this_size(record: Record, quiet: Record) -> bool:
+    """Whether the motion is about as large as that of the linear system, by which shape parameters are drawn."""
+    return bool(0.1 < np.std(record["displacement"]) / np.std(quiet["displacement"]) < 10.0)
 
 
 def _unseen(base: Model, hidden: tuple[str, ...], response: str) -> bool:
@@ -124,49 +179,45 @@ def _unseen(base: Model, hidden: tuple[str, ...], response: str) -> bool:
     return all(term.placeless for term in (*effects, *(entry.term for entry in base.terms)))
 
 
-def _measured(truth: Model, record: Record, response: str) -> Floats | None:
+def _measured(truth: Model, record: Record, experiment: Experiment, wanted: _Wanted) -> Floats | None:
     """The motion without visible error of integration; None where so many steps do not give it."""
-    coarse, fine = (predict(truth, record, response=response, steps_per_sample=n) for n in (STEPS // 2, STEPS))
-    return fine if float(np.std(fine - coarse)) < ACCURATE * float(np.std(fine)) else None
+    steps = experiment.steps(STEPS)
+    coarse, fine = (predict(truth, record, response=wanted.response, steps_per_sample=n) for n in (steps // 2, steps))
+    return fine if float(np.std(fine - coarse)) < wanted.ranges.accurate * float(np.std(fine)) else None
 
 
-def _forgets(model: Model, drive: Floats, dt: float) -> bool:
+def _forgets(model: Model, drive: Floats, experiment: Experiment) -> bool:
     """Whether the motion forgets a small push at its start: that of a chaotic system does not, and no free run follows.
 
     A spring that pushes away from the centre would make such a system, with two places to rest.
     """
+    half = len(drive) // 2
     pushed = drive.copy()
-    pushed[:PUSH] += 0.1 * float(np.std(drive))
-    one, other = (simulate(model, f, dt, Integrator("rk4", 2))["displacement"][SAMPLES // 2 :] for f in (drive, pushed))
+    pushed[: min(PUSH, int(np.ceil(experiment.samples_a_period / 2.0)))] += 0.1 * float(np.std(drive))
+    one, other = (_simulated(model, f, experiment, 2)["displacement"][half:] for f in (drive, pushed))
     return float(np.std(one - other)) < FORGOTTEN * float(np.std(one))
 
 
-def _system(rng: np.random.Generator) -> tuple[Model, float]:
-    """A linear oscillator of any size, sampled as the report's is, give or take a factor of two."""
-    mass = float(10.0 ** rng.uniform(-2.0, 3.0))
-    f_n = float(10.0 ** rng.uniform(-0.5, 2.0))
-    zeta = float(rng.uniform(0.02, 0.10))
-    omega = 2.0 * np.pi * f_n
-    values = (mass, 2.0 * zeta * omega * mass, omega**2 * mass)
-    entries = tuple(ModelTerm(get(n), (v,), ()) for n, v in zip(LINEAR, values, strict=True))
-    return Model("truth", entries), float(rng.uniform(0.04, 0.08)) / f_n
-
-
 def _with_own_nonlinearity(
-    rng: np.random.Generator, base: Model, hidden: tuple[str, ...], drive: Floats, dt: float, quiet: Record
+    rng: np.random.Generator, hidden: tuple[str, ...], drive: Floats, experiment: Experiment, quiet: Record
 ) -> tuple[Model, Record]:
     """Half of the systems have a known nonlinearity of the report's kind from the start."""
-    known = str(rng.choice(KNOWN))
+    known, base = str(rng.choice(KNOWN)), experiment.system
     if known == "none" or known in hidden:
         return base, quiet
-    known_system = grown(base, free(get(known)), drive, dt, KNOWN_SHARE)
+    known_system = grown(base, free(get(known)), drive, experiment.dt, KNOWN_SHARE, experiment.steps(2))
     if known_system is None:
         return base, quiet
-    return known_system[0], simulate(known_system[0], drive, dt, Integrator("rk4", 4))
+    return known_system[0], _simulated(known_system[0], drive, experiment, 4)
 
 
 def _with_effects(
-    rng: np.random.Generator, model: Model, hidden: tuple[str, ...], quiet: Record, drive: Floats, dt: float
+    rng: np.random.Generator,
+    model: Model,
+    hidden: tuple[str, ...],
+    quiet: Record,
+    drive: Floats,
+    experiment: Experiment,
 ) -> Model | None:
     """The model and the hidden effects, as strong as is drawn; None where that cannot be.
 
@@ -175,7 +226,7 @@ def _with_effects(
     wanted = {name: (float(rng.uniform(*SHARE)), _drawn(rng, get(name), quiet)) for name in hidden}
     for name in (*hidden, *hidden[:-1]):
         target, entry = wanted[name]
-        stronger = grown(model.without_term(name), entry, drive, dt, target)
+        stronger = grown(model.without_term(name), entry, drive, experiment.dt, target, experiment.steps(2))
         if stronger is None:
             return None
         model = stronger[0]

@@ -1,45 +1,47 @@
-"""Of many trials: who was taken for whom, how often the targets of reach were met, and how the error fell."""
+"""Of many trials: how often the targets of reach were met, who was taken for whom, and how the error fell.
+
+A tie is scored by whether its set holds the truth and by its size; no size makes up for a truth that is not in it.
+"""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
+from study.support.arrays import Floats
 from study.trials.draw import HIDDEN
-from study.trials.runs import NONE, PAIR, REMOVED, SINGLE, Row
+from study.trials.findings import Row
+from study.trials.rates import Rate, mean, proportion
+from study.trials.runs import COMPLETED, NONE, PAIR, REMOVED, SINGLE, WITH, WITHOUT
 
-Floats = NDArray[np.float64]
-LITTLE_NOISE = 0.05  # up to which the true effect has to come first
+VERY_LITTLE, LITTLE = 0.01, 0.05  # noise up to which ties are to be short, and the true effect has to come first
 WITHIN = 1.05  # held-out error after adding, over that of the true model
-HALF = 0.5  # what a named tie counts that holds the true effect
+WORDS = (
+    "kind", "hidden", "faults", "fault", "fault_channel", "faults_found", "found", "found_channel", "verdict", "first",
+    "tie_set", "second_verdict", "second_tie_set", "whole_tie_set", "pair", "trouble",
+)  # fmt: skip
+Wanted = Mapping[str, Sequence[float]]
+Member = Callable[[Row], bool]
+Score = Callable[[Row], float]
 
 
 def rows_of(table: pd.DataFrame) -> list[Row]:
     """The rows of ``trials.csv``, empty cells as empty words."""
-    words = (
-        "hidden", "verdict", "first", "named", "tied_with", "second_verdict", "second_named", "second_tied_with",
-        "pair", "tie_with_hidden", "trouble",
-    )  # fmt: skip
-    filled = {c: table[c].astype(object).where(table[c].notna(), "").astype(str) for c in words}
+    filled = {c: table[c].astype(object).where(table[c].notna(), "").astype(str) for c in WORDS}
     return cast(list[Row], table.assign(**filled).to_dict("records"))
 
 
 def first_score(row: Row) -> float:
-    """One if the hidden effect is named first, a half if a tie is named that holds it."""
-    if row["verdict"] != MISSING:
-        return 0.0
-    if row["named"] == row["hidden"]:
-        return 1.0
-    return HALF if row["hidden"] in row["tied_with"].split("+") else 0.0
+    """One if the hidden effect is called missing and stands first."""
+    return float(row["verdict"] == MISSING and row["first"] == row["hidden"])
 
 
-def right_place(row: Row) -> float:
-    """One if the hidden effect stands first among the candidates, whatever the verdict."""
-    return float(row["first"] == row["hidden"])
+def tied_score(row: Row) -> float:
+    """One if the hidden effect is among those that the record cannot tell apart."""
+    return float(row["hidden"] in row["tie_set"].split("+"))
 
 
 def nothing_score(row: Row) -> float:
@@ -48,15 +50,29 @@ def nothing_score(row: Row) -> float:
 
 
 def pair_score(row: Row) -> float:
-    """One if the two additions are the two hidden effects; ties count nothing here."""
-    return float({row["named"], row["second_named"]} == set(row["hidden"].split("+")))
+    """One if the two that were put first, one after the other, are the two hidden effects."""
+    put_first = [row[column].split("+")[0] for column in ("tie_set", "second_tie_set")]
+    return float(set(put_first) == set(row["hidden"].split("+")))
 
 
 def removed_score(row: Row) -> float:
-    """One if an effect that is not in the library is called unknown, or what is named comes with a tie."""
+    """One if an effect that is not in the library is called unknown, or is tied, if it may be, with what is named."""
     if row["verdict"] == UNKNOWN:
         return 1.0
-    return float(row["verdict"] == MISSING and (row["tied_with"] != "" or row["tie_with_hidden"] == "True"))
+    whole = row["whole_tie_set"].split("+")
+    return float(row["verdict"] == MISSING and row["first"] in whole and row["hidden"] in whole)
+
+
+def fault_score(row: Row) -> float:
+    """One if the fault is named in its channel with an interval that holds its value."""
+    if (row["found"], row["found_channel"]) != (row["fault"], row["fault_channel"]):
+        return 0.0
+    return float(float(row["found_low"]) <= float(row["fault_value"]) <= float(row["found_high"]))
+
+
+def no_fault_score(row: Row) -> float:
+    """One if no fault of the measurement is found."""
+    return float(row["faults_found"] == "")
 
 
 def as_good_as_truth(row: Row) -> float:
@@ -64,62 +80,109 @@ def as_good_as_truth(row: Row) -> float:
     return float(bool(row["error_after"] <= WITHIN * row["error_true"]))
 
 
-def _quiet(row: Row) -> bool:
-    return row["noise"] <= LITTLE_NOISE
+def _single(test: Member = lambda _: True) -> Member:
+    return lambda row: row["kind"] == SINGLE and test(row)
 
 
-def _kind(kind: str, test: Callable[[Row], bool] = lambda _: True) -> Callable[[Row], bool]:
-    return lambda row: row["kind"] == kind and test(row)
+def _kinds(*kinds: str) -> Member:
+    return lambda row: row["kind"] in kinds
 
 
-TARGETS: tuple[tuple[str, Callable[[Row], bool], Callable[[Row], float], str], ...] = (
-    ("true effect named first, noise up to 5 %", _kind(SINGLE, _quiet), first_score, "first"),
-    ("true effect named first, noise 10 %", _kind(SINGLE, lambda r: not _quiet(r)), first_score, ""),
-    ("true effect heads the list, whatever the verdict, noise up to 5 %", _kind(SINGLE, _quiet), right_place, ""),
-    ("nothing missing where nothing is", _kind(NONE), nothing_score, "nothing"),
-    ("both of two found by diagnosing and adding twice", _kind(PAIR), pair_score, "both"),
-    ("effect out of the library called unknown, or its tie named", _kind(REMOVED), removed_score, "removed"),
-    ("error after adding within 5 % of the true model's", _kind(SINGLE), as_good_as_truth, "first"),
-    ("the same, of the trials with noise", _kind(SINGLE, lambda r: r["noise"] > 0.0), as_good_as_truth, ""),
-)  # fmt: skip
+def _faulty(row: Row) -> bool:
+    return row["fault"] != ""
 
 
-def summary(table: pd.DataFrame, wanted: Mapping[str, float]) -> pd.DataFrame:
-    """Each target with the rate that was measured and its binomial standard error.
+RATES: tuple[tuple[str, Member, Score, str], ...] = (
+    ("true effect first, noise to 5 %", _single(lambda r: r["noise"] <= LITTLE), first_score, "first"),
+    ("true effect first, noise 10 %", _single(lambda r: r["noise"] > LITTLE), first_score, "first_in_noise"),
+    ("tie set holds the truth", _single(), tied_score, "tied"),
+    ("nothing missing where nothing is, and of completed models", _kinds(NONE, COMPLETED), nothing_score, "nothing"),
+    ("... where nothing is", _kinds(NONE), nothing_score, ""),
+    ("... of completed models", _kinds(COMPLETED), nothing_score, ""),
+    ("both of two, by diagnose and add", _kinds(PAIR), pair_score, "both"),
+    ("out of the library: unknown, or in the tie set", _kinds(REMOVED), removed_score, "removed"),
+    ("the fault named, its value within its interval", _faulty, fault_score, "fault"),
+    ("no fault named where there is none", lambda r: not _faulty(r), no_fault_score, ""),
+    ("error after adding within 5 % of the true model's", _single(), as_good_as_truth, ""),
+)
+SIZES: tuple[tuple[str, Member, str], ...] = (
+    ("mean size of the tie set, noise to 1 %", lambda r: r["noise"] <= VERY_LITTLE, "size"),
+    ("mean size of the tie set, noise 5 %", lambda r: VERY_LITTLE < r["noise"] <= LITTLE, "size_in_noise"),
+    ("mean size of the tie set, noise 10 %", lambda r: r["noise"] > LITTLE, ""),
+)
+HELD = "95 % intervals of coefficients that hold the truth, with noise"
 
-    A trial that could not be made or diagnosed counts as failed. ``wanted`` holds the rates ``first``, ``nothing``,
-    ``both``, ``removed``.
+
+def summary(table: pd.DataFrame, wanted: Wanted) -> pd.DataFrame:
+    """Each target without and with a fault of the measurement: what was measured, its 95 % interval, and whether met.
+
+    A trial that could not be made or diagnosed counts as failed. A rate is reached if its interval reaches it.
+    ``wanted`` holds lists of two, without a fault and with one, or of a single one without (with, for ``fault``).
     """
     rows = rows_of(table)
-    return pd.DataFrame([_rate(what, rows, member, score, wanted.get(key)) for what, member, score, key in TARGETS])
+    found: list[Row] = []
+    for faults in (WITHOUT, WITH):
+        own = [row for row in rows if row["faults"] == faults]
+        for what, member, score, key in RATES:
+            scores = [0.0 if row["trouble"] else score(row) for row in own if member(row)]
+            found.append(_line(what, faults, proportion(scores), _least(wanted, key, faults), math.inf))
+        for what, member, key in SIZES:
+            sizes = [float(row["tie_size"]) for row in own if _single(member)(row) and row["tie_set"]]
+            found.append(_line(what, faults, mean(sizes), -math.inf, _most(wanted, key, faults)))
+        held = [row for row in own if not row["trouble"] and row["noise"] > 0.0 and row["asked"] > 0]
+        rate = proportion([row["held"] for row in held], [row["asked"] for row in held])
+        found.append(_line(HELD, faults, rate, _least(wanted, "held", faults), _most(wanted, "held_most", faults)))
+    return pd.DataFrame([line for line in found if line["trials"]])
 
 
-def _rate(
-    what: str, rows: list[Row], member: Callable[[Row], bool], score: Callable[[Row], float], wanted: float | None
-) -> Row:
-    scores = [0.0 if row["trouble"] else score(row) for row in rows if member(row)]
-    rate = float(np.mean(scores)) if scores else math.nan
-    error = math.sqrt(max(rate * (1.0 - rate), 0.0) / len(scores)) if scores else math.nan
-    met = "" if wanted is None else "yes" if rate >= wanted else "no"
-    return {"reach": what, "trials": len(scores), "rate": rate, "standard_error": error,
-            "wanted": math.nan if wanted is None else wanted, "met": met}  # fmt: skip
+def _place(wanted: Wanted, key: str, faults: str) -> float | None:
+    values = wanted.get(key, ())
+    if key == "fault":
+        return values[0] if values and faults == WITH else None
+    place = (WITHOUT, WITH).index(faults)
+    return values[place] if place < len(values) else None
+
+
+def _least(wanted: Wanted, key: str, faults: str) -> float:
+    value = _place(wanted, key, faults)
+    return -math.inf if value is None else value
+
+
+def _most(wanted: Wanted, key: str, faults: str) -> float:
+    value = _place(wanted, key, faults)
+    return math.inf if value is None else value
+
+
+def _line(what: str, faults: str, rate: Rate, least: float, most: float) -> Row:
+    asked = math.isfinite(least) or math.isfinite(most)
+    met = "" if not asked or not rate.trials else "yes" if rate.high >= least and rate.low <= most else "no"
+    return {
+        "reach": what, "faults": faults, "trials": rate.trials, "value": rate.value, "low": rate.low,
+        "high": rate.high, "least": least if math.isfinite(least) else math.nan,
+        "most": most if math.isfinite(most) else math.nan, "reached": met,
+    }  # fmt: skip
 
 
 def confusion(table: pd.DataFrame) -> pd.DataFrame:
     """Trials by what was hidden (rows: each effect alone, none) and what was said (columns)."""
-    never_hidden = sorted({row["named"] for row in rows_of(table)} - {"", *HIDDEN})
+    rows = rows_of(table)
+    never_hidden = sorted({_said(row) for row in rows} - {"", NOTHING, UNKNOWN, *HIDDEN})
     said = [*HIDDEN, *never_hidden, NOTHING, UNKNOWN]
     hidden = [*HIDDEN, NONE]
     counts = np.zeros((len(hidden), len(said)), dtype=np.int64)
-    for row in rows_of(table):
+    for row in rows:
         if row["kind"] in (SINGLE, NONE) and not row["trouble"]:
-            counts[hidden.index(row["hidden"] or NONE), said.index(row["named"] or row["verdict"])] += 1
+            counts[hidden.index(row["hidden"] or NONE), said.index(_said(row))] += 1
     return pd.DataFrame(counts, index=pd.Index(hidden, name="hidden"), columns=said).reset_index()
+
+
+def _said(row: Row) -> str:
+    return row["first"] if row["verdict"] == MISSING else row["verdict"]
 
 
 def ladder(table: pd.DataFrame) -> pd.DataFrame:
     """Mean held-out response error before and after adding what was found, and that of the true model, by noise."""
-    good = table[table["trouble"].isna() | (table["trouble"] == "")]
+    good = table[(table["trouble"].isna() | (table["trouble"] == "")) & (table["faults"] == WITHOUT)]
     rows: list[dict[str, Any]] = []
     for kind, steps in ((SINGLE, ("before", "after", "true")), (PAIR, ("before", "after", "after_two", "true"))):
         for noise, group in good[good["kind"] == kind].groupby("noise"):
@@ -130,7 +193,9 @@ def ladder(table: pd.DataFrame) -> pd.DataFrame:
                      "standard_error": np.std(errors, ddof=1) / math.sqrt(len(errors)) if len(errors) > 1 else math.nan,
                      "median_error": np.median(errors)}
                 )  # fmt: skip
-    return pd.DataFrame(rows)
+    return pd.DataFrame(
+        rows, columns=["kind", "noise", "step", "trials", "mean_error", "standard_error", "median_error"]
+    )
 
 
 def _errors(group: pd.DataFrame, step: str) -> Floats:

@@ -1,34 +1,39 @@
 """What diagnose makes of trials: one row each, the sealed answer beside what was found.
 
-Four kinds: one effect hidden, none, a pair (diagnose, add what comes first, diagnose again), and one
-effect hidden and taken out of the library (``removed``).
+Five kinds: one effect hidden, none, a pair (diagnose, add what comes first, diagnose again), one effect hidden and
+taken out of the library (``removed``), and one effect that the model has already (``completed``).
 """
 
 import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
-from study.compare.comparison import Comparison, compare
+from study.compare.comparison import Comparison
 from study.compare.prediction import predict
 from study.diagnose.adding import added
-from study.diagnose.verdict import MISSING, Diagnosis, diagnose
+from study.diagnose.verdict import diagnose
 from study.identify.time_domain.part_fit import fit_part
 from study.records.prepared import Prepared, prepare_record
+from study.records.record import MOTIONS
 from study.reproduction.settings import TrialSettings
 from study.support.errors import StudyError
-from study.trials.draw import HIDDEN, Trial, make_trial
+from study.trials.draw import ANY, HIDDEN, NO_FAULT, Trial, make_trial
+from study.trials.experiment import WIDE
+from study.trials.findings import Row, accounted, evidence, intervals, measurement, tie_set
 
-Row = dict[str, Any]
-SINGLE, NONE, PAIR, REMOVED = "single", "none", "pair", "removed"
-RESPONSES = ("displacement", "acceleration")
+SINGLE, NONE, PAIR, REMOVED, COMPLETED = "single", "none", "pair", "removed", "completed"
+WITHOUT, WITH = "without", "with"  # a fault of the measurement
 COLUMNS = (
-    "kind", "seed", "hidden", "noise", "response", "known", "share",
-    "verdict", "first", "named", "tied_with", "second_verdict", "second_named", "second_tied_with", "pair",
-    "error_before", "error_after", "error_after_two", "error_true", "noise_floor", "left", "tie_with_hidden", "trouble",
+    "kind", "seed", "hidden", "noise", "faults", "response", "samples_a_period", "samples", "damping", "excitation",
+    "known", "share", "fault", "fault_channel", "fault_value", "fault_unit",
+    "faults_found", "found", "found_channel", "found_value", "found_low", "found_high",
+    "verdict", "first", "tie_set", "tie_size", "pair", "second_verdict", "second_tie_set", "whole_tie_set",
+    "error_before", "error_after", "error_after_two", "error_true", "noise_floor", "left", "held", "asked",
+    "smallest_p", "true_p", "distance", "rivals", "seconds", "trouble",
 )  # fmt: skip
 
 
@@ -36,83 +41,110 @@ COLUMNS = (
 class Order:
     """A trial to be run."""
 
-    kind: str  # ``single``, ``none``, ``pair`` or ``removed``
+    kind: str  # ``single``, ``none``, ``pair``, ``removed`` or ``completed``
     seed: int  # of the trial
     hidden: tuple[str, ...]  # effects to hide
     noise: float  # mean square of the noise over that of the response
     response: str  # what is measured
+    faults: str = WITHOUT  # ``with`` or ``without`` one of the measurement
 
 
 def orders(settings: TrialSettings) -> list[Order]:
-    """Every trial of the published run: all effects at all noises and responses, each with a seed of its own."""
-    grid = [(noise, response) for noise in settings.noises for response in RESPONSES]
-    wanted: list[tuple[str, tuple[str, ...], tuple[float, str]]] = []
-    wanted += [(SINGLE, (name,), place) for _ in range(settings.rounds) for place in grid for name in HIDDEN]
-    wanted += [(NONE, (), place) for _ in range(settings.none) for place in grid]
+    """Every trial of the published run, each with a seed of its own: those without a fault, then those with one.
+
+    Each kind is laid out evenly over effects, noises and responses; then the order is shuffled, so that the first few
+    are a fair sample of all.
+    """
+    rng = np.random.default_rng(settings.first_seed)
+    every: list[Order] = []
+    for faults in (WITHOUT, WITH):
+        wanted = _wanted(settings, rng, faults)
+        first = settings.first_seed + len(every)
+        shuffled = [wanted[int(i)] for i in rng.permutation(len(wanted))]
+        every += [Order(kind, first + i, *rest, faults=faults) for i, (kind, rest) in enumerate(shuffled)]
+    return every
+
+
+def _wanted(
+    settings: TrialSettings, rng: np.random.Generator, faults: str
+) -> list[tuple[str, tuple[tuple[str, ...], float, str]]]:
+    """Kind, hidden effects, noise and response of each trial with, or without, a fault."""
     couples = list(combinations(HIDDEN, 2))
-    drawn = np.random.default_rng(settings.first_seed).permutation(len(couples))[: settings.pairs]
-    wanted += [(PAIR, couples[j], grid[i % len(grid)]) for i, j in enumerate(drawn)]
-    removed = [name for _ in range(settings.removed) for name in HIDDEN]
-    wanted += [(REMOVED, (name,), grid[i % len(grid)]) for i, name in enumerate(removed)]
-    first = settings.first_seed
-    return [Order(kind, first + i, hidden, *place) for i, (kind, hidden, place) in enumerate(wanted)]
+    drawn = [couples[int(i)] for i in rng.permutation(len(couples))[: settings.pairs]]
+    kinds = {
+        SINGLE: [(name,) for _ in range(settings.rounds * len(settings.noises)) for name in HIDDEN],
+        NONE: [()] * (settings.none * len(settings.noises)),
+        COMPLETED: [(name,) for _ in range(settings.completed) for name in HIDDEN],
+        PAIR: drawn,
+        REMOVED: [(name,) for _ in range(settings.removed) for name in HIDDEN if faults == WITHOUT],
+    }
+    grid = [(noise, response) for response in MOTIONS for noise in settings.noises]
+    return [
+        (kind, (hidden, *grid[(i + i // len(grid) + i // len(HIDDEN)) % len(grid)]))
+        for kind, all_hidden in kinds.items()
+        for i, hidden in enumerate(all_hidden)
+    ]
 
 
 def run(order: Order) -> Row:
     """Make a trial, diagnose it and compare with the answer; a fault a user would be told of is kept in ``trouble``."""
     row: Row = dict.fromkeys(COLUMNS, "")
-    row |= {"kind": order.kind, "seed": order.seed, "hidden": "+".join(order.hidden)}
+    row |= {"kind": order.kind, "seed": order.seed, "hidden": "+".join(order.hidden), "faults": order.faults}
     row |= {"noise": order.noise, "response": order.response}
     try:
-        trial = make_trial(order.seed, order.hidden, order.noise, order.response)
-        row |= {
-            "known": "+".join(t.name for t in trial.believed.terms[3:]) or "linear",
-            "share": "+".join(f"{share:.3f}" for share in trial.shares),
-        }
+        fault = ANY if order.faults == WITH else NO_FAULT
+        trial = make_trial(order.seed, order.hidden, order.noise, order.response, fault, WIDE)
+        row |= _answer(trial)
+        begun = time.perf_counter()
         row |= _judged(order, trial)
+        row["seconds"] = round(time.perf_counter() - begun, 1)
     except StudyError as error:
         row["trouble"] = str(error)
     return row
 
 
+def _answer(trial: Trial) -> Row:
+    experiment = trial.experiment
+    return {
+        "samples_a_period": experiment.samples_a_period, "samples": experiment.samples,
+        "damping": experiment.damping, "excitation": experiment.kind,
+        "known": "+".join(t.name for t in trial.believed.terms[3:]) or "linear",
+        "share": "+".join(f"{share:.3f}" for share in trial.shares),
+        "fault": trial.fault.get("fault", ""), "fault_channel": trial.fault.get("channel", ""),
+        "fault_value": trial.fault.get("value", ""), "fault_unit": trial.fault.get("unit", ""),
+    }  # fmt: skip
+
+
 def _judged(order: Order, trial: Trial) -> Row:
     prepared = prepare_record(trial.record)
-    before = compare(trial.believed, prepared)
+    before, faults = accounted(trial.completed if order.kind == COMPLETED else trial.believed, prepared)
     diagnosis = diagnose(before, without=order.hidden if order.kind == REMOVED else ())
-    first = diagnosis.candidates[0]
-    missing = diagnosis.verdict == MISSING
-    after = added(before, first.term) if missing else before
+    named = tie_set(diagnosis)
+    after = added(before, diagnosis.candidates[0].term) if named else before
     row: Row = {
-        "verdict": diagnosis.verdict, "first": first.name, "named": first.name if missing else "",
-        "tied_with": "+".join(first.tied_with), "pair": "+".join(diagnosis.pair),
+        "verdict": diagnosis.verdict, "first": diagnosis.candidates[0].name, "tie_set": "+".join(named),
+        "tie_size": len(named), "pair": "+".join(diagnosis.pair), "left": diagnosis.left,
         "error_before": before.prediction.error, "error_after": after.prediction.error,
-        "error_true": error_of_truth(trial, prepared, after.fit.steps_per_sample),
-        "noise_floor": before.prediction.floor, "left": diagnosis.left,
+        "error_true": error_of_truth(trial, before.prepared, after.fit.steps_per_sample),
+        "noise_floor": before.prediction.floor,
     }  # fmt: skip
-    if missing and order.kind == PAIR:
-        row |= _second(after)
-    if missing and order.kind == REMOVED and not first.tied_with:
-        row["tie_with_hidden"] = str(_tied(diagnose(before), order.hidden[0], first.name))
+    row |= evidence(diagnosis, order.hidden) | measurement(faults, trial.fault) | intervals(after, trial.truth)
+    if named and order.kind == PAIR:
+        row |= _second(after, trial)
+    if named and order.kind == REMOVED:
+        row["whole_tie_set"] = "+".join(tie_set(diagnose(before)))
     return row
 
 
-def _second(after: Comparison) -> Row:
+def _second(after: Comparison, trial: Trial) -> Row:
     """Diagnose again after adding what came first."""
     diagnosis = diagnose(after)
-    best = diagnosis.candidates[0]
-    missing = diagnosis.verdict == MISSING
+    named = tie_set(diagnosis)
+    last = added(after, diagnosis.candidates[0].term) if named else after
     return {
-        "second_verdict": diagnosis.verdict,
-        "second_named": best.name if missing else "",
-        "second_tied_with": "+".join(best.tied_with),
-        "error_after_two": (added(after, best.term) if missing else after).prediction.error,
-    }
-
-
-def _tied(diagnosis: Diagnosis, hidden: str, named: str) -> bool:
-    """Whether the diagnosis with the whole library says that the record cannot tell the two apart."""
-    ties = {row.name: row.tied_with for row in diagnosis.candidates}
-    return named in ties.get(hidden, ()) or hidden in ties.get(named, ())
+        "second_verdict": diagnosis.verdict, "second_tie_set": "+".join(named),
+        "error_after_two": last.prediction.error, **intervals(last, trial.truth),
+    }  # fmt: skip
 
 
 def error_of_truth(trial: Trial, prepared: Prepared, steps: int) -> float:

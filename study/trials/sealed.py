@@ -13,6 +13,7 @@ from study.support.errors import StudyError
 from study.support.files import read_text, replace_file, replacing
 from study.trials.draw import Trial
 
+KEYS = {"hidden", "shares", "noise", "fault", "truth"}
 WANTED = "the answer file of a trial, as 'study trial' writes it"
 
 
@@ -36,9 +37,9 @@ def write(trial: Trial, folder: Path) -> tuple[Path, Path, Path]:
 
 
 def contents(trial: Trial) -> dict[str, Any]:
-    """What the answer holds: hidden effects, their shares of the restoring force, the noise, and the true model."""
+    """What the answer holds: hidden effects, their shares of the restoring force, noise, fault, and the true model."""
     return {
-        "hidden": list(trial.hidden), "shares": list(trial.shares), "noise": trial.noise,
+        "hidden": list(trial.hidden), "shares": list(trial.shares), "noise": trial.noise, "fault": dict(trial.fault),
         "truth": format_model(trial.truth),
     }  # fmt: skip
 
@@ -52,7 +53,7 @@ def unseal(path: Path) -> dict[str, Any]:
         answer: object = json.loads(base64.b64decode(sealed, validate=True))
     except (ValueError, KeyError, TypeError, RecursionError, binascii.Error):
         raise StudyError(f"{path}: this holds no sealed answer; expected {WANTED}") from None
-    if not isinstance(answer, dict) or set(cast(dict[str, Any], answer)) != {"hidden", "shares", "noise", "truth"}:
+    if not isinstance(answer, dict) or set(cast(dict[str, Any], answer)) != KEYS:
         raise StudyError(f"{path}: the answer in it is not that of a trial; expected {WANTED}")
     return cast(dict[str, Any], answer)
 
@@ -62,4 +63,12 @@ def sentences(answer: Mapping[str, Any]) -> str:
     hidden = [f"{name} ({100.0 * share:.0f} %)" for name, share in zip(answer["hidden"], answer["shares"], strict=True)]
     what = f"hidden, with the share of the restoring force: {', '.join(hidden)}" if hidden else "nothing is hidden"
     noise = f"noise: {100.0 * answer['noise']:g} % of the mean square of the response"
-    return f"{what}\n{noise}\nthe model that made the record:\n\n{answer['truth']}"
+    return f"{what}\n{noise}\n{_fault(answer['fault'])}\nthe model that made the record:\n\n{answer['truth']}"
+
+
+def _fault(fault: Mapping[str, Any]) -> str:
+    if not fault:
+        return "fault of the measurement: none"
+    unit = "" if fault["unit"] == "1" else f" {fault['unit']}"
+    name = str(fault["fault"]).replace("_", " ")
+    return f"fault of the measurement: {name} of the {fault['channel']}, {fault['value']:.4g}{unit}"

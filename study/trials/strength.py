@@ -18,16 +18,18 @@ ROUNDS = 12  # of the iteration on the amount
 CLOSE = 0.05  # relative distance from the wanted share at which it ends
 
 
-def grown(model: Model, entry: ModelTerm, drive: Floats, dt: float, target: float) -> tuple[Model, float] | None:
+def grown(
+    model: Model, entry: ModelTerm, drive: Floats, dt: float, target: float, steps: int = 2
+) -> tuple[Model, float] | None:
     """The model with an effect that carries the target share, by iteration on the simulated motion.
 
     The coefficients of ``entry`` say in which proportion, and with which sign, they grow; ``drive`` is the force in N,
-    shape (n,), and ``target`` the wanted share. With the model comes the share that was reached; None where the motion
-    diverges or the share cannot be reached.
+    shape (n,), ``target`` the wanted share and ``steps`` those of the integration a sample. With the model comes the
+    share that was reached; None where the motion diverges or the share cannot be reached.
     """
     unit = tuple(c if c is not None else 1.0 for c in entry.coefficients)
     amount, share = 0.0, 0.0
-    record = simulate(model, drive, dt, Integrator("rk4", 2))
+    record = simulate(model, drive, dt, Integrator("rk4", steps))
     for _ in range(ROUNDS):
         alone = _unshared(replace(entry, coefficients=unit), record)
         restoring = drive - (model.values["m"] or 0.0) * record["acceleration"]
@@ -40,7 +42,7 @@ def grown(model: Model, entry: ModelTerm, drive: Floats, dt: float, target: floa
         amount = wanted if amount == 0.0 else float(np.sqrt(amount * wanted))
         larger = model.with_term(replace(entry, coefficients=tuple(amount * c for c in unit)))
         try:
-            record = simulate(larger, drive, dt, Integrator("rk4", 2))
+            record = simulate(larger, drive, dt, Integrator("rk4", steps))
         except DivergenceError:
             return None
     return None

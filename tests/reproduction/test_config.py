@@ -410,7 +410,7 @@ def test_what_a_job_is_told_survives_as_plain_data(case):
         ("samples: 8192", "samples: true", "sampling.samples is True; expected a whole number"),
         ("samples: 8192", "samples: '8192'", "sampling.samples is '8192'; expected a whole number"),
         ("    seed: 1990 ", "    # ", "excitations.report: 'seed' is missing; expected a whole number of 0 or more"),
-        ("pairs: 40", "pairs: 137", "trials.pairs is 137; expected 136 or less"),
+        ("pairs: 24", "pairs: 137", "trials.pairs is 137; expected 136 or less"),
         ("wanted:  ", "wanted: 1\n  # ", "is not YAML"),
         ("k3: 1.0e+5", "k3: -1", "tolerances.absolute.k3 is -1; expected a number above 0"),
     ],

@@ -17,3 +17,17 @@ def test_the_signed_rank_test_is_exact(count, shift):
 
 def test_nothing_gained_is_no_evidence():
     assert statistics._p_value(np.zeros(48)) == 1.0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_variance_is_positive_where_a_single_sample_decides_an_estimate(seed):
+    """The initial velocity of a system with friction: what it changes later, the initial displacement changes too."""
+    rng = np.random.default_rng(seed)
+    others = rng.standard_normal((960, 3)) * (np.arange(960) > 0)[:, None]
+    jacobian = np.column_stack([others, 0.05 * others[:, 2] + (np.arange(960) == 0)])
+    noise = rng.standard_normal(960)
+    residual = noise - jacobian @ np.linalg.lstsq(jacobian, noise, rcond=None)[0]
+    variance = np.diag(statistics.clustered_covariance(jacobian, residual))
+    white = np.diag(np.linalg.inv(jacobian.T @ jacobian)) * float(residual @ residual) / (960 - 4)
+    assert np.all(variance >= white * (1.0 - 1e-9))
+    assert variance[3] == pytest.approx(white[3], rel=1e-6)

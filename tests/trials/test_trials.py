@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from study.cli import main
@@ -16,12 +15,9 @@ from study.equations.terms import LIBRARY
 from study.identify.time_domain.fit_model import fit_model
 from study.records.prepared import prepare_record
 from study.records.readers import read_record
-from study.reproduction.settings import TrialSettings
 from study.support.errors import StudyError
-from study.trials import HIDDEN, SHARE, make_trial, reach, runs, sealed, share_of
-from study.trials.runs import COLUMNS, Order, Row
-
-SETTINGS = TrialSettings(first_seed=100, noises=(0.0, 0.05), rounds=1, none=2, pairs=4, removed=1, jobs=3)
+from study.trials import HIDDEN, SHARE, WIDE, make_trial, sealed, share_of
+from study.trials.experiment import DAMPINGS, KINDS, MEMORIES, PERIODS, RATES, SAMPLES, wide
 
 
 @pytest.mark.parametrize("name", HIDDEN)
@@ -79,6 +75,62 @@ def test_believed_model_knows_no_value_and_nothing_of_the_effect() -> None:
     assert not {"hysteresis", "constant_force"} & {t.name for t in trial.believed.terms}
 
 
+def test_a_completed_model_has_the_true_terms_and_knows_nothing() -> None:
+    trial = make_trial(21, ("hysteresis", "quadratic_damping"), 0.0, "displacement")
+    assert [t.name for t in trial.completed.terms] == [t.name for t in trial.truth.terms]
+    assert set(trial.completed.values.values()) == {None}
+
+
+def test_a_trial_with_a_fault_is_the_same_trial_before_it() -> None:
+    clean = make_trial(22, (), 0.01, "velocity")
+    faulty = make_trial(22, (), 0.01, "velocity", "delay")
+    assert clean.fault == {}
+    assert (faulty.fault["fault"], faulty.fault["channel"], faulty.fault["unit"]) == ("delay", "velocity", "samples")
+    assert clean.truth == faulty.truth
+    assert clean.record["force"].tobytes() == faulty.record["force"].tobytes()
+    apart = np.std(clean.record["velocity"] - faulty.record["velocity"])
+    rate = np.std(np.diff(clean.record["velocity"]))
+    assert apart == pytest.approx(abs(faulty.fault["value"]) * rate, rel=0.2)
+
+
+def test_any_fault_means_one_in_half_of_the_trials() -> None:
+    named = [make_trial(seed, (), 0.0, "displacement", "any", WIDE).fault.get("fault") for seed in range(40)]
+    without = named.count(None)
+    assert 10 <= without <= 30
+    assert len(set(named)) > 5
+
+
+def test_the_wide_range_reaches_its_ends_and_every_record_is_long_enough() -> None:
+    rng = np.random.default_rng(1)
+    drawn = [wide(rng) for _ in range(2000)]
+    rates, dampings = (np.array([getattr(e, name) for e in drawn]) for name in ("samples_a_period", "damping"))
+    samples = np.array([e.samples for e in drawn])
+    for values, bounds in ((rates, RATES), (dampings, DAMPINGS), (samples, SAMPLES)):
+        assert bounds[0] * (1.0 - 1e-9) <= np.min(values) < 1.05 * bounds[0]
+        assert 0.95 * bounds[1] < np.max(values) <= bounds[1] * (1.0 + 1e-9)
+    assert np.all(samples >= PERIODS * rates * (1.0 - 1e-9))
+    assert np.all(samples >= MEMORIES * rates / (2.0 * np.pi * dampings) * (1.0 - 1e-9))
+    assert {e.kind for e in drawn} == set(KINDS)
+    # evenly on a logarithmic scale, as far as long records are not refused
+    assert np.mean(rates < np.sqrt(RATES[0] * RATES[1])) == pytest.approx(0.5, abs=0.04)
+    assert np.mean(dampings < np.sqrt(DAMPINGS[0] * DAMPINGS[1])) == pytest.approx(0.5, abs=0.04)
+    assert all(e.excitation.highest * e.dt <= 0.4 + 1e-9 for e in drawn)
+    assert all(e.excitation.periods > 1 for e in drawn if "sweep" in e.kind)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_wide_trial_is_the_motion_of_its_truth_and_forgets_its_start(seed: int) -> None:
+    """Against an integration with other steps, from another state."""
+    trial = make_trial(4000 + seed, (), 0.0, "displacement", ranges=WIDE)
+    initial = (float(np.std(trial.record["displacement"])), 0.0)
+    steps = Integrator("rk4", trial.experiment.steps(16))
+    again = simulate(trial.truth, trial.record["force"], trial.record.dt, steps, initial=initial)["displacement"]
+    half = len(again) // 2
+    measured = trial.record["displacement"]
+    assert np.std(again[half:] - measured[half:]) < 0.02 * np.std(measured[half:])
+    assert np.std(again[-len(again) // 8 :] - measured[-len(again) // 8 :]) < 2e-3 * np.std(measured)
+
+
 def test_nothing_hidden_means_the_believed_model_is_the_true_one() -> None:
     trial = make_trial(22, ())
     assert [t.name for t in trial.believed.terms] == [t.name for t in trial.truth.terms]
@@ -119,7 +171,7 @@ def test_command_writes_record_model_and_sealed_answer(tmp_path: Path, capsys: p
     answer = tmp_path / "new" / "trial_7.answer.json"
     assert f"study trial --open {answer}" in said
     record, model = read_record(tmp_path / "new" / "trial_7.csv"), read_model(tmp_path / "new" / "trial_7.yaml")
-    trial = make_trial(7, ("quadratic_damping",), 0.05, "acceleration")
+    trial = make_trial(7, ("quadratic_damping",), 0.05, "acceleration", ranges=WIDE)
     np.testing.assert_array_equal(record["acceleration"], trial.record["acceleration"])
     assert model == trial.believed
     for path in (tmp_path / "new").iterdir():
@@ -128,6 +180,25 @@ def test_command_writes_record_model_and_sealed_answer(tmp_path: Path, capsys: p
     assert main(["trial", "--open", str(answer)]) == 0
     assert "quadratic_damping" in capsys.readouterr().out
     assert parse_model(sealed.unseal(answer)["truth"], answer) == trial.truth
+
+
+@pytest.mark.parametrize(("fault", "said"), [("delay", "delay of the velocity"), ("force_noise", "force noise of the")])
+def test_answer_names_the_fault(tmp_path: Path, capsys: pytest.CaptureFixture[str], fault: str, said: str) -> None:
+    words = ["--seed", "3", "--hidden", "none", "--response", "velocity", "--fault", fault, "--out", str(tmp_path)]
+    assert main(["trial", *words]) == 0
+    assert fault not in capsys.readouterr().out
+    imposed = sealed.unseal(tmp_path / "trial_3.answer.json")["fault"]
+    assert imposed["fault"] == fault
+    assert main(["trial", "--open", str(tmp_path / "trial_3.answer.json")]) == 0
+    assert f"fault of the measurement: {said}" in capsys.readouterr().out
+
+
+def test_a_fault_that_there_is_not_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["trial", "--seed", "3", "--hidden", "none", "--fault", "rust", "--out", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert "'rust'" in said
+    assert "delay" in said
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_command_hides_nothing_when_told_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -153,80 +224,6 @@ def test_what_is_no_answer_is_refused_in_a_sentence(
 def test_answer_file_is_plain_json_with_how_to_open_it(tmp_path: Path) -> None:
     _, _, answer = sealed.write(make_trial(2, ()), tmp_path)
     assert json.loads(answer.read_text())["open_with"] == "study trial --open trial_2.answer.json"
-
-
-def test_orders_cover_every_effect_noise_and_response_with_seeds_of_their_own() -> None:
-    orders = runs.orders(SETTINGS)
-    assert len({o.seed for o in orders}) == len(orders) == 17 * 4 + 2 * 4 + 4 + 17
-    singles = {(o.hidden[0], o.noise, o.response) for o in orders if o.kind == "single"}
-    assert len(singles) == 17 * 4
-    parts = [runs.chunk(orders, i, 3) for i in range(3)]
-    assert sorted((o for part in parts for o in part), key=lambda o: o.seed) == orders
-
-
-def row(**given: object) -> Row:
-    blank: Row = dict.fromkeys(COLUMNS, "")
-    zero = {"noise": 0.0, "error_before": 0.4, "error_after": 0.1, "error_after_two": 0.1, "error_true": 0.1}
-    return blank | zero | given
-
-
-FOUND = {"kind": "single", "hidden": "relaxation", "verdict": "missing_effect", "first": "relaxation"}
-
-
-@pytest.mark.parametrize(
-    ("given", "score"),
-    [
-        ({"named": "relaxation"}, 1.0),
-        ({"named": "hysteresis", "tied_with": "cubic_damping+relaxation"}, 0.5),
-        ({"named": "hysteresis", "tied_with": "cubic_damping"}, 0.0),
-        ({"verdict": "unknown_effect"}, 0.0),
-    ],
-)
-def test_first_counts_one_a_tie_half(given: Row, score: float) -> None:
-    assert reach.first_score(row(**(FOUND | given))) == score
-
-
-def test_pair_needs_both_and_removed_a_tie_or_unknown() -> None:
-    pair = {"kind": "pair", "hidden": "relaxation+hysteresis", "named": "hysteresis"}
-    assert reach.pair_score(row(**pair, second_named="relaxation")) == 1.0
-    assert reach.pair_score(row(**pair, second_named="cubic_damping")) == 0.0
-    removed = {"kind": "removed", "hidden": "relaxation", "named": "hysteresis"}
-    assert reach.removed_score(row(**removed, verdict="missing_effect")) == 0.0
-    assert reach.removed_score(row(**removed, verdict="missing_effect", tied_with="dead_band")) == 1.0
-    assert reach.removed_score(row(**removed, verdict="missing_effect", tie_with_hidden="True")) == 1.0
-    assert reach.removed_score(row(**removed, verdict="nothing_missing")) == 0.0
-    assert reach.removed_score(row(**removed, verdict="unknown_effect")) == 1.0
-
-
-def test_summary_confusion_and_ladder_of_a_table(tmp_path: Path) -> None:
-    table = [
-        row(**FOUND, named="relaxation"),
-        row(**FOUND | {"verdict": "unknown_effect"}, error_after=0.4),
-        row(**FOUND, named="relaxation", noise=0.1),
-        row(kind="single", hidden="relaxation", trouble="it would not run"),
-        row(kind="none", verdict="nothing_missing"),
-        row(kind="pair", hidden="relaxation+hysteresis", named="hysteresis", second_named="relaxation"),
-    ]
-    pd.DataFrame(table, columns=list(COLUMNS)).to_csv(tmp_path / "trials.csv", index=False)
-    read = pd.read_csv(tmp_path / "trials.csv")
-    rates = reach.summary(read, {"first": 0.95, "nothing": 0.95, "both": 0.85, "removed": 0.8})
-    assert rates["trials"].tolist() == [3, 1, 3, 1, 1, 0, 4, 1]
-    assert rates["rate"].tolist()[:2] == pytest.approx([1.0 / 3.0, 1.0])
-    assert rates["standard_error"][0] == pytest.approx(np.sqrt(2.0 / 27.0))
-    assert rates["met"].tolist()[3] == "yes"
-    counts = reach.confusion(read).set_index("hidden")
-    assert counts.loc["relaxation", "relaxation"] == 2
-    assert counts.loc["relaxation", "unknown_effect"] == 1
-    assert counts.loc["none", "nothing_missing"] == 1
-    assert counts.to_numpy().sum() == 4
-    rungs = reach.ladder(read).set_index(["kind", "noise", "step"])
-    assert rungs.loc[("single", 0.0, "after"), "mean_error"] == pytest.approx(0.25)
-
-
-def test_a_trial_that_cannot_be_made_is_a_row_with_its_trouble(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("study.trials.draw.ATTEMPTS", 0)
-    made = runs.run(Order("single", 1, ("relaxation",), 0.0, "displacement"))
-    assert "no system" in made["trouble"]
 
 
 def test_a_model_that_runs_away_predicts_nothing() -> None:

@@ -27,7 +27,7 @@ from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
 Values = Mapping[str, float]
-SEARCHED = 4096  # samples, at most, that a search for open shape parameters looks at
+SEARCHED = 4096  # samples that a search for open shape parameters looks at, if they show anything
 TRIED = 15  # free runs of a fit that tries a start
 NEAR = 0.01  # standard errors: as near a minimum as the fit of a search has to come
 
@@ -64,12 +64,25 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
         )
     unknown = tuple(t for t in model.terms if None in t.parameters)
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
-    look = prepared.shortened(SEARCHED) if unknown else prepared
+    look = _searched(known, prepared) if unknown else prepared
     fit = best_fit(known, look, first_starts(known, look))
     for entry in unknown:
         fit = with_term(fit, entry, shape_search.baseline(fit, look), look)
     ordered = replace(model, terms=tuple(next(t for t in fit.model.terms if t.name == e.name) for e in model.terms))
     return settled(continued(replace(fit, model=ordered), prepared), prepared)
+
+
+def _searched(model: Model, prepared: Prepared) -> Prepared:
+    """What a search for open shape parameters looks at: everything, where a short stretch shows no linear start.
+
+    A slow sweep that is sampled often may pass none of the structure's own frequencies in it.
+    """
+    look = prepared.shortened(SEARCHED)
+    try:
+        linear_start(model, look)
+    except StudyError:
+        return prepared
+    return look
 
 
 def first_starts(model: Model, prepared: Prepared) -> list[dict[str, float]]:

@@ -1,0 +1,1 @@
+"""Faults of the measurement: found beside the physics, corrected, said."""
