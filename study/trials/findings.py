@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from study.compare.comparison import Comparison, compare
-from study.diagnose.ranking import Ranked
+from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, Diagnosis
 from study.equations.model import Model
 from study.records.prepared import Prepared
@@ -40,7 +40,7 @@ def evidence(diagnosis: Diagnosis, hidden: Sequence[str]) -> Row:
     ``rivals`` how far each is that is less than ``FAR`` behind, the first included.
     """
     rows = diagnosis.candidates
-    behind = {row.name: _distance(row, rows[0]) for row in rows}
+    behind = {row.name: max(row.distance, 0.0) for row in rows}
     true = next((row for row in rows if row.name in hidden), None)
     before = diagnosis.comparison.prediction.error
     believable = [r.p_value for r in rows if _off_zero(r) and percent(before) != percent(r.response_error)]
@@ -55,15 +55,6 @@ def evidence(diagnosis: Diagnosis, hidden: Sequence[str]) -> Row:
 def _off_zero(row: Ranked) -> bool:
     low, high = row.interval
     return not low <= 0.0 <= high
-
-
-def _distance(row: Ranked, first: Ranked) -> float:
-    """Standard errors by which a candidate is worse than the first; two of the same prediction are as good."""
-    from study.diagnose import ranking
-
-    if row is first or ranking._alike(row, first):  # pyright: ignore[reportPrivateUsage]
-        return 0.0
-    return max(ranking._distance(row, first), 0.0)  # pyright: ignore[reportPrivateUsage]
 
 
 def intervals(comparison: Comparison, truth: Model) -> Row:
