@@ -17,12 +17,11 @@ from scipy.special import chdtrc
 from study.equations.term import Term
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.prepared import Prepared
+from study.support.thresholds import ALPHA, STILL
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
-UNSTEADY = 0.3  # relative change of its coefficient at which a candidate is no longer believed
 INDISTINCT = 1e-6
-CERTAIN, STILL = 1e-4, 0.01  # p value, and relative change with the amplitude, of a coefficient that moves
 BANDS = 8
 CLASSES = 4
 BLOCK = 64  # samples: long against a period, short against the swell of the amplitude
@@ -137,6 +136,6 @@ def changes(*along: Curve | None) -> float:
     return max((c.spread() for c in along if c is not None), default=math.nan)
 
 
-def wavers(steady: Curve | None) -> bool:
-    """Whether a coefficient moves with the amplitude for certain, and by more than integration makes of it."""
-    return steady is not None and steady.p_value() < CERTAIN and steady.spread() > STILL
+def wavers(steady: Curve | None, asked: int) -> bool:
+    """Whether a coefficient, of so many that are asked for, moves with the amplitude, by more than integration does."""
+    return steady is not None and steady.p_value() * asked < ALPHA and steady.spread() > STILL

@@ -4,9 +4,7 @@ import math
 
 from study.compare.prediction import Prediction
 from study.support.numbers import percent
-
-ALPHA = 0.01  # probability of believing in what is not there, all that was asked for together
-TOLERANCE = 2e-3  # of the rms response: what is practically nothing
+from study.support.thresholds import ALPHA, TOLERANCE
 
 
 def credible(before: Prediction, after: Prediction, interval: tuple[float, float], p_value: float) -> bool:

@@ -2,11 +2,12 @@
 
 import math
 
-from study.diagnose.constancy import UNSTEADY, wavers
+from study.diagnose.constancy import wavers
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
 from study.figures.labels import term_names
 from study.support.numbers import percent
+from study.support.thresholds import UNSTEADY
 
 DEPENDENCE = 0.1  # held-out share from which the unexplained force is said to depend on something
 CLOSE = 0.05  # families this close to the best one are named with it
@@ -62,7 +63,7 @@ def _unknown(diagnosis: Diagnosis) -> list[str]:
     if best is not None and best.gain.explained > 0.0 and best.p_value < 0.05:
         said.append(
             f"The nearest, {term_names(best.name)}, leaves {percent(best.response_error)}; "
-            f"{_doubt(best)}, so its shape is not right."
+            f"{_doubt(best, len(diagnosis.candidates))}, so its shape is not right."
         )
     families = sorted(diagnosis.families.items(), key=lambda item: -item[1])
     if families and families[0][1] > DEPENDENCE:
@@ -76,8 +77,8 @@ def _unknown(diagnosis: Diagnosis) -> list[str]:
     return said
 
 
-def _doubt(row: Ranked) -> str:
-    if row.steadiness is not None and wavers(row.steadiness):
+def _doubt(row: Ranked, asked: int) -> str:
+    if row.steadiness is not None and wavers(row.steadiness, asked):
         change, p = percent(row.steadiness.spread()), row.steadiness.p_value()
         return f"its coefficient changes with the amplitude by {change} (p = {p:.1g})"
     if row.flatness is not None and row.flatness.spread() > UNSTEADY:

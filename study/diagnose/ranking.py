@@ -11,17 +11,15 @@ from numpy.typing import NDArray
 from study.compare.comparison import Comparison
 from study.diagnose.candidates import Candidate
 from study.diagnose.constancy import wavers
-from study.diagnose.credibility import ALPHA
 from study.diagnose.held_out import held_out
 from study.diagnose.ranked import Ranked, examined
 from study.identify.time_domain.part_fit import linearise
 from study.support import statistics
 from study.support.autoregression import autoregression
 from study.support.cores import cores
+from study.support.thresholds import ALPHA, K
 
 Floats = NDArray[np.float64]
-K = 3.0  # standard errors of their difference within which two candidates are a tie
-
 
 def rank(candidates: Sequence[Candidate], comparison: Comparison) -> list[Ranked]:
     """Candidates by what they leave of the held-out residual, the simplest first of those that this cannot tell apart.
@@ -41,8 +39,8 @@ def rank(candidates: Sequence[Candidate], comparison: Comparison) -> list[Ranked
     own = held_out(comparison.fit, before, linearise(comparison.fit, prepared), prepared).white(noise)
     rows = [replace(r, p_value=min(1.0, len(rows) * _p_value(own, white[r.name]))) for r in rows]
     rows.sort(key=lambda r: float(np.mean(white[r.name] ** 2)))
-    tied = [r for r in rows if _level(r, rows[0], white)]
-    first = min(tied, key=lambda r: _complexity(r, white[r.name]))
+    tied = [r for r in rows if r is rows[0] or (_believable(r) and _level(r, rows[0], white))]
+    first = min(tied, key=lambda r: _complexity(r, white[r.name], len(rows)))
     rows = [first] + [r for r in rows if r is not first]
     return [
         replace(r, distance=distance(r, first, white), tied_with=tuple(_tied(r, rows, white)))
@@ -78,11 +76,17 @@ def _level(one: Ranked, other: Ranked, white: Mapping[str, Floats]) -> bool:
 
 
 def _tied(row: Ranked, rows: Sequence[Ranked], white: Mapping[str, Floats]) -> Iterator[str]:
-    if row.gain.explained > 0.0 and row.p_value < ALPHA:
-        yield from (o.name for o in rows if o is not row and _level(o, row, white))
+    if _believable(row):
+        yield from (o.name for o in rows if o is not row and _believable(o) and _level(o, row, white))
 
 
-def _complexity(row: Ranked, white: Floats) -> tuple[bool, bool, int, float]:
+def _believable(row: Ranked) -> bool:
+    """Whether a candidate explains anything at all with a coefficient that is not zero: others tie with nothing."""
+    low, high = row.interval
+    return row.gain.explained > 0.0 and row.p_value < ALPHA and not low <= 0.0 <= high
+
+
+def _complexity(row: Ranked, white: Floats, asked: int) -> tuple[bool, bool, int, float]:
     """Order among candidates that are tied: a physical one whose coefficient stays, and that with fewest unknowns."""
     unknowns = len(row.term.components) + len(row.term.parameters)
-    return bool(row.unphysical), wavers(row.steadiness), unknowns, float(np.mean(white**2))
+    return bool(row.unphysical), wavers(row.steadiness, asked), unknowns, float(np.mean(white**2))

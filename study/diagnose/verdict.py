@@ -10,8 +10,8 @@ from study.compare.comparison import Comparison
 from study.compare.prediction import Prediction
 from study.diagnose import candidates, dependence, pairs
 from study.diagnose.candidates import Candidate
-from study.diagnose.constancy import UNSTEADY, changes, curves, wavers
-from study.diagnose.credibility import ALPHA, TOLERANCE, credible
+from study.diagnose.constancy import changes, curves, wavers
+from study.diagnose.credibility import credible
 from study.diagnose.pairs import Pair
 from study.diagnose.ranked import Ranked
 from study.diagnose.ranking import rank
@@ -24,11 +24,10 @@ from study.identify.time_domain.shape_search import Baseline
 from study.records.prepared import Prepared
 from study.support import statistics
 from study.support.errors import DivergenceError
+from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE, UNSTEADY
 
 Floats = NDArray[np.float64]
 MISSING, NOTHING, UNKNOWN = "missing_effect", "nothing_missing", "unknown_effect"
-GOOD = 0.0075  # of the rms response: what models of real structures leave, however complete
-ENOUGH = 0.99  # of the unexplained power: what explains so much is missing, whatever is missing besides
 SHORT, LONG = 2048, 16384  # samples: a search uses half of the fitting part, within these limits
 SETTLED = 6  # of the candidates, the best: fitted on the whole fitting part and with enough steps
 PAIRED = 1  # the best so many candidates are tried together with every other
@@ -106,7 +105,7 @@ def _decide(
     first = believed[0]
     left = _left(first.fit, first.prediction)
     rows = [first] + [r for r in rows if r is not first]
-    if (first.gain.explained >= ENOUGH or left <= GOOD) and _steady(first):
+    if (first.gain.explained >= ENOUGH or left <= GOOD) and _steady(first, len(rows)):
         return MISSING, rows, left, ()
     slight = first.response_error <= GOOD  # two effects that explain little alone explain little together
     pair = None if slight else _explaining_pair(rows, base, comparison.prepared)
@@ -116,7 +115,7 @@ def _decide(
     return MISSING, [first] + [r for r in rows if r is not first], _left(pair.fit, pair.prediction), pair.names
 
 
-def _steady(row: Ranked) -> bool:
+def _steady(row: Ranked, asked: int) -> bool:
     """Whether the coefficient stays where a true term's would.
 
     Where little is left, the faults of the rest of the model move the coefficient of what is added to it: it may change
@@ -124,7 +123,7 @@ def _steady(row: Ranked) -> bool:
     """
     if row.response_error <= GOOD or row.gain.explained >= ENOUGH:
         return not row.unsteadiness > UNSTEADY
-    return not wavers(row.steadiness)
+    return not wavers(row.steadiness, asked)
 
 
 def _explaining_pair(rows: list[Ranked], base: Baseline, prepared: Prepared) -> Pair | None:
@@ -158,7 +157,7 @@ def _explains(pair: Pair, rows: list[Ranked], prepared: Prepared) -> bool:
     followed = [curves(pair.fit, term, prepared, jacobian) for term in terms]
     if prediction.error <= GOOD:
         return all(changes(*both) <= UNSTEADY for both in followed)
-    return not any(wavers(steadiness) for _, steadiness in followed)
+    return not any(wavers(steadiness, len(rows)) for _, steadiness in followed)
 
 
 def _left(fit: FreeRunFit, prediction: Prediction) -> float:

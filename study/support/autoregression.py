@@ -45,17 +45,3 @@ def whitened(values: Floats, coefficients: Floats) -> Floats:
     first = np.broadcast_to(values[:1], (len(coefficients) - 1, *values.shape[1:]))
     padded = np.concatenate([first, values])
     return np.asarray(lfilter(coefficients, [1.0], padded, axis=0)[len(first) :], dtype=np.float64)
-
-
-def correlation_time(values: Floats) -> float:
-    """Samples over which products of ``values`` are correlated: the sum of squared autocorrelations at all lags.
-
-    Bartlett's (1946) factor by which correlated samples count for fewer independent ones; 1 for white noise.
-    """
-    lags = len(values) // 4
-    covariance = _autocovariance(values - np.mean(values), lags)
-    if covariance[0] <= 0.0:
-        return 1.0
-    squares = (covariance[1:] / covariance[0]) ** 2
-    chance = 2.0 / len(values)  # what an estimate from a tapered record adds to each square
-    return max(1.0, 1.0 + 2.0 * float(np.sum(squares - chance)))

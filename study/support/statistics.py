@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from study.support.arrays import Floats
+from study.support.thresholds import BLOCKS
 
-BLOCKS = 24
-TESTED = 48  # blocks of a test that ranks them: with 24 it lacks power
 SHORTEST = 16  # samples in a block
 
 
@@ -36,9 +35,9 @@ class Gain:
     p_value: float
 
 
-def block_powers(residual: Floats, count: int = BLOCKS) -> Floats:
-    """Sum of squares in each of ``count`` blocks of equal length (fewer for a short residual)."""
-    count = max(2, min(count, len(residual) // SHORTEST))
+def block_powers(residual: Floats) -> Floats:
+    """Sum of squares in each of ``BLOCKS`` blocks of equal length (fewer for a short residual)."""
+    count = max(2, min(BLOCKS, len(residual) // SHORTEST))
     size = len(residual) // count
     return np.sum(residual[: size * count].reshape(count, size) ** 2, axis=1)
 
@@ -50,7 +49,7 @@ def gain(before: Floats, after: Floats) -> Gain:
     ``before`` is of either sign: that is tested, block by block. A test of whether the residual's power falls
     would be half as sensitive, as the change adds its own power to the residual.
     """
-    a, b = block_powers(before), block_powers(after)
+    a, apart, b = (block_powers(values) for values in (before, before - after, after))
     total = float(np.sum(a))
     if total == 0.0:
         return Gain(0.0, 0.0, 1.0)
@@ -58,18 +57,17 @@ def gain(before: Floats, after: Floats) -> Gain:
     left_out = 1.0 - (np.sum(b) - b) / np.maximum(np.sum(a) - a, np.finfo(float).tiny)
     n = len(a)
     error = float(np.sqrt((n - 1) / n * np.sum((left_out - np.mean(left_out)) ** 2)))
-    products = [block_powers(values, TESTED) for values in (before, before - after, after)]
-    return Gain(explained, error, _p_value(products[0] + products[1] - products[2]))
+    return Gain(explained, error, _p_value(a + apart - b))
 
 
-def worse(first: Floats, second: Floats, count: int = TESTED) -> float:
+def worse(first: Floats, second: Floats) -> float:
     """By how many standard errors ``first`` leaves more than ``second``; residuals of the same samples, shape (n,).
 
     The larger of two answers over blocks of time, as each is blind where the other sees: the mean difference in its
     standard errors, which a few strong blocks can hide in their scatter, and the signed ranks (Wilcoxon, 1945), where
     they count no more than weak ones.
     """
-    d = block_powers(first, count) - block_powers(second, count)
+    d = block_powers(first) - block_powers(second)
     spread, mean = float(np.std(d, ddof=1) / np.sqrt(len(d))), float(np.mean(d))
     by_mean = mean / spread if spread > 0.0 else math.copysign(math.inf, mean) if mean else 0.0
     n = len(d)
@@ -93,39 +91,26 @@ def _p_value(products: Floats) -> float:
     return float(np.sum(ways[int(np.sum(rank[products > 0.0])) :])) / 2.0**n
 
 
-def influence(jacobian: Floats, residual: Floats, count: int = 2 * BLOCKS) -> Floats:
-    """What each block of time adds to the error of least-squares estimates, shape (blocks, p).
-
-    ``H^-1 g_b`` with ``g_b = J_b^T e_b`` and ``H = J^T J`` (Liang and Zeger, 1986), brought to the variance of so many
-    independent blocks.
-    """
-    scale, inverse = _inverse(jacobian)
-    count = max(2, min(count, len(residual) // SHORTEST))
-    size = len(residual) // count
-    j = (jacobian / scale)[: size * count].reshape(count, size, -1)
-    blocks = np.einsum("bsp,bs->bp", j, residual[: size * count].reshape(count, size))
-    return np.asarray(blocks @ inverse * math.sqrt(count / (count - 1)) / scale, dtype=np.float64)
-
-
 def clustered_covariance(jacobian: Floats, residual: Floats) -> Floats:
     """Covariance of least-squares estimates when the residual is correlated in time or with the motion.
 
-    The sandwich of :func:`influence`, never below the formula for white noise.
+    The sandwich ``H^-1 (sum over blocks g_b g_b^T) H^-1`` with ``g_b = J_b^T e_b`` and ``H = J^T J``
+    (Liang and Zeger, 1986), never below the formula for white noise.
     """
-    scale, inverse = _inverse(jacobian)
-    each = influence(jacobian, residual) * scale
-    sandwich = each.T @ each
+    scale = np.linalg.norm(jacobian, axis=0)
+    scale = np.where(scale > 0.0, scale, 1.0)
+    j = jacobian / scale
+    inverse = np.linalg.pinv(j.T @ j, rcond=1e-12, hermitian=True)
+    count = max(2, min(BLOCKS, len(residual) // SHORTEST))
+    size = len(residual) // count
+    blocks = np.einsum(
+        "bsp,bs->bp", j[: size * count].reshape(count, size, -1), residual[: size * count].reshape(count, size)
+    )
+    steps = blocks @ inverse  # what each block moves the estimates by: of their products no variance is negative
+    sandwich = steps.T @ steps * count / (count - 1)
     variance = np.diag(sandwich)
     white = np.diag(inverse) * float(residual @ residual) / max(len(residual) - len(scale), 1)
     larger = np.sqrt(np.maximum(variance, white) / np.maximum(variance, np.finfo(float).tiny))
     covariance = sandwich * np.outer(larger, larger)
     np.fill_diagonal(covariance, np.maximum(variance, white))  # one that a single sample decides has no scatter at all
     return covariance / np.outer(scale, scale)
-
-
-def _inverse(jacobian: Floats) -> tuple[Floats, Floats]:
-    """Length of each column, and the inverse of ``J^T J`` for columns of unit length."""
-    scale = np.linalg.norm(jacobian, axis=0)
-    scale = np.where(scale > 0.0, scale, 1.0)
-    j = jacobian / scale
-    return scale, np.linalg.pinv(j.T @ j, rcond=1e-12, hermitian=True)

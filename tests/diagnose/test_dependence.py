@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from study import trials
-from study.compare.prediction import predict
+from study.compare.comparison import compare
 from study.diagnose import candidates, constancy, dependence, pair_screening, pairs
 from study.diagnose.ranking import rank
 from study.equations.model import free
@@ -58,11 +58,11 @@ def test_few_strong_blocks_do_not_make_a_coefficient_move():
 def two_effects():
     made = trials.make_trial(93001, ("quadratic_stiffness", "quadratic_damping"), 0.01, "displacement")
     prepared = prepare_record(made.record)
-    fit = fit_model(made.believed, prepared)
-    base = shape_search.baseline(fit, prepared)
+    comparison = compare(made.believed, prepared)
+    base = shape_search.baseline(comparison.fit, prepared)
     terms = [get(n) for n in ("quadratic_stiffness", "quadratic_damping", "cubic_stiffness", "bilinear_stiffness")]
     tried = candidates.try_all(terms, base, prepared)
-    return made, prepared, base, rank(tried, predict(fit, prepared).residual, prepared)
+    return made, prepared, base, rank(tried, comparison)
 
 
 def test_both_of_two_effects_are_the_best_pair(two_effects):

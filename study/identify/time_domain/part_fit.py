@@ -13,7 +13,7 @@ from study.records.prepared import Prepared
 from study.support.autoregression import whitened
 from study.support.least_squares import least_squares
 from study.support.levenberg_marquardt import OFFSET
-from study.support.statistics import clustered_covariance, influence
+from study.support.statistics import clustered_covariance
 
 Floats = NDArray[np.float64]
 STEPS = 2  # Runge-Kutta steps in a sampling interval while a search compares models
@@ -60,11 +60,6 @@ def linearise(fit: FreeRunFit, prepared: Prepared) -> Floats:
     """Derivatives of the response on the samples that were fitted, shape (n, keys + 2): keys, then initial states."""
     values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
     return run_of(fit, prepared, fit.keys).respond(values, fit.initial, 2)[1]
-
-
-def influence_of(fit: FreeRunFit, jacobian: Floats) -> Floats:
-    """What each block of time adds to the error of a fit's estimates, shape (blocks, keys + 2), weighted as it was."""
-    return influence(whitened(jacobian, fit.noise), whitened(fit.residual, fit.noise))
 
 
 def covariance_of(fit: FreeRunFit, jacobian: Floats) -> Floats:
