@@ -7,7 +7,7 @@ from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
 from study.figures.labels import term_names
 from study.support.numbers import percent
-from study.support.thresholds import UNSTEADY
+from study.support.thresholds import ALPHA, UNSTEADY
 
 DEPENDENCE = 0.1  # held-out share from which the unexplained force is said to depend on something
 CLOSE = 0.05  # families this close to the best one are named with it
@@ -26,9 +26,9 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
 def _nothing(diagnosis: Diagnosis) -> str:
     prediction = diagnosis.comparison.prediction
     return (
-        f"Nothing is missing that this record could show: the error of the response is {percent(prediction.error)}"
-        f" and its noise floor {percent(prediction.floor)}; none of {len(diagnosis.candidates)} candidates "
-        "explains any of it."
+        f"Nothing is missing that this record could show: the error of the response is {percent(prediction.error)}, and "
+        "what is left depends no more than chance has it on the motion, its past or time, as noise does; "
+        f"none of {len(diagnosis.candidates)} candidates explains any of it."
     )
 
 
@@ -55,15 +55,12 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
 
 def _unknown(diagnosis: Diagnosis) -> list[str]:
     prediction = diagnosis.comparison.prediction
-    said = [
-        f"Something is missing that no candidate explains: {percent(prediction.error)} error of the response, "
-        f"of which {percent(prediction.floor)} would be noise."
-    ]
+    said = [f"Something is missing that no candidate explains: the error of the response is {percent(prediction.error)}."]
     best = diagnosis.candidates[0] if diagnosis.candidates else None
-    if best is not None and best.gain.explained > 0.0 and best.p_value < 0.05:
+    if best is not None and best.gain.explained > 0.0 and best.p_value < ALPHA:
         said.append(
             f"The nearest, {term_names(best.name)}, leaves {percent(best.response_error)}; "
-            f"{_doubt(best, len(diagnosis.candidates))}, so its shape is not right."
+            f"{_doubt(best, diagnosis)}, so its shape is not right."
         )
     families = sorted(diagnosis.families.items(), key=lambda item: -item[1])
     if families and families[0][1] > DEPENDENCE:
@@ -77,13 +74,13 @@ def _unknown(diagnosis: Diagnosis) -> list[str]:
     return said
 
 
-def _doubt(row: Ranked, asked: int) -> str:
-    if row.steadiness is not None and wavers(row.steadiness, asked):
+def _doubt(row: Ranked, diagnosis: Diagnosis) -> str:
+    if row.steadiness is not None and wavers(row.steadiness, len(diagnosis.candidates)):
         change, p = percent(row.steadiness.spread()), row.steadiness.p_value()
         return f"its coefficient changes with the amplitude by {change} (p = {p:.1g})"
     if row.flatness is not None and row.flatness.spread() > UNSTEADY:
         return f"its coefficient changes with the frequency by {percent(row.flatness.spread())}"
-    return "what remains has structure"
+    return f"what remains still depends on the motion, its past or time ({percent(diagnosis.left)} of the response)"
 
 
 def _amount(row: Ranked, force: str, length: str) -> str:
