@@ -26,8 +26,8 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
 def _nothing(diagnosis: Diagnosis) -> str:
     prediction = diagnosis.comparison.prediction
     return (
-        f"Nothing is missing that this record could show: the error of the response is {percent(prediction.error)}, and "
-        "what is left depends no more than chance has it on the motion, its past or time, as noise does; "
+        f"Nothing is missing that this record could show: the error of the response is {percent(prediction.error)}, "
+        "and what is left depends no more than chance has it on the motion, its past or time, as noise does; "
         f"none of {len(diagnosis.candidates)} candidates explains any of it."
     )
 
@@ -55,7 +55,8 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
 
 def _unknown(diagnosis: Diagnosis) -> list[str]:
     prediction = diagnosis.comparison.prediction
-    said = [f"Something is missing that no candidate explains: the error of the response is {percent(prediction.error)}."]
+    error = percent(prediction.error)
+    said = [f"Something is missing that no candidate explains: the error of the response is {error}."]
     best = diagnosis.candidates[0] if diagnosis.candidates else None
     if best is not None and best.gain.explained > 0.0 and best.p_value < ALPHA:
         said.append(
