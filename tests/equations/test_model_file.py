@@ -180,7 +180,6 @@ BROKEN: dict[str, tuple[bytes, str]] = {
     "force_deep": (b'terms: [{term: own, force: "' + b"-" * 250 + b'u"}]\n', "deep"),
     "force_long": (b'terms: [{term: own, force: "' + b"u+" * 500 + b'u"}]\n', "1001 characters"),
     "force_unicode": ('terms: [{term: own, force: "µ*u"}]\n'.encode(), "plain ASCII"),
-    "force_coefficient": (b'terms: [{term: own, force: "k*u"}]\n', "'k', a coefficient's name"),
     "own_name_space": (b"terms: [{term: my bracket, force: u}]\n", "'my bracket' is not a name"),
     "python_tag": (b"terms: !!python/object/apply:os.system ['true']\n", "tag"),
     "python_tag_value": (b"terms: [{term: inertia, value: !!python/name:os.system x}]\n", "tag"),
