@@ -14,11 +14,8 @@ with one_sentence():
 # The systems of Table 1: another model in the folder is none of the claims' business.
 MODELS = sorted({f"models/{name.split('.')[1]}.yaml" for name in _reported.statements if name.count(".") == 2})
 
-CLAIM_SETTINGS = {
-    key: STUDY.settings.plain()[key]
-    for key in "sampling noise_seed integrator segments fit_band tolerances ensembles".split()
-}
-CLAIM_SETTINGS["excitations"] = {"report": STUDY.settings.excitations["report"].plain()}
+with one_sentence():
+    CLAIM_SETTINGS = STUDY.settings.claims.plain()
 WITHOUT_NOISE = {key: value for key, value in CLAIM_SETTINGS.items() if key != "noise_seed"}
 CLAIM_RESULTS = [
     f"results/{name}"

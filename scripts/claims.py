@@ -9,13 +9,14 @@ import pandas as pd
 from study.reproduction import tables
 from study.reproduction.claims import claims_table, evidence, reported
 from study.reproduction.claims.judgement import Claim
+from study.reproduction.settings import ClaimSettings
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
 
 
 def main(models: str, statements: str, steps: str, settings: dict[str, Any], csv: str, page: str) -> None:
     rows = cast(list[dict[str, Any]], pd.read_csv(steps).to_dict("records"))
-    found = evidence.Evidence(settings, evidence.models_of(Path(models)), rows)
+    found = evidence.Evidence(ClaimSettings.model_validate(settings), evidence.models_of(Path(models)), rows)
     stated = reported.load(Path(statements))
 
     def progress(number: int, claim: Claim) -> None:

@@ -5,11 +5,12 @@ from typing import Any
 
 from study.reproduction import tables
 from study.reproduction.claims import evidence, excitation_reading, reported
+from study.reproduction.settings import ClaimSettings
 from study.support.workflow_step import one_sentence
 
 
 def main(models: str, statements: str, settings: dict[str, Any], output: str) -> None:
-    found = evidence.Evidence(settings, evidence.models_of(Path(models)), [])
+    found = evidence.Evidence(ClaimSettings.model_validate(settings), evidence.models_of(Path(models)), [])
     stated = reported.load(Path(statements))
     tables.write_csv(excitation_reading.study(found, stated), Path(output))
 

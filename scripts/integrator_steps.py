@@ -5,11 +5,10 @@ from typing import Any
 
 from study.identify.estimators.base import Settings
 from study.records.excitation import READINGS
-from study.records.spectra import Segments
 from study.reproduction import integrator_study, tables
 from study.reproduction.claims.common import SYSTEMS
 from study.reproduction.claims.evidence import Drive, models_of, record_settings
-from study.reproduction.settings import RecordSettings
+from study.reproduction.settings import ClaimSettings
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
 
@@ -17,15 +16,16 @@ SHARE = 5  # differences on the same forces scatter little: a fifth of the ensem
 
 
 def main(models: str, settings: dict[str, Any], csv: str, page: str) -> None:
-    first, count = settings["ensembles"]["first_seed"], max(2, settings["ensembles"]["seeds"] // SHARE)
-    record = RecordSettings.model_validate(record_settings(settings, Drive(SYSTEMS[0])))
-    low, high = settings["fit_band"]
+    told = ClaimSettings.model_validate(settings)
+    first, count = told.ensembles.first_seed, max(2, told.ensembles.seeds // SHARE)
+    record = record_settings(told, Drive(SYSTEMS[0]))
+    low, high = told.fit_band
     own = record.excitation.reading or READINGS[0]
     readings = [own, *(r for r in READINGS if r != own)]
     known = models_of(Path(models))
     table = integrator_study.study(
         {name: known[name] for name in SYSTEMS if name in known},
-        record, Settings(Segments(**settings["segments"]), (low, high)), range(first, first + count), readings,
+        record, Settings(told.segments.segments(), (low, high)), range(first, first + count), readings,
     )  # fmt: skip
     tables.write_csv(table, Path(csv))
     replace_file(Path(page), integrator_study.page(table).encode())

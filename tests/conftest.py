@@ -36,10 +36,13 @@ LINEAR = {"inertia": {"m": 1.0}, "linear_damping": {"c": 3.77}, "linear_stiffnes
 FIRST = (
     "test_hidden_effects.py",
     "test_spectra.py",
+    "test_damaged_files.py",
     "test_broken_records.py",
     "test_readers.py",
+    "test_any_model_file.py",
     "test_model_file.py",
     "test_config.py",
+    "test_figure_pages.py",
     "test_cli.py",
     "test_free_run_fit.py",
     "test_workflow.py",

@@ -21,7 +21,7 @@ from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
 
-from study.equations import formulas, terms
+from study.equations import terms
 from study.equations.model import Model, ModelTerm, free
 from study.equations.redundancy import repeated_force
 from study.equations.terms import Term
@@ -186,17 +186,10 @@ def _phasor(term: Term) -> bool:
 
 
 def _own(name: str, force: object) -> Term:
-    """A user's own term; its formula may name u, v, t and measured channels."""
+    """A user's own term; its formula may name u, v, t and measured channels, whatever these are called."""
     if not isinstance(force, str):
         raise StudyError(f"force of {name!r} is {shown(force)}; expected a formula in quotes")
-    term = terms.custom(name, force)
-    coefficients = {symbol for known in (term, *terms.LIBRARY.values()) for symbol in known.symbols}
-    for used in formulas.names(force):
-        if used in coefficients:  # a channel of that name would be mixed up with the coefficient
-            raise StudyError(
-                f"force of {name!r} uses {used!r}, a coefficient's name; write a number or rename the channel"
-            )
-    return term
+    return terms.custom(name, force)
 
 
 def _coefficients(term: Term, item: Mapping[object, object]) -> tuple[float | None, ...]:

@@ -1,7 +1,5 @@
 """How many steps a free run of a model needs in each sampling interval of a record."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from study.equations import kernels
@@ -12,32 +10,25 @@ from study.records.states import angular_rate, starting_states
 from study.support.arrays import Floats
 
 POINTS = 64  # points of the motion at which the equation of motion is linearised
-ROUGH = 0.5  # largest step times the fastest rate, in the first runs of a search
-FINE = 0.125  # largest step times the median rate, in the runs that estimates come from
-FEWEST, MOST = 4, 32  # steps a sample of the runs that estimates come from
+ROUGH = 0.5  # largest step times the fastest rate
+FINE = 0.125  # largest step times the median rate: a short time of fast rates asks for no smaller steps
+FEWEST, MOST = 4, 32  # steps a sample between which the median rate sets the bound
 
 
-@dataclass(frozen=True)
-class Steps:
-    """Steps in each sampling interval, for the first runs of a search and for the last."""
+def needed_steps(model: Model, record: Record, response: str = "displacement", most: int | None = None) -> int:
+    """Steps in each sampling interval with which a search may begin, the values of the model all known.
 
-    rough: int
-    fine: int
-
-
-def needed_steps(model: Model, record: Record, response: str = "displacement", most: int | None = None) -> Steps:
-    """Steps that suit the motion and the model with its present values, all known.
-
-    ``most`` sets those of the last runs. A Runge-Kutta step h of an oscillation of rate w shifts its phase by
-    ``(h w)^5 / 120`` and grows without end above ``h w = 2.8``, which heavy damping or a short memory reaches though
-    the motion is slow. So rates are the largest eigenvalues of the equation of motion, linearised along the motion.
+    ``most`` are taken at most; the median rate bounds them if it is left out. A Runge-Kutta step h of an oscillation of
+    rate w shifts its phase by ``(h w)^5 / 120`` and grows without end above ``h w = 2.8``, which heavy damping or a
+    short memory reaches though the motion is slow. So rates are the largest eigenvalues of the equation of motion,
+    linearised along the motion.
     """
     rates = _rates(model, record, response)
     if not np.all(np.isfinite(rates)):
-        return Steps(most or FEWEST, most or FEWEST)
-    fine = most or int(np.clip(np.ceil(np.median(rates) * record.dt / FINE), FEWEST, MOST))
+        return most or FEWEST
+    most = most or int(np.clip(np.ceil(np.median(rates) * record.dt / FINE), FEWEST, MOST))
     fastest = max(float(np.max(rates)), angular_rate(record[response], record.dt))
-    return Steps(int(np.clip(np.ceil(fastest * record.dt / ROUGH), 1, fine)), fine)
+    return int(np.clip(np.ceil(fastest * record.dt / ROUGH), 1, most))
 
 
 def _rates(model: Model, record: Record, response: str) -> Floats:

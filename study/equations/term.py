@@ -1,6 +1,7 @@
 """What a term is: the forces of a physical effect, its shape parameters, and when it is physical."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -194,6 +195,13 @@ class Term:
         own = {key.rpartition(".")[2]: values.get(key) for key in self.keys}
         known = {name: value for name, value in own.items() if value is not None}
         return next((sentence for condition in self.bounds if (sentence := condition.broken(known))), "")
+
+    def as_reported(self, coefficients: Sequence[float]) -> tuple[float, ...]:
+        """What the report gives in place of these coefficients, in the order of ``reported``: (4.9) and (4.10)."""
+        if len(coefficients) == 1:
+            return (-coefficients[0],)
+        cosine, sine = coefficients
+        return math.hypot(cosine, sine), math.atan2(0.0 - sine, cosine)  # 0 - 0, not -0
 
     @property
     def steady(self) -> bool:

@@ -7,6 +7,7 @@ from pydantic import AfterValidator, Field
 from study.records.excitation import Excitation
 from study.records.spectra import Segments
 from study.support.config_files import Section
+from study.support.errors import StudyError
 
 
 def _each_once(names: tuple[object, ...]) -> tuple[object, ...]:
@@ -180,9 +181,30 @@ class StudySettings(Section):
     trials: Trials
 
     @property
+    def claims(self) -> "ClaimSettings":
+        """What the claims depend on; a ``StudyError`` if the force history that they judge is not configured."""
+        if "report" not in self.excitations:
+            raise StudyError("config/config.yaml: expected an excitation 'report'; the claims judge that force history")
+        own = {name: getattr(self, name) for name in ClaimSettings.model_fields if name != "excitation"}
+        return ClaimSettings(excitation=self.excitations["report"], **own)
+
+    @property
     def resolution(self) -> float:
         """Hertz from one line of a segment to the next."""
         return 1.0 / (self.segments.length * self.sampling.dt)
+
+
+class ClaimSettings(Section):
+    """What the claims depend on; the seed of the noise is left out for a job whose records have none."""
+
+    excitation: ExcitationSettings  # the report's
+    noise_seed: Seed | None = None
+    sampling: Sampling
+    integrator: IntegratorSettings
+    segments: SegmentSettings
+    fit_band: Band
+    tolerances: Tolerances
+    ensembles: Ensembles
 
 
 class RecordSettings(Section):

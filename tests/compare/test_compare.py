@@ -7,20 +7,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from study.compare import along_time, noise
+from study.compare import noise
 from study.compare.across_levels import levels
 from study.compare.comparison import Comparison, across, compare
-from study.compare.comparison_report import as_json, document, summary, tables
+from study.compare.comparison_report import summary
 from study.compare.comparison_sentences import says, says_of_all
 from study.compare.fitted_coefficients import Coefficient
-from study.equations.model import Model, ModelTerm, free
+from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
 from study.records.excitation import Excitation, force
 from study.records.plan import Plan, make_plan
 from study.records.prepared import prepare_record
 from study.records.record import Record
-from study.support.errors import StudyError
 from study.trials import make_trial
 
 Floats = NDArray[np.float64]
@@ -204,29 +203,6 @@ def test_ranges_apart_from_each_other_are_judged_from_a_state_of_their_own() -> 
     assert len(comparison.prediction.measured) == 2900
 
 
-# ---- units
-
-
-SCALES = [(1e-3, 1e3, "kN", "mm"), (1.0, 1.0, "V", "V"), (0.2248089, 39.37008, "lbf", "in")]
-
-
-@pytest.mark.parametrize(("per_force", "per_length", "force_unit", "length_unit"), SCALES)
-def test_units_change_neither_errors_nor_sentences(
-    per_force: float, per_length: float, force_unit: str, length_unit: str
-) -> None:
-    record = measured(model("quadratic_damping", **VALUES, c2=400.0), drive(), 0.02)
-    units = {"force": force_unit, "displacement": length_unit}
-    scaled = Record(
-        DT, {"force": record["force"] * per_force, "displacement": record["displacement"] * per_length}, units
-    )
-    one, other = compared(model(), record), compared(model(), replace(scaled, name=record.name))
-    assert other.prediction.error == pytest.approx(one.prediction.error, rel=1e-6)
-    assert other.force.total == pytest.approx(one.force.total, rel=1e-6)
-    assert other.prediction.floor == pytest.approx(one.prediction.floor, rel=1e-6)
-    assert says(other) == says(one)
-    assert {c.key: c.unit for c in other.coefficients}["k"] == f"{force_unit}/{length_unit}"
-
-
 # ---- several records
 
 
@@ -241,13 +217,6 @@ def test_the_right_models_coefficients_do_not_move_with_the_level_and_a_wrong_on
     comparisons = [compared(model(), r) for r in reversed(records)]
     assert "k by" in says_of_all(comparisons, across(comparisons))
     assert list(across(comparisons)[0].force) == sorted(across(comparisons)[0].force)
-
-
-def test_records_in_different_units_are_not_held_against_each_other() -> None:
-    record = measured(model(**VALUES), drive(), 0.05)
-    other = replace(record, units={"force": "kN", "displacement": "m"}, name="other")
-    with pytest.raises(StudyError, match="the same unit"):
-        across([compared(model(), record), compared(model(), other)])
 
 
 def test_levels_weigh_by_their_errors() -> None:
@@ -296,59 +265,3 @@ def test_force_and_acceleration_alone_leave_the_band_below_the_cutoff_out() -> N
     assert comparison.prediction.error < 0.02  # the drift is 14 %
     assert all(b.low >= 0.4 for b in comparison.bands)
     assert not comparison.force.band[comparison.force.frequency < 0.5].any()
-
-
-# ---- documents
-
-
-def test_the_document_has_the_fields_of_the_issue_and_is_plain_json() -> None:
-    import json
-
-    comparison = trial("quadratic_damping", 41, 0.0)
-    content = json.loads(as_json(document([comparison])))
-    assert set(content) >= {"model", "error", "noise_floor", "coefficients", "where", "says"}
-    assert content["error"]["response"] == comparison.prediction.error
-    assert content["error"]["force"] == comparison.force.total
-    assert set(content["where"]) == {"frequency", "amplitude", "time", "level"}
-    assert content["where"]["frequency"][0]["of"] == "response"
-    assert content["where"]["amplitude"][0]["of"] == "velocity"
-    assert len(content["where"]["time"]) == along_time.STRETCHES
-    for row in content["coefficients"]:
-        assert row["interval"][0] < row["value"] < row["interval"][1]
-
-
-def test_tables_name_their_record_and_hold_no_text_of_numpy() -> None:
-    comparison = trial("quadratic_damping", 41, 0.0)
-    made = tables([comparison, comparison], across([comparison, comparison]))
-    for name, content in made.items():
-        head, *rows = content.decode().splitlines()
-        assert "record" in head.split(","), name
-        assert rows, name
-        assert "np." not in content.decode()
-
-
-def test_a_fit_that_did_not_arrive_says_so() -> None:
-    comparison = trial("quadratic_damping", 41, 0.0)
-    stopped = replace(comparison, fit=replace(comparison.fit, converged=False, message="still falling"))
-    assert "did not arrive at a minimum (still falling)" in says(stopped)
-
-
-def test_models_that_cannot_run_are_refused_in_one_sentence() -> None:
-    record = measured(model(**VALUES), drive(), 0.05)
-    with pytest.raises(StudyError, match="no inertia"):
-        compared(Model("bare", (free(get("linear_damping")), free(get("linear_stiffness")))), record)
-    unstable = Model(
-        "runaway", tuple(ModelTerm(get(n), (v,), ()) for n, v in zip(LINEAR, (1.0, -50.0, 355.0), strict=True))
-    )
-    with pytest.raises(StudyError):
-        compared(unstable, record)
-
-
-def test_a_model_that_runs_away_is_compared_all_the_same() -> None:
-    made = make_trial(7_000_122, ("displacement_damping", "quadratic_damping"), 0.0, "acceleration")
-    comparison = compared(made.believed, made.record)
-    assert comparison.prediction.diverged
-    assert comparison.prediction.error == pytest.approx(1.0)
-    assert "mean nothing" in says(comparison)
-    assert "100 %" in summary([comparison])
-    assert all(b"nan" not in content for content in tables([comparison]).values())

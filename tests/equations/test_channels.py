@@ -1,6 +1,7 @@
 """Columns beside force and motion: only those that a formula names take part, and no name stands for two things."""
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from study.equations.formulas import ExpressionError
 from study.equations.free_run import predict, prepare
 from study.equations.model import Model, forward_graph, forward_program, free
+from study.equations.model_file import parse_model
 from study.equations.simulate import Integrator, simulate
 from study.equations.substeps import needed_steps
 from study.equations.term import Component, Term
@@ -106,6 +108,19 @@ def test_a_named_column_is_meant_whatever_it_is_called(name: str, varied: Model,
     np.testing.assert_array_equal(fed["displacement"], same["displacement"])
     history = histories(reverse_inputs(model), record)[-1]
     np.testing.assert_allclose(history, column * record["displacement"], rtol=1e-15)
+
+
+@pytest.mark.parametrize("name", ["k", "m", "q_drawn"])
+def test_a_model_file_may_name_a_column_that_is_called_as_a_coefficient(name: str, bare: Record) -> None:
+    """It means the column, and a record without that column is refused in a sentence that names it."""
+    text = "terms: [{{term: inertia, value: 1.0}}, {{term: linear_stiffness, value: 300.0}}, {entry}]"
+    entry = '{{term: drawn, force: "{0}*u", value: 50.0}}'
+    named, plain = (parse_model(text.format(entry=entry.format(n)), Path("rig.yaml")) for n in (name, "elsewhere"))
+    column = 0.5 + 0.1 * np.sin(np.arange(SAMPLES))
+    record = bare.with_channels({name: column, "elsewhere": column})
+    np.testing.assert_array_equal(predict(named, record), predict(plain, record))
+    with pytest.raises(ExpressionError, match=f"the formula of 'drawn' names '{name}'; it may name t, u, v"):
+        predict(named, bare)
 
 
 def test_a_named_column_drives_the_motion_both_ways(systems: dict[str, Model], report_force: Floats) -> None:

@@ -1,4 +1,4 @@
-"""Free runs with exact derivatives, and the fits that rest on them."""
+"""Fits in free run: the coefficients with their errors, what is held, and what is refused."""
 
 from collections.abc import Callable, Mapping
 
@@ -9,17 +9,14 @@ from numpy.typing import NDArray
 from study.equations.free_run import FreeRun, predict, prepare
 from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
-from study.equations.terms import LIBRARY, custom
+from study.equations.terms import custom
 from study.identify.frequency_domain import coefficients
 from study.identify.frequency_domain.conditioned import analyse
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
 from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
-from study.identify.time_domain.multiple_shooting import fit_in_segments
-from study.identify.time_domain.shooting import REACHES, ShootingSegments
 from study.records.excitation import displacement_noise
-from study.records.record import MOTIONS, SI_UNITS, Record
+from study.records.record import SI_UNITS, Record
 from study.records.spectra import Segments, cross_spectra
-from study.records.states import starting_states
 from study.support.errors import DivergenceError, StudyError
 
 Floats = NDArray[np.float64]
@@ -79,90 +76,6 @@ def noisy(record: Record, fraction: float, seed: int) -> Record:
     return record.with_channels({"displacement": clean + displacement_noise(clean, fraction, seed)})
 
 
-def central_differences(run: FreeRun, values: dict[str, float], initial: Floats, step: float) -> Floats:
-    """Columns of the Jacobian by keys, then by the initial state."""
-    point = np.array([*values.values(), *initial])
-    columns: list[Floats] = []
-    for i, value in enumerate(point):
-        ends: list[Floats] = []
-        for sign in (1.0, -1.0):
-            moved = point.copy()
-            moved[i] = value * (1.0 + sign * step)
-            ends.append(run.respond(dict(zip(values, moved, strict=False)), moved[len(values) :])[0])
-        columns.append((ends[0] - ends[1]) / (2.0 * step * value))
-    return np.stack(columns, axis=1)
-
-
-def test_every_effect_of_the_library_is_tried() -> None:
-    assert set(EFFECTS) == set(LIBRARY)
-
-
-@pytest.mark.parametrize("response", MOTIONS)
-@pytest.mark.parametrize("name", EFFECTS)
-def test_jacobian_equals_central_differences(name: str, response: str, make_model: Make, report_force: Floats) -> None:
-    model = with_effect(make_model, name)
-    values = numbers(model)
-    initial = np.array([1e-3, 0.02, 5e-4])[: 2 + len(model.states)]
-    record = Record(DT, {"force": report_force[:1024]})
-    run = prepare(model, record, tuple(values), response=response)
-    _, jacobian = run.respond(values, initial, len(initial))
-    errors: list[Floats] = []
-    for step in (1e-4, 1e-5, 1e-6, 1e-7):  # a step across a kink of the force is no derivative: another one is
-        differences = central_differences(run, values, initial, step)
-        errors.append(np.linalg.norm(jacobian - differences, axis=0) / np.linalg.norm(differences, axis=0))
-    error = np.min(errors, axis=0)
-    # Two steps a sample carry the jump at a switch of friction to the order of the step only.
-    assert np.max(error) < (0.02 if name == "coulomb_friction" else 2e-6)
-
-
-@pytest.fixture
-def rubbing(make_model: Make) -> Model:
-    return make_model(
-        "rubbing", {"inertia": {"m": 1.0}, "linear_stiffness": {"k": 355.3}, "coulomb_friction": {"fc": 0.3}}
-    )
-
-
-def test_friction_stops_the_mass_where_it_should(rubbing: Model) -> None:
-    """Each half cycle costs 2 fc / k of amplitude, and the mass stays where |k u| <= fc: an exact solution."""
-    k, fc, begin = 355.3, 0.3, 0.01
-    halves = int(np.ceil((begin - fc / k) / (2.0 * fc / k)))
-    end = (-1.0) ** halves * (begin - 2.0 * halves * fc / k)
-    run = prepare(rubbing, Record(DT, {"force": np.zeros(200)}), ("m", "k", "fc"), steps_per_sample=8)
-    response, jacobian = run.respond({"m": 1.0, "k": k, "fc": fc}, (begin, 0.0), 2)
-    assert response[-1] == pytest.approx(end, rel=1e-5)
-    assert np.ptp(response[-50:]) == 0.0
-    sign = (-1.0) ** halves
-    exact = [0.0, sign * 2.0 * halves * fc / k**2, -sign * 2.0 * halves / k, sign]
-    np.testing.assert_allclose(jacobian[-1, :4], exact, rtol=1e-4, atol=1e-9)
-
-
-def test_friction_keeps_the_order_of_the_integrator(make_model: Make, report_force: Floats) -> None:
-    model = with_effect(make_model, "coulomb_friction").with_values({"fc": 0.4})
-    record = Record(DT, {"force": report_force[:2048]})
-    reference = predict(model, record, steps_per_sample=64)
-    coarse, fine = (
-        np.linalg.norm(predict(model, record, steps_per_sample=steps) - reference) / np.linalg.norm(reference)
-        for steps in (4, 8)
-    )
-    assert coarse < 1e-4
-    assert coarse / fine > 2.0**3
-
-
-def test_free_run_is_the_simulation(systems: dict[str, Model], records: dict[str, Record]) -> None:
-    for name, model in systems.items():  # the extreme system multiplies differences of rounding
-        record = records[name].part(0, 2048)
-        for response in MOTIONS:
-            again = predict(model, records[name], response=response, steps_per_sample=8, span=(0, 2048))
-            np.testing.assert_allclose(again, record[response], rtol=0.0, atol=1e-8 * np.std(record[response]))
-
-
-def test_free_run_starts_anywhere(systems: dict[str, Model], records: dict[str, Record]) -> None:
-    record = records["mathieu"]
-    state = (record["displacement"][700], record["velocity"][700])
-    again = predict(systems["mathieu"], record, steps_per_sample=8, span=(700, 1500), initial=state)
-    np.testing.assert_allclose(again, record["displacement"][700:1500], rtol=0.0, atol=1e-12)
-
-
 @pytest.mark.parametrize("name", ["linear", "duffing_van_der_pol", "mathieu", "extreme"])
 def test_recovers_table_1_without_noise(name: str, systems: dict[str, Model], records: dict[str, Record]) -> None:
     model, record = systems[name], records[name]
@@ -218,79 +131,6 @@ def test_units_do_not_matter(systems: dict[str, Model], records: dict[str, Recor
     again = fit_free_run(model, scaled, start={key: start[key] * factors[key] for key in start})
     assert again.iterations == fit.iterations
     np.testing.assert_allclose(again.values / [factors[key] for key in again.keys], fit.values, rtol=1e-7)
-
-
-def test_pieces_are_free_runs_of_their_own(systems: dict[str, Model], records: dict[str, Record]) -> None:
-    model, record = systems["mathieu"], records["mathieu"]
-    values, cuts = numbers(model), (300, 450)
-    states = np.stack([record["displacement"][[200, *cuts]], record["velocity"][[200, *cuts]]], axis=1)
-    run = prepare(model, record, tuple(values), steps_per_sample=8, span=(200, 700), restarts=cuts)
-    response, jacobian = run.respond(values, states, 2)
-    np.testing.assert_allclose(response, record["displacement"][200:700], rtol=0.0, atol=1e-12)
-    differences = central_differences_of_a_state(run, values, states)
-    np.testing.assert_allclose(jacobian[:, len(values) + 2], differences, atol=1e-7)
-    assert not np.any(jacobian[:100, len(values) + 2 :])
-    with pytest.raises(StudyError, match="2 initial states were given; 3 segments need one each"):
-        run.respond(values, states[:2])
-
-
-def central_differences_of_a_state(run: FreeRun, values: dict[str, float], states: Floats) -> Floats:
-    """Derivative of the response by the displacement at which the second piece begins."""
-    moved, step = [], np.zeros_like(states)
-    step[1, 0] = 1e-7
-    for sign in (1.0, -1.0):
-        moved.append(run.respond(values, states + sign * step)[0])
-    return (moved[0] - moved[1]) / 2e-7
-
-
-def test_a_regular_system_needs_no_pieces(systems: dict[str, Model], records: dict[str, Record]) -> None:
-    """... but they find the way from a start which a single free run does not survive."""
-    model, record = systems["duffing_van_der_pol"], noisy(records["duffing_van_der_pol"], 0.05, 4).part(0, 2048)
-    far = {"m": 3.0, "c": 1.0, "k": 100.0, "k3": 0.0, "c3": 0.0}
-    assert not fit_free_run(model, record, start=far).converged
-    fit = fit_in_segments(model, record, start=far)
-    assert fit.converged
-    near = fit_free_run(model, record)
-    np.testing.assert_allclose(fit.values, near.values, rtol=1e-4)
-    assert fit.initial.shape == (2,)
-
-
-def test_first_states_are_the_best_of_several_widths(systems: dict[str, Model], records: dict[str, Record]) -> None:
-    model, record, cuts = systems["duffing"], noisy(records["duffing"], 0.05, 2), (100, 200, 300)
-    pieces = ShootingSegments(record, "displacement", (0, 400), cuts, 4)
-    begun = pieces.misfits(model, pieces.first_states(model))
-    for reach in REACHES:
-        one = starting_states(record, "displacement", (0, *cuts), reach)
-        assert np.all(begun <= pieces.misfits(model, one))
-
-
-def test_tied_pieces_are_one_motion(systems: dict[str, Model], records: dict[str, Record]) -> None:
-    """... with the estimates and the covariance of a free run; loose ones know less."""
-    model, record = systems["duffing"], noisy(records["duffing"], 0.05, 2).part(0, 2048)
-    whole, cuts = fit_free_run(model, record), tuple(range(128, 2048, 128))
-    states = starting_states(record, "displacement", (0, *cuts))
-    loose = fit_free_run(model, record, restarts=cuts, initial=states)
-    tied = fit_free_run(model, record, restarts=cuts, initial=loose.initial, continuity=1000.0)
-    assert tied.converged
-    deviations = np.sqrt(np.diag(whole.covariance))
-    assert np.max(np.abs(tied.values - whole.values) / deviations) < 0.01
-    np.testing.assert_allclose(np.sqrt(np.diag(tied.covariance)), deviations, rtol=0.01)
-    assert np.all(np.sqrt(np.diag(loose.covariance)) > deviations)
-    assert tied.residual.shape == whole.residual.shape
-
-
-def test_chaotic_system_is_fitted_in_pieces(systems: dict[str, Model], records: dict[str, Record]) -> None:
-    """The Dead-Band system: a whole free run is hopeless, pieces recover it, the width of the gap included."""
-    model, record = systems["dead_band"], noisy(records["dead_band"], 0.05, 3).part(0, 4096)
-    start = {**started(model, record), "dead_band.u_g": 0.0028}
-    whole = fit_free_run(model, record, start=start, steps_per_sample=4)
-    noise = np.sqrt(0.05) * np.std(records["dead_band"]["displacement"])
-    assert whole.rms > 1.5 * noise
-    fit = fit_in_segments(model, record, start=start, steps_per_sample=4)
-    assert fit.rms < 1.05 * noise
-    assert fit.initial.ndim == 2
-    assert np.max(np.abs(error_in_standard_errors(model, fit))) < 4.0
-    assert fit.estimate["dead_band.u_g"] == pytest.approx(0.0025, rel=0.02)
 
 
 SHAPES = {

@@ -3,7 +3,6 @@
 import math
 import re
 import shutil
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,6 @@ from scipy.integrate import solve_ivp
 from study.equations.model_file import read_model
 from study.identify.estimators.base import Settings
 from study.records.record import Record
-from study.records.spectra import Segments
 from study.reproduction import config, integrator_study
 from study.reproduction.claims import (
     claims_table,
@@ -32,7 +30,7 @@ from study.reproduction.claims.judgement import Condition
 from study.reproduction.claims.reported import Reported, Statement
 from study.reproduction.claims.sample import Sample, departure
 from study.reproduction.preliminary import model_restoring_force, natural_frequency
-from study.reproduction.settings import RecordSettings
+from study.reproduction.settings import ClaimSettings, Ensembles
 
 ROOT = Path(__file__).parents[2]
 SEEDS = 6
@@ -40,8 +38,9 @@ MET, MISSED = Condition("c", "m", True), Condition("x above 2", "x 1", False)
 
 
 @pytest.fixture(scope="module")
-def settings() -> dict[str, Any]:
-    return {**config.load(ROOT / "config").settings.plain(), "ensembles": {"seeds": SEEDS, "first_seed": 5001}}
+def settings() -> ClaimSettings:
+    ensembles = Ensembles(seeds=SEEDS, first_seed=5001)
+    return config.load(ROOT / "config").settings.claims.model_copy(update={"ensembles": ensembles})
 
 
 @pytest.fixture(scope="module")
@@ -50,16 +49,16 @@ def report() -> Reported:
 
 
 @pytest.fixture(scope="module")
-def steps(settings: dict[str, Any]) -> pd.DataFrame:
+def steps(settings: ClaimSettings) -> pd.DataFrame:
     models = evidence.models_of(ROOT / "models")
-    record = RecordSettings.model_validate(evidence.record_settings(settings, evidence.Drive("linear", level=4.0)))
-    told = Settings(Segments(**settings["segments"]), tuple(settings["fit_band"]))
+    record = evidence.record_settings(settings, evidence.Drive("linear", level=4.0))
+    told = Settings(settings.segments.segments(), settings.fit_band)
     chosen = {name: models[name] for name in ("linear", "van_der_pol")}
     return integrator_study.study(chosen, record, told, range(5001, 5004), ["raw", "filtered"])
 
 
 @pytest.fixture(scope="module")
-def found(settings: dict[str, Any], steps: pd.DataFrame) -> evidence.Evidence:
+def found(settings: ClaimSettings, steps: pd.DataFrame) -> evidence.Evidence:
     return evidence.Evidence(settings, evidence.models_of(ROOT / "models"), steps.to_dict("records"))
 
 
@@ -189,7 +188,7 @@ def test_the_page_holds_every_row(judged: pd.DataFrame) -> None:
     assert all(line.replace("\\|", "").count("|") == width for line in page.splitlines() if line.startswith("|"))
 
 
-def changed(folder: Path, settings: Mapping[str, Any], system: str, old: str, new: str) -> evidence.Evidence:
+def changed(folder: Path, settings: ClaimSettings, system: str, old: str, new: str) -> evidence.Evidence:
     shutil.copytree(ROOT / "models", folder / "models")
     path = folder / "models" / f"{system}.yaml"
     text = path.read_text(encoding="utf-8")
@@ -211,7 +210,7 @@ def changed(folder: Path, settings: Mapping[str, Any], system: str, old: str, ne
     ],
 )  # fmt: skip
 def test_a_changed_coefficient_changes_the_verdicts(
-    tmp_path: Path, settings: dict[str, Any], found: evidence.Evidence, report: Reported,
+    tmp_path: Path, settings: ClaimSettings, found: evidence.Evidence, report: Reported,
     system: str, old: str, new: str, claims: list[str],
 ) -> None:  # fmt: skip
     other = changed(tmp_path, settings, system, old, new)
@@ -226,7 +225,7 @@ def test_a_changed_statement_changes_the_verdict(found: evidence.Evidence, repor
     assert claims_table.judge("siso_stiffness", found, Reported(rows)).verdict == "not reproduced"
 
 
-def test_the_same_evidence_twice(settings: dict[str, Any], found: evidence.Evidence, report: Reported) -> None:
+def test_the_same_evidence_twice(settings: ClaimSettings, found: evidence.Evidence, report: Reported) -> None:
     again = evidence.Evidence(settings, evidence.models_of(ROOT / "models"), [])
     first, second = (claims_table.judge("siso_frequency", whose, report) for whose in (found, again))
     assert first == second
@@ -353,7 +352,7 @@ def integrated(error: float, diverged: int = 0) -> list[dict[str, Any]]:
     ],
 )
 def test_a_run_that_diverges_makes_error_free_worse_and_none_makes_it_better(
-    settings: dict[str, Any], report: Reported, error: float, diverged: int, said: str
+    settings: ClaimSettings, report: Reported, error: float, diverged: int, said: str
 ) -> None:
     some = evidence.Evidence(settings, evidence.models_of(ROOT / "models"), integrated(error, diverged))
     claim = claims_table.judge("error_free", some, report)

@@ -103,7 +103,7 @@ def named_parameters(estimate: Estimate) -> tuple[Parameter, ...]:
         named |= {p.name: p for p in _modal(estimate)}
     for term in (t for t in LIBRARY.values() if t.reported and t.symbols[0] in plain):
         own = [plain.pop(symbol) for symbol in term.symbols]
-        turned = (Parameter(term.reported[0], -own[0].value, own[0].error),)
+        turned = (Parameter(term.reported[0], term.as_reported([own[0].value])[0], own[0].error),)
         named |= {p.name: p for p in (turned if len(own) == 1 else _phasor(estimate, term))}
     return (*named.values(), *plain.values())
 
@@ -128,9 +128,9 @@ def _phasor(e: Estimate, term: Term) -> tuple[Parameter, Parameter]:
     """Amplitude and phase of a cosine and a sine."""
     (cosine, sine), (amplitude, phase) = term.symbols, term.reported
     a, b = e[cosine], e[sine]
-    size = math.hypot(a, b)
+    size, angle = term.as_reported((a, b))
     if size == 0.0:
         return Parameter(amplitude, 0.0, e.error(cosine)), Parameter(phase, 0.0, math.inf)
     length = e.derived_error({cosine: a / size, sine: b / size})
     turn = e.derived_error({cosine: b / size**2, sine: -a / size**2})
-    return Parameter(amplitude, size, length), Parameter(phase, math.atan2(0.0 - b, a), turn)  # 0 - 0, not -0
+    return Parameter(amplitude, size, length), Parameter(phase, angle, turn)

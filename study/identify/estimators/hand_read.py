@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from study.equations.model import Model
+from study.equations.terms import LIBRARY
 from study.identify.estimators import miso
 from study.identify.estimators.base import Identified, Parameter, Settings
 from study.identify.frequency_domain.inputs import Input
@@ -27,7 +28,7 @@ def identify(model: Model, record: Record, settings: Settings) -> Identified:
             values += read_linear(frequency, response, band)
         else:
             values += _plateaus(item, frequency[keep], response[keep])
-    return Identified(result.inputs, None, tuple(Parameter(n, v, math.nan) for n, v in _renamed(values)))
+    return Identified(result.inputs, None, tuple(Parameter(n, v, math.nan) for n, v in _as_reported(values)))
 
 
 def read_linear(frequency: Floats, response: Complexes, band: tuple[float, float]) -> list[tuple[str, float]]:
@@ -69,12 +70,10 @@ def _plateaus(item: Input, frequency: Floats, response: Complexes) -> list[tuple
     return [(part.symbol, float(np.mean((response / powers[:, p]).real))) for p, part in enumerate(item.parts)]
 
 
-def _renamed(values: list[tuple[str, float]]) -> list[tuple[str, float]]:
-    """Periodic and dead-band coefficients under the report's names, (4.9) and (4.10)."""
+def _as_reported(values: list[tuple[str, float]]) -> list[tuple[str, float]]:
+    """Coefficients that the report gives in another form, in that form and under its names."""
     named = dict(values)
-    if "km_cos" in named:
-        a, b = named.pop("km_cos"), named.pop("km_sin")
-        named |= {"k_m": math.hypot(a, b), "phase": math.atan2(-b, a)}
-    if "kg" in named:
-        named["k_dead_band"] = -named.pop("kg")
+    for term in (t for t in LIBRARY.values() if t.reported and t.symbols[0] in named):
+        own = [named.pop(symbol) for symbol in term.symbols]
+        named |= dict(zip(term.reported, term.as_reported(own), strict=True))
     return list(named.items())

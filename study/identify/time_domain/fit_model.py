@@ -154,7 +154,7 @@ def best_fit(
 
 def _rough(model: Model, prepared: Prepared, start: Values) -> int:
     """Steps of a search's runs: those of every search, or more where the model's own rates ask for them."""
-    return max(STEPS, needed_steps(model.with_values(start), prepared.record, prepared.response).rough)
+    return max(STEPS, needed_steps(model.with_values(start), prepared.record, prepared.response))
 
 
 def _tried(

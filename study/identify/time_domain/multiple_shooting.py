@@ -57,7 +57,7 @@ def fit_in_segments(
     whole = span or (0, len(record))
     segments = ShootingSegments(record, response, whole, even_restarts(record, response, whole), steps_per_sample)
     begun = model.with_values(dict(start or {}))
-    rough = replace(segments, steps_per_sample=needed_steps(begun, record, response, steps_per_sample).rough)
+    rough = replace(segments, steps_per_sample=needed_steps(begun, record, response, steps_per_sample))
     runs = min(LOOSE, max_iterations)
     loose = fit_segments(begun, rough, rough.first_states(begun), held, runs)
     if loose.rms < CLEAN * segments.spread:  # errors of long steps would matter

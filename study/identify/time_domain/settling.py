@@ -82,7 +82,7 @@ def _stands(fit: FreeRunFit, prepared: Prepared) -> bool:
 
 def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit with so many steps per sample that halving them shifts no coefficient by what its error shows."""
-    most = max(MOST_STEPS, needed_steps(fit.model, prepared.record, prepared.response).rough)
+    most = max(MOST_STEPS, needed_steps(fit.model, prepared.record, prepared.response))
     while fit.keys and fit.steps_per_sample < most:
         jacobian = linearise(fit, prepared)
         moved = integration_shift(fit, prepared, jacobian)

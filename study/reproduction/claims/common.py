@@ -47,7 +47,7 @@ def _recovered(evidence: Evidence, reported: Reported, ensemble: Ensemble, name:
     true, sample = reported.table_1(ensemble.system, name), ensemble.miso(name)
     off = sample.mean - true
     if true == 0.0:
-        allowed: float = evidence.settings["tolerances"]["absolute"][name]
+        allowed: float = evidence.settings.tolerances.absolute[name]
         criterion, measured = f"mean {name} within +-{allowed:g}", f"{name} {off:+.2g} +- {sample.error:.1g}"
     else:
         tolerance = evidence.tolerance(ensemble.system, name)

@@ -40,7 +40,7 @@ def conclusion_4(evidence: Evidence, reported: Reported) -> list[Condition]:
     drives = {label: Drive(COMBINED, excitation=(("kind", kind),)) for label, kind in SPECTRA.items()}
     ensembles = {label: evidence.ensemble(drive) for label, drive in drives.items()}
     ensembles["squared Gaussian"] = _skewed(evidence)
-    low, high = _force_from(evidence), evidence.settings["fit_band"][1]
+    low, high = _force_from(evidence), evidence.settings.fit_band[1]
     excited = evidence.ensemble(drives["Pierson-Moskowitz"], Assumed(band=(low, high)))
     left = ", ".join(condition.measured for condition in recovered(evidence, reported, excited, PARTS))
     return explained(
@@ -53,9 +53,9 @@ def conclusion_4(evidence: Evidence, reported: Reported) -> list[Condition]:
 
 def _force_from(evidence: Evidence) -> float:
     """Where the Pierson-Moskowitz autospectrum exceeds a tenth of its peak, in hertz."""
-    sampling = evidence.settings["sampling"]
+    sampling = evidence.settings.sampling
     frequency = np.linspace(0.01, 10.0, 1000)
-    density = theoretical_autospectrum(Excitation("pierson_moskowitz"), frequency, sampling["samples"], sampling["dt"])
+    density = theoretical_autospectrum(Excitation("pierson_moskowitz"), frequency, sampling.samples, sampling.dt)
     return float(frequency[np.argmax(density > 0.1 * np.max(density))])
 
 
@@ -66,14 +66,15 @@ def squared(seed: int, samples: int, dt: float, cutoff: float) -> Floats:
 
 
 def _skewed(evidence: Evidence) -> Ensemble:
-    sampling, excitation = evidence.settings["sampling"], evidence.settings["excitations"]["report"]
-    model, integrator = evidence.model(Drive(COMBINED)), Integrator(**evidence.settings["integrator"])
+    sampling, excitation = evidence.settings.sampling, evidence.settings.excitation
+    model, integrator = evidence.model(Drive(COMBINED)), Integrator(**evidence.settings.integrator.model_dump())
 
     def outcome(seed: int) -> Outcome:
-        values = squared(seed, sampling["samples"], sampling["dt"], excitation.get("cutoff", 12.5))
-        return evidence.analyse(model, simulate(model, values, sampling["dt"], integrator))
+        values = squared(seed, sampling.samples, sampling.dt, excitation.at_level(1.0).cutoff)
+        return evidence.analyse(model, simulate(model, values, sampling.dt, integrator))
 
-    own, *others = threaded(outcome, [excitation["seed"], *evidence.seeds])
+    assert excitation.seed is not None  # records of the same excitation are simulated before
+    own, *others = threaded(outcome, [excitation.seed, *evidence.seeds])
     return Ensemble(COMBINED, own, tuple(others))
 
 

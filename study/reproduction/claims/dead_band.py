@@ -108,7 +108,7 @@ def dead_band_error(evidence: Evidence, reported: Reported) -> Iterator[Conditio
 
 def dead_band_share(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """About 65 percent, under both readings of unit variance."""
-    stated, chosen = reported.value("dead_band_share"), evidence.settings["excitations"]["report"]["reading"]
+    stated, chosen = reported.value("dead_band_share"), evidence.settings.excitation.reading
     by_level = {level: evidence.at(SYSTEM, level).linear_coherence() for level in (0.05, 0.1, *common.levels(reported))}
     lowest = min(by_level, key=lambda level: by_level[level].mean)
     where, bottom = evidence.at(SYSTEM, lowest).lowest(lambda o: o.miso.cumulative[0])

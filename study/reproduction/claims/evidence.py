@@ -16,10 +16,11 @@ from study.identify.estimators.base import Identified, Settings
 from study.identify.estimators.hand_read import read_curve
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.records.record import Record
-from study.records.spectra import Segments, autospectrum
+from study.records.spectra import autospectrum
 from study.reproduction.claims.sample import Sample, average
 from study.reproduction.ensemble import NOISE_OFFSET, threaded
 from study.reproduction.make_record import make_record
+from study.reproduction.settings import ClaimSettings, RecordSettings
 from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
@@ -133,11 +134,11 @@ class Evidence:
     ``results/integrator_steps.csv``.
     """
 
-    def __init__(self, settings: Table, models: Mapping[str, Model], integrator_steps: Sequence[Table]) -> None:
+    def __init__(self, settings: ClaimSettings, models: Mapping[str, Model], integrator_steps: Sequence[Table]) -> None:
         self.settings, self.models, self.integrator_steps = settings, models, integrator_steps
-        first = settings["ensembles"]["first_seed"]
-        self.seeds = range(first, first + settings["ensembles"]["seeds"])
-        self.segments = Segments(**settings["segments"])
+        first = settings.ensembles.first_seed
+        self.seeds = range(first, first + settings.ensembles.seeds)
+        self.segments = settings.segments.segments()
         self.records: Callable[[Drive], tuple[Record, ...]] = lru_cache(KEPT)(self._records)
         self._ensembles = cache(self._identified)
 
@@ -183,15 +184,14 @@ class Evidence:
 
     def tolerance(self, system: str, name: str) -> float:
         """The configured tolerance of a parameter, relative to its true value."""
-        tolerances = self.settings["tolerances"]
-        own = tolerances.get("of_case", {}).get(system, {})
-        return own.get(name, tolerances["relative"][name])
+        tolerances = self.settings.tolerances
+        return tolerances.of_case.get(system, {}).get(name, tolerances.relative[name])
 
     def estimator_settings(self, assumed: Assumed = OWN_TERMS) -> Settings:
         """What the estimators go by: the configured segments and band, where nothing else is assumed."""
-        segments = {**self.settings["segments"], **dict(assumed.segments)}
-        low, high = assumed.band or self.settings["fit_band"]
-        return Settings(Segments(**segments), (low, high))
+        segments = self.settings.segments.model_copy(update=dict(assumed.segments))
+        low, high = assumed.band or self.settings.fit_band
+        return Settings(segments.segments(), (low, high))
 
     def analyse(self, model: Model, record: Record, assumed: Assumed = OWN_TERMS) -> Outcome:
         """Identify one record, SI/SO and MI/SO."""
@@ -204,16 +204,13 @@ class Evidence:
         return Outcome(_analysis(single, settings), _analysis(multiple, settings))
 
 
-def record_settings(settings: Table, drive: Drive) -> dict[str, Any]:
+def record_settings(settings: ClaimSettings, drive: Drive) -> RecordSettings:
     """What ``study.reproduction.make_record.make_record`` expects, for a drive."""
-    if "report" not in settings["excitations"]:
-        raise StudyError("config/config.yaml: expected an excitation 'report'; the claims judge that force history")
-    return {
-        "case": drive.system, "excitation": {**settings["excitations"]["report"], **dict(drive.excitation)},
-        "level": drive.level, "noise": drive.noise,
-        **({"noise_seed": settings["noise_seed"]} if drive.noise > 0.0 else {}), "sampling": settings["sampling"],
-        "integrator": settings["integrator"],
-    }  # fmt: skip
+    return RecordSettings(
+        case=drive.system, excitation=settings.excitation.model_copy(update=dict(drive.excitation)), level=drive.level,
+        noise=drive.noise, noise_seed=settings.noise_seed if drive.noise > 0.0 else None, sampling=settings.sampling,
+        integrator=settings.integrator,
+    )  # fmt: skip
 
 
 def _analysis(identified: Identified, settings: Settings) -> Analysis:

@@ -152,7 +152,7 @@ def noise_linear(evidence: Evidence, reported: Reported) -> list[Condition]:
             biases = {n: _bias(n, value / truth[n] - 1.0) for n, value in values.items()}
             label = f"{percent(noise)} noise, {way}"
             conditions += [together(label, [biases[n] for n in ("k", "m", "f_n")]), together(label, [biases["c"]])]
-    low, worst = evidence.settings["fit_band"][0], noises(reported)[-1]
+    low, worst = evidence.settings.fit_band[0], noises(reported)[-1]
     strong = evidence.ensemble(Drive(COMBINED, noise=worst), Assumed(band=(low, STRONG_BELOW)))
     left = ", ".join(f"{n} {percent(strong.miso(n).mean / true - 1.0, '+.2g')}" for n, true in truth.items())
     return explained(

@@ -31,7 +31,7 @@ def coherence_forms(evidence: Evidence, _: Reported) -> Iterator[Condition]:
 
 def averages(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Segments end to end, and what the overlapped ones are worth."""
-    segments, samples = evidence.segments, evidence.settings["sampling"]["samples"]
+    segments, samples = evidence.segments, evidence.settings.sampling.samples
     stated, apart, worth = reported.value("averages"), samples // segments.length, segments.effective_averages(samples)
     count = segments.count(samples)
     yield Condition(f"{stated:g} segments end to end", f"{apart} segments end to end", apart == stated)
@@ -45,7 +45,7 @@ def averages(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
 
 def resolution(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Line spacing and lengths in seconds."""
-    samples, dt = evidence.settings["sampling"]["samples"], evidence.settings["sampling"]["dt"]
+    samples, dt = evidence.settings.sampling.samples, evidence.settings.sampling.dt
     length = evidence.segments.length
     values = {
         "resolution": (1.0 / (length * dt), 1e-3), "resolution.seconds": (length * dt, 1e-9),

@@ -50,7 +50,7 @@ def system_stiffness_gap(evidence: Evidence, reported: Reported) -> Iterator[Con
 
 def amplitude_nonlinear(evidence: Evidence, _: Reported) -> Iterator[Condition]:
     """Doubling the force doubles the response of a system that is linear, the Mathieu included."""
-    dt, integrator = evidence.settings["sampling"]["dt"], Integrator(**evidence.settings["integrator"])
+    dt, integrator = evidence.settings.sampling.dt, Integrator(**evidence.settings.integrator.model_dump())
     for system in SYSTEMS:
         record, linear = evidence.records(Drive(system))[0], system in LINEAR_IN_FORCE
         doubled: Floats = 2.0 * record["displacement"]
@@ -62,7 +62,7 @@ def amplitude_nonlinear(evidence: Evidence, _: Reported) -> Iterator[Condition]:
 
 def nyquist(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Half the sampling rate of the study and of the report."""
-    dt, stated, step = evidence.settings["sampling"]["dt"], reported.value("nyquist"), reported.value("nyquist.dt")
+    dt, stated, step = evidence.settings.sampling.dt, reported.value("nyquist"), reported.value("nyquist.dt")
     highest = 0.5 / dt
     yield Condition(f"1 / (2 dt) equals {stated:g} Hz", f"{highest:g} Hz", math.isclose(highest, stated, rel_tol=1e-9))
     yield Condition(f"dt equals {step:g} s", f"{dt:g} s", math.isclose(dt, step, rel_tol=1e-9))

@@ -1,0 +1,155 @@
+"""Free runs with exact derivatives."""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from study.equations.free_run import FreeRun, predict, prepare
+from study.equations.model import Model
+from study.equations.terms import LIBRARY
+from study.records.record import MOTIONS, Record
+from study.support.errors import StudyError
+
+Floats = NDArray[np.float64]
+Make = Callable[[str, Mapping[str, Mapping[str, float]]], Model]
+DT = 0.02
+LINEAR = {"inertia": {"m": 1.0}, "linear_damping": {"c": 3.77}, "linear_stiffness": {"k": 355.3}}
+EFFECTS: dict[str, dict[str, float]] = {
+    "inertia": {},
+    "linear_damping": {},
+    "linear_stiffness": {},
+    "quadratic_stiffness": {"k2": 1e4},
+    "signed_quadratic_stiffness": {"k2s": 5e4},
+    "cubic_stiffness": {"k3": 2e7},
+    "quintic_stiffness": {"k5": 1e12},
+    "van_der_pol_damping": {"c3": 2e6},
+    "displacement_damping": {"cu": 2e3},
+    "quadratic_damping": {"c2": 60.0},
+    "cubic_damping": {"cv3": 1e3},
+    "coulomb_friction": {"fc": 0.2},
+    "dead_band": {"kg": -300.0, "dead_band.u_g": 0.0025},
+    "bilinear_stiffness": {"kb": 100.0},
+    "one_sided_contact": {"kc": 300.0, "one_sided_contact.gap": 0.002},
+    "periodic_stiffness": {"km_cos": 150.0, "km_sin": 50.0, "periodic_stiffness.f_m": 1.0},
+    "relaxation": {"kr": 200.0, "relaxation.tau": 0.05},
+    "hysteresis": {"kz": 200.0, "hysteresis.beta": 300.0, "hysteresis.gamma": 100.0},
+    "constant_force": {"f0": 0.2},
+    "harmonic_force": {"fh_cos": 0.3, "fh_sin": 0.2, "harmonic_force.f": 4.0},
+}
+
+
+def with_effect(make_model: Make, name: str) -> Model:
+    return make_model(name, {**LINEAR, **({name: EFFECTS[name]} if EFFECTS[name] else {})})
+
+
+def numbers(model: Model) -> dict[str, float]:
+    return {key: float(value) for key, value in model.values.items() if value is not None}
+
+
+def central_differences(run: FreeRun, values: dict[str, float], initial: Floats, step: float) -> Floats:
+    """Columns of the Jacobian by keys, then by the initial state."""
+    point = np.array([*values.values(), *initial])
+    columns: list[Floats] = []
+    for i, value in enumerate(point):
+        ends: list[Floats] = []
+        for sign in (1.0, -1.0):
+            moved = point.copy()
+            moved[i] = value * (1.0 + sign * step)
+            ends.append(run.respond(dict(zip(values, moved, strict=False)), moved[len(values) :])[0])
+        columns.append((ends[0] - ends[1]) / (2.0 * step * value))
+    return np.stack(columns, axis=1)
+
+
+def test_every_effect_of_the_library_is_tried() -> None:
+    assert set(EFFECTS) == set(LIBRARY)
+
+
+@pytest.mark.parametrize("response", MOTIONS)
+@pytest.mark.parametrize("name", EFFECTS)
+def test_jacobian_equals_central_differences(name: str, response: str, make_model: Make, report_force: Floats) -> None:
+    model = with_effect(make_model, name)
+    values = numbers(model)
+    initial = np.array([1e-3, 0.02, 5e-4])[: 2 + len(model.states)]
+    record = Record(DT, {"force": report_force[:1024]})
+    run = prepare(model, record, tuple(values), response=response)
+    _, jacobian = run.respond(values, initial, len(initial))
+    errors: list[Floats] = []
+    for step in (1e-4, 1e-5, 1e-6, 1e-7):  # a step across a kink of the force is no derivative: another one is
+        differences = central_differences(run, values, initial, step)
+        errors.append(np.linalg.norm(jacobian - differences, axis=0) / np.linalg.norm(differences, axis=0))
+    error = np.min(errors, axis=0)
+    # Two steps a sample carry the jump at a switch of friction to the order of the step only.
+    assert np.max(error) < (0.02 if name == "coulomb_friction" else 2e-6)
+
+
+@pytest.fixture
+def rubbing(make_model: Make) -> Model:
+    return make_model(
+        "rubbing", {"inertia": {"m": 1.0}, "linear_stiffness": {"k": 355.3}, "coulomb_friction": {"fc": 0.3}}
+    )
+
+
+def test_friction_stops_the_mass_where_it_should(rubbing: Model) -> None:
+    """Each half cycle costs 2 fc / k of amplitude, and the mass stays where |k u| <= fc: an exact solution."""
+    k, fc, begin = 355.3, 0.3, 0.01
+    halves = int(np.ceil((begin - fc / k) / (2.0 * fc / k)))
+    end = (-1.0) ** halves * (begin - 2.0 * halves * fc / k)
+    run = prepare(rubbing, Record(DT, {"force": np.zeros(200)}), ("m", "k", "fc"), steps_per_sample=8)
+    response, jacobian = run.respond({"m": 1.0, "k": k, "fc": fc}, (begin, 0.0), 2)
+    assert response[-1] == pytest.approx(end, rel=1e-5)
+    assert np.ptp(response[-50:]) == 0.0
+    sign = (-1.0) ** halves
+    exact = [0.0, sign * 2.0 * halves * fc / k**2, -sign * 2.0 * halves / k, sign]
+    np.testing.assert_allclose(jacobian[-1, :4], exact, rtol=1e-4, atol=1e-9)
+
+
+def test_friction_keeps_the_order_of_the_integrator(make_model: Make, report_force: Floats) -> None:
+    model = with_effect(make_model, "coulomb_friction").with_values({"fc": 0.4})
+    record = Record(DT, {"force": report_force[:2048]})
+    reference = predict(model, record, steps_per_sample=64)
+    coarse, fine = (
+        np.linalg.norm(predict(model, record, steps_per_sample=steps) - reference) / np.linalg.norm(reference)
+        for steps in (4, 8)
+    )
+    assert coarse < 1e-4
+    assert coarse / fine > 2.0**3
+
+
+def test_free_run_is_the_simulation(systems: dict[str, Model], records: dict[str, Record]) -> None:
+    for name, model in systems.items():  # the extreme system multiplies differences of rounding
+        record = records[name].part(0, 2048)
+        for response in MOTIONS:
+            again = predict(model, records[name], response=response, steps_per_sample=8, span=(0, 2048))
+            np.testing.assert_allclose(again, record[response], rtol=0.0, atol=1e-8 * np.std(record[response]))
+
+
+def test_free_run_starts_anywhere(systems: dict[str, Model], records: dict[str, Record]) -> None:
+    record = records["mathieu"]
+    state = (record["displacement"][700], record["velocity"][700])
+    again = predict(systems["mathieu"], record, steps_per_sample=8, span=(700, 1500), initial=state)
+    np.testing.assert_allclose(again, record["displacement"][700:1500], rtol=0.0, atol=1e-12)
+
+
+def test_pieces_are_free_runs_of_their_own(systems: dict[str, Model], records: dict[str, Record]) -> None:
+    model, record = systems["mathieu"], records["mathieu"]
+    values, cuts = numbers(model), (300, 450)
+    states = np.stack([record["displacement"][[200, *cuts]], record["velocity"][[200, *cuts]]], axis=1)
+    run = prepare(model, record, tuple(values), steps_per_sample=8, span=(200, 700), restarts=cuts)
+    response, jacobian = run.respond(values, states, 2)
+    np.testing.assert_allclose(response, record["displacement"][200:700], rtol=0.0, atol=1e-12)
+    differences = central_differences_of_a_state(run, values, states)
+    np.testing.assert_allclose(jacobian[:, len(values) + 2], differences, atol=1e-7)
+    assert not np.any(jacobian[:100, len(values) + 2 :])
+    with pytest.raises(StudyError, match="2 initial states were given; 3 segments need one each"):
+        run.respond(values, states[:2])
+
+
+def central_differences_of_a_state(run: FreeRun, values: dict[str, float], states: Floats) -> Floats:
+    """Derivative of the response by the displacement at which the second piece begins."""
+    moved, step = [], np.zeros_like(states)
+    step[1, 0] = 1e-7
+    for sign in (1.0, -1.0):
+        moved.append(run.respond(values, states + sign * step)[0])
+    return (moved[0] - moved[1]) / 2e-7

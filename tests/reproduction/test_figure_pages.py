@@ -1,0 +1,205 @@
+"""Whole pages of figures: nothing overlaps, the same bytes each time."""
+
+import importlib.util
+import itertools
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib import style
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+
+from study.figures import curves, frequency_response, page, styles
+from study.records.record import Record, write_csv
+from study.records.spectra import Segments
+from study.support.errors import StudyError
+
+ROOT = Path(__file__).parents[2]
+SHEET = ROOT / "study" / "figures" / "study.mplstyle"
+FREQUENCY = np.arange(0.0, 12.5, 0.1)
+OMEGA = 2j * np.pi * FREQUENCY
+LINEAR = OMEGA**2 + 3.77 * OMEGA + 355.3
+SYSTEMS = {
+    "duffing": [("u", LINEAR), ("u**3", 2e7 + 0 * OMEGA)],
+    "duffing_van_der_pol": [("u", LINEAR), ("u**3", 2e7 + 2e6 / 3.0 * OMEGA)],
+    "mathieu": [("u", LINEAR), ("u*cos(2*pi*f_m*t)", 177.7 + 0 * OMEGA), ("u*sin(2*pi*f_m*t)", 0 * OMEGA)],
+    "plain": [("u", LINEAR)],
+}
+COLUMNS = ("frequency", "estimator", "input", "shape", "real", "imag", "standard_error", "exact_real", "exact_imag")
+KINDS = ("linear", "nonlinear", "coherence", "histogram")
+
+
+def script(name):
+    spec = importlib.util.spec_from_file_location(name, ROOT / "scripts" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses look their module up
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def draw_case():
+    return script("draw_case")
+
+
+@pytest.fixture(scope="module")
+def draw_preliminary():
+    return script("draw_preliminary")
+
+
+@pytest.fixture(autouse=True)
+def _sheet():
+    with style.context(SHEET):
+        yield
+
+
+def response_table(system, spread=0.05, exact=True, estimators=("siso", "miso")):
+    rng = np.random.default_rng(8)
+    frames = []
+    for name in estimators:
+        for j, (shape, true) in enumerate(SYSTEMS[system][: 1 if name == "siso" else None]):
+            error = spread * np.maximum(np.abs(true), 50.0)
+            values = true + error * (rng.standard_normal((2, len(true))).T @ [1.0, 1j]) / np.sqrt(2.0)
+            known = true if exact else np.full_like(true, np.nan)
+            columns = (FREQUENCY, name, j + 1, shape, values.real, values.imag, error, known.real, known.imag)
+            frames.append(pd.DataFrame(dict(zip(COLUMNS, columns, strict=True))))
+    return pd.concat(frames)
+
+
+def coherence_table(system):
+    count = len(SYSTEMS[system])
+    frames = [
+        pd.DataFrame({"frequency": FREQUENCY, "estimator": "miso", "input": j + 1, "shape": shape,
+                      "terms": "linear_damping + van_der_pol_damping", "cumulative": (j + 1) / count})
+        for j, (shape, _) in enumerate(SYSTEMS[system])
+    ]  # fmt: skip
+    return pd.concat(frames)
+
+
+def one(system="duffing", number=1, **kwargs):
+    return curves.responses(response_table(system, **kwargs), 10.0)[number - 1]
+
+
+def axes():
+    return Figure().subplots()
+
+
+@pytest.fixture
+def products(tmp_path):
+    """Writes the three products of a case."""
+
+    def write(system, **kwargs):
+        record, responses, coherences = (tmp_path / f"{n}.csv" for n in ("record", "responses", "coherences"))
+        force, displacement = np.random.default_rng(2).standard_normal((2, 2048))
+        channels = {"force": force, "displacement": 0.002 * displacement, "acceleration": force}
+        write_csv(Record(0.02, channels), record)
+        response_table(system, **kwargs).to_csv(responses, index=False)
+        coherence_table(system).to_csv(coherences, index=False)
+        return record, responses, coherences
+
+    return write
+
+
+# ---- pages
+
+
+def test_same_bytes_each_time_and_a_look_that_the_sheet_decides():
+    def made():
+        figure, panels = page.page("Title", "what is shown")
+        frequency_response.magnitude(panels[0], one(), "N/m")
+        page.legend(figure, panels, bands=True)
+        return figure
+
+    for kind in ("png", "svg"):
+        assert page.rendered(made(), kind) == page.rendered(made(), kind)
+    assert b"<dc:date>" not in page.rendered(made(), "svg")
+    assert made().axes[0].lines[0].get_color() == "C0"
+    with style.context({"axes.prop_cycle": "cycler('color', ['ff0000'])"}):
+        assert to_rgba("C0") == (1.0, 0.0, 0.0, 1.0)
+
+
+def check_layout(figure):
+    """Every word within the page, none over another or over a panel, a unit on every axis."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    renderer = canvas.get_renderer()
+    extent, size = figure.get_tightbbox(renderer), figure.get_size_inches()
+    assert min(extent.p0) > 0.0, "something leaves the page at the left or below"
+    assert np.all(extent.p1 < size), "something leaves the page at the right or above"
+    heads = [*figure.texts, *figure.legends, *(a for p in figure.axes for a in (p._left_title, *p.texts))]
+    boxes = [(head, head.get_window_extent(renderer)) for head in heads]
+    boxes = [(head, box) for head, box in boxes if box.width > 0]
+    for (one_head, box), (other_head, other) in itertools.combinations(boxes, 2):
+        assert not box.overlaps(other), f"{one_head} covers {other_head}"
+    for panel in (p for p in figure.axes if p.axison):
+        frame = panel.get_window_extent()
+        assert not any(box.overlaps(frame) for _, box in boxes), "a heading or the legend covers a panel"
+        assert all(label == "" or label.endswith(")") for label in (panel.get_xlabel(), panel.get_ylabel()))
+    shown = [p for p in figure.axes if p.axison]
+    assert not shown or (any(p.get_ylabel() for p in shown) and any(p.get_xlabel() for p in shown))
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_overlaps_on_any_page(draw_case, products, system, kind, monkeypatch, tmp_path):
+    seen = []
+    monkeypatch.setattr(page, "rendered", lambda figure, _: seen.append(figure) or b"")
+    title = "Extreme Duffing-Van der Pol system, input variance 0.2"
+    draw_case.draw(*products(system), {kind: [tmp_path / "a.png"]}, title=title, style=SHEET)
+    check_layout(seen[0])
+
+
+def test_there_is_room_for_many_estimators(draw_case, products, monkeypatch, tmp_path):
+    seen = []
+    monkeypatch.setattr(page, "rendered", lambda figure, _: seen.append(figure) or b"")
+    names = (*styles.ESTIMATORS, "another_one")
+    paths = products("duffing_van_der_pol", spread=0.5, estimators=names)
+    draw_case.draw(*paths, {k: [tmp_path / k] for k in ("linear", "nonlinear")}, title="Noise", style=SHEET)
+    for figure in seen:
+        check_layout(figure)
+    assert {"local polynomial", "95 % band"} <= {t.get_text() for t in seen[0].legends[0].get_texts()}
+
+
+def test_draw_writes_each_kind_twice(draw_case, products, tmp_path):
+    outputs = {kind: [tmp_path / f"{kind}.{ending}" for ending in ("png", "svg")] for kind in KINDS}
+    draw_case.draw(*products("duffing"), outputs, title="Duffing system", style=SHEET)
+    for png, svg in outputs.values():
+        assert png.read_bytes().startswith(b"\x89PNG")
+        assert b"</svg>" in svg.read_bytes()
+
+
+def test_draw_refuses_an_unknown_kind(draw_case, products, tmp_path):
+    with pytest.raises(StudyError, match="no kind of figure 'other'; known are linear"):
+        draw_case.draw(*products("duffing"), {"other": [tmp_path / "a.png"]}, title="", style=SHEET)
+
+
+@pytest.mark.parametrize(
+    ("system", "kind"),
+    [("duffing", "pattern"), ("mathieu", "pattern"), ("mathieu", "autospectrum"), ("linear", "force_history"),
+     ("linear", "force_histogram")],
+)  # fmt: skip
+def test_preliminary_figures(draw_preliminary, products, tmp_path, system, kind, monkeypatch):
+    source = draw_preliminary.Source(products("plain")[0], ROOT / "models" / f"{system}.yaml", f"{system} system")
+    seen, real = [], page.rendered
+    monkeypatch.setattr(page, "rendered", lambda figure, ending: seen.append(figure) or real(figure, ending))
+    output = tmp_path / "a.svg"
+    draw_preliminary.draw(source, {kind: [output]}, style=SHEET, segments=Segments(256))
+    assert b"</svg>" in output.read_bytes()
+    check_layout(seen[0])
+
+
+@pytest.mark.parametrize("length", [128, 256])
+def test_the_stretch_of_force_is_as_long_as_a_segment(draw_preliminary, products, length):
+    source = draw_preliminary.Source(products("plain")[0], ROOT / "models" / "linear.yaml", "")
+    figure = draw_preliminary.force_history(source, Segments(length))
+    assert len(figure.axes[0].lines[0].get_xdata()) == length
+
+
+def test_preliminary_refuses_an_unknown_kind(draw_preliminary, products, tmp_path):
+    source = draw_preliminary.Source(products("plain")[0], ROOT / "models" / "linear.yaml", "")
+    with pytest.raises(StudyError, match="no kind of figure 'other'; known are pattern"):
+        draw_preliminary.draw(source, {"other": [tmp_path / "a.png"]}, style=SHEET, segments={})
