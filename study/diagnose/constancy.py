@@ -17,7 +17,7 @@ from scipy.special import chdtrc
 from study.equations.term import Term
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.prepared import Prepared
-from study.support.thresholds import ALPHA, STILL
+from study.support.thresholds import ALPHA, TOLERANCE
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -138,4 +138,4 @@ def changes(*along: Curve | None) -> float:
 
 def wavers(steady: Curve | None, asked: int) -> bool:
     """Whether a coefficient, of so many that are asked for, moves with the amplitude, by more than integration does."""
-    return steady is not None and steady.p_value() * asked < ALPHA and steady.spread() > STILL
+    return steady is not None and steady.p_value() * asked < ALPHA and steady.spread() > TOLERANCE

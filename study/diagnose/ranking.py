@@ -17,7 +17,7 @@ from study.identify.time_domain.part_fit import linearise
 from study.support import statistics
 from study.support.autoregression import autoregression
 from study.support.cores import cores
-from study.support.thresholds import ALPHA, K
+from study.support.thresholds import ALPHA, NEARLY, K
 
 Floats = NDArray[np.float64]
 
@@ -39,8 +39,7 @@ def rank(candidates: Sequence[Candidate], comparison: Comparison) -> list[Ranked
     own = held_out(comparison.fit, before, linearise(comparison.fit, prepared), prepared).white(noise)
     rows = [replace(r, p_value=min(1.0, len(rows) * _p_value(own, white[r.name]))) for r in rows]
     rows.sort(key=lambda r: float(np.mean(white[r.name] ** 2)))
-    tied = [r for r in rows if r is rows[0] or (_believable(r) and _level(r, rows[0], white))]
-    first = min(tied, key=lambda r: _complexity(r, white[r.name], len(rows)))
+    first = _unimpeached(rows, min(_tie(rows, white), key=lambda r: _complexity(r, white[r.name], len(rows))))
     rows = [first] + [r for r in rows if r is not first]
     return [
         replace(r, distance=distance(r, first, white), tied_with=tuple(_tied(r, rows, white)))
@@ -86,7 +85,30 @@ def _believable(row: Ranked) -> bool:
     return row.gain.explained > 0.0 and row.p_value < ALPHA and not low <= 0.0 <= high
 
 
-def _complexity(row: Ranked, white: Floats, asked: int) -> tuple[bool, bool, int, float]:
-    """Order among candidates that are tied: a physical one whose coefficient stays, and that with fewest unknowns."""
+def _tie(rows: Sequence[Ranked], white: Mapping[str, Floats]) -> list[Ranked]:
+    """The best candidate and those that the record cannot tell from it."""
+    return [r for r in rows if r is rows[0] or (_believable(r) and _level(r, rows[0], white))]
+
+
+def _complexity(row: Ranked, white: Floats, asked: int) -> tuple[bool, int, float]:
+    """Order among candidates that are tied: one that nothing speaks against, and that with fewest unknowns."""
     unknowns = len(row.term.components) + len(row.term.parameters)
-    return bool(row.unphysical), wavers(row.steadiness, asked), unknowns, float(np.mean(white**2))
+    return _impeached(row, asked), unknowns, float(np.mean(white**2))
+
+
+def _impeached(row: Ranked, asked: int) -> bool:
+    """Whether a candidate is fitted outside of what makes it physical, or needs a coefficient that wanders."""
+    return bool(row.unphysical) or wavers(row.steadiness, asked)
+
+
+def _unimpeached(rows: Sequence[Ranked], first: Ranked) -> Ranked:
+    """The first candidate, or the best one that nothing speaks against and that explains nearly as much.
+
+    A Bouc-Wen element of negative stiffness, say, is a hardening spring in disguise; and what imitates another effect
+    needs a coefficient that changes with the level.
+    """
+    if not _impeached(first, len(rows)):
+        return first
+    enough = NEARLY * first.gain.explained
+    better = (r for r in rows if _believable(r) and not _impeached(r, len(rows)) and r.gain.explained >= enough)
+    return next(better, first)
