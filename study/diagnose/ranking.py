@@ -21,6 +21,7 @@ from study.support.thresholds import ALPHA, NEARLY, K
 
 Floats = NDArray[np.float64]
 
+
 def rank(candidates: Sequence[Candidate], comparison: Comparison) -> list[Ranked]:
     """Candidates by what they leave of the held-out residual, the simplest first of those that this cannot tell apart.
 

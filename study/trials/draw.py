@@ -198,6 +198,12 @@ def _forgets(model: Model, drive: Floats, experiment: Experiment) -> bool:
     return float(np.std(one - other)) < FORGOTTEN * float(np.std(one))
 
 
+def _grown(
+    model: Model, entry: ModelTerm, drive: Floats, experiment: Experiment, target: float
+) -> tuple[Model, float] | None:
+    return grown(model, entry, drive, experiment.dt, target, experiment.steps(2), secant=experiment.secant)
+
+
 def _with_own_nonlinearity(
     rng: np.random.Generator, hidden: tuple[str, ...], drive: Floats, experiment: Experiment, quiet: Record
 ) -> tuple[Model, Record]:
@@ -205,7 +211,9 @@ def _with_own_nonlinearity(
     known, base = str(rng.choice(KNOWN)), experiment.system
     if known == "none" or known in hidden:
         return base, quiet
-    known_system = grown(base, free(get(known)), drive, experiment.dt, KNOWN_SHARE, experiment.steps(2))
+    known_system = grown(
+        base, free(get(known)), drive, experiment.dt, KNOWN_SHARE, experiment.steps(2), secant=experiment.secant
+    )
     if known_system is None:
         return base, quiet
     return known_system[0], _simulated(known_system[0], drive, experiment, 4)
@@ -226,7 +234,9 @@ def _with_effects(
     wanted = {name: (float(rng.uniform(*SHARE)), _drawn(rng, get(name), quiet)) for name in hidden}
     for name in (*hidden, *hidden[:-1]):
         target, entry = wanted[name]
-        stronger = grown(model.without_term(name), entry, drive, experiment.dt, target, experiment.steps(2))
+        stronger = grown(
+            model.without_term(name), entry, drive, experiment.dt, target, experiment.steps(2), secant=experiment.secant
+        )
         if stronger is None:
             return None
         model = stronger[0]

@@ -40,6 +40,7 @@ class Experiment:
     dt: float  # sampling interval in seconds
     samples: int  # in the record
     excitation: Excitation
+    secant: bool = True  # whether effects are sized by the secant method; seeds of old rest on a slower one
 
     @property
     def samples_a_period(self) -> float:
@@ -72,7 +73,7 @@ def report_like(rng: np.random.Generator) -> Experiment:
     zeta = float(rng.uniform(0.02, 0.10))
     dt = float(rng.uniform(0.04, 0.08)) / f_n
     excitation = Excitation(level=float(10.0 ** rng.uniform(-1.0, 5.0)), reading="filtered", cutoff=0.25 / dt)
-    return Experiment(_oscillator(mass, f_n, zeta), zeta, f_n, dt, 8192, excitation)
+    return Experiment(_oscillator(mass, f_n, zeta), zeta, f_n, dt, 8192, excitation, secant=False)
 
 
 def wide(rng: np.random.Generator) -> Experiment:

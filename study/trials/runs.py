@@ -78,11 +78,11 @@ def _wanted(
         PAIR: drawn,
         REMOVED: [(name,) for _ in range(settings.removed) for name in HIDDEN if faults == WITHOUT],
     }
-    grid = [(noise, response) for response in MOTIONS for noise in settings.noises]
     return [
-        (kind, (hidden, *grid[(i + i // len(grid) + i // len(HIDDEN)) % len(grid)]))
+        (kind, (hidden, settings.noises[at % len(settings.noises)], MOTIONS[at % len(MOTIONS)]))
         for kind, all_hidden in kinds.items()
         for i, hidden in enumerate(all_hidden)
+        for at in [i // len(HIDDEN) + i % len(HIDDEN)]  # so each effect meets each noise, round by round
     ]
 
 

@@ -1,5 +1,6 @@
 """How strong is an effect: the share of the restoring force that it carries and no linear model can take over."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -15,20 +16,23 @@ from study.support.least_squares import least_squares
 Floats = NDArray[np.float64]
 SHARE = (0.10, 0.40)  # of the rms restoring force, in every trial
 ROUNDS = 12  # of the iteration on the amount
+STEEPEST = 3.0  # power of the amount by which a share is taken to grow, or one over it, at most
 CLOSE = 0.05  # relative distance from the wanted share at which it ends
 
 
 def grown(
-    model: Model, entry: ModelTerm, drive: Floats, dt: float, target: float, steps: int = 2
+    model: Model, entry: ModelTerm, drive: Floats, dt: float, target: float, steps: int = 2, *, secant: bool = False
 ) -> tuple[Model, float] | None:
     """The model with an effect that carries the target share, by iteration on the simulated motion.
 
     The coefficients of ``entry`` say in which proportion, and with which sign, they grow; ``drive`` is the force in N,
-    shape (n,), ``target`` the wanted share and ``steps`` those of the integration a sample. With the model comes the
-    share that was reached; None where the motion diverges or the share cannot be reached.
+    shape (n,), ``target`` the wanted share and ``steps`` those of the integration a sample. With ``secant`` the share
+    is taken for that power of the amount which the last two show, otherwise for its square: slow where damping calms
+    the motion that it acts on. With the model comes the share that was reached; None where the motion diverges or the
+    share cannot be reached.
     """
     unit = tuple(c if c is not None else 1.0 for c in entry.coefficients)
-    amount, share = 0.0, 0.0
+    amount, share, before = 0.0, 0.0, (0.0, 0.0)
     record = simulate(model, drive, dt, Integrator("rk4", steps))
     for _ in range(ROUNDS):
         alone = _unshared(replace(entry, coefficients=unit), record)
@@ -39,13 +43,26 @@ def grown(
         if alone == 0.0:
             return None
         wanted = target * float(np.std(restoring)) / alone
-        amount = wanted if amount == 0.0 else float(np.sqrt(amount * wanted))
+        at = (amount, share)
+        amount, before = _amount(before, at, wanted) if secant else _between(amount, wanted), at
         larger = model.with_term(replace(entry, coefficients=tuple(amount * c for c in unit)))
         try:
             record = simulate(larger, drive, dt, Integrator("rk4", steps))
         except DivergenceError:
             return None
     return None
+
+
+def _between(amount: float, wanted: float) -> float:
+    return wanted if amount == 0.0 else float(np.sqrt(amount * wanted))
+
+
+def _amount(one: tuple[float, float], other: tuple[float, float], wanted: float) -> float:
+    """The next amount from the last two with their shares; ``wanted`` if the share grew as the amount does."""
+    if min(one) <= 0.0 or one[0] == other[0]:
+        return _between(other[0], wanted)
+    slope = math.log(other[1] / one[1]) / math.log(other[0] / one[0])
+    return other[0] * (wanted / other[0]) ** (1.0 / min(max(slope, 1.0 / STEEPEST), STEEPEST))
 
 
 def share_of(model: Model, name: str, record: Record) -> float:

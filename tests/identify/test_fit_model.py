@@ -16,6 +16,7 @@ from study.identify.time_domain.part_fit import fit_part
 from study.identify.time_domain.settling import continued
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.prepared import prepare_record, whole
+from study.support.errors import StudyError
 
 
 def noisy(record, seed=1, fraction=0.01):
@@ -96,3 +97,50 @@ def test_a_width_is_found_within_its_error_where_no_free_run_follows(seed, syste
     assert fit.restarts
     assert abs(fit.estimate["dead_band.u_g"] - 0.0025) < 4.0 * fit.estimate.error("dead_band.u_g")
     assert fit.estimate["dead_band.u_g"] == pytest.approx(0.0025, rel=0.02)
+
+
+def test_where_the_motion_runs_away_from_a_start_one_nearer_to_the_linear_one_is_taken(systems):
+    """Stiffness that differs between the sides: by the reverse system it softens so far that the motion escapes."""
+    terms = systems["linear"].with_term(free(get("quadratic_stiffness")))
+    truth = terms.with_values({"m": 0.0156127, "c": 0.0798547, "k": 582.264, "k2": 50.0108})
+    settings = Excitation(
+        "swept_sine", 34400.0, start_frequency=9.4385, stop_frequency=223.859, sweep="logarithmic", periods=4
+    )  # fmt: skip
+    dt = 1.0 / (41.8 * 30.7356)
+    drive = force(settings, 24640, dt, 1)
+    clean = simulate(truth, drive, dt, Integrator("rk4", 8))
+    noise = displacement_noise(clean["acceleration"], 0.05, 3_100_029)
+    record = replace(clean, channels={"force": drive, "acceleration": clean["acceleration"] + noise})
+    prepared = prepare_record(record)
+    starts = fits.first_starts(opened(truth), prepared)
+    assert fits._tried(opened(truth), prepared, (), starts[1], 5) is None, "the case that this is about"
+    fit = fit_model(opened(truth), prepared)
+    assert fit.rms == pytest.approx(float(np.std(noise[: len(drive) // 2])), rel=0.02)
+    assert fit.model.values["k2"] == pytest.approx(50.0, rel=0.05)
+
+
+def test_a_search_looks_at_everything_where_a_stretch_shows_nothing_of_the_structure(systems):
+    """The end of a slow sweep, sampled often, beside a harmonic force that was not measured."""
+    values = {
+        "m": 32.5561,
+        "c": 72.9475,
+        "k": 1505923.3,
+        "fh_cos": -2.0873,
+        "fh_sin": 0.1035,
+        "harmonic_force.f": 26.9567,
+    }
+    truth = systems["linear"].with_term(free(get("harmonic_force"))).with_values(values)
+    settings = Excitation(
+        "swept_sine", 2.33142, start_frequency=13.951, stop_frequency=176.987, sweep="linear", periods=4
+    )  # fmt: skip
+    dt = 1.0 / (97.4 * 34.23)
+    drive = force(settings, 48656, dt, 1)
+    clean = simulate(truth, drive, dt, Integrator("rk4", 4))
+    noise = displacement_noise(clean["displacement"], 0.01, 3)
+    record = replace(clean, channels={"force": drive, "displacement": clean["displacement"] + noise})
+    prepared = prepare_record(record)
+    with pytest.raises(StudyError, match="nothing in common"):
+        fits.first_starts(systems["linear"], prepared.shortened(shape_search.SEARCHED))
+    fit = fit_model(opened(truth), prepared)
+    assert fit.model.values["harmonic_force.f"] == pytest.approx(26.9567, rel=1e-4)
+    assert fit.rms == pytest.approx(float(np.std(noise[: len(drive) // 2])), rel=0.02)

@@ -27,7 +27,6 @@ from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
 Values = Mapping[str, float]
-SEARCHED = 4096  # samples that a search for open shape parameters looks at, if they show anything
 TRIED = 15  # free runs of a fit that tries a start
 NEAR = 0.01  # standard errors: as near a minimum as the fit of a search has to come
 
@@ -64,25 +63,12 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
         )
     unknown = tuple(t for t in model.terms if None in t.parameters)
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
-    look = _searched(known, prepared) if unknown else prepared
+    look = shape_search.stretch(known, prepared) if unknown else prepared
     fit = best_fit(known, look, first_starts(known, look))
     for entry in unknown:
         fit = with_term(fit, entry, shape_search.baseline(fit, look), look)
     ordered = replace(model, terms=tuple(next(t for t in fit.model.terms if t.name == e.name) for e in model.terms))
     return settled(continued(replace(fit, model=ordered), prepared), prepared)
-
-
-def _searched(model: Model, prepared: Prepared) -> Prepared:
-    """What a search for open shape parameters looks at: everything, where a short stretch shows no linear start.
-
-    A slow sweep that is sampled often may pass none of the structure's own frequencies in it.
-    """
-    look = prepared.shortened(SEARCHED)
-    try:
-        linear_start(model, look)
-    except StudyError:
-        return prepared
-    return look
 
 
 def first_starts(model: Model, prepared: Prepared) -> list[dict[str, float]]:
@@ -137,8 +123,11 @@ def best_fit(
     """
     held = model.held_keys if held is None else tuple(held)
     shapes = tuple(key for key in model.values if "." in key and key not in held)
-    tried = (_tried(model, prepared, (*held, *shapes), start, TRIED) for start in starts)
-    first = sorted((fit for fit in tried if fit is not None), key=lambda fit: fit.rms)
+    begun = list(starts)
+    each = [_tried(model, prepared, (*held, *shapes), start, TRIED) for start in begun]
+    nearer = [_halfway(begun[0], start) for start, fit in zip(begun[1:], each[1:], strict=True) if fit is None]
+    each += [_tried(model, prepared, (*held, *shapes), start, TRIED) for start in nearer]
+    first = sorted((fit for fit in each if fit is not None), key=lambda fit: fit.rms)
     best = first[0] if first else None
     if best is not None and (shapes or not best.converged):
         best = _freed(best, prepared, held)
@@ -167,6 +156,11 @@ def _tried(
         return fit_part(begun, prepared, held, steps=steps, max_iterations=runs, initial=initial, offset=NEAR)
     except StudyError:
         return None
+
+
+def _halfway(safe: Values, start: Values) -> dict[str, float]:
+    """Where to begin if the motion runs away from a start, as it does from springs that soften a little too much."""
+    return {key: value if "." in key else 0.5 * (value + safe.get(key, value)) for key, value in start.items()}
 
 
 def _freed(fit: FreeRunFit, prepared: Prepared, held: Sequence[str]) -> FreeRunFit | None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
-from study.equations.model import ModelTerm
+from study.equations.model import Model, ModelTerm
 from study.equations.term import Parameter, Term
 from study.identify.frequency_domain.starting_values import linear_start, oscillator
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -21,9 +21,23 @@ from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 
+SEARCHED = 4096  # samples that a search for open shape parameters looks at, if they show anything
 PEAKS = 6  # lines of a spectrum that are tried as the frequency of a periodic effect
 STARTS = 4  # points of the search that start a fit
 SPREAD = 5  # points that start a fit where the search is blunt, from one end of the range to the other
+
+
+def stretch(model: Model, prepared: Prepared) -> Prepared:
+    """What a search for open shape parameters looks at: everything, where a short stretch shows no linear start.
+
+    A slow sweep that is sampled often may pass none of the structure's own frequencies in it.
+    """
+    look = prepared.shortened(SEARCHED)
+    try:
+        linear_start(model, look)
+    except StudyError:
+        return prepared
+    return look
 
 
 @dataclass(frozen=True)
