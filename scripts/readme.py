@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from study.compare import history
 from study.reproduction import summary
 from study.support import document
 from study.support.errors import StudyError
@@ -32,8 +33,8 @@ def main(results: Path, figures: Path, readme: Path, tool: Path) -> None:
         said = document.Image("What was hidden, and what was said", CONFUSION)
         document.put(tool, "reach", [reach(pd.read_csv(reached)), said])
         shutil.copyfile(figures / CONFUSION, tool.parent / CONFUSION)
-    if (history := results / "silverbox" / "history.json").is_file():
-        document.put(tool, "ladder", [ladder(json.loads(history.read_text(encoding="utf-8"))["steps"])])
+    if (climbed := results / "silverbox" / "history.json").is_file():
+        document.put(tool, "ladder", [ladder(json.loads(climbed.read_text(encoding="utf-8"))["steps"])])
 
 
 def reach(table: pd.DataFrame) -> document.Block:
@@ -47,9 +48,9 @@ def reach(table: pd.DataFrame) -> document.Block:
 
 def ladder(steps: list[dict]) -> document.Block:
     rows = [
-        ("linear oscillator" if step["added"] is None else f"+ {step['added'].replace('_', ' ')}",
+        ("linear oscillator" if number == 0 else history.label(step).replace("_", " "),
          f"{100.0 * step['error']['response']:.3g} %", f"{1000.0 * step['rms']:.3f} mV")
-        for step in steps
+        for number, step in enumerate(steps)
     ]  # fmt: skip
     return document.table(("model", "error of the response", "rms"), rows)
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from study.compare.history import label
 from study.figures import page
 from study.figures.sheet import in_style
 
@@ -22,7 +23,7 @@ def ladder(axes: Axes, steps: Sequence[dict[str, Any]]) -> Axes:
     floor = [100.0 * s["noise_floor"]["response"] for s in steps]
     axes.plot(place, floor, ":", color="0.1", label="noise floor")
     axes.set_yscale("log")
-    names = [f"+ {s['added']}".replace("_", " ") if s.get("added") else "as given" for s in steps]
+    names = [label(s).replace("_", " ") for s in steps]
     axes.set_xticks(place, names, rotation=20, ha="right")
     axes.set_ylabel("held-out error (%)")
     axes.margins(x=0.08)

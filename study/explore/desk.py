@@ -49,6 +49,7 @@ class Desk:
         self._behind = ThreadPoolExecutor(1, "diagnosis")
         self._actions: Mapping[str, tuple[str, Callable[[str], None]]] = {
             "add": ("adding {}", lambda name: self._change(sessions.with_added(self.session, name))),
+            "drop": ("dropping {}", lambda name: self._change(sessions.dropped(self.session, name))),
             "undo": ("undoing", lambda _: self._change(sessions.undone(self.session))),
             "hold": ("holding {}", lambda key: self._change(sessions.with_held(self.session, key, True))),
             "free": ("freeing {}", lambda key: self._change(sessions.with_held(self.session, key, False))),
