@@ -22,7 +22,8 @@ from study.support.cores import cores
 from study.support.numbers import percent
 from study.support.statistics import clustered_covariance, gain
 
-DOUBLED = 1.0  # of the residual's power: a term without which, linearised, so much more is left is needed for certain
+DOUBLED = 1.0  # of the residual's power: a term without which, linearised, so much more is left is needed for certain;
+# but where shapes or memories bend, as those of hysteresis do, they may take over what the linearised model cannot
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +140,7 @@ class _Stage:
         """The model without a term, if it does as well; None where the term is needed."""
         sized = self._relative_interval(entry, covariance)
         gone = removal(self.fit, entry.name, jacobian)
-        plain = not entry.parameters and entry.term.state is None
+        plain = all(not t.parameters and t.term.state is None for t in self.fit.model.terms)
         lost, left = float(gone.lost @ gone.lost), float(self.fit.residual @ self.fit.residual)
         if plain and sized[0] > 0.0 and lost > DOUBLED * left:
             return None
