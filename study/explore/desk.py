@@ -107,7 +107,7 @@ class Desk:
         self._tell(busy="")
 
     def _change(self, session: Session) -> None:
-        self._tell(session, busy="")
+        self._tell(session)
         self.diagnose()
 
     def _try(self, text: str) -> None:
