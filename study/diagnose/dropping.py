@@ -1,6 +1,7 @@
 """A term taken out of a fitted model: the rest is fitted again, from where it takes over what the term did."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,15 +93,17 @@ def check_can_go(model: Model, name: str) -> None:
     expect(len(names) > 1, f"{name} is the only term beside inertia; expected a model that keeps another one")
 
 
-def _starts(model: Model, prepared: Prepared, start: dict[str, float], held: Sequence[str]) -> list[dict[str, float]]:
+def _starts(
+    model: Model, prepared: Prepared, start: dict[str, float], held: Sequence[str]
+) -> Iterator[dict[str, float]]:  # fmt: skip
     """Where a fit of the model begins; its values are those of the fit with the term."""
     known = model.numbers()
-    starts = [known | start, known] if start else [known]
-    try:
+    if start:
+        yield known | start
+    yield known
+    with suppress(StudyError):
         anew = reverse_start(model, prepared)
-    except StudyError:
-        return starts
-    return [*starts, known | {key: value for key, value in anew.items() if key in known and key not in held}]
+        yield known | {key: value for key, value in anew.items() if key in known and key not in held}
 
 
 def _states(fit: FreeRunFit, name: str) -> Floats:

@@ -65,7 +65,10 @@ def needless(comparison: Comparison, besides: Collection[str] = ()) -> tuple[Nee
     tuple of Needless
         Empty where the response error judges nothing: the free run does not stay finite, or the system is chaotic.
     """
-    terms = [t for t in comparison.model.terms if _open(t) and t.name not in besides]
+    keys = comparison.fit.keys  # a term that another estimator than the fit in free run found has none there
+    terms: list[ModelTerm] = [
+        t for t in comparison.model.terms if _open(t) and t.name not in besides and set(t.keys) <= set(keys)
+    ]
     stage, asked = _Stage(comparison.fit, comparison.prediction, comparison), len(terms)
     found: list[Needless] = []
     while terms and len(stage.fit.model.terms) > 2 and not (stage.prediction.diverged or stage.fit.restarts):
@@ -75,7 +78,7 @@ def needless(comparison: Comparison, besides: Collection[str] = ()) -> tuple[Nee
         first = min(alone, key=lambda n: n.error_without)
         found.append(first)
         stage = _Stage(first.fit, first.prediction, comparison)
-        names = {n.name for n in alone} - {first.name}
+        names = [n.name for n in alone if n is not first]
         terms = [t for t in terms if t.name in names]
     return tuple(found)
 
@@ -93,7 +96,8 @@ def of_records(names: Sequence[str], found: Sequence[Sequence[Needless]], any_mo
 
     What one record does not show another may need.
     """
-    common = set.intersection(*({n.name for n in row} for row in found))
+    first, *others = found
+    common = [n.name for n in first if all(any(n.name == o.name for o in row) for row in others)]
     if not common:
         return ""
     several = len(names) > 1
