@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from study.compare import history
 from study.reproduction import summary
 from study.support import document
 from study.support.errors import StudyError
@@ -27,15 +28,15 @@ def main(results: Path, readme: Path, tool: Path) -> None:
         raise StudyError(f"{claims}: there is no such file; run 'make study' first")
     table = pd.read_csv(claims, keep_default_na=False).set_index("id").loc[list(SHOWN)].reset_index()
     document.put(readme, "numbers", [summary.statements(table)])
-    if (history := results / "silverbox" / "history.json").is_file():
-        document.put(tool, "history", [errors_by_step(json.loads(history.read_text(encoding="utf-8"))["steps"])])
+    if (climbed := results / "silverbox" / "history.json").is_file():
+        document.put(tool, "history", [errors_by_step(json.loads(climbed.read_text(encoding="utf-8"))["steps"])])
 
 
 def errors_by_step(steps: list[dict]) -> document.Block:
     rows = [
-        ("linear oscillator" if step["added"] is None else f"+ {step['added'].replace('_', ' ')}",
+        ("linear oscillator" if number == 0 else history.label(step).replace("_", " "),
          f"{100.0 * step['error']['response']:.3g} %", f"{1000.0 * step['rms']:.3f} mV")
-        for step in steps
+        for number, step in enumerate(steps)
     ]  # fmt: skip
     return document.table(("model", "error of the response", "rms"), rows)
 

@@ -15,6 +15,7 @@ from study.commands.record_arguments import (
 
 if TYPE_CHECKING:
     from study.compare.comparison import Comparison
+    from study.diagnose.needless import Needless
     from study.equations.model import Model
     from study.equations.terms import Term
 
@@ -33,6 +34,7 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.compare.comparison import compare
     from study.compare.comparison_report import as_json, document, history_step, summary
     from study.diagnose.adding import added
+    from study.diagnose.needless import needless, of_records
     from study.equations.model_file import add_term, read_model
     from study.support.file_sets import write_files
 
@@ -43,19 +45,23 @@ def _run(arguments: argparse.Namespace) -> None:
     steps = history.read(arguments.model)
     records = read_records(arguments)
     pairs: list[tuple[Comparison, Comparison]] = []
-    with progress(" fits", 2 * len(records)) as step:
+    unneeded: list[tuple[Needless, ...]] = []
+    with progress(" fits", 3 * len(records)) as step:
         for record in records:
             before = compare(model, prepared_of(arguments, record))
             step("")
             pairs.append((before, added(before, term)))
             step("")
+            unneeded.append(needless(pairs[-1][1], besides=(term.name,)))
+            step("")
+    said = of_records([record.name for record in records], unneeded, any_more=True)
     for before, after in pairs:
         steps = history.climbed(steps, history_step(before), history_step(after, term.name))
     history.write(arguments.model, steps)
     add_term(arguments.model, term)
     write_files(folder, {"comparison.json": as_json(document([after for _, after in pairs]))})
     print(summary([after for _, after in pairs]))
-    print("\n" + history.table(steps))
+    print("\n" + history.table(steps) + (f"\n\n{said}" if said else ""))
 
 
 def _term(arguments: argparse.Namespace) -> "Term":

@@ -10,6 +10,7 @@ from study.compare import history
 from study.compare.history_picture import files as history_pictures
 from study.diagnose import diagnosis_report
 from study.diagnose.diagnosis_files import files as diagnosis_files
+from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, Diagnosis
 from study.equations.model_file import WANTED, parse_model
 from study.explore import session as sessions
@@ -28,6 +29,9 @@ def climb(record: Path, model: Path, options: Sequence[str], steps: int, folder:
     for each diagnosis), ``climb.html``, ``history.json`` and the history's picture; what an earlier climb left there is
     removed. The options are those of the command line: how the record is read, fitted and judged. At most ``steps``
     effects are added.
+
+    What the model does not need any more after an addition is taken out again. So that the climb ends, a term that was
+    taken out comes back only where the error falls below all that was reached.
     """
     arguments = parser().parse_args(["explore", str(record), "--model", str(model), *options])
     text = read_text(model, WANTED)
@@ -37,9 +41,9 @@ def climb(record: Path, model: Path, options: Sequence[str], steps: int, folder:
     session = sessions.begin(parse_model(text, model), prepared_of(arguments, data))
     for number in range(steps + 1):
         session, diagnosis = _diagnosed(session, work / f"step_{number}")
-        if diagnosis.verdict != MISSING or number == steps:
+        if diagnosis.verdict != MISSING or number == steps or _in_a_circle(session, diagnosis.candidates[0]):
             break
-        session = sessions.with_added(session, diagnosis.candidates[0].name)
+        session = _stepped_back(sessions.with_added(session, diagnosis.candidates[0].name))
     saved = files(session, model.name, text)
     write_files(folder, {SAVED: saved.pop(PAGE), "history.json": history.as_bytes(session.steps)})
     write_files(folder, history_pictures(session.steps, model.stem))
@@ -48,11 +52,32 @@ def climb(record: Path, model: Path, options: Sequence[str], steps: int, folder:
     return session.steps
 
 
+def _in_a_circle(session: Session, first: Ranked) -> bool:
+    """Whether a candidate was taken out before and would bring no model that is better than all so far."""
+    least = min(stage.comparison.prediction.error for stage in session.stages)
+    again = first.name in {stage.dropped for stage in session.stages} and first.response_error >= least
+    if again:
+        print(f"{first.name} was taken out before and brings nothing that was not reached: the climb ends\n")
+    return again
+
+
+def _stepped_back(session: Session) -> Session:
+    """The session without what its model does not need any more after an addition."""
+    added = session.now.added
+    while True:
+        session = sessions.weighed(session)
+        found = [n for n in session.now.unneeded or () if n.name != added]
+        if not found:
+            return session
+        print(found[0].sentence(any_more=True) + "\n")
+        session = sessions.dropped(session, found[0].name)
+
+
 def _diagnosed(session: Session, folder: Path) -> tuple[Session, Diagnosis]:
     """The session with its present model diagnosed, printed and written into a folder; and the diagnosis."""
     now, diagnosis = sessions.examined(session)
     print(f"{now.label}: {diagnosis.verdict.replace('_', ' ')}")
     print(diagnosis_report.table(diagnosis))
     print(f"\n{now.said}\n", flush=True)
-    write_files(folder, diagnosis_files(diagnosis, now.said))
+    write_files(folder, diagnosis_files(diagnosis, now.said, now.unneeded or ()))
     return sessions.with_stage(session, now), diagnosis

@@ -44,7 +44,8 @@ def _diagnosed(model: "Model", record: "Record", arguments: argparse.Namespace, 
     """Diagnose one record, print the diagnosis, and give the files' contents."""
     from study.compare.comparison import compare
     from study.diagnose import diagnosis_report
-    from study.diagnose.diagnosis_files import files, in_words
+    from study.diagnose.diagnosis_files import files, in_words, unneeded_in_words
+    from study.diagnose.needless import needless
     from study.diagnose.verdict import diagnose
 
     prepared = prepared_of(arguments, record)
@@ -52,11 +53,14 @@ def _diagnosed(model: "Model", record: "Record", arguments: argparse.Namespace, 
         comparison = compare(model, prepared)
         without = tuple(arguments.without)
         diagnosis = diagnose(comparison, extra=own, without=without, progress=lambda _: step(""))
+        unneeded = needless(comparison)
         words = in_words(diagnosis)
     print(f"{record.name}: {diagnosis.verdict.replace('_', ' ')}")
     print(diagnosis_report.table(diagnosis))
     print("\n" + words)
-    return files(diagnosis, words)
+    if unneeded:
+        print(f"\n{unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
+    return files(diagnosis, words, unneeded)
 
 
 COMMAND = Command(

@@ -122,10 +122,14 @@ def level_row(level: Level) -> Row:
     }  # fmt: skip
 
 
-def history_step(comparison: Comparison, added: str | None = None) -> Row:
-    """A comparison as a step of the history (``study.compare.history``); ``added`` names the term that is new in it."""
+def history_step(comparison: Comparison, added: str | None = None, dropped: str | None = None) -> Row:
+    """A comparison as a step of the history (``study.compare.history``).
+
+    ``added`` names the term that is new in it, ``dropped`` the one that was taken out.
+    """
     return {
-        "terms": [t.name for t in comparison.model.terms], "added": added, "record": comparison.record.name,
+        "terms": [t.name for t in comparison.model.terms], "added": added, "dropped": dropped,
+        "record": comparison.record.name,
         "error": {"force": comparison.force.total, "response": comparison.prediction.error},
         "rms": float(comparison.prediction.error * comparison.prediction.size),
         "unit": comparison.record.units.get(comparison.plan.response, ""),

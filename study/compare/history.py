@@ -52,13 +52,21 @@ def climbed(steps: list[Step], before: Step, after: Step) -> list[Step]:
     return [*steps, *([] if known else [before]), after]
 
 
+def label(step: Step) -> str:
+    """What was done to arrive at a model: ``+ term``, ``- term`` or ``as given``."""
+    if step.get("added"):
+        return f"+ {step['added']}"
+    return f"- {step['dropped']}" if step.get("dropped") else "as given"
+
+
 def table(steps: list[Step]) -> str:
     """The history for people, one line a model."""
     from tabulate import tabulate
 
     rows: list[list[str]] = []
     for number, step in enumerate(steps):
-        what = f"+ {step['added']}" if step.get("added") else ", ".join(step["terms"])
+        done = label(step)
+        what = ", ".join(step["terms"]) if done == "as given" else done
         error = step["error"]
         force = "-" if error["force"] is None else percent(error["force"])
         rows.append(

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator
 
+from study.compare.history import label
 from study.figures import page
 from study.figures.sheet import in_style
 
@@ -25,7 +26,7 @@ def errors_by_step(axes: Axes, steps: Sequence[dict[str, Any]]) -> Axes:
     axes.set_yscale("log", subs=[])
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    names = [f"+ {s['added']}".replace("_", " ") if s.get("added") else "as given" for s in steps]
+    names = [label(s).replace("_", " ") for s in steps]
     axes.set_xticks(place, names, rotation=20, ha="right")
     axes.set_ylabel("held-out error (%)")
     axes.margins(x=0.08)

@@ -19,7 +19,13 @@ def credible(before: Prediction, after: Prediction, interval: tuple[float, float
     p_value : float
         Of what it explains, all effects that were asked for accounted for.
     """
+    return certain(before, after, interval, p_value) and percent(before.error) != percent(after.error)
+
+
+def certain(before: Prediction, after: Prediction, interval: tuple[float, float], p_value: float) -> bool:
+    """The same, whether or not the gain shows in the digits printed: much noise hides there what is no chance.
+
+    An effect that is certain but not credible is neither called missing nor, where it is in the model, needless.
+    """
     gained = math.sqrt(max(before.error**2 - after.error**2, 0.0))
-    zero = interval[0] <= 0.0 <= interval[1]
-    seen = percent(before.error) != percent(after.error)
-    return p_value < ALPHA and not zero and gained > TOLERANCE and seen
+    return p_value < ALPHA and not interval[0] <= 0.0 <= interval[1] and gained > TOLERANCE

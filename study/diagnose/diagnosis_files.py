@@ -1,10 +1,13 @@
 """A diagnosis in words, and as the files that a command writes."""
 
+from collections.abc import Sequence
+
 from study.compare.comparison_report import as_json, where
 from study.diagnose import diagnosis_pages, diagnosis_report
 from study.diagnose.diagnosis_sentences import sentences
+from study.diagnose.needless import Needless, fields, paragraph
 from study.diagnose.separating_test import advice
-from study.diagnose.verdict import MISSING, Diagnosis
+from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
 
 
 def in_words(diagnosis: Diagnosis) -> str:
@@ -15,9 +18,18 @@ def in_words(diagnosis: Diagnosis) -> str:
     return " ".join(s for s in said if s)
 
 
-def files(diagnosis: Diagnosis, words: str) -> dict[str, bytes]:
-    """``diagnosis.json`` and the pictures by file name; ``words`` is the diagnosis in words."""
+def unneeded_in_words(found: Sequence[Needless], diagnosis: Diagnosis) -> str:
+    """Which terms the diagnosed model does not need, in sentences; empty if it needs all."""
+    return paragraph(found, complete=diagnosis.verdict == NOTHING)
+
+
+def files(diagnosis: Diagnosis, words: str, unneeded: Sequence[Needless] = ()) -> dict[str, bytes]:
+    """``diagnosis.json`` and the pictures by file name; ``words`` is the diagnosis in words.
+
+    ``unneeded`` are the terms of the model that it does not need.
+    """
     comparison = diagnosis.comparison
     content = diagnosis_report.fields(diagnosis)
     content |= {"record": comparison.record.name, "where": where(comparison), "says": words}
+    content["not_needed"] = fields(unneeded)
     return {"diagnosis.json": as_json(content)} | diagnosis_pages.files(diagnosis, comparison.record.name)

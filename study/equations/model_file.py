@@ -103,12 +103,37 @@ def add_term(path: Path, entry: Term | ModelTerm) -> Model:
     return after
 
 
+def drop_term(path: Path, name: str) -> Model:
+    """Take a term out of a model file, and return the model that the file now holds.
+
+    Every other byte stays, but for a comment behind the entry on its own line; on any failure the file is untouched.
+
+    Raises
+    ------
+    StudyError
+        If the file is no model, lacks the term or has no other, or cannot be written.
+    """
+    text = text_without(path, name)
+    replace_file(path, text.encode())
+    return parse_model(text, path)
+
+
+def text_without(path: Path, name: str) -> str:
+    """The text of a model file without a term, which stays in the file; raises as :func:`drop_term`."""
+    text = read_text(path, WANTED)
+    before = parse_model(text, path)
+    if name not in before or len(before.terms) == 1:
+        raise StudyError(f"{path}: {shown(name)} cannot be taken out of {', '.join(t.name for t in before.terms)}")
+    return revised(text, str(path), before.without_term(name))
+
+
 def revised(text: str, source: str, model: Model) -> str:
     """The text of a model file, changed to hold this model; comments, order and quoting stay.
 
-    The model has the terms of the file in their order, values held or freed, and perhaps further terms. ``source`` is
-    named in messages.
+    The model has terms of the file in their order, values held or freed, and perhaps further terms behind them; what it
+    lacks of the file is taken out. ``source`` is named in messages.
     """
+    text = _shortened(text, source, model)
     before = parse_model(text, Path(source)).terms
     for number, entry in enumerate(model.terms):
         if number >= len(before):
@@ -117,6 +142,20 @@ def revised(text: str, source: str, model: Model) -> str:
             text = yaml_text.with_changed(text, "terms", number, format_entry(entry))
     if not _holds(text, Path(source), model):
         raise StudyError(f"{source}: its layout leaves no clear place for a change; expected one entry a line")
+    return text
+
+
+def _shortened(text: str, source: str, model: Model) -> str:
+    """The text with those entries alone that the model begins with, in their order."""
+    wanted, gone = [t.name for t in model.terms], list[int]()
+    entries = parse_model(text, Path(source)).terms
+    for number, entry in enumerate(entries):
+        if wanted[number - len(gone) :][:1] != [entry.name]:
+            gone.append(number)
+    if len(gone) == len(entries):
+        raise StudyError(f"{source}: none of its terms is left; expected a model that keeps one")
+    for number in reversed(gone):
+        text = yaml_text.without_entry(text, "terms", number)
     return text
 
 

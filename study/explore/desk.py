@@ -49,6 +49,7 @@ class Desk:
         self._behind = ThreadPoolExecutor(1, "diagnosis")
         self._actions: Mapping[str, tuple[str, Callable[[str], None]]] = {
             "add": ("adding {}", lambda name: self._change(sessions.with_added(self.session, name))),
+            "drop": ("dropping {}", lambda name: self._change(sessions.dropped(self.session, name))),
             "undo": ("undoing", lambda _: self._change(sessions.undone(self.session))),
             "hold": ("holding {}", lambda key: self._change(sessions.with_held(self.session, key, True))),
             "free": ("freeing {}", lambda key: self._change(sessions.with_held(self.session, key, False))),
@@ -106,7 +107,7 @@ class Desk:
         self._tell(busy="")
 
     def _change(self, session: Session) -> None:
-        self._tell(session, busy="")
+        self._tell(session)
         self.diagnose()
 
     def _try(self, text: str) -> None:

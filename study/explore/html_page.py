@@ -10,6 +10,7 @@ import numpy as np
 from bokeh.models import ColumnDataSource, CustomJS
 from jinja2 import Environment, Template
 
+from study.compare.history import label
 from study.explore import plots, theme, words
 from study.explore.axis_scales import Columns
 from study.explore.page_units import in_text
@@ -84,10 +85,10 @@ def history_height(steps: int) -> int:
 def history_columns(session: Session) -> Columns:
     """The history as columns: errors and noise floor in per cent by the name of the step."""
     steps = session.steps
-    earlier = [f"+ {step['added']}" if step.get("added") else "as given" for step in steps]
+    earlier = [label(step) for step in steps]
     named = [*earlier[: len(steps) - len(session.stages)], *(stage.label for stage in session.stages)]
     return {
-        "name": [f"{i} {words.in_words(label)}" for i, label in enumerate(named)],
+        "name": [f"{i} {words.in_words(done)}" for i, done in enumerate(named)],
         "response": [100.0 * step["error"]["response"] for step in steps],
         "force": [100.0 * (step["error"]["force"] or np.nan) for step in steps],
         "floor": [100.0 * step["noise_floor"]["response"] for step in steps],

@@ -24,5 +24,5 @@ def files(session: Session, name: str, text: str) -> dict[str, bytes]:
     }
     contents |= pictures(now.comparison) | history_pictures(steps, stem)
     if now.diagnosis is not None:
-        contents |= diagnosis_files(now.diagnosis, now.said)
+        contents |= diagnosis_files(now.diagnosis, now.said, now.unneeded or ())
     return contents

@@ -12,9 +12,10 @@ import numpy as np
 from study.compare.comparison import Comparison, compare
 from study.compare.comparison_report import history_step
 from study.compare.missing_force import MissingForce, missing_force
-from study.diagnose import candidates
+from study.diagnose import candidates, dropping
 from study.diagnose.candidates import Candidate
-from study.diagnose.diagnosis_files import in_words
+from study.diagnose.diagnosis_files import in_words, unneeded_in_words
+from study.diagnose.needless import Needless, needless
 from study.diagnose.ranked import Ranked
 from study.diagnose.ranking import rank
 from study.diagnose.verdict import Diagnosis, diagnose, search_base, search_part
@@ -41,6 +42,8 @@ class Stage:
     diagnosis: Diagnosis | None = None  # None as long as nobody has asked
     said: str = ""  # the diagnosis in words
     would: Mapping[str, MissingForce] = field(default_factory=dict[str, MissingForce])  # with a candidate, by its name
+    dropped: str | None = None  # the term that was taken out of the model before
+    unneeded: tuple[Needless, ...] | None = None  # terms that it does not need; None as long as nobody has asked
 
     @property
     def shown(self) -> tuple[Ranked, ...]:
@@ -71,7 +74,7 @@ class Session:
     @property
     def steps(self) -> list[Step]:
         """The history, the steps before this session included."""
-        own = [history_step(r.comparison, r.added) for r in self.stages]
+        own = [history_step(r.comparison, r.added, r.dropped) for r in self.stages]
         last = self.earlier[-1] if self.earlier else None
         known = last is not None and last["terms"] == own[0]["terms"] and last["record"] == own[0]["record"]
         return [*self.earlier, *own[1 if known else 0 :]]
@@ -107,6 +110,28 @@ def with_added(session: Session, name: str) -> Session:
     return climbed(session, comparison, f"+ {name}", name)
 
 
+def dropped(session: Session, name: str) -> Session:
+    """The session with a term taken out of the model and the rest fitted again.
+
+    Raises
+    ------
+    StudyError
+        If it is not in the model or cannot be left out.
+    """
+    comparison = dropping.dropped(session.now.comparison, name)
+    return replace(
+        session, stages=(*session.stages, Stage(comparison.model, f"- {name}", None, comparison, dropped=name))
+    )
+
+
+def weighed(session: Session) -> Session:
+    """The session with the present model's terms asked whether they are needed."""
+    if session.now.unneeded is not None:
+        return session
+    now = replace(session.now, unneeded=needless(session.now.comparison))
+    return replace(session, stages=(*session.stages[:-1], now))
+
+
 def undone(session: Session) -> Session:
     """The session before its last change; the model as given stays."""
     return replace(session, stages=session.stages[:-1]) if len(session.stages) > 1 else session
@@ -126,9 +151,14 @@ def with_held(session: Session, key: str, hold: bool) -> Session:
 
 
 def examined(session: Session, progress: Callable[[int], None] | None = None) -> tuple[Stage, Diagnosis]:
-    """The present stage with what is missing, in words too, and what each candidate would leave; and the diagnosis."""
+    """The present stage with what is missing and what is not needed, in words too, and what each candidate would leave.
+
+    And the diagnosis.
+    """
     diagnosis = diagnose(session.now.comparison, extra=session.own, progress=progress)
-    return _foreseen(replace(session.now, diagnosis=diagnosis, said=in_words(diagnosis))), diagnosis
+    now = weighed(session).now
+    said = f"{in_words(diagnosis)} {unneeded_in_words(now.unneeded or (), diagnosis)}".strip()
+    return _foreseen(replace(now, diagnosis=diagnosis, said=said)), diagnosis
 
 
 def lacking_with(row: Ranked) -> MissingForce:
@@ -151,7 +181,9 @@ def _foreseen(stage: Stage) -> Stage:
 def with_stage(session: Session, stage: Stage) -> Session:
     """The session with a diagnosed stage in place of those of its model; unchanged if that was undone meanwhile."""
     stages = (
-        replace(r, diagnosis=stage.diagnosis, said=stage.said, would=stage.would) if r.model == stage.model else r
+        replace(r, diagnosis=stage.diagnosis, said=stage.said, would=stage.would, unneeded=stage.unneeded)
+        if r.model == stage.model
+        else r
         for r in session.stages
     )
     return replace(session, stages=tuple(stages))

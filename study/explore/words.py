@@ -7,6 +7,7 @@ from typing import Any
 from study.compare.comparison import Comparison
 from study.compare.comparison_sentences import says
 from study.compare.fitted_coefficients import Coefficient
+from study.diagnose.needless import Needless
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, NOTHING
 from study.explore.page_units import in_text, length, number, rate
@@ -31,7 +32,7 @@ def words(stage: Stage, rows: Sequence[Ranked], step: int, live: bool, force_uni
         "says": escape(says(comparison)),
         "verdict": _verdict(stage, live),
         "candidates": _candidates(stage, rows, live),
-        "coefficients": _coefficients(comparison, live),
+        "coefficients": _coefficients(stage, live),
         "equation": equation(stage),
         "notes": escape("; ".join(comparison.notes)),
         "step": escape(name(stage, step)),
@@ -147,18 +148,29 @@ def _bar(row: Ranked) -> str:
     )
 
 
-def _coefficients(comparison: Comparison, live: bool) -> str:
+def _coefficients(stage: Stage, live: bool) -> str:
+    """A row each; that of a term's first coefficient says whether the term is not needed."""
     head = "<tr><th></th><th>term</th><th>value</th><th>95 % interval</th><th>unit</th><th></th></tr>"
-    return f"<table>{head}{''.join(_coefficient(c, live) for c in comparison.coefficients)}</table>"
+    waiting = {n.name: n for n in stage.unneeded or ()}
+    rows = [_coefficient(c, live, waiting.pop(c.term, None)) for c in stage.comparison.coefficients]
+    return f"<table>{head}{''.join(rows)}</table>"
 
 
-def _coefficient(coefficient: Coefficient, live: bool) -> str:
+def _unneeded(term: Needless | None, live: bool) -> str:
+    """That a term is not needed, with the button that takes it out."""
+    if term is None:
+        return ""
+    drop = f" <button data-act='drop' data-name='{escape(term.name)}'>Drop</button>" if live else ""
+    return f"<span class='unneeded' title='{escape(term.sentence())}'>not needed{drop}</span>"
+
+
+def _coefficient(coefficient: Coefficient, live: bool, unneeded: Needless | None) -> str:
     half = "held" if coefficient.error is None else f"± {number(1.96 * coefficient.error, 2)}"
     act, label = ("free", "Free") if coefficient.held else ("hold", "Hold")
     button = f"<button data-act='{act}' data-name='{escape(coefficient.key)}'>{label}</button>" if live else ""
     return (
         f"<tr data-key='{escape(coefficient.key)}'><td><i>{escape(coefficient.key.rpartition('.')[2])}</i></td>"
-        f"<td>{escape(in_words(coefficient.term))}</td>"
+        f"<td>{escape(in_words(coefficient.term))}{_unneeded(unneeded, live)}</td>"
         f"<td class='number'>{number(coefficient.value, 5)}</td><td>{half}</td>"
         f"<td>{escape(in_text(coefficient.unit))}</td><td>{button}</td></tr>"
     )

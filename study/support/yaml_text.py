@@ -116,6 +116,45 @@ def with_changed(text: str, key: str, number: int, entry: str) -> str:
     return text[: node.start_mark.index] + entry + text[_last_leaf(node).end_mark.index :]
 
 
+def without_entry(text: str, key: str, number: int) -> str:
+    """The text without one entry of that list, counted from zero, which must have another; nothing else changes.
+
+    A comment behind the entry, on its own line, goes with it: it is about what goes.
+    """
+    nodes = _list(text, key)
+    node = nodes.value[number]
+    if nodes.flow_style:
+        return _without_item(text, nodes.value, number)
+    dash = text.rindex("-", 0, node.start_mark.index)
+    first = text.rfind("\n", 0, dash) + 1
+    end = text.find("\n", len(text[: _last_leaf(node).end_mark.index].rstrip()))
+    if end < 0:  # the last line, which nothing ends: nor does the one before it then
+        return text[: max(first - 1, 0)].removesuffix("\r")
+    return text[:first] + text[end + 1 :]
+
+
+def _without_item(text: str, nodes: list[Any], number: int) -> str:
+    """The text without one item of a list in brackets, and without the comma that it needed."""
+    start, end = nodes[number].start_mark.index, _last_leaf(nodes[number]).end_mark.index
+    if number > 0:
+        before = nodes[number - 1].end_mark.index
+        if text[before:start].strip() == ",":  # no comment between
+            return text[:before] + text[end:]
+    if number + 1 < len(nodes):
+        behind = nodes[number + 1].start_mark.index
+        if text[end:behind].strip() == ",":
+            return text[:start] + text[behind:]
+    comma = text.find(",", end)
+    follows = comma >= 0 and not text[end:comma].strip()
+    rest = text[comma + 1 if follows else end :]
+    line = text.rfind("\n", 0, start) + 1
+    alone = not text[line:start].strip()
+    comment = rest.partition("\n")[0].strip()
+    if alone and (not comment or comment.startswith("#")):
+        return text[:line] + rest.partition("\n")[2]
+    return text[:start] + rest
+
+
 def _list(text: str, key: str) -> Any:
     return next(value for name, value in _yaml().compose(text).value if name.value == key)
 

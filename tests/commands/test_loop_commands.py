@@ -3,7 +3,12 @@ import json
 import pytest
 
 from study import cli, trials
+from study.commands import climb
 from study.compare import history
+from study.diagnose import verdict
+from study.equations.model_file import read_model
+from study.explore import session as sessions
+from study.explore.saved_files import PAGE
 from study.records.record import write_csv
 
 
@@ -54,6 +59,11 @@ def test_diagnose_add_history(rig, capsys):
         (["diagnose", "rig.csv", "--model", "rig.yaml", "--without", "friction"], "there is no term 'friction'"),
         (["diagnose", "none.csv", "--model", "rig.yaml"], "none.csv"),
         (["history", "none.yaml"], "none.yaml"),
+        (["drop", "rig.yaml", "hysteresis", "--data", "rig.csv"], "rig.yaml: 'hysteresis' is not in the model"),
+        (["drop", "rig.yaml", "no_such\nthing", "--data", "rig.csv"], "is not in the model; expected linear_damping"),
+        (["drop", "rig.yaml", "inertia", "--data", "rig.csv"], "rig.yaml: inertia cannot be dropped"),
+        (["drop", "rig.yaml", "linear_damping", "--data", "none.csv"], "none.csv"),
+        (["drop", "none.yaml", "linear_damping", "--data", "rig.csv"], "none.yaml"),
     ],
 )
 def test_bad_input_is_one_sentence_and_changes_nothing(rig, capsys, words, said):
@@ -72,6 +82,112 @@ def test_a_broken_history_is_refused_before_the_model_is_touched(rig, capsys):
     assert cli.main(["add", "rig.yaml", "quadratic_damping", "--data", "rig.csv"]) == 2
     assert "is not JSON" in capsys.readouterr().err
     assert (rig / "rig.yaml").read_bytes() == before
+
+
+def test_the_only_term_left_is_not_dropped(rig, capsys):
+    (rig / "rig.yaml").write_text("terms: [inertia, linear_stiffness]\n")
+    assert cli.main(["drop", "rig.yaml", "linear_stiffness", "--data", "rig.csv"]) == 2
+    assert "linear_stiffness is the only term beside inertia; expected" in capsys.readouterr().err
+    assert (rig / "rig.yaml").read_text() == "terms: [inertia, linear_stiffness]\n"
+
+
+def test_what_is_not_needed_is_said_and_dropped(rig, capsys):
+    """What an earlier guess added, and what the record shows once the hidden drag is in the model."""
+    text = (rig / "rig.yaml").read_text() + "  # tried in March\n"
+    (rig / "rig.yaml").write_text(text)
+    add = ["add", "rig.yaml", "quadratic_damping", "--data", "rig.csv", "--out", "found"]
+    drop = ["drop", "rig.yaml", "quadratic_stiffness", "--data", "rig.csv", "--out", "found"]
+    assert cli.main(["add", "rig.yaml", "quadratic_stiffness", "--data", "rig.csv", "--out", "found"]) == 0
+    capsys.readouterr()
+    assert cli.main(add) == 0
+    said = "Quadratic stiffness is not needed any more: without it the error is "
+    assert said in capsys.readouterr().out
+
+    assert cli.main(["diagnose", "rig.csv", "--model", "rig.yaml", "--out", "found"]) == 0
+    assert "Quadratic stiffness is not needed: without it" in capsys.readouterr().out
+    (unneeded,) = json.loads((rig / "found" / "diagnosis.json").read_text())["not_needed"]
+    assert unneeded["term"] == "quadratic_stiffness"
+
+    assert cli.main(drop) == 0
+    out = capsys.readouterr().out
+    assert "- quadratic_stiffness" in out
+    assert "not needed" not in out
+    assert (rig / "rig.yaml").read_text() == text.replace("  # tried", "  - quadratic_damping\n  # tried")
+    steps = history.read(rig / "rig.yaml")
+    assert [history.label(s) for s in steps[1:]] == [
+        "+ quadratic_stiffness",
+        "+ quadratic_damping",
+        "- quadratic_stiffness",
+    ]
+    assert steps[-1]["error"]["response"] == pytest.approx(unneeded["error_without"], rel=1e-3)
+    assert "quadratic_stiffness" not in steps[-1]["terms"]
+    assert cli.main(drop) == 2
+    assert len(history.read(rig / "rig.yaml")) == len(steps)
+
+
+def test_a_layout_that_cannot_be_changed_is_refused_before_anything_is_written(rig, capsys, monkeypatch):
+    monkeypatch.setattr("study.support.yaml_text.without_entry", lambda text, *_: f"{text}!")
+    before = (rig / "rig.yaml").read_bytes()
+    assert cli.main(["drop", "rig.yaml", "linear_damping", "--data", "rig.csv"]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert (rig / "rig.yaml").read_bytes() == before
+    assert not history.path_of(rig / "rig.yaml").exists()
+
+
+def test_a_climb_goes_forwards_and_backwards(rig, capsys):
+    """It begins with an effect that does some of the work of the missing one, and ends without it."""
+    (rig / "rig.yaml").write_text((rig / "rig.yaml").read_text() + "  - cubic_damping  # a guess\n")
+    steps = climb.climb(rig / "rig.csv", rig / "rig.yaml", [], 3, rig / "out")
+    assert [history.label(s) for s in steps] == ["as given", "+ quadratic_damping", "- cubic_damping"]
+    assert steps[-1]["error"]["response"] == pytest.approx(steps[-2]["error"]["response"], rel=0.01)
+    assert "Cubic damping is not needed any more" in capsys.readouterr().out
+    reached = read_model(rig / "out" / "climb" / "rig.yaml")
+    assert "cubic_damping" not in reached
+    assert "quadratic_damping" in reached
+    assert "# a guess" in (rig / "rig.yaml").read_text()
+    assert "- cubic damping" in (rig / "out" / climb.SAVED).read_text()
+    assert not (rig / "out" / "climb" / PAGE).exists()
+
+
+def test_a_climb_does_not_go_in_a_circle(rig, capsys, monkeypatch):
+    """A diagnosis that asks for what was just taken out, again and again, ends the climb."""
+    (rig / "rig.yaml").write_text((rig / "rig.yaml").read_text() + "  - quadratic_stiffness\n")
+    original = sessions.diagnose
+
+    def stubborn(comparison, **options):
+        found = original(comparison, **options)
+        rows = sorted(found.candidates, key=lambda row: row.name != "quadratic_stiffness")
+        first = rows[0].name == "quadratic_stiffness" or "quadratic_damping" not in comparison.model
+        shown = tuple(rows) if rows[0].name == "quadratic_stiffness" else found.candidates
+        return verdict.Diagnosis(**{**vars(found), "verdict": verdict.MISSING if first else found.verdict,
+                                    "candidates": shown})  # fmt: skip
+
+    monkeypatch.setattr(sessions, "diagnose", stubborn)
+    steps = climb.climb(rig / "rig.csv", rig / "rig.yaml", [], 6, rig / "out")
+    assert [history.label(s) for s in steps] == ["as given", "+ quadratic_damping", "- quadratic_stiffness"]
+    assert "the climb ends" in capsys.readouterr().out
+
+
+def test_a_term_comes_back_where_it_brings_the_best_model_so_far():
+    """What was not needed once may be needed when the model around it is another."""
+
+    class Row:
+        name = "relaxation"
+        response_error = 0.1
+
+    class Error:
+        def __init__(self, error, dropped=None):
+            self.comparison, self.dropped = self, dropped
+            self.prediction, self.error = self, error
+
+    class Past:
+        stages = (Error(0.3), Error(0.2, "relaxation"))
+
+    assert not climb._in_a_circle(Past(), Row())  # type: ignore[arg-type]
+    Row.response_error = 0.2
+    assert climb._in_a_circle(Past(), Row())  # type: ignore[arg-type]
+    Row.name = "hysteresis"
+    assert not climb._in_a_circle(Past(), Row())  # type: ignore[arg-type]
 
 
 @pytest.mark.usefixtures("rig")

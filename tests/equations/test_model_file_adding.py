@@ -1,4 +1,4 @@
-"""Adding a term to a model file leaves the rest as the user wrote it."""
+"""Adding a term to a model file, or taking one out, leaves the rest as the user wrote it."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import pytest
 
 from study.equations import model_file
 from study.equations.model import ModelTerm, free
-from study.equations.model_file import add_term, read_model
+from study.equations.model_file import add_term, drop_term, read_model, revised
 from study.equations.terms import custom, get
 from study.support.errors import StudyError
 
@@ -84,3 +84,95 @@ def test_a_layout_without_a_clear_place_is_left_alone(tmp_path: Path, monkeypatc
     with pytest.raises(StudyError, match="add '- cubic_stiffness' to 'terms' by hand"):
         add_term(path, get("cubic_stiffness"))
     assert path.read_text() == "terms: [inertia]\n"
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_what_was_added_is_taken_out_to_the_byte(layout: str, tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_bytes(LAYOUTS[layout].encode())
+    before = read_model(path)
+    add_term(path, ModelTerm(get("one_sided_contact"), (1.25e25,), (-1e-7,)))
+    assert drop_term(path, "one_sided_contact") == before
+    assert path.read_bytes() == LAYOUTS[layout].encode()
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_taking_out_any_entry_leaves_the_others(layout: str, place: int, tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_bytes(LAYOUTS[layout].encode())
+    for name in ("cubic_stiffness", "relaxation"):
+        add_term(path, get(name))
+    before, old = read_model(path), path.read_text()
+    name = before.terms[place].name
+    after = drop_term(path, name)
+    assert after == read_model(path) == before.without_term(name)
+    left, kept = iter(old), path.read_text()
+    assert all(letter in left for letter in kept)  # letters are gone, none is new, none has moved
+
+
+LINES = {
+    "head": "# rig\nterms:\n  # the weights\n",
+    "inertia": "  - inertia   # weighed\n",
+    "linear_damping": "  - linear_damping  # guess\n",
+    "between": "  # springs\n",
+    "linear_stiffness": "  - linear_stiffness # k\n",
+    "tail": "\n# the end\n",
+}
+
+
+@pytest.mark.parametrize("name", ["inertia", "linear_damping", "linear_stiffness"])
+def test_comments_stay_but_for_the_one_behind_the_entry(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text("".join(LINES.values()))
+    drop_term(path, name)
+    assert path.read_text() == "".join(line for key, line in LINES.items() if key != name)
+
+
+@pytest.mark.parametrize(
+    ("name", "wanted"),
+    [
+        ("inertia", "terms: [\n  {term: linear_damping, value: 1},  # damper\n  linear_stiffness\n]\n"),
+        ("linear_damping", "terms: [\n  inertia,   # mass\n  linear_stiffness\n]\n"),
+        ("linear_stiffness", "terms: [\n  inertia,   # mass\n  {term: linear_damping, value: 1},  # damper\n]\n"),
+    ],
+)
+def test_an_entry_of_a_list_in_brackets_goes_with_its_line(name: str, wanted: str, tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text(
+        "terms: [\n  inertia,   # mass\n  {term: linear_damping, value: 1},  # damper\n  linear_stiffness\n]\n"
+    )
+    drop_term(path, name)
+    assert path.read_text() == wanted
+
+
+def test_a_term_that_is_not_there_or_alone_is_not_taken_out(tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text("terms: [inertia]\n")
+    for name in ("inertia", "hysteresis"):
+        with pytest.raises(StudyError, match=f"rig.yaml: '{name}' cannot be taken out of inertia"):
+            drop_term(path, name)
+    assert path.read_text() == "terms: [inertia]\n"
+
+
+def test_a_text_follows_a_model_that_lost_one_term_and_got_another() -> None:
+    """A session may drop a term, add others and add it again: it then stands behind them."""
+    text = "terms:\n  - inertia # m\n  - linear_damping # c\n  - linear_stiffness # k\n"
+    model = model_file.parse_model(text, Path("rig.yaml"))
+    lost = model.without_term("linear_damping").with_term(get("cubic_stiffness"))
+    again = lost.with_term(get("linear_damping")).with_values({"k": 3.5})
+    assert revised(text, "rig.yaml", again) == (
+        "terms:\n  - inertia # m\n  - {term: linear_stiffness, value: 3.5} # k\n  - cubic_stiffness\n"
+        "  - linear_damping\n"
+    )
+
+
+def test_a_layout_from_which_nothing_can_be_taken_is_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text("terms: [inertia, cubic_stiffness]\n")
+    monkeypatch.setattr(model_file.yaml_text, "without_entry", lambda text, *_: f"{text}!")
+    with pytest.raises(StudyError, match=r"rig\.yaml: "):
+        drop_term(path, "cubic_stiffness")
+    assert path.read_text() == "terms: [inertia, cubic_stiffness]\n"

@@ -107,6 +107,50 @@ def test_a_value_is_held_where_it_stands_and_freed_again(grown):
             sessions.with_held(held, key, hold)
 
 
+@pytest.fixture(scope="module")
+def superfluous(grown: sessions.Session) -> sessions.Session:
+    """With a term more than the record shows, and diagnosed."""
+    more = added(grown.now.comparison, get("quadratic_stiffness"))
+    session = sessions.climbed(grown, more, "+ quadratic_stiffness", "quadratic_stiffness")
+    return sessions.with_stage(session, sessions.examined(session)[0])
+
+
+def test_what_is_not_needed_has_a_button_that_takes_it_out(grown, superfluous):
+    now = superfluous.now
+    assert [n.name for n in now.unneeded] == ["quadratic_stiffness"]
+    assert "Quadratic stiffness is not needed: without it" in now.said
+    places = dict(zip(*words.words(now, now.shown, 2, True, "N").values(), strict=True))
+    assert re.findall(r"data-act='drop' data-name='(\w+)'", places["coefficients"]) == ["quadratic_stiffness"]
+    assert "not needed" in places["coefficients"]
+    saved_ = dict(zip(*words.words(now, now.shown, 2, False, "N").values(), strict=True))["coefficients"]
+    assert "not needed" in saved_
+    assert "data-act" not in saved_
+    needed = dict(zip(*words.words(grown.now, (), 1, True, "N").values(), strict=True))["coefficients"]
+    assert "data-act='drop'" not in needed
+
+
+def test_a_dropped_term_is_gone_and_undoing_brings_it_back(grown, superfluous):
+    after = sessions.dropped(superfluous, "quadratic_stiffness")
+    assert after.now.label == "- quadratic_stiffness"
+    assert after.now.model == grown.now.model
+    error = grown.now.comparison.prediction.error
+    assert after.now.comparison.prediction.error == pytest.approx(error, rel=1e-3)
+    assert [history.label(s) for s in after.steps] == [
+        "as given", "+ quadratic_damping", "+ quadratic_stiffness", "- quadratic_stiffness"
+    ]  # fmt: skip
+    assert html_page.history_columns(after)["name"][-1] == "3 - quadratic stiffness"
+    assert sessions.undone(after) == superfluous
+    model = model_file.format_model(grown.stages[0].model.with_term(get("quadratic_stiffness")))
+    contents = files(after, "rig.yaml", f"# hall 3\n{model}")
+    assert "quadratic_stiffness" not in contents["rig.yaml"].decode()
+    assert contents["rig.yaml"].startswith(b"# hall 3\n")
+    assert b'"dropped": "quadratic_stiffness"' in contents["rig.history.json"]
+    assert b'"not_needed"' in files(superfluous, "rig.yaml", model)["diagnosis.json"]
+    for name, said in (("hysteresis", "not in the model"), ("inertia", "cannot be dropped")):
+        with pytest.raises(StudyError, match=said):
+            sessions.dropped(after, name)
+
+
 def test_a_formula_is_tried_beside_the_library(asked):
     tried = sessions.tried(asked, "mine = v*abs(v)")
     row = sessions.candidate(tried, "mine")
@@ -281,6 +325,11 @@ def test_the_desk_does_one_thing_at_a_time_and_says_what_went_wrong(asked, tmp_p
     wait("add", "quadratic_damping")
     assert desk.session.now.label == "+ quadratic_damping"
     assert "adding quadratic_damping" in busy
+    wait("drop", "hysteresis")
+    assert "'hysteresis' is not in the model" in desk.state.notice
+    wait("drop", "quadratic_damping")
+    assert desk.session.now.label == "- quadratic_damping"
+    assert "dropping quadratic_damping" in busy
     desk.close()
 
 
