@@ -211,9 +211,7 @@ def _with_own_nonlinearity(
     known, base = str(rng.choice(KNOWN)), experiment.system
     if known == "none" or known in hidden:
         return base, quiet
-    known_system = grown(
-        base, free(get(known)), drive, experiment.dt, KNOWN_SHARE, experiment.steps(2), secant=experiment.secant
-    )
+    known_system = _grown(base, free(get(known)), drive, experiment, KNOWN_SHARE)
     if known_system is None:
         return base, quiet
     return known_system[0], _simulated(known_system[0], drive, experiment, 4)
@@ -234,9 +232,7 @@ def _with_effects(
     wanted = {name: (float(rng.uniform(*SHARE)), _drawn(rng, get(name), quiet)) for name in hidden}
     for name in (*hidden, *hidden[:-1]):
         target, entry = wanted[name]
-        stronger = grown(
-            model.without_term(name), entry, drive, experiment.dt, target, experiment.steps(2), secant=experiment.secant
-        )
+        stronger = _grown(model.without_term(name), entry, drive, experiment, target)
         if stronger is None:
             return None
         model = stronger[0]

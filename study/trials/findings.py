@@ -8,14 +8,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from study.compare.comparison import Comparison, compare
-from study.diagnose.ranked import Ranked
+from study.diagnose.credibility import credible
 from study.diagnose.verdict import MISSING, Diagnosis
 from study.equations.model import Model
 from study.records.prepared import Prepared
-from study.support.numbers import percent
 
 Row = dict[str, Any]
 Found = Mapping[str, Any]  # a fault of the measurement as diagnosis.json has it
+WHATEVER_ITS_P_VALUE = 0  # effects asked for: a p value times none is below any alpha
 FAR = 20.0  # standard errors: rivals that are farther behind stand in no tie set
 
 
@@ -42,19 +42,14 @@ def evidence(diagnosis: Diagnosis, hidden: Sequence[str]) -> Row:
     rows = diagnosis.candidates
     behind = {row.name: max(row.distance, 0.0) for row in rows}
     true = next((row for row in rows if row.name in hidden), None)
-    before = diagnosis.comparison.prediction.error
-    believable = [r.p_value for r in rows if _off_zero(r) and percent(before) != percent(r.response_error)]
+    before = diagnosis.comparison.prediction
+    believable = [r.p_value for r in rows if credible(before, r.prediction, r.interval, WHATEVER_ITS_P_VALUE)]
     return {
         "smallest_p": min(believable, default=1.0),
         "true_p": math.nan if true is None else true.p_value,
         "distance": math.nan if true is None else behind[true.name],
         "rivals": "+".join(f"{d:.2f}" for d in behind.values() if d < FAR),
     }
-
-
-def _off_zero(row: Ranked) -> bool:
-    low, high = row.interval
-    return not low <= 0.0 <= high
 
 
 def intervals(comparison: Comparison, truth: Model) -> Row:

@@ -27,7 +27,8 @@ def differing(own: pd.DataFrame, kept: pd.DataFrame) -> list[str]:
 def _apart(column: str, own: pd.DataFrame, before: pd.DataFrame) -> Sequence[int]:
     one, other = own[column], before[column]
     if column in WORDS:
-        same = one.fillna("").astype(str).to_numpy() == other.fillna("").astype(str).to_numpy()
+        first, second = (c.astype(object).where(c.notna(), "").astype(str).to_numpy() for c in (one, other))
+        same = first == second
     else:
         numbers = [pd.to_numeric(c, errors="coerce").to_numpy(dtype=np.float64) for c in (one, other)]
         floor = 1e-6 if column.startswith("error") else 0.0  # what the integration leaves where there is no noise

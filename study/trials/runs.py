@@ -16,12 +16,13 @@ from study.compare.comparison import Comparison
 from study.compare.prediction import predict
 from study.diagnose.adding import added
 from study.diagnose.verdict import diagnose
+from study.faults.imposed import FAULTS
 from study.identify.time_domain.part_fit import fit_part
 from study.records.prepared import Prepared, prepare_record
 from study.records.record import MOTIONS
 from study.reproduction.settings import TrialSettings
 from study.support.errors import StudyError
-from study.trials.draw import ANY, HIDDEN, NO_FAULT, Trial, make_trial
+from study.trials.draw import HIDDEN, NO_FAULT, Trial, make_trial
 from study.trials.experiment import WIDE
 from study.trials.findings import Row, accounted, evidence, intervals, measurement, tie_set
 
@@ -92,7 +93,7 @@ def run(order: Order) -> Row:
     row |= {"kind": order.kind, "seed": order.seed, "hidden": "+".join(order.hidden), "faults": order.faults}
     row |= {"noise": order.noise, "response": order.response}
     try:
-        fault = ANY if order.faults == WITH else NO_FAULT
+        fault = FAULTS[order.seed % len(FAULTS)] if order.faults == WITH else NO_FAULT
         trial = make_trial(order.seed, order.hidden, order.noise, order.response, fault, WIDE)
         row |= _answer(trial)
         begun = time.perf_counter()

@@ -10,6 +10,7 @@ import pytest
 from scipy.stats import binomtest
 
 from study.diagnose.verdict import diagnose
+from study.faults.imposed import FAULTS
 from study.records.prepared import prepare_record
 from study.reproduction.config import load
 from study.reproduction.settings import TrialSettings
@@ -23,7 +24,7 @@ from study.trials.runs import COLUMNS, Order
 ROOT = Path(__file__).parents[2]
 CONFIG = load(ROOT / "config").settings.trials
 KEPT = ROOT / "docs" / "trials.csv"
-AGAIN, SLOW = 12, 4.0  # trials that are run again, but for those that took longer than so many seconds
+AGAIN, QUICK = 12, 3000  # trials that are run again: the first, those of records with fewer samples among them
 SETTINGS = TrialSettings(
     first_seed=100, noises=(0.0, 0.05), rounds=1, none=2, completed=1, pairs=4, removed=1, jobs=3
 )  # fmt: skip
@@ -214,6 +215,14 @@ def test_a_trial_that_cannot_be_made_is_a_row_with_its_trouble(monkeypatch: pyte
     assert "no system" in made["trouble"]
 
 
+def test_every_trial_with_a_fault_has_one_and_all_have_their_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runs, "_judged", lambda *_: {})
+    made = [runs.run(Order("none", 5000 + i, (), 0.01, "velocity", "with")) for i in range(len(FAULTS))]
+    assert {m["fault"] for m in made} == set(FAULTS)
+    assert all(m["trouble"] == "" for m in made)
+    assert runs.run(Order("none", 5000, (), 0.01, "velocity"))["fault"] == ""
+
+
 def test_the_kept_table_is_what_this_code_gives(tmp_path: Path) -> None:
     """Its first trials again; where this fails, `make trials` is due."""
     table = pd.read_csv(KEPT)
@@ -221,7 +230,7 @@ def test_the_kept_table_is_what_this_code_gives(tmp_path: Path) -> None:
     first = table.sort_values("seed").head(AGAIN)
     orders = {order.seed: order for order in runs.orders(CONFIG)}
     assert set(table["seed"]) <= set(orders)
-    quick = [orders[int(seed)] for seed in first.loc[first["seconds"] < SLOW, "seed"]]
+    quick = [orders[int(seed)] for seed in first.loc[first["samples"] < QUICK, "seed"]]
     assert len(quick) >= 3
     own = written([runs.run(order) for order in quick], tmp_path)
     assert kept.differing(own, table) == [], "other settings, other code, or other rounding"
