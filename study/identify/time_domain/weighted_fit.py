@@ -2,7 +2,7 @@
 
 Noise of any colour biases no fit in free run, but the plain sum of squares makes poor use of a record whose noise lies
 at some frequencies alone. The residual of a wrong model is no noise: weighted with it, the model leaves more of the
-response, and the plain fit stands.
+response or its coefficients move by more than their errors, and the plain fit stands.
 """
 
 from dataclasses import replace
@@ -10,12 +10,12 @@ from dataclasses import replace
 import numpy as np
 
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.part_fit import fit_part
+from study.identify.time_domain.part_fit import covariance_of, fit_part, linearise
 from study.identify.time_domain.settling import continued, settled
 from study.records.prepared import Prepared
 from study.support.autoregression import autoregression
 from study.support.errors import DivergenceError
-from study.support.thresholds import TOLERANCE
+from study.support.thresholds import TOLERANCE, K
 
 RUNS = 20  # free runs of the weighted fit, which begins at the plain one
 
@@ -40,4 +40,15 @@ def weighted(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     except DivergenceError:
         return fit
     again = replace(again, elsewhere=fit.elsewhere)
-    return again if again.converged and again.rms - fit.rms < TOLERANCE * prepared.spread else fit
+    return again if again.converged and _agree(fit, again, prepared) else fit
+
+
+def _agree(plain: FreeRunFit, other: FreeRunFit, prepared: Prepared) -> bool:
+    """Whether two fits follow the response alike, and no coefficient moves by more than its error explains.
+
+    Of a true model weighting lowers the variance, so what moves an estimate is less than that (Hausman, 1978).
+    """
+    if other.rms - plain.rms > TOLERANCE * prepared.spread:
+        return False
+    deviations = np.sqrt(np.diag(covariance_of(plain, linearise(plain, prepared))))[: len(plain.keys)]
+    return bool(np.all(np.abs(other.values - plain.values) <= K * deviations))
