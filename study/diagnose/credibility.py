@@ -2,10 +2,8 @@
 
 from study.compare.prediction import Prediction
 from study.support.numbers import percent
-from study.support.statistics import gain
-
-ALPHA = 0.01  # probability of believing in an effect that is not there, all that were asked for together
-SMALLEST_GAIN = 1e-3  # of the rms response: what an effect must explain; less is the resolution of integration
+from study.support.statistics import ALPHA as ALPHA
+from study.support.statistics import SMALLEST_GAIN, gain
 
 
 def credible(before: Prediction, after: Prediction, interval: tuple[float, float], asked: int = 1) -> bool:

@@ -13,6 +13,8 @@ from study.support.arrays import Floats
 BLOCKS = 24
 TESTED = 48  # blocks of a test that ranks them: with 24 it lacks power
 SHORTEST = 16  # samples in a block
+ALPHA = 0.01  # probability of believing in what is not there, all that was asked for together
+SMALLEST_GAIN = 1e-3  # of the rms response: what an effect must explain; less is the resolution of integration
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model
@@ -104,6 +105,7 @@ def fit_free_run(
     initial: str | Floats = "estimate",
     continuity: float = 0.0,
     offset: float = OFFSET,
+    lost: NDArray[np.bool_] | None = None,
 ) -> FreeRunFit:
     """Fit a model in free run.
 
@@ -127,6 +129,8 @@ def fit_free_run(
         states, the residual as a share of the response's. From 100 on the segments are one motion, all but exactly.
     offset : float
         Length of the next step, in standard errors, at which a search has converged.
+    lost : bool array, shape (samples of the record,), optional
+        Samples of the response that say nothing: their residual counts as zero.
 
     Raises
     ------
@@ -155,7 +159,8 @@ def fit_free_run(
         states[:, :2] = starting_states(record, response, (first, *restarts))
     measured = record[response][first : first + run.samples]
     positive = tuple(key for entry in model.terms for key in entry.term.positive if key in begin)
-    problem = _Problem(run, measured, free, _weights(continuity, measured, states), positive)
+    kept = None if lost is None else (~lost[first : first + run.samples]).astype(np.float64)
+    problem = _Problem(run, measured, free, _weights(continuity, measured, states), positive, kept)
     end = problem.search(np.array([*begin.values(), *states.ravel()]), max_iterations, offset)
     return replace(
         _result(model, problem, end), restarts=tuple(restarts), first=first, steps_per_sample=steps_per_sample
@@ -194,6 +199,7 @@ class _Problem:
     free_states: int
     weights: Floats | None
     positive: tuple[str, ...]
+    kept: Floats | None  # 0 for samples that are lost, 1 for others
 
     def states(self, x: Floats) -> Floats:
         """Initial states in the variables, shape (segments, states)."""
@@ -215,7 +221,10 @@ class _Problem:
         if self.weights is not None:
             gaps = self.weights * (arrivals[:, :, 0] - states[1:])
             continuity = ContinuityGaps(gaps, self.weights[:, None] * arrivals[:, :, 1:], self.weights)
-        return point_at(x, self.measured - response, jacobian, len(self.run.keys), (0, *self.run.cuts), continuity)
+        residual = self.measured - response
+        if self.kept is not None:
+            residual, jacobian = residual * self.kept, jacobian * self.kept[:, None]
+        return point_at(x, residual, jacobian, len(self.run.keys), (0, *self.run.cuts), continuity)
 
     def search(self, x: Floats, max_iterations: int, offset: float) -> End:
         """The minimum near x."""

@@ -1,0 +1,106 @@
+"""Physical effects that a record asks for beside a model: what a fault of the measurement has to prove itself against."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from study.equations.model import ModelTerm, free
+from study.equations.terms import LIBRARY, Term
+from study.faults.leftover import Leftover, better, leftover, share
+from study.identify.time_domain import shape_search
+from study.identify.time_domain.fit_model import continued, settled, with_term
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.part_fit import fit_part, run_of
+from study.records.prepared import Prepared
+from study.support.arrays import Floats
+from study.support.errors import StudyError
+
+LOOKED_AT = 4096  # samples of the fitting part, at most, in a search
+FITTED = 3  # effects of the largest linear share that are fitted
+
+
+def asks_for_more(left: Leftover) -> bool:
+    """Whether any effect of the library explains a part of what is left, as far as small amounts of it show.
+
+    One free run with the sensitivities of all effects without shape parameters.
+    """
+    columns = _sensitivities(left)
+    if columns is None:
+        return True
+    found = [share(left, (columns[0][:, [i]], columns[1][:, [i]])) for i in range(columns[0].shape[1])]
+    return any(f is not None and f.significant(len(found)) for f in found)
+
+
+def missing(left: Leftover, without: Sequence[str] = ()) -> FreeRunFit | None:
+    """The fitted model with the effect that explains most of what is left; None if none explains any of it."""
+    prepared, fit = left.prepared, left.fit
+    look = prepared.shortened(LOOKED_AT)
+    terms = [t for t in LIBRARY.values() if t.name not in fit.model and t.name != "inertia" and t.name not in without]
+    try:
+        near = fit if look is prepared else fit_part(fit.model, look, fit.held, steps=fit.steps_per_sample)
+        base = shape_search.baseline(near, look)
+    except StudyError:
+        return None
+    promising = sorted(terms, key=lambda term: -_linear_share(term, base, look))[:FITTED]
+    tried = [_fitted(term, base, look, prepared) for term in promising]
+    best = min(
+        (t for t in tried if t is not None), key=lambda t: float(np.sum(t.residual[1] ** 2)), default=None
+    )  # fmt: skip
+    return best.fit if best is not None and better(left, best, len(terms)) else None
+
+
+def refitted(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit | None:
+    """A fit again, on a record that was corrected, from where it stands; None where that does not run."""
+    try:
+        return fit_part(fit.model, prepared, fit.held, steps=fit.steps_per_sample, initial=np.atleast_2d(fit.initial))
+    except StudyError:
+        return None
+
+
+def without_effect(fit: FreeRunFit, name: str, prepared: Prepared) -> FreeRunFit | None:
+    """The model without one of its effects, fitted again; None where that does not run."""
+    model = fit.model.without_term(name)
+    held = [key for key in fit.held if key in model.values]
+    states = np.atleast_2d(fit.initial)
+    own = next(entry for entry in fit.model.terms if entry.name == name).term.state is not None
+    try:
+        return fit_part(
+            model, prepared, held, steps=fit.steps_per_sample, initial=None if own else states
+        )  # fmt: skip
+    except StudyError:
+        return None
+
+
+def _linear_share(term: Term, base: shape_search.Baseline, look: Prepared) -> float:
+    return max((start.share for start in shape_search.starts(term, base, look)), default=0.0)
+
+
+def _fitted(term: Term, base: shape_search.Baseline, look: Prepared, prepared: Prepared) -> Leftover | None:
+    """What the model with an effect leaves; None where it does not run."""
+    try:
+        fit = with_term(base.fit, free(term), base, look)
+        return leftover(settled(continued(fit, prepared), prepared), prepared)
+    except StudyError:
+        return None
+
+
+def _sensitivities(left: Leftover) -> tuple[Floats, Floats] | None:
+    """What small amounts of plain effects add to the response on both parts; None where that run fails."""
+    fit, model, keys = left.fit, left.fit.model, list[str]()
+    run = left.prediction.run
+    for term in LIBRARY.values():
+        if term.name not in model and not term.parameters and term.name != "inertia":
+            model = model.with_term(ModelTerm(term, (0.0,) * len(term.components), ()))
+            keys += term.symbols
+    if run is None or not keys:
+        return None
+    extended = replace(fit, model=model, keys=tuple(keys), values=np.zeros(len(keys)))
+    try:
+        fitted = run_of(extended, left.prepared, keys).respond(dict.fromkeys(keys, 0.0), fit.initial, 0)[1]
+        judged = run.derivatives(extended)[:, : len(keys)]
+    except StudyError:
+        return None
+    if not (np.all(np.isfinite(fitted)) and np.all(np.isfinite(judged))):
+        return None
+    return fitted, judged
