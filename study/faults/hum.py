@@ -9,7 +9,7 @@ from scipy.fft import rfft
 from scipy.special import fdtrc
 
 from study.faults.fault import HUM, Fault
-from study.faults.leftover import Leftover, Share, share
+from study.faults.leftover import Leftover, share
 from study.support.arrays import Floats
 from study.support.statistics import ALPHA
 

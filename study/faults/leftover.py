@@ -72,7 +72,7 @@ class Leftover:
 class Share:
     """What columns explain of a leftover; k columns."""
 
-    amounts: Floats  # shape (k,)
+    amounts: Floats  # shape (k,); on the fitting part
     covariance: Floats  # shape (k, k), clustered
     gain: Gain  # on the judging part
     power: float  # by which the mean square falls there, over that of the response
@@ -116,3 +116,13 @@ def better(before: Leftover, after: Leftover, asked: int) -> bool:
     power = float(np.mean(before.residual[1] ** 2) - np.mean(after.residual[1] ** 2)) / before.size**2
     held_out = gain(before.residual[1], after.residual[1])
     return held_out.p_value * asked < ALPHA and power > SMALLEST_GAIN**2
+
+
+def amounts_on_both(left: Leftover, columns: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """Amounts of the columns, shape (k,), and their clustered covariance, from both parts of the record together."""
+    fitted, judged = left.known(columns)
+    count = fitted.shape[1]
+    design = np.vstack([np.hstack([left.own[0], fitted]), np.hstack([left.own[1], judged])])
+    residual = np.concatenate(left.residual)
+    amounts = least_squares(design, residual, 1e-9)
+    return amounts[-count:], clustered_covariance(design, residual - design @ amounts)[-count:, -count:]

@@ -1,23 +1,22 @@
 """Physical effects that a record asks for beside a model: what a fault of the measurement has to prove itself against."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from study.equations.model import ModelTerm, free
+from study.equations.model import ModelTerm
 from study.equations.terms import LIBRARY, Term
 from study.faults.leftover import Leftover, better, leftover, share
 from study.identify.time_domain import shape_search
-from study.identify.time_domain.fit_model import continued, settled, with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part, run_of
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
 from study.support.errors import StudyError
 
-LOOKED_AT = 4096  # samples of the fitting part, at most, in a search
+LOOKED_AT = 2048  # samples of the fitting part, at most, in a search
 FITTED = 3  # effects of the largest linear share that are fitted
+RUNS = 20  # free runs of such a fit
 
 
 def asks_for_more(left: Leftover) -> bool:
@@ -32,22 +31,21 @@ def asks_for_more(left: Leftover) -> bool:
     return any(f is not None and f.significant(len(found)) for f in found)
 
 
-def missing(left: Leftover, without: Sequence[str] = ()) -> FreeRunFit | None:
-    """The fitted model with the effect that explains most of what is left; None if none explains any of it."""
+def missing(left: Leftover) -> Leftover | None:
+    """What is left beside the effect that explains most; None if none explains any of it."""
     prepared, fit = left.prepared, left.fit
     look = prepared.shortened(LOOKED_AT)
-    terms = [t for t in LIBRARY.values() if t.name not in fit.model and t.name != "inertia" and t.name not in without]
+    terms = [t for t in LIBRARY.values() if t.name not in fit.model and t.name != "inertia"]
     try:
         near = fit if look is prepared else fit_part(fit.model, look, fit.held, steps=fit.steps_per_sample)
         base = shape_search.baseline(near, look)
     except StudyError:
         return None
-    promising = sorted(terms, key=lambda term: -_linear_share(term, base, look))[:FITTED]
-    tried = [_fitted(term, base, look, prepared) for term in promising]
-    best = min(
-        (t for t in tried if t is not None), key=lambda t: float(np.sum(t.residual[1] ** 2)), default=None
-    )  # fmt: skip
-    return best.fit if best is not None and better(left, best, len(terms)) else None
+    starts = [(term, shape_search.starts(term, base, look)[:1]) for term in terms]
+    promising = sorted((s for s in starts if s[1]), key=lambda s: -s[1][0].share)[:FITTED]
+    tried = [_fitted(term, point[0], base, look, prepared) for term, point in promising]
+    best = min((t for t in tried if t is not None), key=lambda t: float(np.sum(t.residual[1] ** 2)), default=None)
+    return best if best is not None and better(left, best, len(terms)) else None
 
 
 def refitted(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit | None:
@@ -72,15 +70,17 @@ def without_effect(fit: FreeRunFit, name: str, prepared: Prepared) -> FreeRunFit
         return None
 
 
-def _linear_share(term: Term, base: shape_search.Baseline, look: Prepared) -> float:
-    return max((start.share for start in shape_search.starts(term, base, look)), default=0.0)
-
-
-def _fitted(term: Term, base: shape_search.Baseline, look: Prepared, prepared: Prepared) -> Leftover | None:
-    """What the model with an effect leaves; None where it does not run."""
+def _fitted(
+    term: Term, point: shape_search.Start, base: shape_search.Baseline, look: Prepared, prepared: Prepared
+) -> Leftover | None:  # fmt: skip
+    """What the model with an effect leaves, from one start and with few runs; None where it does not run."""
+    fit, entry = base.fit, ModelTerm(term, point.coefficients, point.parameters)
     try:
-        fit = with_term(base.fit, free(term), base, look)
-        return leftover(settled(continued(fit, prepared), prepared), prepared)
+        first = fit_part(fit.model.with_term(entry), look, fit.held, steps=fit.steps_per_sample, max_iterations=RUNS)
+        whole = first if look is prepared else fit_part(
+            first.model, prepared, fit.held, steps=fit.steps_per_sample, max_iterations=RUNS
+        )
+        return leftover(whole, prepared)
     except StudyError:
         return None
 

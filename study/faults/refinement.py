@@ -11,7 +11,7 @@ from study.faults.correction import corrected
 from study.faults.drift import slow_part
 from study.faults.fault import HIGH_PASS, HUM, Fault
 from study.faults.hum import hum
-from study.faults.leftover import Leftover, leftover, share
+from study.faults.leftover import Leftover, amounts_on_both, leftover
 from study.faults.physics import refitted
 from study.records.prepared import Prepared
 from study.support import statistics
@@ -41,10 +41,8 @@ def refined(
         return None if line is None else _corrected(line, given, faults, left)
     before = left
     for _ in range(STEPS):
-        found = share(left, adjustable.columns(name, left, value))
-        if found is None:
-            return None
-        step, error = float(found.amounts[0]), math.sqrt(max(float(found.covariance[0, 0]), 0.0))
+        amounts, covariance = amounts_on_both(left, adjustable.columns(name, left, value))
+        step, error = float(amounts[0]), math.sqrt(max(float(covariance[0, 0]), 0.0))
         value += step
         if not adjustable.sensible(name, value, left):
             return None

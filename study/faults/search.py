@@ -14,15 +14,17 @@ from study.faults.correction import corrected
 from study.faults.drift import drift
 from study.faults.fault import DRIFT, FORCE_NOISE, HUM, SPIKES, Fault
 from study.faults.force_noise import force_noise
-from study.faults.hum import hum, is_of_the_mains
+from study.faults.hum import hum, is_of_the_mains, line
 from study.faults.leftover import Leftover, better, leftover, share
 from study.faults.refinement import Refined, refined
 from study.faults.spikes import spikes
 from study.faults.spotted import spotted
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.prepared import Prepared
+from study.support.arrays import Floats
+from study.support.statistics import gain
 
-ROUNDS = 8  # faults looked for one after the other
+ROUNDS = 12  # faults and effects looked for one after the other
 EFFECTS = 3  # of the library that are added before a fault is believed
 
 
@@ -74,6 +76,7 @@ def search(given: Prepared, fit: FreeRunFit, faults: Sequence[Fault], asked: Seq
         if following is None:
             break
         stage = following
+    stage = _needed(stage)
     noise = force_noise(stage.rich, len(asked)) if FORCE_NOISE in asked else None
     return stage.faults if noise is None else (*stage.faults, noise)
 
@@ -115,17 +118,36 @@ def _merged(faults: Sequence[Fault], spike: Fault) -> Fault:
 
 
 def _contested(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
-    """One fault more of those that have a look-alike among the effects of the library."""
-    alone = _best(stage.left, names, asked)
-    if alone is None and not stage.effects and not physics.asks_for_more(stage.left):
+    """One fault more of those that have a look-alike in the library, or one effect more that the record asks for."""
+    name = _best(stage.rich, names, asked)
+    one = None if name is None else refined(name, stage.given, stage.faults, stage.rich)
+    effect = _effect(stage, one)
+    if one is None:
+        return None if effect is None else replace(stage, rich=effect)
+    if effect is None:
+        return _accepted(stage, one)
+    fault_needed = share(effect, _columns(one.fault, effect))
+    needed = fault_needed is not None and fault_needed.significant(asked), _needs(one, effect)
+    if needed == (False, False):
+        return _tied(stage, one, effect)
+    if needed == (False, True) or (all(needed) and _power(effect) < _power(one.left)):
+        return replace(stage, rich=effect)
+    return _accepted(stage, one)
+
+
+def _effect(stage: Stage, one: Refined | None) -> Leftover | None:
+    """The effect that the record asks for most beside those that it has asked for already."""
+    if len(stage.effects) >= EFFECTS or (one is None and not physics.asks_for_more(stage.rich)):
         return None
-    stage = _with_physics(stage)
-    if not stage.effects:
-        return None if alone is None else _accepted(stage, alone, stage.left)
-    beside = _best(stage.rich, names, asked)
-    if beside is not None:
-        return _accepted(stage, beside, stage.rich)
-    return None if alone is None else _tied(stage, alone)
+    return physics.missing(stage.rich)
+
+
+def _columns(fault: Fault, left: Leftover) -> tuple[Floats, Floats]:
+    return line(fault.frequency, left) if fault.fault == HUM else adjustable.columns(fault.fault, left)
+
+
+def _power(left: Leftover) -> float:
+    return float(np.sum(left.residual[0] ** 2) + np.sum(left.residual[1] ** 2))
 
 
 def _best(left: Leftover, names: Sequence[str], asked: int) -> str | None:
@@ -133,9 +155,9 @@ def _best(left: Leftover, names: Sequence[str], asked: int) -> str | None:
     power: dict[str, float] = {}
     for name in names:
         if name == HUM:
-            line = hum(left, asked)
-            if line is not None:
-                power[name] = line.explained * float(np.mean(left.residual[1] ** 2)) / left.size**2
+            fault = hum(left, asked)
+            if fault is not None:
+                power[name] = fault.explained * float(np.mean(left.residual[1] ** 2)) / left.size**2
             continue
         found = share(left, adjustable.columns(name, left))
         if found is not None and found.significant(asked) and adjustable.sensible(name, float(found.amounts[0]), left):
@@ -143,62 +165,45 @@ def _best(left: Leftover, names: Sequence[str], asked: int) -> str | None:
     return max(power, key=lambda name: power[name], default=None)
 
 
-def _accepted(stage: Stage, name: str, left: Leftover) -> Stage | None:
-    """The stage with a fault corrected whose value is found beside what ``left`` is left by.
+def _accepted(stage: Stage, one: Refined) -> Stage | None:
+    """The stage with a fault corrected.
 
     An effect that imitated the fault is no longer needed then; the value is found again without it.
     """
-    one = refined(name, stage.given, stage.faults, left)
-    if one is None:
-        return None
-    following = stage.without(one.fault)
-    if following is None or len(following.rich.fit.keys) == len(left.fit.keys):
+    following = stage.without(_explaining(one.fault, stage.rich, one.left))
+    if following is None or len(following.effects) == len(stage.effects) or one.fault.fault == HUM:
         return following
-    again = refined(name, stage.given, stage.faults, following.rich, one.fault.value)
-    return following if again is None else stage.without(again.fault)
+    again = refined(one.fault.fault, stage.given, stage.faults, following.rich, one.fault.value)
+    return following if again is None else stage.without(_explaining(again.fault, stage.rich, again.left))
 
 
-def _tied(stage: Stage, name: str) -> Stage | None:
-    """What becomes of a fault that is not needed beside the effects: if these are not needed beside it, it is named.
-
-    Of one number against several effects with theirs the one number is the simpler explanation.
-    """
-    one = refined(name, stage.given, stage.faults, stage.left)
-    if one is None or _needs(one, stage):
-        return None
-    if len(stage.effects) > 1 or (name == HUM and _beyond_reason(stage)):
-        return stage.without(one.fault)
-    return stage.named(one.fault.with_rivals(*stage.effects))
+def _explaining(fault: Fault, before: Leftover, after: Leftover) -> Fault:
+    return replace(fault, explained=gain(before.residual[1], after.residual[1]).explained)
 
 
-def _needs(one: Refined, stage: Stage) -> bool:
-    """Whether the effects explain anything beside the corrected fault."""
-    both = _again(stage.rich, one.left.prepared)
+def _tied(stage: Stage, one: Refined, effect: Leftover) -> Stage | None:
+    """What becomes of a fault and an effect neither of which is needed beside the other: the fault is mentioned."""
+    if one.fault.fault == HUM and _beyond_reason(stage, effect):
+        return _accepted(stage, one)
+    names = [e.name for e in effect.fit.model.terms if e.name not in stage.rich.fit.model]
+    fault = _explaining(one.fault, stage.rich, one.left).with_rivals(*names)
+    return replace(stage, faults=(*stage.faults, fault), rich=effect)
+
+
+def _needs(one: Refined, effect: Leftover) -> bool:
+    """Whether the effect explains anything beside the corrected fault."""
+    both = _again(effect, one.left.prepared)
     return both is not None and better(one.left, both, 1)
 
 
-def _beyond_reason(stage: Stage) -> bool:
+def _beyond_reason(stage: Stage, effect: Leftover) -> bool:
     """Whether a harmonic force would have to be larger than the whole measured one."""
-    values = stage.rich.fit.model.numbers()
-    entry = next((e for e in stage.rich.fit.model.terms if e.name == "harmonic_force"), None)
+    values = effect.fit.model.numbers()
+    entry = next((e for e in effect.fit.model.terms if e.name == "harmonic_force"), None)
     if entry is None:
         return False
     force = stage.given.record["force"][slice(*stage.given.plan.fit)]
     return float(np.hypot(*(values[s] for s in entry.term.symbols))) > float(np.max(np.abs(force)))
-
-
-def _with_physics(stage: Stage) -> Stage:
-    """The stage with as many effects as the record asks for."""
-    rich = stage.rich
-    while len(rich.fit.model.terms) - len(stage.left.fit.model.terms) < EFFECTS:
-        if rich is not stage.left and not physics.asks_for_more(rich):
-            break
-        fit = physics.missing(rich)
-        more = None if fit is None else leftover(fit, rich.prepared)
-        if more is None:
-            break
-        rich = more
-    return replace(stage, rich=rich)
 
 
 def _pruned(rich: Leftover, left: Leftover) -> Leftover:
@@ -209,6 +214,18 @@ def _pruned(rich: Leftover, left: Leftover) -> Leftover:
         if fewer is not None and not better(fewer, rich, 1):
             rich = fewer
     return left if len(rich.fit.model.terms) == len(left.fit.model.terms) else rich
+
+
+def _needed(stage: Stage) -> Stage:
+    """Without the faults that the effects found after them have made needless."""
+    for fault in stage.faults:
+        if fault.fault in adjustable.ADJUSTABLE and fault.corrected and not fault.held:
+            others = tuple(f for f in stage.faults if f is not fault)
+            prepared = corrected(stage.given, others)
+            left, rich = (_again(one, prepared) for one in (stage.left, stage.rich))
+            if left is not None and rich is not None and stage.effects and not better(rich, stage.rich, 1):
+                stage = Stage(stage.given, others, left, rich)
+    return stage
 
 
 def _again(left: Leftover, prepared: Prepared) -> Leftover | None:
