@@ -60,7 +60,7 @@ def accounted(
     first = corrected(prepared, faults)
     fit = fit_model(model, first)
     found = search(prepared, fit, faults, asked) if asked else faults
-    final = first if len(found) == len(faults) else corrected(prepared, found)
+    final = first if found == faults else corrected(prepared, found)
     same = final is first and estimator == FREE_RUN
     return Accounted(compare(model, final, fit=fit if same else None, estimator=estimator, progress=progress), found)
 

@@ -8,21 +8,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import ndtr
 
 from study.faults import adjustable, physics
 from study.faults.correction import corrected
 from study.faults.drift import drift
-from study.faults.fault import DRIFT, FORCE_NOISE, HUM, SPIKES, Fault
+from study.faults.fault import CLIPPING, DRIFT, DROP_OUTS, FORCE_NOISE, HUM, SPIKES, Fault
 from study.faults.force_noise import force_noise
 from study.faults.hum import hum, is_of_the_mains, line
 from study.faults.leftover import Leftover, better, leftover, share
 from study.faults.refinement import Refined, refined
 from study.faults.spikes import spikes
-from study.faults.spotted import spotted
+from study.faults.spotted import drop_outs, spotted, widened
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
-from study.support.statistics import gain
+from study.support.statistics import ALPHA, gain
 
 ROUNDS = 12  # faults and effects looked for one after the other
 EFFECTS = 3  # of the library that are added before a fault is believed
@@ -70,15 +71,25 @@ def search(given: Prepared, fit: FreeRunFit, faults: Sequence[Fault], asked: Seq
     left = leftover(fit, corrected(given, faults))
     if left is None:
         return tuple(faults)
-    stage = Stage(given, tuple(faults), left, left)
+    stage = _beyond_the_limits(Stage(given, tuple(faults), left, left))
     for _ in range(ROUNDS):
         following = _next(stage, asked)
         if following is None:
             break
         stage = following
-    stage = _needed(stage)
-    noise = force_noise(stage.rich, len(asked)) if FORCE_NOISE in asked else None
+    stage = _needed(stage, len(asked))
+    known = FORCE_NOISE not in asked or physics.asks_for_more(stage.rich)
+    noise = None if known else force_noise(stage.rich, len(asked))
     return stage.faults if noise is None else (*stage.faults, noise)
+
+
+def _beyond_the_limits(stage: Stage) -> Stage:
+    """Without the samples near a limit that clips, which noise may have kept within it."""
+    faults = [widened(f, stage.given, stage.left) if f.fault == CLIPPING else f for f in stage.faults]
+    if not any(f.fault == CLIPPING for f in faults):
+        return stage
+    left = _again(stage.left, corrected(stage.given, faults))
+    return stage if left is None else Stage(stage.given, tuple(faults), left, left)
 
 
 def _next(stage: Stage, asked: Sequence[str]) -> Stage | None:
@@ -93,7 +104,11 @@ def _next(stage: Stage, asked: Sequence[str]) -> Stage | None:
 
 
 def _plain(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
-    """One fault more of those that no physics imitates: spikes, drift, and hum of the mains."""
+    """One fault more of those that no physics imitates: drop-outs, spikes, drift, and hum of the mains."""
+    if DROP_OUTS in names:
+        fault = drop_outs(stage.rich, asked)
+        if fault is not None:
+            return stage.without(fault)
     if SPIKES in names:
         fault = spikes(stage.rich, asked)
         if fault is not None:
@@ -121,6 +136,7 @@ def _contested(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
     """One fault more of those that have a look-alike in the library, or one effect more that the record asks for."""
     name = _best(stage.rich, names, asked)
     one = None if name is None else refined(name, stage.given, stage.faults, stage.rich)
+    one = None if one is None or _may_be_none(one.fault, asked) else one
     effect = _effect(stage, one)
     if one is None:
         return None if effect is None else replace(stage, rich=effect)
@@ -133,6 +149,11 @@ def _contested(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
     if needed == (False, True) or (all(needed) and _power(effect) < _power(one.left)):
         return replace(stage, rich=effect)
     return _accepted(stage, one)
+
+
+def _may_be_none(fault: Fault, asked: int) -> bool:
+    """Whether chance alone gives such a value, so many faults having been asked for; from the whole record."""
+    return fault.error > 0.0 and 2.0 * float(ndtr(-abs(fault.value) / fault.error)) * asked >= ALPHA
 
 
 def _effect(stage: Stage, one: Refined | None) -> Leftover | None:
@@ -216,14 +237,16 @@ def _pruned(rich: Leftover, left: Leftover) -> Leftover:
     return left if len(rich.fit.model.terms) == len(left.fit.model.terms) else rich
 
 
-def _needed(stage: Stage) -> Stage:
+def _needed(stage: Stage, asked: int) -> Stage:
     """Without the faults that the effects found after them have made needless."""
     for fault in stage.faults:
         if fault.fault in adjustable.ADJUSTABLE and fault.corrected and not fault.held:
             others = tuple(f for f in stage.faults if f is not fault)
             prepared = corrected(stage.given, others)
             left, rich = (_again(one, prepared) for one in (stage.left, stage.rich))
-            if left is not None and rich is not None and stage.effects and not better(rich, stage.rich, 1):
+            if left is None or rich is None:
+                continue
+            if _may_be_none(fault, asked) or (stage.effects and not better(rich, stage.rich, 1)):
                 stage = Stage(stage.given, others, left, rich)
     return stage
 

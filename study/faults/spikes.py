@@ -7,9 +7,10 @@ from scipy.special import stdtr
 from study.faults.fault import SPIKES, Fault
 from study.faults.leftover import Leftover
 from study.support.arrays import Floats
-from study.support.statistics import ALPHA
+from study.support.statistics import ALPHA, SMALLEST_GAIN
 
 NEIGHBOURS = 8  # samples on either side that tell how much a sample differs from its own two neighbours
+CERTAIN = 2  # spikes that show that there are such
 ROUNDS = 4  # of looking again beside what was found: a spike hides a smaller one near it
 
 
@@ -25,15 +26,19 @@ def spikes(left: Leftover, asked: int) -> Fault | None:
     power = np.concatenate(left.residual) ** 2
     places = np.concatenate(left.samples).astype(np.int64)
     explained = float(np.sum(power[lost[places]]) / np.sum(power))
-    return Fault(SPIKES, prepared.response, float(np.mean(lost[places])), unit="1", explained=explained, lost=lost)
+    if explained * float(np.mean(power)) <= (SMALLEST_GAIN * left.size) ** 2:
+        return None
+    count = float(np.mean(lost[places]))
+    beside = lost | np.roll(lost, 1) | np.roll(lost, -1)  # another spike there could not be told from this one
+    return Fault(SPIKES, prepared.response, count, unit="1", explained=explained, lost=beside)
 
 
 def alone(residual: Floats, known: NDArray[np.bool_], level: float) -> NDArray[np.bool_]:
     """Samples that differ from the mean of their neighbours by more than chance, and stand alone with it, shape (n,).
 
     The bend ``r_i - (r_(i-1) + r_(i+1)) / 2`` of a sample is compared with the bends near it, and with those of the
-    whole residual: Student's t for the number of these, all samples asked for. An impact bends many samples in a row,
-    a spike one.
+    whole residual: Student's t for the number of these, all samples asked for. A spike bends its neighbours half as much
+    the other way, a jump or a kink of a motion does not. Where some such were seen, what else stands out is one too.
     """
     found = np.zeros(len(residual), dtype=np.bool_)
     if len(residual) < 4 * NEIGHBOURS:
@@ -47,10 +52,19 @@ def alone(residual: Floats, known: NDArray[np.bool_], level: float) -> NDArray[n
         t = np.abs(bend) / spread
         peak = (t >= np.roll(t, 1)) & (t >= np.roll(t, -1)) & whole
         new = peak & (2.0 * stdtr(freedom, -t) * len(residual) < level)
+        if np.count_nonzero(found) < CERTAIN:
+            new &= _single(bend)
         if not np.any(new):
             break
         found |= new
     return found
+
+
+def _single(bend: Floats) -> NDArray[np.bool_]:
+    """Where both neighbours bend the other way, by half as much give or take the half of that, shape (n,)."""
+    size = np.where(bend == 0.0, np.inf, bend)
+    sides = [np.roll(bend, shift) / size for shift in (1, -1)]
+    return np.all([(side > -0.75) & (side < -0.25) for side in sides], axis=0)
 
 
 def _spread(bend: Floats, whole: NDArray[np.bool_]) -> tuple[Floats, Floats]:

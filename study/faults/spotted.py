@@ -1,4 +1,4 @@
-"""Faults that a channel shows by itself, without a model: clipping, steps of the converter, drop-outs.
+"""Faults that a channel shows by itself, by values that recur: clipping, steps of the converter, drop-outs.
 
 Measured values hardly ever repeat exactly. Where they do, the instrument says something: at the extremes that its range
 has ended, in one place that nothing was read, everywhere that it counts in steps.
@@ -6,22 +6,26 @@ has ended, in one place that nothing was read, everywhere that it counts in step
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import fdtrc
 
 from study.faults.fault import CLIPPING, CONVERTER_STEPS, DROP_OUTS, Fault
+from study.faults.leftover import Leftover
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
-from study.support.statistics import SMALLEST_GAIN
+from study.support.statistics import ALPHA, SMALLEST_GAIN
 
 REPEATED = 0.5  # of the samples of a channel: whose values recur so often comes in steps
+MARGIN = 2.0  # standard deviations of the noise from a limit, within which a sample may have been clipped
 RUN = 3  # samples in a row with the same value: a channel that counts in no steps has stood still
 STANDING = 0.05  # of the samples: a channel that stands still longer is at rest, and has not dropped out
 
 
 def spotted(prepared: Prepared, asked: Sequence[str]) -> tuple[Fault, ...]:
-    """Those of the three that the measured response shows and that are asked for."""
+    """Clipping and steps of the converter, where the measured response shows them and they are asked for."""
     values, name = prepared.record[prepared.response], prepared.response
     unit = prepared.record.units.get(name, "")
     found: list[Fault] = []
@@ -31,9 +35,6 @@ def spotted(prepared: Prepared, asked: Sequence[str]) -> tuple[Fault, ...]:
     clipped = at_the_limits(values, step)
     if clipped is not None and CLIPPING in asked:
         found.append(Fault(CLIPPING, name, _limit(values, clipped), unit=unit, lost=clipped))
-    gone = dropped_out(values, step, clipped)
-    if gone is not None and DROP_OUTS in asked:
-        found.append(Fault(DROP_OUTS, name, float(np.mean(gone)), unit="1", lost=gone))
     return tuple(found)
 
 
@@ -79,19 +80,61 @@ def _switches(values: Floats) -> bool:
     return len(np.unique(values[: 4096])) <= 3
 
 
-def dropped_out(values: Floats, step: float | None, clipped: NDArray[np.bool_] | None) -> NDArray[np.bool_] | None:
-    """Samples in runs of one value, of a channel that counts in no steps and is not clipped there."""
-    if step is not None:
+def drop_outs(left: Leftover, asked: int) -> Fault | None:
+    """Samples in runs of one value, where the model says that the motion went on; None without any.
+
+    By the F test of what is left there against what is left elsewhere, each run a single number. A system at rest, as
+    one that friction holds, stands still too. Of a channel that counts in steps nothing can be said.
+    """
+    prepared, values = left.prepared, left.prepared.record[left.prepared.response]
+    if converter_step(values) is not None:
         return None
-    same = np.diff(values) == 0.0
-    mask = np.zeros(len(values), dtype=np.bool_)
-    for first, last in _runs(same):
-        if last - first + 1 >= RUN:
+    mask, runs = _standing(values)
+    places = np.concatenate(left.samples).astype(np.int64)
+    power, there = np.concatenate(left.residual) ** 2, mask[places]
+    if not 0.0 < float(np.mean(there)) < STANDING:
+        return None
+    elsewhere = float(np.mean(power[~there]))
+    if elsewhere > 0.0 and float(fdtrc(runs, len(power), np.mean(power[there]) / elsewhere)) * asked >= ALPHA:
+        return None
+    explained = float(np.sum(power[there]) / np.sum(power))
+    return Fault(DROP_OUTS, prepared.response, float(np.mean(mask)), unit="1", explained=explained, lost=mask)
+
+
+def _standing(values: Floats) -> tuple[NDArray[np.bool_], int]:
+    """Samples in runs of ``RUN`` or more of the same value, away from the extremes, and the number of runs."""
+    mask, count = np.zeros(len(values), dtype=np.bool_), 0
+    limits = float(np.min(values)), float(np.max(values))
+    for first, last in _runs(np.diff(values) == 0.0):
+        if last - first + 1 >= RUN and values[first] not in limits:
             mask[first : last + 1] = True
-    if clipped is not None:
-        mask &= ~clipped
-    share = float(np.mean(mask))
-    return mask if 0.0 < share < STANDING else None
+            count += 1
+    return mask, count
+
+
+def widened(fault: Fault, given: Prepared, left: Leftover) -> Fault:
+    """Clipping with all samples lost whose true motion may be beyond the limit, as the free run tells.
+
+    Noise decides whether a sample near the limit is clipped. If those that are not were kept, their noise would not
+    have zero mean, and the coefficients a bias.
+    """
+    if fault.lost is None:
+        return fault
+    prepared, lost = left.prepared, fault.lost.copy()
+    values = given.record[given.response]
+    margin = MARGIN * _noise(np.concatenate(left.residual))
+    for limit in np.unique(values[fault.lost]).tolist():
+        sign = 1.0 if limit > float(np.mean(values)) else -1.0
+        for span, predicted in zip((left.fit.span, prepared.plan.judge), left.predicted, strict=True):
+            lost[slice(*span)] |= sign * (predicted - limit) > -margin
+    return replace(fault, lost=lost)
+
+
+def _noise(residual: Floats) -> float:
+    """Standard deviation of white noise in a residual that may hold a smooth motion as well, from its second bends."""
+    bend = np.diff(residual, 2)
+    bend = bend[bend != 0.0]  # where samples are lost
+    return 1.4826 * float(np.median(np.abs(bend))) / math.sqrt(6.0) if len(bend) else 0.0
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
