@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.special import fdtrc
 
 from study.compare.prediction import Prediction, predict
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -11,7 +12,7 @@ from study.identify.time_domain.part_fit import linearise
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
 from study.support.least_squares import least_squares
-from study.support.statistics import ALPHA, SMALLEST_GAIN, Gain, clustered_covariance, gain
+from study.support.statistics import ALPHA, BLOCKS, SMALLEST_GAIN, Gain, clustered_covariance, gain
 
 INDISTINCT = 1e-5  # share of a column's length that the model's own coefficients leave of it
 
@@ -72,14 +73,15 @@ class Leftover:
 class Share:
     """What columns explain of a leftover; k columns."""
 
-    amounts: Floats  # shape (k,); on the fitting part
+    amounts: Floats  # shape (k,); from both parts
     covariance: Floats  # shape (k, k), clustered
-    gain: Gain  # on the judging part
+    p_value: float  # of such amounts, or the first of them, if they were zero
+    gain: Gain  # on the judging part, of the amounts of the fitting part
     power: float  # by which the mean square falls there, over that of the response
 
     def significant(self, asked: int) -> bool:
-        """Whether that is no chance, of so many that were asked for, and more than integration resolves."""
-        return self.gain.p_value * asked < ALPHA and self.power > SMALLEST_GAIN**2
+        """Whether that is no chance, of so many that were asked for, holds out, and is more than integration resolves."""
+        return self.p_value * asked < ALPHA and self.power > SMALLEST_GAIN**2
 
 
 def leftover(fit: FreeRunFit, prepared: Prepared) -> Leftover | None:
@@ -90,11 +92,12 @@ def leftover(fit: FreeRunFit, prepared: Prepared) -> Leftover | None:
     return None if prediction.diverged else Leftover(fit, prediction, prepared)
 
 
-def share(left: Leftover, columns: tuple[Floats, Floats]) -> Share | None:
-    """Joint regression on the fitting part, held against the judging part.
+def share(left: Leftover, columns: tuple[Floats, Floats], leading: bool = False) -> Share | None:
+    """Joint regression of the residual on the model's own sensitivities and more columns.
 
     ``columns`` are those of a fault or an effect on both parts, shapes (n, k) and (m, k). They get only what the
-    model's own coefficients and initial state cannot take. None where these can take all of it.
+    model's own coefficients and initial state cannot take; None where these can take all of it. A test of all amounts
+    or, where ``leading``, of the first alone: the others stand for what is unknown beside it.
     """
     fitted, judged = left.known(columns)
     own = left.own
@@ -105,10 +108,17 @@ def share(left: Leftover, columns: tuple[Floats, Floats]) -> Share | None:
     amounts = least_squares(design, left.residual[0], 1e-9)
     before = left.residual[1]
     after = before - np.hstack([own[1], judged]) @ amounts
-    count = fitted.shape[1]
-    covariance = clustered_covariance(design, left.residual[0] - design @ amounts)[-count:, -count:]
     power = float(np.mean(before**2) - np.mean(after**2)) / left.size**2
-    return Share(amounts[-count:], covariance, gain(before, after), power)
+    whole, covariance = amounts_on_both(left, columns)
+    tested = slice(1) if leading else slice(None)
+    return Share(whole, covariance, _p_value(whole[tested], covariance[tested, tested]), gain(before, after), power)
+
+
+def _p_value(amounts: Floats, covariance: Floats) -> float:
+    """Wald's test of amounts whose covariance rests on blocks: Hotelling's, as these are few."""
+    count, freedom = len(amounts), 2 * BLOCKS - 1
+    wald = float(amounts @ np.linalg.pinv(covariance, hermitian=True) @ amounts)
+    return float(fdtrc(count, freedom - count + 1, wald * (freedom - count + 1) / (count * freedom)))
 
 
 def better(before: Leftover, after: Leftover, asked: int) -> bool:

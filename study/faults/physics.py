@@ -1,10 +1,11 @@
 """Physical effects that a record asks for beside a model: what a fault of the measurement has to prove itself against."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from study.equations.model import ModelTerm
+from study.equations.model import Model, ModelTerm
 from study.equations.terms import LIBRARY, Term
 from study.faults.leftover import Leftover, better, leftover, share
 from study.identify.time_domain import shape_search
@@ -16,6 +17,7 @@ from study.support.errors import StudyError
 
 LOOKED_AT = 2048  # samples of the fitting part, at most, in a search
 FITTED = 3  # effects of the largest linear share that are fitted
+POINTS = 2  # of the search over its shape, from which it is
 RUNS = 20  # free runs of such a fit
 
 
@@ -41,9 +43,9 @@ def missing(left: Leftover) -> Leftover | None:
         base = shape_search.baseline(near, look)
     except StudyError:
         return None
-    starts = [(term, shape_search.starts(term, base, look)[:1]) for term in terms]
+    starts = [(term, shape_search.starts(term, base, look)[:POINTS]) for term in terms]
     promising = sorted((s for s in starts if s[1]), key=lambda s: -s[1][0].share)[:FITTED]
-    tried = [_fitted(term, point[0], base, look, prepared) for term, point in promising]
+    tried = [_fitted(term, points, base, look, prepared) for term, points in promising]
     best = min((t for t in tried if t is not None), key=lambda t: float(np.sum(t.residual[1] ** 2)), default=None)
     return best if best is not None and better(left, best, len(terms)) else None
 
@@ -71,16 +73,21 @@ def without_effect(fit: FreeRunFit, name: str, prepared: Prepared) -> FreeRunFit
 
 
 def _fitted(
-    term: Term, point: shape_search.Start, base: shape_search.Baseline, look: Prepared, prepared: Prepared
+    term: Term, points: Sequence[shape_search.Start], base: shape_search.Baseline, look: Prepared, prepared: Prepared
 ) -> Leftover | None:  # fmt: skip
-    """What the model with an effect leaves, from one start and with few runs; None where it does not run."""
-    fit, entry = base.fit, ModelTerm(term, point.coefficients, point.parameters)
+    """What the model with an effect leaves, its shape held at first, with few runs; None where it does not run."""
+    held, shapes = base.fit.held, tuple(f"{term.name}.{p.name}" for p in term.parameters)
+    entries = [ModelTerm(term, point.coefficients, point.parameters) for point in points]
+    first = [_tried(base.fit.model.with_term(e), look, (*held, *shapes), base.fit.steps_per_sample) for e in entries]
+    best = min((fit for fit in first if fit is not None), key=lambda fit: fit.rms, default=None)
+    for part in (look, prepared) if best is not None and shapes else (prepared,):
+        best = None if best is None else _tried(best.model, part, held, best.steps_per_sample)
+    return None if best is None else leftover(best, prepared)
+
+
+def _tried(model: Model, part: Prepared, held: Sequence[str], steps: int) -> FreeRunFit | None:
     try:
-        first = fit_part(fit.model.with_term(entry), look, fit.held, steps=fit.steps_per_sample, max_iterations=RUNS)
-        whole = first if look is prepared else fit_part(
-            first.model, prepared, fit.held, steps=fit.steps_per_sample, max_iterations=RUNS
-        )
-        return leftover(whole, prepared)
+        return fit_part(model, part, held, steps=steps, max_iterations=RUNS)
     except StudyError:
         return None
 

@@ -77,10 +77,7 @@ def search(given: Prepared, fit: FreeRunFit, faults: Sequence[Fault], asked: Seq
         if following is None:
             break
         stage = following
-    stage = _needed(stage, len(asked))
-    known = FORCE_NOISE not in asked or physics.asks_for_more(stage.rich)
-    noise = None if known else force_noise(stage.rich, len(asked))
-    return stage.faults if noise is None else (*stage.faults, noise)
+    return _needed(stage, len(asked)).faults
 
 
 def _beyond_the_limits(stage: Stage) -> Stage:
@@ -99,8 +96,7 @@ def _next(stage: Stage, asked: Sequence[str]) -> Stage | None:
     plain = _plain(stage, names, len(asked))
     if plain is not None:
         return plain
-    rivals = [f.fault for f in stage.faults if f.rivals]
-    return _contested(stage, [n for n in names if n in (*adjustable.ADJUSTABLE, HUM) and n not in rivals], len(asked))
+    return _contested(stage, [n for n in names if n not in [f.fault for f in stage.faults if f.rivals]], len(asked))
 
 
 def _plain(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
@@ -134,21 +130,30 @@ def _merged(faults: Sequence[Fault], spike: Fault) -> Fault:
 
 def _contested(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
     """One fault more of those that have a look-alike in the library, or one effect more that the record asks for."""
-    name = _best(stage.rich, names, asked)
+    name = _best(stage.rich, [n for n in names if n in (*adjustable.ADJUSTABLE, HUM)], asked)
     one = None if name is None else refined(name, stage.given, stage.faults, stage.rich)
     one = None if one is None or _may_be_none(one.fault, asked) else one
     effect = _effect(stage, one)
     if one is None:
-        return None if effect is None else replace(stage, rich=effect)
+        return _noisy_force(stage, names, asked) if effect is None else replace(stage, rich=effect)
     if effect is None:
         return _accepted(stage, one)
-    fault_needed = share(effect, _columns(one.fault, effect))
+    fault_needed = share(effect, _columns(one.fault, effect), leading=one.fault.fault != HUM)
     needed = fault_needed is not None and fault_needed.significant(asked), _needs(one, effect)
     if needed == (False, False):
         return _tied(stage, one, effect)
     if needed == (False, True) or (all(needed) and _power(effect) < _power(one.left)):
         return replace(stage, rich=effect)
     return _accepted(stage, one)
+
+
+def _noisy_force(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
+    """The stage with noise on the force, which is said of what no effect explains; None if it is not seen or known."""
+    noise = force_noise(stage.rich, asked) if FORCE_NOISE in names else None
+    if noise is None:
+        return None
+    effect = physics.missing(stage.rich) if len(stage.effects) < EFFECTS else None
+    return replace(stage, faults=(*stage.faults, noise)) if effect is None else replace(stage, rich=effect)
 
 
 def _may_be_none(fault: Fault, asked: int) -> bool:
@@ -180,7 +185,7 @@ def _best(left: Leftover, names: Sequence[str], asked: int) -> str | None:
             if fault is not None:
                 power[name] = fault.explained * float(np.mean(left.residual[1] ** 2)) / left.size**2
             continue
-        found = share(left, adjustable.columns(name, left))
+        found = share(left, adjustable.columns(name, left), leading=True)
         if found is not None and found.significant(asked) and adjustable.sensible(name, float(found.amounts[0]), left):
             power[name] = found.power
     return max(power, key=lambda name: power[name], default=None)
@@ -246,7 +251,8 @@ def _needed(stage: Stage, asked: int) -> Stage:
             left, rich = (_again(one, prepared) for one in (stage.left, stage.rich))
             if left is None or rich is None:
                 continue
-            if _may_be_none(fault, asked) or (stage.effects and not better(rich, stage.rich, 1)):
+            needed = share(rich, adjustable.columns(fault.fault, rich), leading=True)
+            if needed is None or not needed.significant(asked):
                 stage = Stage(stage.given, others, left, rich)
     return stage
 

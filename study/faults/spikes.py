@@ -10,7 +10,6 @@ from study.support.arrays import Floats
 from study.support.statistics import ALPHA, SMALLEST_GAIN
 
 NEIGHBOURS = 8  # samples on either side that tell how much a sample differs from its own two neighbours
-CERTAIN = 2  # spikes that show that there are such
 ROUNDS = 4  # of looking again beside what was found: a spike hides a smaller one near it
 
 
@@ -38,7 +37,8 @@ def alone(residual: Floats, known: NDArray[np.bool_], level: float) -> NDArray[n
 
     The bend ``r_i - (r_(i-1) + r_(i+1)) / 2`` of a sample is compared with the bends near it, and with those of the
     whole residual: Student's t for the number of these, all samples asked for. A spike bends its neighbours half as much
-    the other way, a jump or a kink of a motion does not. Where some such were seen, what else stands out is one too.
+    the other way, a jump or a kink of a motion does not. Where
+    most of what stands out does that, all of it counts as spikes, for two may be neighbours.
     """
     found = np.zeros(len(residual), dtype=np.bool_)
     if len(residual) < 4 * NEIGHBOURS:
@@ -52,8 +52,8 @@ def alone(residual: Floats, known: NDArray[np.bool_], level: float) -> NDArray[n
         t = np.abs(bend) / spread
         peak = (t >= np.roll(t, 1)) & (t >= np.roll(t, -1)) & whole
         new = peak & (2.0 * stdtr(freedom, -t) * len(residual) < level)
-        if np.count_nonzero(found) < CERTAIN:
-            new &= _single(bend)
+        if not np.any(found) and 2 * np.count_nonzero(new & _single(bend)) <= np.count_nonzero(new):
+            break
         if not np.any(new):
             break
         found |= new
