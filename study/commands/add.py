@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 from study.commands.command import Command, progress
 from study.commands.record_arguments import (
+    accounted_for,
     add_out_argument,
     add_reading_arguments,
     out_folder,
-    prepared_of,
     read_records,
 )
 
@@ -30,7 +30,6 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> None:
     from study.compare import history
-    from study.compare.comparison import compare
     from study.compare.comparison_report import as_json, document, rung, summary
     from study.diagnose.adding import added
     from study.equations.model_file import add_term, read_model
@@ -44,8 +43,8 @@ def _run(arguments: argparse.Namespace) -> None:
     records = read_records(arguments)
     pairs: list[tuple[Comparison, Comparison]] = []
     with progress(" fits", 2 * len(records)) as step:
-        for record in records:
-            before = compare(model, prepared_of(arguments, record))
+        for record, path in zip(records, arguments.records, strict=True):
+            before = accounted_for(arguments, model, record, path).comparison
             step("")
             pairs.append((before, added(before, term)))
             step("")

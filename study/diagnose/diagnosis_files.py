@@ -1,10 +1,14 @@
 """A diagnosis in words, and as the files that a command writes."""
 
+from collections.abc import Sequence
+
 from study.compare.comparison_report import as_json, where
 from study.diagnose import diagnosis_pages, diagnosis_report
 from study.diagnose.diagnosis_sentences import sentences
 from study.diagnose.separating_test import advice
 from study.diagnose.verdict import MISSING, Diagnosis
+from study.faults import fault
+from study.faults.fault import Fault
 
 
 def in_words(diagnosis: Diagnosis) -> str:
@@ -15,9 +19,13 @@ def in_words(diagnosis: Diagnosis) -> str:
     return " ".join(s for s in said if s)
 
 
-def files(diagnosis: Diagnosis, words: str) -> dict[str, bytes]:
-    """``diagnosis.json`` and the pictures by file name; ``words`` is the diagnosis in words."""
+def files(diagnosis: Diagnosis, words: str, faults: Sequence[Fault] = ()) -> dict[str, bytes]:
+    """``diagnosis.json`` and the pictures by file name; ``words`` is the diagnosis in words.
+
+    ``faults`` are those of the measurement that the record was corrected for, or may have.
+    """
     comparison = diagnosis.comparison
     content = diagnosis_report.fields(diagnosis)
     content |= {"record": comparison.record.name, "where": where(comparison), "says": words}
+    content |= {"measurement": [fault.fields(f) for f in faults]}
     return {"diagnosis.json": as_json(content)} | diagnosis_pages.files(diagnosis, comparison.record.name)

@@ -1,7 +1,7 @@
 """A comparison with the faults of the measurement accounted for: compare, find, correct, compare again."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from study.compare.by_estimator import FREE_RUN
 from study.compare.comparison import Comparison, compare
@@ -11,6 +11,7 @@ from study.faults.fault import Fault
 from study.faults.imposed import FAULTS
 from study.faults.search import first_faults, search
 from study.identify.time_domain.fit_model import fit_model
+from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.prepared import Prepared
 
 __all__ = ["Accounted", "accounted", "corrected", "find_faults"]
@@ -58,18 +59,30 @@ def accounted(
     asked = tuple(name for name in FAULTS if name not in switched_off and name not in known)
     faults = first_faults(prepared, known, asked)
     first = corrected(prepared, faults)
+    if not asked:
+        return _compared(model, first, faults, None, estimator, progress)
     fit = fit_model(model, first)
-    found = search(prepared, fit, faults, asked) if asked else faults
+    found = search(prepared, fit, faults, asked)
     final = first if found == faults else corrected(prepared, found)
-    same = final is first and estimator == FREE_RUN
-    return Accounted(compare(model, final, fit=fit if same else None, estimator=estimator, progress=progress), found)
+    return _compared(model, final, found, fit if final is first else None, estimator, progress)
+
+
+def _compared(
+    model: Model, prepared: Prepared, faults: tuple[Fault, ...], fit: FreeRunFit | None, estimator: str,
+    progress: Callable[[str], None] | None,
+) -> Accounted:  # fmt: skip
+    """The comparison with a corrected record, which says so in its notes; ``fit`` is the fit to it, if there is one."""
+    if faults:
+        prepared = replace(prepared, notes=(*prepared.notes, *(fault.note for fault in faults)))
+    again = fit if estimator == FREE_RUN else None
+    return Accounted(compare(model, prepared, fit=again, estimator=estimator, progress=progress), faults)
 
 
 def find_faults(comparison: Comparison, switched_off: Sequence[str] = ()) -> tuple[Fault, ...]:
     """The faults of the measurement in a record that a model has been compared with."""
     asked = tuple(name for name in FAULTS if name not in switched_off)
     faults = first_faults(comparison.prepared, {}, asked)
-    fit = comparison.fit if not any(f.corrected for f in faults) else fit_model(
-        comparison.model, corrected(comparison.prepared, faults)
-    )
+    fit = comparison.fit
+    if any(fault.corrected for fault in faults):
+        fit = fit_model(comparison.model, corrected(comparison.prepared, faults))
     return search(comparison.prepared, fit, faults, asked)

@@ -1,7 +1,7 @@
 """Drift: what is left at the slowest lines of a record, above those beside them.
 
-A force that is missing acts on the structure at all frequencies below its resonance alike; an instrument that drifts adds
-its own at the slowest.
+A force that is missing acts on the structure at all frequencies below its resonance alike; an instrument that drifts
+adds its own at the slowest.
 """
 
 import numpy as np

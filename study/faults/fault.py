@@ -75,7 +75,12 @@ class Fault:
     @property
     def says(self) -> str:
         """The fault in a sentence."""
-        return f"{_SENTENCES[self.fault](self)}{_what_follows(self)}."
+        return f"{self.note[0].upper()}{self.note[1:]}."
+
+    @property
+    def note(self) -> str:
+        """The same as a part of a sentence."""
+        return f"{_SENTENCES[self.fault](self)}{_what_follows(self)}"
 
     def with_rivals(self, *names: str) -> "Fault":
         """The same as one of several explanations that this record cannot tell apart."""

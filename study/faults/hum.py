@@ -91,5 +91,3 @@ def _refined(frequency: float, left: Leftover) -> float:
         turns = np.exp(-2j * np.pi * left.prepared.dt * np.outer(tried, places))
         frequency = float(tried[int(np.argmax(np.abs(turns @ (taper * residual))))])
     return frequency
-
-

@@ -64,9 +64,7 @@ class Leftover:
 
     def known(self, columns: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
         """Columns on both parts, zero where samples are lost."""
-        return self.prepared.known(columns[0], self.fit.span), self.prepared.known(
-            columns[1], self.prepared.plan.judge
-        )
+        return self.prepared.known(columns[0], self.fit.span), self.prepared.known(columns[1], self.prepared.plan.judge)
 
 
 @dataclass(frozen=True)
@@ -80,7 +78,7 @@ class Share:
     power: float  # by which the mean square falls there, over that of the response
 
     def significant(self, asked: int) -> bool:
-        """Whether that is no chance, of so many that were asked for, holds out, and is more than integration resolves."""
+        """Whether that is no chance, of so many that were asked for, and more than integration resolves."""
         return self.p_value * asked < ALPHA and self.power > SMALLEST_GAIN**2
 
 

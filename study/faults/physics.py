@@ -1,4 +1,4 @@
-"""Physical effects that a record asks for beside a model: what a fault of the measurement has to prove itself against."""
+"""Physical effects that a record asks for beside a model: what a fault has to prove itself against."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,6 +14,7 @@ from study.identify.time_domain.part_fit import fit_part, run_of
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
 from study.support.errors import StudyError
+from study.support.statistics import SMALLEST_GAIN
 
 LOOKED_AT = 2048  # samples of the fitting part, at most, in a search
 FITTED = 3  # effects of the largest linear share that are fitted
@@ -46,8 +47,19 @@ def missing(left: Leftover) -> Leftover | None:
     starts = [(term, shape_search.starts(term, base, look)[:POINTS]) for term in terms]
     promising = sorted((s for s in starts if s[1]), key=lambda s: -s[1][0].share)[:FITTED]
     tried = [_fitted(term, points, base, look, prepared) for term, points in promising]
-    best = min((t for t in tried if t is not None), key=lambda t: float(np.sum(t.residual[1] ** 2)), default=None)
+    best = _simplest_of_the_best([t for t in tried if t is not None])
     return best if best is not None and better(left, best, len(terms)) else None
+
+
+def _simplest_of_the_best(tried: Sequence[Leftover]) -> Leftover | None:
+    """Of those that leave as little as the best, as far as integration resolves, the one with the fewest unknowns."""
+    powers = [float(np.mean(t.residual[1] ** 2)) for t in tried]
+    least = min(powers, default=0.0)
+    level = [
+        t for t, power in zip(tried, powers, strict=True)
+        if power <= least + 0.1 * (SMALLEST_GAIN * t.size) ** 2
+    ]  # fmt: skip
+    return min(level, key=lambda t: len(t.fit.keys), default=None)
 
 
 def refitted(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit | None:

@@ -20,6 +20,7 @@ from study.faults.leftover import Leftover, better, leftover, share
 from study.faults.refinement import Refined, refined
 from study.faults.spikes import spikes
 from study.faults.spotted import drop_outs, spotted, widened
+from study.identify.time_domain.fit_model import settled
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
@@ -149,11 +150,15 @@ def _contested(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
 
 def _noisy_force(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
     """The stage with noise on the force, which is said of what no effect explains; None if it is not seen or known."""
-    noise = force_noise(stage.rich, asked) if FORCE_NOISE in names else None
-    if noise is None:
+    if FORCE_NOISE not in names or len(stage.effects) >= EFFECTS or force_noise(stage.rich, asked) is None:
         return None
-    effect = physics.missing(stage.rich) if len(stage.effects) < EFFECTS else None
-    return replace(stage, faults=(*stage.faults, noise)) if effect is None else replace(stage, rich=effect)
+    effect = physics.missing(stage.rich)
+    if effect is not None:
+        return replace(stage, rich=effect)
+    # What an integration in few steps leaves is shaped by the structure too.
+    left = leftover(settled(stage.rich.fit, stage.rich.prepared), stage.rich.prepared)
+    noise = None if left is None else force_noise(left, asked)
+    return None if noise is None else replace(stage, faults=(*stage.faults, noise))
 
 
 def _may_be_none(fault: Fault, asked: int) -> bool:

@@ -36,9 +36,9 @@ def alone(residual: Floats, known: NDArray[np.bool_], level: float) -> NDArray[n
     """Samples that differ from the mean of their neighbours by more than chance, and stand alone with it, shape (n,).
 
     The bend ``r_i - (r_(i-1) + r_(i+1)) / 2`` of a sample is compared with the bends near it, and with those of the
-    whole residual: Student's t for the number of these, all samples asked for. A spike bends its neighbours half as much
-    the other way, a jump or a kink of a motion does not. Where
-    most of what stands out does that, all of it counts as spikes, for two may be neighbours.
+    whole residual: Student's t for the number of these, all samples asked for. A spike bends its neighbours half as
+    much the other way, a jump or a kink of a motion does not. Where most of what stands out does that, all of it counts
+    as spikes, for two may be neighbours.
     """
     found = np.zeros(len(residual), dtype=np.bool_)
     if len(residual) < 4 * NEIGHBOURS:

@@ -77,7 +77,7 @@ def _recurs(values: Floats, mask: NDArray[np.bool_], limit: float, step: float |
 
 def _switches(values: Floats) -> bool:
     """Whether a channel has three values or fewer, as one that switches."""
-    return len(np.unique(values[: 4096])) <= 3
+    return len(np.unique(values[:4096])) <= 3
 
 
 def drop_outs(left: Leftover, asked: int) -> Fault | None:
