@@ -8,7 +8,7 @@ from scipy.special import fdtrc
 
 from study.compare.prediction import Prediction, predict
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.part_fit import linearise
+from study.identify.time_domain.part_fit import linearise, run_of
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
 from study.support.least_squares import least_squares
@@ -43,7 +43,7 @@ class Leftover:
     @cached_property
     def predicted(self) -> tuple[Floats, Floats]:
         """Response of the free run on both parts: free of noise."""
-        fitted = self.prepared.record[self.prepared.response][slice(*self.fit.span)] - self.fit.residual
+        fitted = run_of(self.fit, self.prepared).respond({}, self.fit.initial)[0]
         return fitted, self.prediction.predicted
 
     @property
@@ -79,7 +79,8 @@ class Share:
 
     def significant(self, asked: int) -> bool:
         """Whether that is no chance, of so many that were asked for, and more than integration resolves."""
-        return self.p_value * asked < ALPHA and self.power > SMALLEST_GAIN**2
+        p_value = 2.0 * min(self.p_value, self.gain.p_value)  # two tests: each sees what the other is blind to
+        return p_value * asked < ALPHA and self.power > SMALLEST_GAIN**2
 
 
 def leftover(fit: FreeRunFit, prepared: Prepared) -> Leftover | None:

@@ -14,11 +14,12 @@ from study.identify.time_domain.part_fit import fit_part, run_of
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
 from study.support.errors import StudyError
-from study.support.statistics import SMALLEST_GAIN
+from study.support.statistics import difference
 
 LOOKED_AT = 2048  # samples of the fitting part, at most, in a search
 FITTED = 3  # effects of the largest linear share that are fitted
 POINTS = 2  # of the search over its shape, from which it is
+CHANCE = 2.0  # standard errors by which one effect may leave more than another and be as good
 RUNS = 20  # free runs of such a fit
 
 
@@ -52,14 +53,12 @@ def missing(left: Leftover) -> Leftover | None:
 
 
 def _simplest_of_the_best(tried: Sequence[Leftover]) -> Leftover | None:
-    """Of those that leave as little as the best, as far as integration resolves, the one with the fewest unknowns."""
-    powers = [float(np.mean(t.residual[1] ** 2)) for t in tried]
-    least = min(powers, default=0.0)
-    level = [
-        t for t, power in zip(tried, powers, strict=True)
-        if power <= least + 0.1 * (SMALLEST_GAIN * t.size) ** 2
-    ]  # fmt: skip
-    return min(level, key=lambda t: len(t.fit.keys), default=None)
+    """Of those that are not worse than the best by what chance makes of it, the one with the fewest unknowns."""
+    best = min(tried, key=lambda t: float(np.sum(t.residual[1] ** 2)), default=None)
+    if best is None:
+        return None
+    level = [t for t in tried if t is best or difference(t.residual[1], best.residual[1]) < CHANCE]
+    return min(level, key=lambda t: (len(t.fit.keys), t is not best))
 
 
 def refitted(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit | None:

@@ -126,7 +126,8 @@ def _merged(faults: Sequence[Fault], spike: Fault) -> Fault:
     if before is None or before.lost is None or spike.lost is None:
         return spike
     lost = before.lost | spike.lost
-    return replace(before, value=before.value + spike.value, lost=lost)
+    error = float(np.hypot(before.error, spike.error))
+    return replace(before, value=before.value + spike.value, error=error, lost=lost)
 
 
 def _contested(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:

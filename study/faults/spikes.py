@@ -29,7 +29,8 @@ def spikes(left: Leftover, asked: int) -> Fault | None:
         return None
     count = float(np.mean(lost[places]))
     beside = lost | np.roll(lost, 1) | np.roll(lost, -1)  # another spike there could not be told from this one
-    return Fault(SPIKES, prepared.response, count, unit="1", explained=explained, lost=beside)
+    error = float(np.sqrt(count / len(places)))  # of a count: small ones cannot be told from noise
+    return Fault(SPIKES, prepared.response, count, error, "1", explained, lost=beside)
 
 
 def alone(residual: Floats, known: NDArray[np.bool_], level: float) -> NDArray[np.bool_]:

@@ -81,10 +81,11 @@ def _switches(values: Floats) -> bool:
 
 
 def drop_outs(left: Leftover, asked: int) -> Fault | None:
-    """Samples in runs of one value, where the model says that the motion went on; None without any.
+    """Samples in runs of one value, which noise does not repeat; None without any.
 
-    By the F test of what is left there against what is left elsewhere, each run a single number. A system at rest, as
-    one that friction holds, stands still too. Of a channel that counts in steps nothing can be said.
+    A system at rest, as one that friction holds, stands still too. Without noise a run counts where the model says that
+    the motion went on, by the F test of what is left there against what is left elsewhere, each run a single number. Of
+    a channel that counts in steps nothing can be said.
     """
     prepared, values = left.prepared, left.prepared.record[left.prepared.response]
     if converter_step(values) is not None:
@@ -95,7 +96,12 @@ def drop_outs(left: Leftover, asked: int) -> Fault | None:
     if not 0.0 < float(np.mean(there)) < STANDING:
         return None
     elsewhere = float(np.mean(power[~there]))
-    if elsewhere > 0.0 and float(fdtrc(runs, len(power), np.mean(power[there]) / elsewhere)) * asked >= ALPHA:
+    noisy = _noise(np.concatenate(left.residual)) > SMALLEST_GAIN * left.size
+    if (
+        not noisy
+        and elsewhere > 0.0
+        and float(fdtrc(runs, len(power), np.mean(power[there]) / elsewhere)) * asked >= ALPHA
+    ):
         return None
     explained = float(np.sum(power[there]) / np.sum(power))
     return Fault(DROP_OUTS, prepared.response, float(np.mean(mask)), unit="1", explained=explained, lost=mask)
