@@ -10,9 +10,11 @@ from study.faults.correction import corrected
 from study.faults.fault import Fault
 from study.faults.imposed import FAULTS
 from study.faults.search import first_faults, search
-from study.identify.time_domain.fit_model import fit_model
+from study.identify.time_domain.fit_model import fit_model, settled
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.prepared import Prepared
+from study.support.errors import StudyError
+from study.support.statistics import SMALLEST_GAIN
 
 __all__ = ["Accounted", "accounted", "corrected", "find_faults"]
 
@@ -62,9 +64,20 @@ def accounted(
     if not asked:
         return _compared(model, first, faults, None, estimator, progress)
     fit = fit_model(model, first)
-    found = search(prepared, fit, faults, asked)
+    found, near = search(prepared, fit, faults, asked)
     final = first if found == faults else corrected(prepared, found)
-    return _compared(model, final, found, fit if final is first else None, estimator, progress)
+    best = fit if final is first else _fitted(model, final, near)
+    return _compared(model, final, found, best, estimator, progress)
+
+
+def _fitted(model: Model, prepared: Prepared, near: FreeRunFit) -> FreeRunFit:
+    """The better of a fit from nothing and one from where the search for faults has ended."""
+    close = settled(near, prepared)
+    try:
+        anew = fit_model(model, prepared)
+    except StudyError:
+        return close
+    return anew if anew.rms <= close.rms * (1.0 + SMALLEST_GAIN) else close
 
 
 def _compared(
@@ -85,4 +98,4 @@ def find_faults(comparison: Comparison, switched_off: Sequence[str] = ()) -> tup
     fit = comparison.fit
     if any(fault.corrected for fault in faults):
         fit = fit_model(comparison.model, corrected(comparison.prepared, faults))
-    return search(comparison.prepared, fit, faults, asked)
+    return search(comparison.prepared, fit, faults, asked)[0]

@@ -64,21 +64,25 @@ def first_faults(prepared: Prepared, held: Mapping[str, float], asked: Sequence[
     return (*given, *spotted(prepared, asked))
 
 
-def search(given: Prepared, fit: FreeRunFit, faults: Sequence[Fault], asked: Sequence[str]) -> tuple[Fault, ...]:
-    """All faults of a record, those that are known first; ``asked`` are the names that are looked for.
+def search(
+    given: Prepared, fit: FreeRunFit, faults: Sequence[Fault], asked: Sequence[str]
+) -> tuple[tuple[Fault, ...], FreeRunFit]:  # fmt: skip
+    """All faults of a record, those that are known first, and the model fitted to the corrected record.
 
-    ``fit`` is the model fitted to the record with the known faults corrected.
+    ``asked`` are the names that are looked for, ``fit`` is the model fitted to the record with the known faults
+    corrected. The fit that is given back begins there and searches no further.
     """
     left = leftover(fit, corrected(given, faults))
     if left is None:
-        return tuple(faults)
+        return tuple(faults), fit
     stage = _beyond_the_limits(Stage(given, tuple(faults), left, left))
     for _ in range(ROUNDS):
         following = _next(stage, asked)
         if following is None:
             break
         stage = following
-    return _needed(stage, len(asked)).faults
+    stage = _needed(stage, len(asked))
+    return stage.faults, stage.left.fit
 
 
 def _beyond_the_limits(stage: Stage) -> Stage:
