@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from study.commands.parser import parser
-from study.commands.record_arguments import prepared_of, read_records
+from study.commands.record_arguments import accounted_for, read_records
 from study.compare import history
 from study.compare.history_picture import files as history_pictures
 from study.diagnose import diagnosis_report
@@ -38,7 +38,7 @@ def climb(record: Path, model: Path, options: Sequence[str], steps: int, folder:
     (data,) = read_records(arguments)
     work = folder / "climb"
     shutil.rmtree(work, ignore_errors=True)
-    session = sessions.begin(parse_model(text, model), prepared_of(arguments, data))
+    session = sessions.begin_with(accounted_for(arguments, parse_model(text, model), data, record).comparison)
     for number in range(steps + 1):
         session, diagnosis = _diagnosed(session, work / f"step_{number}")
         if diagnosis.verdict != MISSING or number == steps or _in_a_circle(session, diagnosis.candidates[0]):

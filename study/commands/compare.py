@@ -4,7 +4,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from study.commands.command import Command, progress
-from study.commands.record_arguments import add_record_arguments, out_folder, prepared_of, read_records
+from study.commands.record_arguments import accounted_for, add_record_arguments, out_folder, read_records
 from study.identify.estimators import ESTIMATORS
 
 if TYPE_CHECKING:
@@ -24,29 +24,35 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    from study.compare.comparison import STEPS, across, compare
+    from study.compare.comparison import STEPS, across
     from study.compare.comparison_pictures import level_pictures, pictures
     from study.compare.comparison_report import as_json, document, summary, tables
     from study.equations.model_file import read_model
+    from study.faults.fault import fields
     from study.support.extras import lacking
     from study.support.file_sets import write_files
 
     folder = out_folder(arguments)
     model = read_model(arguments.model)
-    prepared = [prepared_of(arguments, record) for record in read_records(arguments)]
-    many, unpaged = len(prepared) > 1, lacking("bokeh", PAGE, "explore")
+    records = read_records(arguments)
+    many, unpaged = len(records) > 1, lacking("bokeh", PAGE, "explore")
     files: dict[str, bytes] = {}
-    with progress("step", (STEPS + 1) * len(prepared)) as step:
-        comparisons = [compare(model, p, estimator=arguments.estimator, progress=step) for p in prepared]
+    with progress("step", (STEPS + 1) * len(records)) as step:
+        accounted = [
+            accounted_for(arguments, model, record, path, estimator=arguments.estimator, progress=step)
+            for record, path in zip(records, arguments.records, strict=True)
+        ]
+        comparisons = [a.comparison for a in accounted]
         for comparison in comparisons:
             step("pictures")
             prefix = f"{comparison.record.name}_" if many else ""
             own = pictures(comparison) | ({} if unpaged else _page(comparison))
             files |= {prefix + name: content for name, content in own.items()}
+    measurement = [{"record": a.comparison.record.name, **fields(f)} for a in accounted for f in a.faults]
     levels = across(comparisons)
     files |= level_pictures(levels, comparisons[0].record.units.get("force", "N"))
     files |= {f"{name}.csv": content for name, content in tables(comparisons, levels).items()}
-    files["comparison.json"] = as_json(document(comparisons, levels))
+    files["comparison.json"] = as_json(document(comparisons, levels) | {"measurement": measurement})
     write_files(folder, files)
     print(summary(comparisons, levels))
     page = f"no page ({unpaged})" if unpaged else "a page for each record" if many else PAGE

@@ -1,10 +1,11 @@
 """``study diagnose``: which effect is missing from a model."""
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from study.commands.command import Command, progress
-from study.commands.record_arguments import add_record_arguments, out_folder, prepared_of, read_records
+from study.commands.record_arguments import accounted_for, add_record_arguments, out_folder, read_records
 
 if TYPE_CHECKING:
     from study.equations.model import Model
@@ -24,6 +25,7 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.diagnose.user_candidates import own_candidates
     from study.equations import terms
     from study.equations.model_file import read_model
+    from study.faults.settings import settings_beside
     from study.support.file_sets import write_files
 
     folder = out_folder(arguments)
@@ -33,34 +35,39 @@ def _run(arguments: argparse.Namespace) -> None:
         terms.get(name)
     files: dict[str, bytes] = {}
     records = read_records(arguments)
-    for record in records:
+    for path in arguments.records:
+        settings_beside(path)  # what is wrong there is said before the work begins
+    for record, path in zip(records, arguments.records, strict=True):
         prefix = f"{record.name}_" if len(records) > 1 else ""
-        files |= {prefix + name: data for name, data in _diagnosed(model, record, arguments, own).items()}
+        files |= {prefix + name: data for name, data in _diagnosed(model, record, path, arguments, own).items()}
     write_files(folder, files)
     print(f"\n{folder}: {', '.join(name for name in files if not name.endswith('.svg'))}")
 
 
-def _diagnosed(model: "Model", record: "Record", arguments: argparse.Namespace, own: "list[Term]") -> dict[str, bytes]:
+def _diagnosed(
+    model: "Model", record: "Record", path: Path, arguments: argparse.Namespace, own: "list[Term]"
+) -> dict[str, bytes]:  # fmt: skip
     """Diagnose one record, print the diagnosis, and give the files' contents."""
-    from study.compare.comparison import compare
     from study.diagnose import diagnosis_report
     from study.diagnose.diagnosis_files import files, in_words, unneeded_in_words
     from study.diagnose.needless import needless
     from study.diagnose.verdict import diagnose
+    from study.faults.fault import paragraph
 
-    prepared = prepared_of(arguments, record)
     with progress(" candidates", name=record.name) as step:
-        comparison = compare(model, prepared)
+        accounted = accounted_for(arguments, model, record, path)
         without = tuple(arguments.without)
-        diagnosis = diagnose(comparison, extra=own, without=without, progress=lambda _: step(""))
-        unneeded = needless(comparison)
+        diagnosis = diagnose(accounted.comparison, extra=own, without=without, progress=lambda _: step(""))
+        unneeded = needless(accounted.comparison)
         words = in_words(diagnosis)
     print(f"{record.name}: {diagnosis.verdict.replace('_', ' ')}")
     print(diagnosis_report.table(diagnosis))
     print("\n" + words)
+    if accounted.faults:
+        print("\n" + paragraph(accounted.faults))
     if unneeded:
         print(f"\n{unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
-    return files(diagnosis, words, unneeded)
+    return files(diagnosis, words, unneeded, accounted.faults)
 
 
 COMMAND = Command(

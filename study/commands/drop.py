@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 from study.commands.command import Command, progress
 from study.commands.record_arguments import (
+    accounted_for,
     add_out_argument,
     add_reading_arguments,
     out_folder,
-    prepared_of,
     read_records,
 )
 
@@ -28,7 +28,6 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> None:
     from study.compare import history
-    from study.compare.comparison import compare
     from study.compare.comparison_report import as_json, document, history_step, summary
     from study.diagnose.dropping import check_can_go, dropped
     from study.diagnose.needless import needless, of_records
@@ -46,8 +45,8 @@ def _run(arguments: argparse.Namespace) -> None:
     pairs: list[tuple[Comparison, Comparison]] = []
     unneeded: list[tuple[Needless, ...]] = []
     with progress(" fits", 3 * len(records)) as step:
-        for record in records:
-            before = compare(model, prepared_of(arguments, record))
+        for record, path in zip(records, arguments.records, strict=True):
+            before = accounted_for(arguments, model, record, path).comparison
             step("")
             pairs.append((before, dropped(before, name)))
             step("")

@@ -3,7 +3,7 @@
 import argparse
 
 from study.commands.command import Command, progress, whole
-from study.commands.record_arguments import add_record_arguments, out_folder, prepared_of, read_records
+from study.commands.record_arguments import accounted_for, add_record_arguments, out_folder, read_records
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,9 +29,9 @@ def _run(arguments: argparse.Namespace) -> None:
     model = parse_model(text, arguments.model)
     steps = history.read(arguments.model)
     (record,) = read_records(arguments)
-    prepared = prepared_of(arguments, record)
     with progress("step", STEPS) as step:
-        session = sessions.begin(model, prepared, earlier=steps, progress=step)
+        accounted = accounted_for(arguments, model, record, arguments.records[0], progress=step)
+        session = sessions.begin_with(accounted.comparison, earlier=steps)
     desk = Desk(session, arguments.model, text, folder)
     try:
         serve(desk, arguments.port, lambda address: _ready(address, not arguments.no_browser))

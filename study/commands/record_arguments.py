@@ -3,12 +3,14 @@
 import argparse
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from study.commands.command import number, whole
 from study.support.errors import at, expect
 
 if TYPE_CHECKING:
+    from study.equations.model import Model
+    from study.faults.accounting import Accounted
     from study.records.prepared import Prepared
     from study.records.readers import ReadOptions
     from study.records.record import Record
@@ -53,6 +55,9 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     )
     reading.add_argument(
         "--accept-swapped", action="store_true", help="take force and response as named, though they seem exchanged"
+    )
+    reading.add_argument(
+        "--no-measurement", action="store_true", help="look for no faults of the measurement: drift, delay, spikes ..."
     )
     judging = parser.add_argument_group("fitting and judging")
     judging.add_argument("--fit", type=span, metavar="A:B", help="samples to fit, A to B - 1 (default: the first half)")
@@ -115,6 +120,21 @@ def prepared_of(arguments: argparse.Namespace, record: "Record") -> "Prepared":
         expect(usable, f"no {arguments.response} was measured; expected --response {measured}")
         plan = make_plan(record, fit, judge, arguments.response)
     return prepare_record(record, plan, arguments.cutoff)
+
+
+def accounted_for(
+    arguments: argparse.Namespace, model: "Model", record: "Record", path: Path, **options: Any
+) -> "Accounted":
+    """The comparison of a model with a record that is made ready and corrected for faults of the measurement.
+
+    ``options`` are those of :func:`study.faults.accounting.accounted`: estimator and progress.
+    """
+    from study.faults.accounting import accounted
+    from study.faults.settings import NOTHING_ASKED, settings_beside
+
+    settings = NOTHING_ASKED if arguments.no_measurement else settings_beside(path)
+    prepared = prepared_of(arguments, record)
+    return accounted(model, prepared, held=settings.held, switched_off=settings.switched_off, **options)
 
 
 def _within(given: Span | None, record: "Record") -> tuple[int, int] | None:

@@ -74,14 +74,15 @@ def compare(
     prepared: Prepared,
     *,
     start: Mapping[str, float] | None = None,
+    search: FreeRunFit | None = None,
     fit: FreeRunFit | None = None,
     estimator: str = FREE_RUN,
     progress: Progress | None = None,
 ) -> Comparison:
     """Fit what a model leaves open to one part of a record and judge it on the other.
 
-    ``start`` holds values to begin the fit from, one for each that is fitted (searched for if left out), ``fit`` the
-    fit itself where there is one already. ``estimator`` finds the coefficients: the fit in free run, or one of
+    ``start`` holds values to begin the fit from, one for each that is fitted (searched for if left out), ``search``
+    what ``fit_model`` gave where that was called already, ``fit`` the finished fit of a candidate. ``estimator`` finds the coefficients: the fit in free run, or one of
     ``study.identify.estimators``; with ``local_polynomial`` the error of the force is free of leakage too. ``progress``
     is called with what is being done, ``STEPS`` times. A model that cannot be fitted raises a ``StudyError``.
     """
@@ -91,7 +92,7 @@ def compare(
     if estimator != FREE_RUN:
         fit, known = fit_by(estimator, model, prepared)
     if fit is None:
-        fit, *alike = best_first(fit_model(model, prepared, start), prepared)
+        fit, *alike = best_first(search or fit_model(model, prepared, start), prepared)
         fit = weighted(fit, prepared)
     else:
         alike = rivals(fit, prepared)

@@ -59,8 +59,8 @@ class Prediction:
 
     @property
     def difference(self) -> Floats:
-        """Measured minus predicted response at all frequencies, shape (n,)."""
-        return self.measured - self.predicted
+        """Measured minus predicted response at all frequencies, zero where a sample is lost, shape (n,)."""
+        return self.prepared.known(self.measured - self.predicted, self.prepared.plan.judge)
 
     @cached_property
     def motion(self) -> Floats:

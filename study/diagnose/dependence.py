@@ -58,7 +58,7 @@ def leftover(base: Baseline, prepared: Prepared) -> Leftover:
     try:
         run = judging_run(fit, prepared)
         later = [run.motion(name) for name in MOTIONS[:2]]
-        later.append(prepared.judged - run.motion(prepared.response))
+        later.append(prepared.known(prepared.judged - run.motion(prepared.response), prepared.plan.judge))
         later.append(run.derivatives(shaped)[:, : len(shaped.keys) + states])
     except DivergenceError:
         split = len(fit.residual) // 2

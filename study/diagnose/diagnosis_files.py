@@ -8,6 +8,8 @@ from study.diagnose.diagnosis_sentences import sentences
 from study.diagnose.needless import Needless, fields, paragraph
 from study.diagnose.separating_test import advice
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
+from study.faults import fault
+from study.faults.fault import Fault
 
 
 def in_words(diagnosis: Diagnosis) -> str:
@@ -23,13 +25,17 @@ def unneeded_in_words(found: Sequence[Needless], diagnosis: Diagnosis) -> str:
     return paragraph(found, complete=diagnosis.verdict == NOTHING)
 
 
-def files(diagnosis: Diagnosis, words: str, unneeded: Sequence[Needless] = ()) -> dict[str, bytes]:
+def files(
+    diagnosis: Diagnosis, words: str, unneeded: Sequence[Needless] = (), faults: Sequence[Fault] = ()
+) -> dict[str, bytes]:  # fmt: skip
     """``diagnosis.json`` and the pictures by file name; ``words`` is the diagnosis in words.
 
-    ``unneeded`` are the terms of the model that it does not need.
+    ``unneeded`` are the terms of the model that it does not need, ``faults`` those of the measurement that the record
+    was corrected for, or may have.
     """
     comparison = diagnosis.comparison
     content = diagnosis_report.fields(diagnosis)
     content |= {"record": comparison.record.name, "where": where(comparison), "says": words}
     content["not_needed"] = fields(unneeded)
+    content |= {"measurement": [fault.fields(f) for f in faults]}
     return {"diagnosis.json": as_json(content)} | diagnosis_pages.files(diagnosis, comparison.record.name)

@@ -84,8 +84,13 @@ def begin(
     model: Model, prepared: Prepared, *, earlier: Sequence[Step] = (), progress: Progress | None = None
 ) -> Session:
     """A session with the model as given."""
-    comparison = compare(model, prepared, progress=progress)
-    return Session(prepared, (Stage(model, "as given", None, comparison),), earlier=tuple(earlier))
+    return begin_with(compare(model, prepared, progress=progress), earlier=earlier)
+
+
+def begin_with(comparison: Comparison, *, earlier: Sequence[Step] = ()) -> Session:
+    """A session with the model as it was compared, on the record as it was corrected for that."""
+    first = Stage(comparison.model, "as given", None, comparison)
+    return Session(comparison.prepared, (first,), earlier=tuple(earlier))
 
 
 def climbed(session: Session, comparison: Comparison, label: str, added: str | None) -> Session:

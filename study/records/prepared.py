@@ -3,10 +3,11 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from study.records.completion import complete
 from study.records.plan import Plan, make_plan
-from study.records.record import Record
+from study.records.record import MOTIONS, Record
 from study.support.arrays import Floats
 
 
@@ -29,6 +30,10 @@ class Prepared:
         What was converted or computed, a sentence each.
     low : float
         Frequency in hertz below which the user wants nothing judged: the cut-off that was given, or 0.
+    measured : tuple of str
+        The motions that were measured; the others are derivatives and integrals of them.
+    lost : bool array, shape (n,), optional
+        Samples of the response that say nothing, such as clipped ones: they are neither fitted nor judged.
     """
 
     record: Record
@@ -37,6 +42,8 @@ class Prepared:
     edge: int
     notes: tuple[str, ...] = ()
     low: float = 0.0
+    measured: tuple[str, ...] = ()
+    lost: NDArray[np.bool_] | None = None
 
     @property
     def response(self) -> str:
@@ -63,6 +70,13 @@ class Prepared:
         """Standard deviation of the response within the fitting part."""
         return float(np.std(self.fitted))
 
+    def known(self, values: Floats, span: tuple[int, int]) -> Floats:
+        """Values along a span, shape (samples, ...), zero where the sample of the response is lost."""
+        if self.lost is None:
+            return values
+        kept = ~self.lost[slice(*span)]
+        return values * (kept if values.ndim == 1 else kept[:, None])
+
     def inner(self, span: tuple[int, int]) -> tuple[int, int]:
         """A span without the uncertain samples at the ends of the record."""
         return max(span[0], self.edge), min(span[1], len(self.record) - self.edge)
@@ -87,7 +101,8 @@ def prepare_record(record: Record, plan: Plan | None = None, cutoff: float | Non
     """
     completed = complete(record, cutoff)
     plan, low = plan or make_plan(record), cutoff or 0.0
-    return Prepared(completed.record, plan, completed.band, completed.edge, completed.notes, low)
+    measured = tuple(motion for motion in MOTIONS if motion in record)
+    return Prepared(completed.record, plan, completed.band, completed.edge, completed.notes, low, measured)
 
 
 def whole(record: Record, response: str = "displacement") -> Prepared:

@@ -7,10 +7,12 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from study.compare.comparison import Comparison, compare
+from study.compare.comparison import Comparison
 from study.diagnose.credibility import credible
 from study.diagnose.verdict import MISSING, Diagnosis
 from study.equations.model import Model
+from study.faults import accounting
+from study.faults.fault import fields
 from study.records.prepared import Prepared
 
 Row = dict[str, Any]
@@ -21,7 +23,8 @@ FAR = 20.0  # standard errors: rivals that are farther behind stand in no tie se
 
 def accounted(model: Model, prepared: Prepared) -> tuple[Comparison, tuple[Found, ...]]:
     """The comparison that a diagnosis begins with, and the faults of the measurement that it accounts for."""
-    return compare(model, prepared), ()
+    found = accounting.accounted(model, prepared)
+    return found.comparison, tuple(fields(fault) for fault in found.faults)
 
 
 def tie_set(diagnosis: Diagnosis) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model
@@ -114,6 +115,7 @@ def fit_free_run(
     continuity: float = 0.0,
     offset: float = OFFSET,
     noise: Floats = WHITE,
+    lost: NDArray[np.bool_] | None = None,
 ) -> FreeRunFit:
     """Fit a model in free run.
 
@@ -140,6 +142,8 @@ def fit_free_run(
     noise : array, shape (order + 1,)
         Autoregressive coefficients of the noise, as :func:`study.support.autoregression.autoregression` gives them; the
         residual filtered with them is minimised. White noise by default, and wherever there are restarts.
+    lost : bool array, shape (samples of the record,), optional
+        Samples of the response that say nothing: their residual counts as zero.
 
     Raises
     ------
@@ -168,7 +172,8 @@ def fit_free_run(
         states[:, :2] = starting_states(record, response, (first, *restarts))
     measured = record[response][first : first + run.samples]
     positive = tuple(key for entry in model.terms for key in entry.term.positive if key in begin)
-    problem = _Problem(run, measured, free, _weights(continuity, measured, states), positive, noise)
+    kept = None if lost is None else (~lost[first : first + run.samples]).astype(np.float64)
+    problem = _Problem(run, measured, free, _weights(continuity, measured, states), positive, noise, kept)
     end = problem.search(np.array([*begin.values(), *states.ravel()]), max_iterations, offset)
     return replace(
         _result(model, problem, end), restarts=tuple(restarts), first=first, steps_per_sample=steps_per_sample,
@@ -209,6 +214,7 @@ class _Problem:
     weights: Floats | None
     positive: tuple[str, ...]
     noise: Floats
+    kept: Floats | None  # 0 for samples that are lost, 1 for others
 
     def states(self, x: Floats) -> Floats:
         """Initial states in the variables, shape (segments, states)."""
@@ -231,6 +237,8 @@ class _Problem:
             gaps = self.weights * (arrivals[:, :, 0] - states[1:])
             continuity = ContinuityGaps(gaps, self.weights[:, None] * arrivals[:, :, 1:], self.weights)
         residual = self.measured - response
+        if self.kept is not None:
+            residual, jacobian = residual * self.kept, jacobian * self.kept[:, None]
         if len(self.noise) > 1:
             residual, jacobian = whitened(residual, self.noise), whitened(jacobian, self.noise)
         return point_at(x, residual, jacobian, len(self.run.keys), (0, *self.run.cuts), continuity)
@@ -238,7 +246,8 @@ class _Problem:
     def residual(self, x: Floats) -> Floats:
         """Measured minus predicted response at x, shape (samples,)."""
         values = dict(zip(self.run.keys, (float(v) for v in x), strict=False))
-        return self.measured - self.run.respond(values, self.states(x))[0]
+        residual = self.measured - self.run.respond(values, self.states(x))[0]
+        return residual if self.kept is None else residual * self.kept
 
     def search(self, x: Floats, max_iterations: int, offset: float) -> End:
         """The minimum near x."""

@@ -42,7 +42,7 @@ def fit_part(
     return fit_free_run(
         model, prepared.record, start=begin, held=held, response=prepared.response, steps_per_sample=steps,
         span=prepared.plan.fit, max_iterations=max_iterations, offset=offset,
-        initial="estimate" if initial is None else initial, noise=noise,
+        initial="estimate" if initial is None else initial, noise=noise, lost=prepared.lost,
     )  # fmt: skip
 
 
@@ -59,7 +59,7 @@ def run_of(
 def linearise(fit: FreeRunFit, prepared: Prepared) -> Floats:
     """Derivatives of the response on the samples that were fitted, shape (n, keys + 2): keys, then initial states."""
     values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
-    return run_of(fit, prepared, fit.keys).respond(values, fit.initial, 2)[1]
+    return prepared.known(run_of(fit, prepared, fit.keys).respond(values, fit.initial, 2)[1], fit.span)
 
 
 def covariance_of(fit: FreeRunFit, jacobian: Floats) -> Floats:
@@ -121,7 +121,8 @@ class JudgingRun:
         """As :func:`linearise`, on the judging part, of a fit with the same motion."""
         values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
         run = self._run(fit.keys, self.prepared.response, 1, fit.model)
-        return run.respond(values, self.initial, 2)[1][self.prepared.plan.judge[0] - self.first :]
+        derivatives = run.respond(values, self.initial, 2)[1][self.prepared.plan.judge[0] - self.first :]
+        return self.prepared.known(derivatives, self.prepared.plan.judge)
 
     def _run(self, keys: Sequence[str], motion: str, finer: int, model: Model | None = None) -> FreeRun:
         return prepare(
@@ -143,6 +144,6 @@ def judging_run(fit: FreeRunFit, prepared: Prepared) -> JudgingRun:
         return JudgingRun(fit, prepared, fit.first, fit.initial)
     again = fit_free_run(
         fit.model, prepared.record, held=tuple(fit.model.values), response=plan.response,
-        steps_per_sample=fit.steps_per_sample, span=plan.judge,
+        steps_per_sample=fit.steps_per_sample, span=plan.judge, lost=prepared.lost,
     )  # fmt: skip
     return JudgingRun(fit, prepared, plan.judge[0], again.initial)

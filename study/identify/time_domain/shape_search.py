@@ -131,6 +131,7 @@ def sensitivity(
         _, added = run.respond(dict.fromkeys(term.symbols, 0.0), base.fit.initial)
     except StudyError:
         return None
+    added = prepared.known(added, base.fit.span)
     added = added - base.basis @ (base.basis.T @ added)
     return added if np.all(np.isfinite(added)) and np.any(added) else None
 

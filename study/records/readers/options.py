@@ -11,7 +11,7 @@ from study.support.files import read_text
 from study.support.yaml_text import as_list, as_mapping, read_plain, shown
 
 BESIDE = ".record.yaml"
-WANTED = "a YAML file with 'columns', 'units', 'fs' or 'dt', 'group', 'samples', 'period'"
+WANTED = "a YAML file with 'columns', 'units', 'fs' or 'dt', 'group', 'samples', 'period', 'measurement'"
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,8 @@ class ReadOptions:
     period: int | None = None  # samples in one period of a periodic excitation
     accept_saturated: bool = False  # a channel that rests at its extreme value is like that (a trapezoidal force, say)
     accept_swapped: bool = False  # force and response are as named, though they seem exchanged
+    # Faults of the measurement by name: a value that is known, None for one not to be looked for; empty for none.
+    measurement: Mapping[str, float | None] | None = None
 
     def __post_init__(self) -> None:
         """Refuse what contradicts itself or no record can have."""
@@ -58,6 +60,7 @@ class ReadOptions:
             self.samples if self.samples is not None else other.samples,
             self.period if self.period is not None else other.period,
             self.accept_saturated or other.accept_saturated, self.accept_swapped or other.accept_swapped,
+            self.measurement if self.measurement is not None else other.measurement,
         )  # fmt: skip
 
 
@@ -109,7 +112,29 @@ def _options(content: object) -> ReadOptions:
         period=_whole("period", given.get("period")),
         accept_saturated=_flag("accept_saturated", given),
         accept_swapped=_flag("accept_swapped", given),
+        measurement=_measurement(given),
     )
+
+
+def _measurement(given: Mapping[object, object]) -> dict[str, float | None] | None:
+    content = given.get("measurement")
+    if content is None or content is True or content == "on":
+        return None
+    if content is False or content == "off":
+        return {}
+    faults, wanted = as_mapping(content), "'off', or a mapping such as '{delay: 0.5, drift: off}'"
+    if not faults:
+        raise _wrong("measurement", content, wanted)
+    return {_text("a fault in measurement", name): _held(name, value) for name, value in faults.items()}
+
+
+def _held(name: object, value: object) -> float | None:
+    if value is False or value == "off":
+        return None
+    number = _number(f"{name} in measurement", value) if type(value) in (int, float) else None
+    if number is None or not math.isfinite(number):
+        raise _wrong(f"{name} in measurement", value, "a number, or 'off'")
+    return number
 
 
 def _mapping(given: Mapping[object, object], key: str) -> dict[str, object]:

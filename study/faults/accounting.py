@@ -1,0 +1,101 @@
+"""A comparison with the faults of the measurement accounted for: compare, find, correct, compare again."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from study.compare.by_estimator import FREE_RUN
+from study.compare.comparison import Comparison, compare
+from study.equations.model import Model
+from study.faults.correction import corrected
+from study.faults.fault import Fault
+from study.faults.imposed import FAULTS
+from study.faults.search import first_faults, search
+from study.identify.time_domain.fit_model import fit_model, settled
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.records.prepared import Prepared
+from study.support.errors import StudyError
+from study.support.thresholds import TOLERANCE
+
+__all__ = ["Accounted", "accounted", "corrected", "find_faults"]
+
+
+@dataclass(frozen=True, eq=False)
+class Accounted:
+    """A comparison with the corrected record, and the faults that it is corrected for."""
+
+    comparison: Comparison
+    faults: tuple[Fault, ...]
+
+
+def accounted(
+    model: Model,
+    prepared: Prepared,
+    *,
+    held: Mapping[str, float] | None = None,
+    switched_off: Sequence[str] = (),
+    estimator: str = FREE_RUN,
+    progress: Callable[[str], None] | None = None,
+) -> Accounted:
+    """Compare a model with a record, the faults of the measurement accounted for.
+
+    Parameters
+    ----------
+    model, prepared, estimator, progress
+        As for :func:`study.compare.comparison.compare`.
+    held : mapping of float
+        Values of faults (of ``HOLDABLE``) that are known; they are corrected and not searched for.
+    switched_off : sequence of str
+        Faults that are not looked for.
+
+    Returns
+    -------
+    Accounted
+        A record without faults is compared as it is.
+
+    Raises
+    ------
+    StudyError
+        If the model cannot be fitted.
+    """
+    known = dict(held or {})
+    asked = tuple(name for name in FAULTS if name not in switched_off and name not in known)
+    faults = first_faults(prepared, known, asked)
+    first = corrected(prepared, faults)
+    if not asked:
+        return _compared(model, first, faults, None, estimator, progress)
+    fit = fit_model(model, first)
+    found, near = search(prepared, fit, faults, asked)
+    final = first if found == faults else corrected(prepared, found)
+    best = fit if final is first else _fitted(model, final, near)
+    return _compared(model, final, found, best, estimator, progress)
+
+
+def _fitted(model: Model, prepared: Prepared, near: FreeRunFit) -> FreeRunFit:
+    """The better of a fit from nothing and one from where the search for faults has ended."""
+    close = settled(near, prepared)
+    try:
+        anew = fit_model(model, prepared)
+    except StudyError:
+        return close
+    return anew if anew.rms <= close.rms * (1.0 + TOLERANCE) else close
+
+
+def _compared(
+    model: Model, prepared: Prepared, faults: tuple[Fault, ...], fit: FreeRunFit | None, estimator: str,
+    progress: Callable[[str], None] | None,
+) -> Accounted:  # fmt: skip
+    """The comparison with a corrected record, which says so in its notes; ``fit`` is the fit to it, if there is one."""
+    if faults:
+        prepared = replace(prepared, notes=(*prepared.notes, *(fault.note for fault in faults)))
+    again = fit if estimator == FREE_RUN else None
+    return Accounted(compare(model, prepared, search=again, estimator=estimator, progress=progress), faults)
+
+
+def find_faults(comparison: Comparison, switched_off: Sequence[str] = ()) -> tuple[Fault, ...]:
+    """The faults of the measurement in a record that a model has been compared with."""
+    asked = tuple(name for name in FAULTS if name not in switched_off)
+    faults = first_faults(comparison.prepared, {}, asked)
+    fit = comparison.fit
+    if any(fault.corrected for fault in faults):
+        fit = fit_model(comparison.model, corrected(comparison.prepared, faults))
+    return search(comparison.prepared, fit, faults, asked)[0]

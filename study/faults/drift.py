@@ -1,0 +1,79 @@
+"""Drift: what is left at the slowest lines of a record, above those beside them.
+
+A force that is missing acts on the structure at all frequencies below its resonance alike; an instrument that drifts
+adds its own at the slowest.
+"""
+
+import numpy as np
+from scipy.fft import dct
+from scipy.special import fdtrc
+
+from study.faults.fault import DRIFT, Fault
+from study.faults.leftover import Leftover
+from study.support.arrays import Floats
+from study.support.least_squares import least_squares
+from study.support.thresholds import ALPHA, TOLERANCE
+
+SLOWEST, BESIDE = 8, 32  # cosines, of half a period each more than the one before, that are held against the next
+FEWEST = 256  # samples that show both
+
+
+def drift(left: Leftover, asked: int) -> Fault | None:
+    """A drift of the response, None where the slowest lines hold no more than those beside them.
+
+    The F test of both groups of lines, of which a smooth spectrum makes independent numbers of one variance.
+    """
+    places, residual = _in_time(left)
+    if len(residual) < FEWEST:
+        return None
+    lines = np.asarray(dct(residual, norm="ortho"), dtype=np.float64)
+    if _p_value(lines, 1, SLOWEST, BESIDE) * asked >= ALPHA:
+        return None
+    count = _extent(lines, ALPHA)
+    noise = float(np.mean(lines[count + 1 : 3 * count + SLOWEST + 1] ** 2))
+    power = max(float(np.sum(lines[1 : count + 1] ** 2)) - count * noise, 0.0) / len(residual)
+    if power <= (TOLERANCE * left.size) ** 2:
+        return None
+    waveform = slow_part(left, count)
+    shown = waveform[places.astype(np.int64)]
+    explained = 1.0 - float(np.sum((residual - shown) ** 2) / np.sum(residual**2))
+    error = float(np.sqrt(noise / len(residual)))
+    unit = left.prepared.record.units.get(left.prepared.response, "")
+    return Fault(DRIFT, left.prepared.response, float(np.sqrt(power)), error, unit, explained, waveform)
+
+
+def slow_part(left: Leftover, count: int) -> Floats:
+    """The ``count`` slowest cosines of a residual along the whole record, without their mean, shape (n,)."""
+    places, residual = _in_time(left)
+    first, last = places[0], places[-1]
+    shapes = _cosines((places - first + 0.5) / (last - first + 1.0), count)
+    amounts = least_squares(shapes, residual)
+    everywhere = np.clip(np.arange(len(left.prepared.record), dtype=np.float64), first, last)
+    slow = _cosines((everywhere - first + 0.5) / (last - first + 1.0), count)[:, 1:] @ amounts[1:]
+    return np.asarray(slow, dtype=np.float64)
+
+
+def _in_time(left: Leftover) -> tuple[Floats, Floats]:
+    """Places and residual of both parts in the order of time."""
+    places, residual = np.concatenate(left.samples), np.concatenate(left.residual)
+    order = np.argsort(places)
+    return places[order], residual[order]
+
+
+def _cosines(x: Floats, count: int) -> Floats:
+    return np.cos(np.pi * np.outer(x, np.arange(count + 1)))
+
+
+def _p_value(lines: Floats, first: int, last: int, beside: int) -> float:
+    """Of the mean power of lines ``first`` to ``last`` over that of the ``beside`` after them."""
+    own, next_to = lines[first : last + 1] ** 2, lines[last + 1 : last + 1 + beside] ** 2
+    level = float(np.mean(next_to))
+    return float(fdtrc(len(own), len(next_to), float(np.mean(own)) / level)) if level > 0.0 else 1.0
+
+
+def _extent(lines: Floats, level: float) -> int:
+    """Lines that the drift reaches: doubled while their faster half stands above those after it."""
+    count = SLOWEST
+    while 4 * count < len(lines) // 8 and _p_value(lines, count // 2 + 1, count, 2 * count) < level:
+        count *= 2
+    return count

@@ -1,0 +1,93 @@
+"""Noise on the measured force: what is left is shaped as the structure shapes a force.
+
+The spectrum of what is left is held against two kinds of noise by Whittle's likelihood, each beside white noise on the
+response: noise on the force behind the structure, and noise on the response itself; both white or of first order.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.fft import rfft, rfftfreq
+
+from study.faults.fault import FORCE_NOISE, Fault
+from study.faults.leftover import Leftover
+from study.identify.time_domain.shape_search import baseline
+from study.support.arrays import Complexes, Floats
+from study.support.least_squares import least_squares
+from study.support.thresholds import ALPHA, TOLERANCE
+
+MEMORIES = (0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.9)  # correlation of neighbouring samples
+ROUNDS = 30  # of the search for both densities
+LINEAR = {"m": "inertia", "c": "linear_damping", "k": "linear_stiffness"}
+
+
+@dataclass(frozen=True)
+class _Noise:
+    """Noise of one shape beside white noise, and minus the logarithm of its likelihood."""
+
+    amount: float
+    error: float
+    cost: float
+
+
+def force_noise(left: Leftover, asked: int) -> Fault | None:
+    """Noise on the force; None where noise on the response is as likely, by the ratio of the likelihoods."""
+    residual = np.concatenate(left.residual)
+    n, prepared = len(residual), left.prepared
+    frequency = np.asarray(rfftfreq(n, prepared.dt))[1:-1]
+    power = np.abs(np.asarray(rfft(residual)))[1:-1] ** 2 / n
+    passed = np.abs(_transfer(left, np.asarray(2j * np.pi * frequency, dtype=np.complex128))) ** 2
+    level = float(np.mean(passed))
+    colours = [_first_order(memory, 2.0 * np.pi * frequency * prepared.dt) for memory in MEMORIES]
+    on_response = min(_likely(power, colour).cost for colour in colours)
+    on_force = [_likely(power, passed / level * colour) for colour in colours]
+    best = min(on_force, key=lambda noise: noise.cost)
+    if on_response - best.cost < np.log(asked / ALPHA) or best.amount <= (TOLERANCE * left.size) ** 2:
+        return None
+    value, error = _rms(on_force, level)
+    explained = float(best.amount * np.mean(passed / level) / np.mean(residual**2))
+    unit = prepared.record.units.get("force", "")
+    return Fault(FORCE_NOISE, "force", value, error, unit, min(explained, 1.0))
+
+
+def _rms(found: list[_Noise], level: float) -> tuple[float, float]:
+    """Rms of the noise and its standard error, over all colours by how likely each is."""
+    weights = np.exp(-np.array([noise.cost for noise in found]) + min(noise.cost for noise in found))
+    weights /= float(np.sum(weights))
+    sizes = np.sqrt(np.array([max(noise.amount, 0.0) for noise in found]) / level)
+    errors = np.array([noise.error / np.sqrt(max(noise.amount, 1e-300) * level) / 2.0 for noise in found])
+    value = float(weights @ sizes)
+    return value, float(np.sqrt(weights @ (np.where(weights > 1e-6, errors, 0.0) ** 2 + (sizes - value) ** 2)))
+
+
+def _transfer(left: Leftover, omega: Complexes) -> Complexes:
+    """From a small force to the response: of the model itself where it is linear, else of what is nearest to it."""
+    base = baseline(left.fit, left.prepared)
+    if all(entry.name in LINEAR.values() for entry in left.fit.model.terms):
+        own = left.fit.model.numbers()
+        base = replace(base, approximation={symbol: own.get(symbol, 0.0) for symbol in LINEAR})
+    return base.transfer(omega)
+
+
+def _likely(power: Floats, shape: Floats) -> _Noise:
+    """The most likely amounts of a shape and of white noise, both zero or more, by Fisher's scoring."""
+    columns = np.column_stack([shape, np.ones_like(shape)])
+    mean = float(np.mean(power))
+    amounts = np.array([0.5 * mean / float(np.mean(shape)), 0.5 * mean])
+    for _ in range(ROUNDS):
+        spectrum = columns @ amounts
+        again = least_squares(columns / spectrum[:, None], power / spectrum)
+        again = np.maximum(again, 1e-9 * mean)
+        done = bool(np.all(np.abs(again - amounts) < 1e-6 * mean))
+        amounts = again
+        if done:
+            break
+    spectrum = columns @ amounts
+    information = (columns / spectrum[:, None]).T @ (columns / spectrum[:, None])
+    error = float(np.sqrt(np.linalg.pinv(information)[0, 0]))
+    return _Noise(float(amounts[0]), error, float(np.sum(np.log(spectrum) + power / spectrum)))
+
+
+def _first_order(memory: float, turn: Floats) -> Floats:
+    """Spectrum of noise of unit mean square whose neighbouring samples have this correlation."""
+    return (1.0 - memory**2) / (1.0 - 2.0 * memory * np.cos(turn) + memory**2)

@@ -1,0 +1,124 @@
+"""Physical effects that a record asks for beside a model: what a fault has to prove itself against."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from study.equations.model import Model, ModelTerm
+from study.equations.terms import LIBRARY, Term
+from study.faults.leftover import Leftover, better, leftover, share
+from study.identify.time_domain import shape_search
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.part_fit import fit_part, run_of
+from study.records.prepared import Prepared
+from study.support.arrays import Floats
+from study.support.errors import StudyError
+from study.support.statistics import difference
+
+LOOKED_AT = 2048  # samples of the fitting part, at most, in a search
+FITTED = 3  # effects of the largest linear share that are fitted
+POINTS = 2  # of the search over its shape, from which it is
+CHANCE = 2.0  # standard errors by which one effect may leave more than another and be as good
+RUNS = 20  # free runs of such a fit
+
+
+def asks_for_more(left: Leftover) -> bool:
+    """Whether any effect of the library explains a part of what is left, as far as small amounts of it show.
+
+    One free run with the sensitivities of all effects without shape parameters.
+    """
+    columns = _sensitivities(left)
+    if columns is None:
+        return True
+    found = [share(left, (columns[0][:, [i]], columns[1][:, [i]])) for i in range(columns[0].shape[1])]
+    return any(f is not None and f.significant(len(found)) for f in found)
+
+
+def missing(left: Leftover) -> Leftover | None:
+    """What is left beside the effect that explains most; None if none explains any of it."""
+    prepared, fit = left.prepared, left.fit
+    look = prepared.shortened(LOOKED_AT)
+    terms = [t for t in LIBRARY.values() if t.name not in fit.model and t.name != "inertia"]
+    try:
+        near = fit if look is prepared else fit_part(fit.model, look, fit.held, steps=fit.steps_per_sample)
+        base = shape_search.baseline(near, look)
+    except StudyError:
+        return None
+    starts = [(term, shape_search.starts(term, base, look)[:POINTS]) for term in terms]
+    promising = sorted((s for s in starts if s[1]), key=lambda s: -s[1][0].share)[:FITTED]
+    tried = [_fitted(term, points, base, look, prepared) for term, points in promising]
+    best = _simplest_of_the_best([t for t in tried if t is not None])
+    return best if best is not None and better(left, best, len(terms)) else None
+
+
+def _simplest_of_the_best(tried: Sequence[Leftover]) -> Leftover | None:
+    """Of those that are not worse than the best by what chance makes of it, the one with the fewest unknowns."""
+    best = min(tried, key=lambda t: float(np.sum(t.residual[1] ** 2)), default=None)
+    if best is None:
+        return None
+    level = [t for t in tried if t is best or difference(t.residual[1], best.residual[1]) < CHANCE]
+    return min(level, key=lambda t: (len(t.fit.keys), t is not best))
+
+
+def refitted(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit | None:
+    """A fit again, on a record that was corrected, from where it stands; None where that does not run."""
+    try:
+        return fit_part(fit.model, prepared, fit.held, steps=fit.steps_per_sample, initial=np.atleast_2d(fit.initial))
+    except StudyError:
+        return None
+
+
+def without_effect(fit: FreeRunFit, name: str, prepared: Prepared) -> FreeRunFit | None:
+    """The model without one of its effects, fitted again; None where that does not run."""
+    model = fit.model.without_term(name)
+    held = [key for key in fit.held if key in model.values]
+    states = np.atleast_2d(fit.initial)
+    own = next(entry for entry in fit.model.terms if entry.name == name).term.state is not None
+    try:
+        return fit_part(
+            model, prepared, held, steps=fit.steps_per_sample, initial=None if own else states
+        )  # fmt: skip
+    except StudyError:
+        return None
+
+
+def _fitted(
+    term: Term, points: Sequence[shape_search.Start], base: shape_search.Baseline, look: Prepared, prepared: Prepared
+) -> Leftover | None:  # fmt: skip
+    """What the model with an effect leaves, its shape held at first, with few runs; None where it does not run."""
+    held, shapes = base.fit.held, tuple(f"{term.name}.{p.name}" for p in term.parameters)
+    entries = [ModelTerm(term, point.coefficients, point.parameters) for point in points]
+    first = [_tried(base.fit.model.with_term(e), look, (*held, *shapes), base.fit.steps_per_sample) for e in entries]
+    best = min((fit for fit in first if fit is not None), key=lambda fit: fit.rms, default=None)
+    for part in (look, prepared) if best is not None and shapes else (prepared,):
+        best = None if best is None else _tried(best.model, part, held, best.steps_per_sample)
+    return None if best is None else leftover(best, prepared)
+
+
+def _tried(model: Model, part: Prepared, held: Sequence[str], steps: int) -> FreeRunFit | None:
+    try:
+        return fit_part(model, part, held, steps=steps, max_iterations=RUNS)
+    except StudyError:
+        return None
+
+
+def _sensitivities(left: Leftover) -> tuple[Floats, Floats] | None:
+    """What small amounts of plain effects add to the response on both parts; None where that run fails."""
+    fit, model, keys = left.fit, left.fit.model, list[str]()
+    run = left.prediction.run
+    for term in LIBRARY.values():
+        if term.name not in model and not term.parameters and term.name != "inertia":
+            model = model.with_term(ModelTerm(term, (0.0,) * len(term.components), ()))
+            keys += term.symbols
+    if run is None or not keys:
+        return None
+    extended = replace(fit, model=model, keys=tuple(keys), values=np.zeros(len(keys)))
+    try:
+        fitted = run_of(extended, left.prepared, keys).respond(dict.fromkeys(keys, 0.0), fit.initial, 0)[1]
+        judged = run.derivatives(extended)[:, : len(keys)]
+    except StudyError:
+        return None
+    if not (np.all(np.isfinite(fitted)) and np.all(np.isfinite(judged))):
+        return None
+    return fitted, judged

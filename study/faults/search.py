@@ -1,0 +1,274 @@
+"""The search for faults of the measurement, beside the model and beside whatever physics the record asks for.
+
+A fault with a look-alike in the library is believed if it is needed beside the effects that the record asks for; where
+these do all that it does, and it does all that they do, the record cannot tell, and that is said.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import ndtr
+
+from study.faults import adjustable, physics
+from study.faults.correction import corrected
+from study.faults.drift import drift
+from study.faults.fault import CLIPPING, DRIFT, DROP_OUTS, FORCE_NOISE, HUM, SPIKES, Fault
+from study.faults.force_noise import force_noise
+from study.faults.hum import hum, is_of_the_mains, line
+from study.faults.leftover import Leftover, better, leftover, share
+from study.faults.refinement import Refined, refined
+from study.faults.spikes import spikes
+from study.faults.spotted import drop_outs, spotted, widened
+from study.identify.time_domain.fit_model import settled
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.records.prepared import Prepared
+from study.support.arrays import Floats
+from study.support.statistics import gain
+from study.support.thresholds import ALPHA
+
+ROUNDS = 12  # faults and effects looked for one after the other
+EFFECTS = 3  # of the library that are added before a fault is believed
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """Where a search stands: the record as given, the faults found, and the model fitted to the corrected record."""
+
+    given: Prepared
+    faults: tuple[Fault, ...]
+    left: Leftover  # of the model
+    rich: Leftover  # of the model and the effects that the record asks for
+
+    @property
+    def effects(self) -> list[str]:
+        """The effects that the record asks for."""
+        return [e.name for e in self.rich.fit.model.terms if e.name not in self.left.fit.model]
+
+    def named(self, fault: Fault) -> "Stage":
+        """The stage with a fault that nothing is corrected for."""
+        return replace(self, faults=(*self.faults, fault))
+
+    def without(self, *faults: Fault) -> "Stage | None":
+        """The stage with these faults corrected; None where a model does not run any more."""
+        known = (*(f for f in self.faults if f.fault not in [g.fault for g in faults if f.fault == SPIKES]), *faults)
+        prepared = corrected(self.given, known)
+        left, rich = (_again(one, prepared) for one in (self.left, self.rich))
+        return None if left is None or rich is None else Stage(self.given, known, left, _pruned(rich, left))
+
+
+def first_faults(prepared: Prepared, held: Mapping[str, float], asked: Sequence[str]) -> tuple[Fault, ...]:
+    """Faults that the user gave values of, and those that the response shows by itself."""
+    name = prepared.response
+    unit = prepared.record.units.get(name, "")
+    given = [Fault(f, name, v, unit=adjustable.unit(f, unit), held=True) for f, v in held.items()]
+    return (*given, *spotted(prepared, asked))
+
+
+def search(
+    given: Prepared, fit: FreeRunFit, faults: Sequence[Fault], asked: Sequence[str]
+) -> tuple[tuple[Fault, ...], FreeRunFit]:  # fmt: skip
+    """All faults of a record, those that are known first, and the model fitted to the corrected record.
+
+    ``asked`` are the names that are looked for, ``fit`` is the model fitted to the record with the known faults
+    corrected. The fit that is given back begins there and searches no further.
+    """
+    left = leftover(fit, corrected(given, faults))
+    if left is None:
+        return tuple(faults), fit
+    stage = _beyond_the_limits(Stage(given, tuple(faults), left, left))
+    for _ in range(ROUNDS):
+        following = _next(stage, asked)
+        if following is None:
+            break
+        stage = following
+    stage = _needed(stage, len(asked))
+    return stage.faults, stage.left.fit
+
+
+def _beyond_the_limits(stage: Stage) -> Stage:
+    """Without the samples near a limit that clips, which noise may have kept within it."""
+    faults = [widened(f, stage.given, stage.left) if f.fault == CLIPPING else f for f in stage.faults]
+    if not any(f.fault == CLIPPING for f in faults):
+        return stage
+    left = _again(stage.left, corrected(stage.given, faults))
+    return stage if left is None else Stage(stage.given, tuple(faults), left, left)
+
+
+def _next(stage: Stage, asked: Sequence[str]) -> Stage | None:
+    """The stage with one fault more; None if there is none."""
+    found = [f.fault for f in stage.faults]
+    names = [name for name in asked if name not in found or name in (HUM, SPIKES)]
+    plain = _plain(stage, names, len(asked))
+    if plain is not None:
+        return plain
+    return _contested(stage, [n for n in names if n not in [f.fault for f in stage.faults if f.rivals]], len(asked))
+
+
+def _plain(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
+    """One fault more of those that no physics imitates: drop-outs, spikes, drift, and hum of the mains."""
+    if DROP_OUTS in names:
+        fault = drop_outs(stage.rich, asked)
+        if fault is not None:
+            return stage.without(fault)
+    if SPIKES in names:
+        fault = spikes(stage.rich, asked)
+        if fault is not None:
+            return stage.without(_merged(stage.faults, fault))
+    if DRIFT in names:
+        fault = drift(stage.rich, asked)
+        if fault is not None:
+            return stage.without(fault)
+    fault = hum(stage.rich, asked) if HUM in names else None
+    if fault is not None and is_of_the_mains(fault.frequency, stage.left):
+        return stage.without(fault)
+    return None
+
+
+def _merged(faults: Sequence[Fault], spike: Fault) -> Fault:
+    """All spikes as one fault."""
+    before = next((f for f in faults if f.fault == SPIKES), None)
+    if before is None or before.lost is None or spike.lost is None:
+        return spike
+    lost = before.lost | spike.lost
+    error = float(np.hypot(before.error, spike.error))
+    return replace(before, value=before.value + spike.value, error=error, lost=lost)
+
+
+def _contested(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
+    """One fault more of those that have a look-alike in the library, or one effect more that the record asks for."""
+    name = _best(stage.rich, [n for n in names if n in (*adjustable.ADJUSTABLE, HUM)], asked)
+    one = None if name is None else refined(name, stage.given, stage.faults, stage.rich)
+    one = None if one is None or _may_be_none(one.fault, asked) else one
+    effect = _effect(stage, one)
+    if one is None:
+        return _noisy_force(stage, names, asked) if effect is None else replace(stage, rich=effect)
+    if effect is None:
+        return _accepted(stage, one)
+    fault_needed = share(effect, _columns(one.fault, effect), leading=one.fault.fault != HUM)
+    needed = fault_needed is not None and fault_needed.significant(asked), _needs(one, effect)
+    if needed == (False, False):
+        return _tied(stage, one, effect)
+    if needed == (False, True) or (all(needed) and _power(effect) < _power(one.left)):
+        return replace(stage, rich=effect)
+    return _accepted(stage, one)
+
+
+def _noisy_force(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
+    """The stage with noise on the force, which is said of what no effect explains; None if it is not seen or known."""
+    if FORCE_NOISE not in names or len(stage.effects) >= EFFECTS or force_noise(stage.rich, asked) is None:
+        return None
+    effect = physics.missing(stage.rich)
+    if effect is not None:
+        return replace(stage, rich=effect)
+    # What an integration in few steps leaves is shaped by the structure too.
+    left = leftover(settled(stage.rich.fit, stage.rich.prepared), stage.rich.prepared)
+    noise = None if left is None else force_noise(left, asked)
+    return None if noise is None else replace(stage, faults=(*stage.faults, noise))
+
+
+def _may_be_none(fault: Fault, asked: int) -> bool:
+    """Whether chance alone gives such a value, so many faults having been asked for; from the whole record."""
+    return fault.error > 0.0 and 2.0 * float(ndtr(-abs(fault.value) / fault.error)) * asked >= ALPHA
+
+
+def _effect(stage: Stage, one: Refined | None) -> Leftover | None:
+    """The effect that the record asks for most beside those that it has asked for already."""
+    if len(stage.effects) >= EFFECTS or (one is None and not physics.asks_for_more(stage.rich)):
+        return None
+    return physics.missing(stage.rich)
+
+
+def _columns(fault: Fault, left: Leftover) -> tuple[Floats, Floats]:
+    return line(fault.frequency, left) if fault.fault == HUM else adjustable.columns(fault.fault, left)
+
+
+def _power(left: Leftover) -> float:
+    return float(np.sum(left.residual[0] ** 2) + np.sum(left.residual[1] ** 2))
+
+
+def _best(left: Leftover, names: Sequence[str], asked: int) -> str | None:
+    """The fault that explains most of what is left, and that not by chance; None without any."""
+    power: dict[str, float] = {}
+    for name in names:
+        if name == HUM:
+            fault = hum(left, asked)
+            if fault is not None:
+                power[name] = fault.explained * float(np.mean(left.residual[1] ** 2)) / left.size**2
+            continue
+        found = share(left, adjustable.columns(name, left), leading=True)
+        if found is not None and found.significant(asked) and adjustable.sensible(name, float(found.amounts[0]), left):
+            power[name] = found.power
+    return max(power, key=lambda name: power[name], default=None)
+
+
+def _accepted(stage: Stage, one: Refined) -> Stage | None:
+    """The stage with a fault corrected.
+
+    An effect that imitated the fault is no longer needed then; the value is found again without it.
+    """
+    following = stage.without(_explaining(one.fault, stage.rich, one.left))
+    if following is None or len(following.effects) == len(stage.effects) or one.fault.fault == HUM:
+        return following
+    again = refined(one.fault.fault, stage.given, stage.faults, following.rich, one.fault.value)
+    return following if again is None else stage.without(_explaining(again.fault, stage.rich, again.left))
+
+
+def _explaining(fault: Fault, before: Leftover, after: Leftover) -> Fault:
+    return replace(fault, explained=gain(before.residual[1], after.residual[1]).explained)
+
+
+def _tied(stage: Stage, one: Refined, effect: Leftover) -> Stage | None:
+    """What becomes of a fault and an effect neither of which is needed beside the other: the fault is mentioned."""
+    if one.fault.fault == HUM and _beyond_reason(stage, effect):
+        return _accepted(stage, one)
+    names = [e.name for e in effect.fit.model.terms if e.name not in stage.rich.fit.model]
+    fault = _explaining(one.fault, stage.rich, one.left).with_rivals(*names)
+    return replace(stage, faults=(*stage.faults, fault), rich=effect)
+
+
+def _needs(one: Refined, effect: Leftover) -> bool:
+    """Whether the effect explains anything beside the corrected fault."""
+    both = _again(effect, one.left.prepared)
+    return both is not None and better(one.left, both, 1)
+
+
+def _beyond_reason(stage: Stage, effect: Leftover) -> bool:
+    """Whether a harmonic force would have to be larger than the whole measured one."""
+    values = effect.fit.model.numbers()
+    entry = next((e for e in effect.fit.model.terms if e.name == "harmonic_force"), None)
+    if entry is None:
+        return False
+    force = stage.given.record["force"][slice(*stage.given.plan.fit)]
+    return float(np.hypot(*(values[s] for s in entry.term.symbols))) > float(np.max(np.abs(force)))
+
+
+def _pruned(rich: Leftover, left: Leftover) -> Leftover:
+    """Without the effects that the corrected record no longer asks for, the last one first."""
+    for name in reversed([e.name for e in rich.fit.model.terms if e.name not in left.fit.model]):
+        fit = physics.without_effect(rich.fit, name, rich.prepared)
+        fewer = None if fit is None else leftover(fit, rich.prepared)
+        if fewer is not None and not better(fewer, rich, 1):
+            rich = fewer
+    return left if len(rich.fit.model.terms) == len(left.fit.model.terms) else rich
+
+
+def _needed(stage: Stage, asked: int) -> Stage:
+    """Without the faults that the effects found after them have made needless."""
+    for fault in stage.faults:
+        if fault.fault in adjustable.ADJUSTABLE and fault.corrected and not fault.held:
+            others = tuple(f for f in stage.faults if f is not fault)
+            prepared = corrected(stage.given, others)
+            left, rich = (_again(one, prepared) for one in (stage.left, stage.rich))
+            if left is None or rich is None:
+                continue
+            needed = share(rich, adjustable.columns(fault.fault, rich), leading=True)
+            if needed is None or not needed.significant(asked):
+                stage = Stage(stage.given, others, left, rich)
+    return stage
+
+
+def _again(left: Leftover, prepared: Prepared) -> Leftover | None:
+    """A model fitted again to a record that was corrected."""
+    fit = physics.refitted(left.fit, prepared)
+    return None if fit is None else leftover(fit, prepared)

@@ -1,0 +1,50 @@
+"""What the user says of the instruments: which faults are held at a value, and which are not looked for."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from study.faults.fault import HOLDABLE, NAMES
+from study.records.readers.options import beside, read_options
+from study.support.errors import at, expect
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Faults with a value that is known, and faults that are not looked for."""
+
+    held: Mapping[str, float] = field(default_factory=dict[str, float])
+    switched_off: tuple[str, ...] = ()
+
+
+NOTHING_ASKED = Settings(switched_off=NAMES)
+
+
+def settings_beside(record: Path) -> Settings:
+    """The settings in the file that may stand beside a record, under ``measurement``.
+
+    Raises
+    ------
+    StudyError
+        If it names a fault that is not known, or holds one at a value that one number does not describe.
+    """
+    path = beside(record)
+    if not path.is_file():
+        return Settings()
+    given = read_options(path).measurement
+    if given is None:
+        return Settings()
+    with at(path):
+        return NOTHING_ASKED if given == {} else settings_of(given)
+
+
+def settings_of(given: Mapping[str, float | None]) -> Settings:
+    """Settings from values by name of the fault; None for a fault that is not looked for."""
+    for name, value in given.items():
+        expect(name in NAMES, f"measurement names {name!r}; expected one of {', '.join(NAMES)}")
+        known = value is None or name in HOLDABLE
+        expect(known, f"{name} is held at {value}; expected 'off', or a number for one of {', '.join(HOLDABLE)}")
+        expect(name != "high_pass" or value is None or value > 0.0, f"high_pass is {value}; expected a cut-off above 0")
+        expect(name != "gain_change" or value is None or value > -1.0, f"gain_change is {value}; expected it above -1")
+    held = {name: value for name, value in given.items() if value is not None and value != 0.0}
+    return Settings(held, tuple(name for name in given if name not in held))

@@ -1,0 +1,155 @@
+"""Faults that a channel shows by itself, by values that recur: clipping, steps of the converter, drop-outs.
+
+Measured values hardly ever repeat exactly. Where they do, the instrument says something: at the extremes that its range
+has ended, in one place that nothing was read, everywhere that it counts in steps.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import fdtrc
+
+from study.faults.fault import CLIPPING, CONVERTER_STEPS, DROP_OUTS, Fault
+from study.faults.leftover import Leftover
+from study.records.prepared import Prepared
+from study.support.arrays import Floats
+from study.support.thresholds import ALPHA, TOLERANCE
+
+REPEATED = 0.5  # of the samples of a channel: whose values recur so often comes in steps
+MARGIN = 2.0  # standard deviations of the noise from a limit, within which a sample may have been clipped
+RUN = 3  # samples in a row with the same value: a channel that counts in no steps has stood still
+STANDING = 0.05  # of the samples: a channel that stands still longer is at rest, and has not dropped out
+
+
+def spotted(prepared: Prepared, asked: Sequence[str]) -> tuple[Fault, ...]:
+    """Clipping and steps of the converter, where the measured response shows them and they are asked for."""
+    values, name = prepared.record[prepared.response], prepared.response
+    unit = prepared.record.units.get(name, "")
+    found: list[Fault] = []
+    step = converter_step(values)
+    if step is not None and CONVERTER_STEPS in asked:
+        found.append(Fault(CONVERTER_STEPS, name, step, unit=unit))
+    clipped = at_the_limits(values, step)
+    if clipped is not None and CLIPPING in asked:
+        found.append(Fault(CLIPPING, name, _limit(values, clipped), unit=unit, lost=clipped))
+    return tuple(found)
+
+
+def converter_step(values: Floats) -> float | None:
+    """Distance of neighbouring values of a channel whose values are few, None of others."""
+    levels = np.unique(values)
+    inner = np.diff(levels)
+    if len(levels) > REPEATED * len(values) or len(levels) < 3:
+        return None
+    step = float(np.median(inner))
+    counts = inner / step
+    lattice = np.abs(counts - np.round(counts)) < 1e-3 * np.maximum(1.0, counts)
+    if not np.all(lattice) or step / math.sqrt(12.0) < TOLERANCE * float(np.std(values)):
+        return None
+    return float(np.sum(inner) / np.sum(np.round(counts)))
+
+
+def at_the_limits(values: Floats, step: float | None) -> NDArray[np.bool_] | None:
+    """Samples at the largest or smallest value, where these recur in a row as values of a motion do not.
+
+    A smooth motion in steps rests at an extreme for a while too: there a limit counts that is reached, in runs, more
+    often than the value next to it.
+    """
+    limits = (float(np.min(values)), float(np.max(values)))
+    masks = [values == limit for limit in limits]
+    reached = [mask for mask, limit in zip(masks, limits, strict=True) if _recurs(values, mask, limit, step)]
+    return np.any(reached, axis=0) if reached else None
+
+
+def _recurs(values: Floats, mask: NDArray[np.bool_], limit: float, step: float | None) -> bool:
+    count, runs = int(np.count_nonzero(mask)), _runs(mask)
+    if _switches(values) or count < 4 or len(runs) < 2:
+        return False
+    if step is None:
+        return True
+    inward = limit + step if limit < float(np.mean(values)) else limit - step
+    beside = int(np.count_nonzero(np.abs(values - inward) < 0.25 * step))
+    return count > beside + 5.0 * math.sqrt(beside + count)
+
+
+def _switches(values: Floats) -> bool:
+    """Whether a channel has three values or fewer, as one that switches."""
+    return len(np.unique(values[:4096])) <= 3
+
+
+def drop_outs(left: Leftover, asked: int) -> Fault | None:
+    """Samples in runs of one value, which noise does not repeat; None without any.
+
+    A system at rest, as one that friction holds, stands still too. Without noise a run counts where the model says that
+    the motion went on, by the F test of what is left there against what is left elsewhere, each run a single number. Of
+    a channel that counts in steps nothing can be said.
+    """
+    prepared, values = left.prepared, left.prepared.record[left.prepared.response]
+    if converter_step(values) is not None:
+        return None
+    mask, runs = _standing(values)
+    places = np.concatenate(left.samples).astype(np.int64)
+    power, there = np.concatenate(left.residual) ** 2, mask[places]
+    if not 0.0 < float(np.mean(there)) < STANDING:
+        return None
+    elsewhere = float(np.mean(power[~there]))
+    noisy = _noise(np.concatenate(left.residual)) > TOLERANCE * left.size
+    if (
+        not noisy
+        and elsewhere > 0.0
+        and float(fdtrc(runs, len(power), np.mean(power[there]) / elsewhere)) * asked >= ALPHA
+    ):
+        return None
+    explained = float(np.sum(power[there]) / np.sum(power))
+    return Fault(DROP_OUTS, prepared.response, float(np.mean(mask)), unit="1", explained=explained, lost=mask)
+
+
+def _standing(values: Floats) -> tuple[NDArray[np.bool_], int]:
+    """Samples in runs of ``RUN`` or more of the same value, away from the extremes, and the number of runs."""
+    mask, count = np.zeros(len(values), dtype=np.bool_), 0
+    limits = float(np.min(values)), float(np.max(values))
+    for first, last in _runs(np.diff(values) == 0.0):
+        if last - first + 1 >= RUN and values[first] not in limits:
+            mask[first : last + 1] = True
+            count += 1
+    return mask, count
+
+
+def widened(fault: Fault, given: Prepared, left: Leftover) -> Fault:
+    """Clipping with all samples lost whose true motion may be beyond the limit, as the free run tells.
+
+    Noise decides whether a sample near the limit is clipped. If those that are not were kept, their noise would not
+    have zero mean, and the coefficients a bias.
+    """
+    if fault.lost is None:
+        return fault
+    prepared, lost = left.prepared, fault.lost.copy()
+    values = given.record[given.response]
+    margin = MARGIN * _noise(np.concatenate(left.residual))
+    for limit in np.unique(values[fault.lost]).tolist():
+        sign = 1.0 if limit > float(np.mean(values)) else -1.0
+        for span, predicted in zip((left.fit.span, prepared.plan.judge), left.predicted, strict=True):
+            lost[slice(*span)] |= sign * (predicted - limit) > -margin
+    return replace(fault, lost=lost)
+
+
+def _noise(residual: Floats) -> float:
+    """Standard deviation of white noise in a residual that may hold a smooth motion as well, from its second bends."""
+    bend = np.diff(residual, 2)
+    bend = bend[bend != 0.0]  # where samples are lost
+    return 1.4826 * float(np.median(np.abs(bend))) / math.sqrt(6.0) if len(bend) else 0.0
+
+
+def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First sample and the one after the last of each run."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
+def _limit(values: Floats, clipped: NDArray[np.bool_]) -> float:
+    """Half the range of a channel clipped on both sides, or the one limit."""
+    shown = np.unique(values[clipped])
+    return float(0.5 * (shown[-1] - shown[0])) if len(shown) > 1 else abs(float(shown[0]))
