@@ -82,9 +82,10 @@ def compare(
     """Fit what a model leaves open to one part of a record and judge it on the other.
 
     ``start`` holds values to begin the fit from, one for each that is fitted (searched for if left out), ``search``
-    what ``fit_model`` gave where that was called already, ``fit`` the finished fit of a candidate. ``estimator`` finds the coefficients: the fit in free run, or one of
-    ``study.identify.estimators``; with ``local_polynomial`` the error of the force is free of leakage too. ``progress``
-    is called with what is being done, ``STEPS`` times. A model that cannot be fitted raises a ``StudyError``.
+    what ``fit_model`` gave where that was called already, ``fit`` the finished fit of a candidate. ``estimator`` finds
+    the coefficients: the fit in free run, or one of ``study.identify.estimators``; with ``local_polynomial`` the error
+    of the force is free of leakage too. ``progress`` is called with what is being done, ``STEPS`` times. A model that
+    cannot be fitted raises a ``StudyError``.
     """
     report: Progress = progress or (lambda _: None)
     report("fit")
