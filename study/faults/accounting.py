@@ -10,8 +10,9 @@ from study.faults.correction import corrected
 from study.faults.fault import Fault
 from study.faults.imposed import FAULTS
 from study.faults.search import first_faults, search
-from study.identify.time_domain.fit_model import fit_model, settled
+from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.settling import settled
 from study.records.prepared import Prepared
 from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE

@@ -14,7 +14,7 @@ from study.identify.time_domain.part_fit import fit_part, run_of
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
 from study.support.errors import StudyError
-from study.support.statistics import difference
+from study.support.statistics import worse
 
 LOOKED_AT = 2048  # samples of the fitting part, at most, in a search
 FITTED = 3  # effects of the largest linear share that are fitted
@@ -57,7 +57,7 @@ def _simplest_of_the_best(tried: Sequence[Leftover]) -> Leftover | None:
     best = min(tried, key=lambda t: float(np.sum(t.residual[1] ** 2)), default=None)
     if best is None:
         return None
-    level = [t for t in tried if t is best or difference(t.residual[1], best.residual[1]) < CHANCE]
+    level = [t for t in tried if t is best or worse(t.residual[1], best.residual[1]) < CHANCE]
     return min(level, key=lambda t: (len(t.fit.keys), t is not best))
 
 

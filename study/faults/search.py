@@ -20,8 +20,8 @@ from study.faults.leftover import Leftover, better, leftover, share
 from study.faults.refinement import Refined, refined
 from study.faults.spikes import spikes
 from study.faults.spotted import drop_outs, spotted, widened
-from study.identify.time_domain.fit_model import settled
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.settling import settled
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
 from study.support.statistics import gain
