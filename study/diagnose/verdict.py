@@ -29,7 +29,7 @@ from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE, UNSTEADY
 Floats = NDArray[np.float64]
 MISSING, NOTHING, UNKNOWN = "missing_effect", "nothing_missing", "unknown_effect"
 SHORT, LONG = 2048, 16384  # samples: a search uses half of the fitting part, within these limits
-SETTLED = 6  # of the candidates, the best: fitted on the whole fitting part and with enough steps
+SETTLED = 4  # of the candidates, the best: fitted on the whole fitting part and with enough steps
 PAIRED = 1  # the best so many candidates are tried together with every other
 
 
@@ -68,9 +68,13 @@ def diagnose(
 
 
 def search_part(prepared: Prepared) -> Prepared:
-    """The record with as much to fit as a search uses: enough to tell candidates apart, and sooner done."""
+    """The record with as much to fit as a search uses: enough to tell candidates apart, and sooner done.
+
+    More where that is a quiet stretch, such as the end of a sweep, which shows less than half of the motion's size.
+    """
     first, last = prepared.plan.fit
-    return prepared.shortened(int(np.clip((last - first) // 2, SHORT, LONG)))
+    look = prepared.shortened(int(np.clip((last - first) // 2, SHORT, LONG)))
+    return look if look.spread > 0.5 * prepared.spread else prepared.shortened(LONG)
 
 
 def search_base(comparison: Comparison) -> Baseline:
