@@ -4,6 +4,7 @@ A fault with a look-alike in the library is believed if it is needed beside the 
 these do all that it does, and it does all that they do, the record cannot tell, and that is said.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -235,7 +236,7 @@ def _beyond_reason(stage: Stage, effect: Leftover) -> bool:
     if entry is None:
         return False
     force = stage.given.record["force"][slice(*stage.given.plan.fit)]
-    return float(np.hypot(*(values[s] for s in entry.term.symbols))) > float(np.max(np.abs(force)))
+    return math.hypot(*(values[s] for s in entry.term.symbols)) > float(np.max(np.abs(force)))
 
 
 def _pruned(rich: Leftover, left: Leftover) -> Leftover:
