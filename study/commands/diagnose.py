@@ -25,7 +25,7 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.diagnose.user_candidates import own_candidates
     from study.equations import terms
     from study.equations.model_file import read_model
-    from study.faults.fault_settings import settings_beside
+    from study.faults.instrument_settings import settings_beside
     from study.support.file_sets import write_files
 
     folder = out_folder(arguments)

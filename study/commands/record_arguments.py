@@ -130,7 +130,7 @@ def accounted_for(
     ``options`` are those of :func:`study.faults.accounting.accounted`: estimator and progress.
     """
     from study.faults.accounting import accounted
-    from study.faults.fault_settings import NOTHING_ASKED, settings_beside
+    from study.faults.instrument_settings import NOTHING_ASKED, settings_beside
 
     settings = NOTHING_ASKED if arguments.no_measurement else settings_beside(path)
     prepared = prepared_of(arguments, record)

@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 
 from study.compare.prediction import Prediction
 from study.diagnose.candidates import Candidate
-from study.diagnose.constancy import Curve, changes, curves
+from study.diagnose.constancy import Curve, changes, curves, wavers
 from study.diagnose.held_out import HeldOut, held_out
 from study.equations.terms import Term
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import linearise, uncertainty
 from study.support import statistics
 from study.support.statistics import Gain
+from study.support.thresholds import ENOUGH, GOOD, UNSTEADY
 
 Floats = NDArray[np.float64]
 
@@ -57,6 +58,16 @@ class Ranked:
     def unphysical(self) -> str:
         """Why it is no physical effect as fitted, in a sentence; empty if it is one."""
         return self.term.physical(self.fit.model.values)
+
+    def wanders(self, asked: int) -> bool:
+        """Whether its coefficient, of so many that are asked for, moves as that of a true term would not.
+
+        Where little is left, the faults of the rest of the model move the coefficient of what is added to it: it may
+        change by a share of itself then.
+        """
+        if self.response_error <= GOOD or self.gain.explained >= ENOUGH:
+            return self.unsteadiness > UNSTEADY
+        return wavers(self.steadiness, asked)
 
     @property
     def interval(self) -> tuple[float, float]:

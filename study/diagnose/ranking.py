@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from study.compare.comparison import Comparison
 from study.diagnose.candidates import Candidate
-from study.diagnose.constancy import wavers
 from study.diagnose.held_out import held_out
 from study.diagnose.ranked import Ranked, examined
 from study.identify.time_domain.part_fit import linearise
@@ -91,25 +90,23 @@ def _tie(rows: Sequence[Ranked], white: Mapping[str, Floats]) -> list[Ranked]:
     return [r for r in rows if r is rows[0] or (_believable(r) and _level(r, rows[0], white))]
 
 
-def _complexity(row: Ranked, white: Floats, asked: int) -> tuple[bool, int, float]:
+def _complexity(row: Ranked, white: Floats, asked: int) -> tuple[bool, bool, int, float]:
     """Order among candidates that are tied: one that nothing speaks against, and that with fewest unknowns."""
     unknowns = len(row.term.components) + len(row.term.parameters)
-    return _impeached(row, asked), unknowns, float(np.mean(white**2))
+    return *_against(row, asked), unknowns, float(np.mean(white**2))
 
 
-def _impeached(row: Ranked, asked: int) -> bool:
-    """Whether a candidate is fitted outside of what makes it physical, or needs a coefficient that wanders."""
-    return bool(row.unphysical) or wavers(row.steadiness, asked)
+def _against(row: Ranked, asked: int) -> tuple[bool, bool]:
+    """What speaks against a candidate: values outside of what makes it physical, and a coefficient that wanders."""
+    return bool(row.unphysical), row.wanders(asked)
 
 
 def _unimpeached(rows: Sequence[Ranked], first: Ranked) -> Ranked:
-    """The first candidate, or the best one that nothing speaks against and that explains nearly as much.
+    """The first candidate, or one against which less speaks, if there is one that explains nearly as much.
 
     A Bouc-Wen element of negative stiffness, say, is a hardening spring in disguise; and what imitates another effect
     needs a coefficient that changes with the level.
     """
-    if not _impeached(first, len(rows)):
-        return first
     enough = NEARLY * first.gain.explained
-    better = (r for r in rows if _believable(r) and not _impeached(r, len(rows)) and r.gain.explained >= enough)
-    return next(better, first)
+    better = [r for r in rows if r is first or (_believable(r) and r.gain.explained >= enough)]
+    return min(better, key=lambda r: (*_against(r, len(rows)), r is not first))

@@ -109,7 +109,7 @@ def _decide(
     first = believed[0]
     left = _left(first.fit, first.prediction)
     rows = [first] + [r for r in rows if r is not first]
-    if (first.gain.explained >= ENOUGH or left <= GOOD) and _steady(first, len(rows)):
+    if (first.gain.explained >= ENOUGH or left <= GOOD) and not first.wanders(len(rows)):
         return MISSING, rows, left, ()
     slight = first.response_error <= GOOD  # two effects that explain little alone explain little together
     pair = None if slight else _explaining_pair(rows, base, comparison.prepared)
@@ -117,17 +117,6 @@ def _decide(
         return UNKNOWN, rows, left, ()
     first = next(r for r in rows if r.name == pair.names[0])
     return MISSING, [first] + [r for r in rows if r is not first], _left(pair.fit, pair.prediction), pair.names
-
-
-def _steady(row: Ranked, asked: int) -> bool:
-    """Whether the coefficient stays where a true term's would.
-
-    Where little is left, the faults of the rest of the model move the coefficient of what is added to it: it may change
-    by a share of itself then.
-    """
-    if row.response_error <= GOOD or row.gain.explained >= ENOUGH:
-        return not row.unsteadiness > UNSTEADY
-    return not wavers(row.steadiness, asked)
 
 
 def _explaining_pair(rows: list[Ranked], base: Baseline, prepared: Prepared) -> Pair | None:

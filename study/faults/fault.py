@@ -1,7 +1,7 @@
 """A fault of the measurement: what it is, how large, and what it says to an engineer."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -142,7 +142,7 @@ def _counted(f: Fault) -> str:
     return f"{100.0 * f.value:.2g} % of the samples of the {f.channel}"
 
 
-_SENTENCES: Mapping[str, Any] = {
+_SENTENCES: Mapping[str, Callable[[Fault], str]] = {
     OFFSET: lambda f: f"the {f.channel} has an offset of {_amount(f)}",
     DRIFT: lambda f: f"the {f.channel} drifts by {_amount(f)} (rms)",
     HUM: lambda f: f"a hum of {_amount(f)} at {f.frequency:.5g} Hz lies on the {f.channel}",

@@ -77,7 +77,7 @@ def strongest_line(left: Leftover, level: float) -> float | None:
     ratio[-2:] = 0.0
     best = int(np.argmax(ratio))
     # A taper lets neighbours share power: of the lines beside, about half are independent.
-    p_value = float(fdtrc(2.0, count[best], ratio[best])) * len(power)
+    p_value = float(fdtrc(2.0, float(count[best]), float(ratio[best]))) * len(power)
     return best / (n * left.prepared.dt) if p_value < level else None
 
 

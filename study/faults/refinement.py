@@ -9,7 +9,7 @@ import numpy as np
 from study.faults import adjustable
 from study.faults.correction import corrected
 from study.faults.drift import slow_part
-from study.faults.fault import HIGH_PASS, HUM, Fault
+from study.faults.fault import DELAY, HIGH_PASS, HUM, Fault
 from study.faults.hum import hum
 from study.faults.leftover import Leftover, amounts_on_both, leftover
 from study.faults.physics import refitted
@@ -17,6 +17,7 @@ from study.records.prepared import Prepared
 from study.support import statistics
 
 STEPS = 8  # of Gauss and Newton
+COARSE = (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)  # samples
 NEAR = 0.05  # standard errors: as near the value as the search has to come
 
 
@@ -40,6 +41,8 @@ def refined(
         line = hum(left, 1)
         return None if line is None else _corrected(line, given, faults, left)
     before = left
+    if name == DELAY and value == 0.0:
+        value, left = _coarse(given, faults, left)
     for _ in range(STEPS):
         amounts, covariance = amounts_on_both(left, adjustable.columns(name, left, value))
         step, error = float(amounts[0]), math.sqrt(max(float(covariance[0, 0]), 0.0))
@@ -54,8 +57,30 @@ def refined(
         left = one.left
         if abs(step) <= NEAR * error:
             break
+    if relative_power(left) >= relative_power(before):
+        return None
     explained = statistics.gain(before.residual[1], left.residual[1]).explained
     return Refined(replace(one.fault, explained=explained), left)  # pyright: ignore[reportPossiblyUnboundVariable]
+
+
+def _coarse(given: Prepared, faults: Sequence[Fault], left: Leftover) -> tuple[float, Leftover]:
+    """Where the search for a delay begins: at zero, or at the best of some whole samples if it is more than a part.
+
+    A model that is fitted to a record late by a good part of a period finds a minimum of its own.
+    """
+    step = float(amounts_on_both(left, adjustable.columns(DELAY, left))[0][0])
+    best = 0.0, left
+    for late in COARSE if abs(step) > 0.5 else ():
+        tried = _left(given, (*faults, Fault(DELAY, given.response, late)), left)
+        if tried is not None and relative_power(tried) < relative_power(best[1]):
+            best = late, tried
+    return best
+
+
+def relative_power(left: Leftover) -> float:
+    """Power of what is left over that of the response: a correction of the gain scales both."""
+    measured = left.prepared.fitted, left.prepared.judged
+    return sum(float(np.sum(r**2)) / float(np.sum(m**2)) for r, m in zip(left.residual, measured, strict=True))
 
 
 def _corrected(fault: Fault, given: Prepared, faults: Sequence[Fault], left: Leftover) -> Refined | None:

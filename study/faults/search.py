@@ -4,6 +4,7 @@ A fault with a look-alike in the library is believed if it is needed beside the 
 these do all that it does, and it does all that they do, the record cannot tell, and that is said.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -17,7 +18,7 @@ from study.faults.fault import CLIPPING, DRIFT, DROP_OUTS, FORCE_NOISE, HUM, SPI
 from study.faults.force_noise import force_noise
 from study.faults.hum import hum, is_of_the_mains, line
 from study.faults.leftover import Leftover, better, leftover, share
-from study.faults.refinement import Refined, refined
+from study.faults.refinement import Refined, refined, relative_power
 from study.faults.spikes import spikes
 from study.faults.spotted import drop_outs, spotted, widened
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -149,7 +150,7 @@ def _contested(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
     needed = fault_needed is not None and fault_needed.significant(asked), _needs(one, effect)
     if needed == (False, False):
         return _tied(stage, one, effect)
-    if needed == (False, True) or (all(needed) and _power(effect) < _power(one.left)):
+    if needed == (False, True) or (all(needed) and relative_power(effect) < relative_power(one.left)):
         return replace(stage, rich=effect)
     return _accepted(stage, one)
 
@@ -181,10 +182,6 @@ def _effect(stage: Stage, one: Refined | None) -> Leftover | None:
 
 def _columns(fault: Fault, left: Leftover) -> tuple[Floats, Floats]:
     return line(fault.frequency, left) if fault.fault == HUM else adjustable.columns(fault.fault, left)
-
-
-def _power(left: Leftover) -> float:
-    return float(np.sum(left.residual[0] ** 2) + np.sum(left.residual[1] ** 2))
 
 
 def _best(left: Leftover, names: Sequence[str], asked: int) -> str | None:
@@ -240,7 +237,7 @@ def _beyond_reason(stage: Stage, effect: Leftover) -> bool:
     if entry is None:
         return False
     force = stage.given.record["force"][slice(*stage.given.plan.fit)]
-    return float(np.hypot(*(values[s] for s in entry.term.symbols))) > float(np.max(np.abs(force)))
+    return math.hypot(*(values[s] for s in entry.term.symbols)) > float(np.max(np.abs(force)))
 
 
 def _pruned(rich: Leftover, left: Leftover) -> Leftover:

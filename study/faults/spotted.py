@@ -137,10 +137,10 @@ def widened(fault: Fault, given: Prepared, left: Leftover) -> Fault:
 
 
 def _noise(residual: Floats) -> float:
-    """Standard deviation of white noise in a residual that may hold a smooth motion as well, from its second bends."""
-    bend = np.diff(residual, 2)
+    """Standard deviation of white noise in a residual that may hold a smooth motion too, from its sixth differences."""
+    bend = np.diff(residual, 6)
     bend = bend[bend != 0.0]  # where samples are lost
-    return 1.4826 * float(np.median(np.abs(bend))) / math.sqrt(6.0) if len(bend) else 0.0
+    return 1.4826 * float(np.median(np.abs(bend))) / math.sqrt(924.0) if len(bend) else 0.0
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
