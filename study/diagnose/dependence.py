@@ -13,7 +13,6 @@ from itertools import pairwise, product
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
-from scipy.signal import lfilter
 
 from study.equations.model import ModelTerm
 from study.equations.terms import custom
@@ -137,8 +136,15 @@ def _states(left: Leftover) -> list[Floats]:
     """Relaxations of several speeds, of the motion and of where it turned."""
     steps: Floats = np.diff(left.displacement, prepend=left.displacement[0])
     rate = float(np.std(steps) / np.std(left.velocity))  # time step in units of displacement over velocity
-    relaxed = [np.asarray(lfilter([1.0], [1.0, -np.exp(-rate / tau)], steps), dtype=np.float64) for tau in TAUS]
+    relaxed = [_relaxed(steps, float(np.exp(-rate / tau))) for tau in TAUS]
     return relaxed + [_hysteresis(steps, beta) for beta in (0.5, 1.5, 4.0)]
+
+
+def _relaxed(steps: Floats, kept: float) -> Floats:
+    """The sum of all steps so far, of each of which a share is kept from sample to sample, shape (n,)."""
+    size = next_fast_len(2 * len(steps), real=True)
+    memory = kept ** np.arange(len(steps))
+    return np.asarray(irfft(rfft(steps, size) * rfft(memory, size), size)[: len(steps)], dtype=np.float64)
 
 
 def _hysteresis(steps: Floats, beta: float) -> Floats:

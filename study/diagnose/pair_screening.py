@@ -12,7 +12,6 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import rfft, rfftfreq
-from scipy.signal import get_window
 
 from study.diagnose.ranked import Ranked
 from study.equations.model import Model, ModelTerm
@@ -100,7 +99,7 @@ def _spectra(model: Model, base: Baseline, prepared: Prepared) -> tuple[dict[str
     receptance, so that noise on the response weighs as it does in a free run.
     """
     part = prepared.record.part(*prepared.inner(prepared.plan.fit))
-    taper = get_window("hann", len(part))
+    taper = np.hanning(len(part) + 1)[:-1]
     frequency = np.asarray(rfftfreq(len(part), part.dt))
     force = np.asarray(rfft(taper * part["force"]))
     loud = np.abs(force) ** 2 > FAINT * np.max(np.abs(force) ** 2)

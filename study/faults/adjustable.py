@@ -3,7 +3,6 @@
 from collections.abc import Callable
 
 import numpy as np
-from scipy.signal import lfilter
 
 from study.faults.fault import DELAY, GAIN_CHANGE, HIGH_PASS, OFFSET
 from study.faults.imposed import high_passed, shifted
@@ -53,7 +52,8 @@ def undone(fault: str, values: Floats, value: float, dt: float) -> Floats:
     if fault == DELAY:
         return shifted(values, -value)
     half = np.pi * value * dt
-    return np.asarray(lfilter([1.0 + half, half - 1.0], [1.0, -1.0], values - np.mean(values)), dtype=np.float64)
+    centred = values - np.mean(values)
+    return np.cumsum((1.0 + half) * centred + (half - 1.0) * np.concatenate([[0.0], centred[:-1]]))
 
 
 def sensible(fault: str, value: float, left: Leftover) -> bool:

@@ -11,17 +11,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
-from scipy.signal import lfilter, lfiltic
 
 from study.records.record import MOTIONS, SI_UNITS, Record
 from study.records.spectra import Segments, autospectrum
 from study.support.arrays import Floats
+from study.support.autoregression import burg, continued_by
 from study.support.errors import StudyError
 from study.support.units import ROLES, VOLTAGE, Unit, parse_unit, role_unit
 
 ORDER = 64  # coefficients of the linear prediction at each end
 TRAINING = 4096  # samples from which the linear prediction is estimated
-PREDICTABLE = 1e-14  # share of the power at which the prediction is complete, above the rounding of the recursion
 SHORTEST = 512  # samples by which each end is continued, at least
 RINGING = 4.0  # periods of the cut-off frequency by which ends are continued when integrating
 SETTLED = 2.0  # periods of the cut-off frequency at each end where an integrated channel is uncertain
@@ -172,32 +171,11 @@ def _predicted(values: Floats, reach: int) -> Floats:
     limit = 2.0 * float(np.max(np.abs(recent)))
     order = min(ORDER, len(recent) // 3)
     while order > 0:
-        weights = np.concatenate([[1.0], -burg(recent, order)])
-        state = lfiltic([1.0], weights, recent[: -len(weights) : -1])
-        continued = np.asarray(lfilter([1.0], weights, np.zeros(reach), zi=state)[0], dtype=np.float64)
+        continued = continued_by(burg(recent, order), recent, reach)
         if float(np.max(np.abs(continued), initial=0.0)) <= limit:
             return continued
         order //= 2
     return np.zeros(reach)
-
-
-def burg(values: Floats, order: int) -> Floats:
-    """Coefficients of a stable linear prediction ``x_n = sum_k a_k x_(n-k)`` (Burg, 1975), shape (order,).
-
-    The recursion minimises forward and backward prediction errors together and uses no window, so that
-    a sinusoid continues as itself. It stops early once nothing is left to predict.
-    """
-    forward, backward = values[1:].copy(), values[:-1].copy()
-    weights = np.zeros(0)
-    floor = PREDICTABLE * float(forward @ forward + backward @ backward)
-    for _ in range(order):
-        power = float(forward @ forward + backward @ backward)
-        if power <= floor or len(forward) < 2:
-            break
-        reflection = 2.0 * float(forward @ backward) / power
-        weights = np.concatenate([weights - reflection * weights[::-1], [reflection]])
-        forward, backward = (forward - reflection * backward)[1:], (backward - reflection * forward)[:-1]
-    return weights
 
 
 def suggest_cutoff(record: Record) -> float:

@@ -1,47 +1,78 @@
-"""The colour of noise: an autoregressive model, and what it makes white."""
+"""Linear prediction: what noise of any colour, or a motion, tells of its next sample."""
+
+from collections.abc import Iterator
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
-from scipy.linalg import solve_toeplitz
-from scipy.signal import lfilter
 
 from study.support.arrays import Floats
 
-ORDERS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
+HIGHEST = 32  # order of an autoregressive noise
 SAMPLES = 20  # for each coefficient, at least
+PREDICTABLE = 1e-14  # share of the power at which the prediction is complete, above the rounding of the recursion
 
 
 def autoregression(noise: Floats) -> Floats:
     """Coefficients ``1, a1, ... ap`` with which ``noise`` filtered is white; p by Schwarz's criterion (1978), or 0.
 
-    From the Yule and Walker equations, with the taper that a spectrum of many decades needs; shape (p + 1,).
+    Shape (p + 1,).
     """
-    n = len(noise)
-    covariance = _autocovariance(noise - np.mean(noise), min(ORDERS[-1], n // SAMPLES))
+    n, centred = len(noise), noise - np.mean(noise)
     best, least = np.ones(1), 0.0
-    if covariance[0] <= 0.0:
-        return best
-    for order in (p for p in ORDERS if p < len(covariance)):
-        a = solve_toeplitz(covariance[:order] * _RIDGE[:order], covariance[1 : order + 1])
-        left = 1.0 - float(a @ covariance[1 : order + 1]) / covariance[0]
-        price = n * np.log(max(left, np.finfo(float).eps)) + order * np.log(n)
+    for weights, left in _lattice(centred, min(HIGHEST, n // SAMPLES)):
+        price = n * np.log(max(left, np.finfo(float).eps)) + len(weights) * np.log(n)
         if price < least:
-            best, least = np.concatenate([[1.0], -a]), price
+            best, least = np.concatenate([[1.0], -weights]), float(price)
     return best
-
-
-_RIDGE = np.where(np.arange(ORDERS[-1] + 1) == 0, 1.0 + 1e-9, 1.0)  # keeps the equations solvable without noise
-
-
-def _autocovariance(values: Floats, lags: int) -> Floats:
-    """At lags of 0 to ``lags`` samples, shape (lags + 1,); positive definite."""
-    tapered = values * np.hanning(len(values))
-    power = np.abs(rfft(tapered, next_fast_len(2 * len(values)))) ** 2
-    return np.asarray(irfft(power)[: lags + 1], dtype=np.float64)
 
 
 def whitened(values: Floats, coefficients: Floats) -> Floats:
     """``values`` along their first axis filtered, those before the first sample taken as equal to it; same shape."""
-    first = np.broadcast_to(values[:1], (len(coefficients) - 1, *values.shape[1:]))
-    padded = np.concatenate([first, values])
-    return np.asarray(lfilter(coefficients, [1.0], padded, axis=0)[len(first) :], dtype=np.float64)
+    order = len(coefficients) - 1
+    padded = np.concatenate([np.broadcast_to(values[:1], (order, *values.shape[1:])), values])
+    total = coefficients[0] * values
+    for k in range(1, order + 1):  # SciPy's signal package takes longer to load than this takes
+        total = total + coefficients[k] * padded[order - k : len(padded) - k]
+    return total
+
+
+def burg(values: Floats, order: int) -> Floats:
+    """Coefficients of a stable linear prediction ``x_n = sum_k a_k x_(n-k)`` (Burg, 1975), shape (order,).
+
+    Fewer where nothing is left to predict.
+    """
+    weights = np.zeros(0)
+    for longer, _ in _lattice(values, order):
+        weights = longer
+    return weights
+
+
+def continued_by(weights: Floats, recent: Floats, reach: int) -> Floats:
+    """The samples after the last one as a linear prediction has them, shape (reach,)."""
+    order = len(weights)
+    if order == 0:
+        return np.zeros(reach)
+    series = np.concatenate([recent[len(recent) - order :], np.empty(reach)])
+    backwards = weights[::-1].copy()
+    for i in range(order, len(series)):
+        series[i] = backwards @ series[i - order : i]
+    return series[order:]
+
+
+def _lattice(values: Floats, order: int) -> Iterator[tuple[Floats, float]]:
+    """Linear predictions of order 1, 2, ..., each with the share of the mean square that it leaves (Burg, 1975).
+
+    The recursion minimises forward and backward prediction errors together and uses no window, so that a sinusoid
+    continues as itself. It stops early once nothing is left to predict.
+    """
+    forward, backward = values[1:].copy(), values[:-1].copy()
+    weights, left = np.zeros(0), 1.0
+    floor = PREDICTABLE * float(forward @ forward + backward @ backward)
+    for _ in range(order):
+        power = float(forward @ forward + backward @ backward)
+        if power <= floor or len(forward) < 2:
+            return
+        reflection = 2.0 * float(forward @ backward) / power
+        weights = np.concatenate([weights - reflection * weights[::-1], [reflection]])
+        forward, backward = (forward - reflection * backward)[1:], (backward - reflection * forward)[:-1]
+        left *= 1.0 - reflection**2
+        yield weights, left

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from study.equations.model_file import read_model
 from study.equations.simulate import Integrator, simulate
-from study.records.completion import burg, complete, consistent, derivative, suggest_cutoff
+from study.records.completion import complete, consistent, derivative, suggest_cutoff
 from study.records.record import MOTIONS, Record
+from study.support.autoregression import burg
 from study.support.errors import StudyError
 
 MODELS = Path(__file__).parents[2] / "models"
