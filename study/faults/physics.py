@@ -1,6 +1,7 @@
 """Physical effects that a record asks for beside a model: what a fault has to prove itself against."""
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part, run_of
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
+from study.support.cores import cores
 from study.support.errors import StudyError
 from study.support.statistics import worse
 
@@ -45,9 +47,11 @@ def missing(left: Leftover) -> Leftover | None:
         base = shape_search.baseline(near, look)
     except StudyError:
         return None
-    starts = [(term, shape_search.starts(term, base, look)[:POINTS]) for term in terms]
-    promising = sorted((s for s in starts if s[1]), key=lambda s: -s[1][0].share)[:FITTED]
-    tried = [_fitted(term, points, base, look, prepared) for term, points in promising]
+    with ThreadPoolExecutor(cores()) as pool:
+        points = list(pool.map(lambda term: shape_search.starts(term, base, look)[:POINTS], terms))
+        starts = [(term, found) for term, found in zip(terms, points, strict=True) if found]
+        promising = sorted(starts, key=lambda s: -s[1][0].share)[:FITTED]
+        tried = list(pool.map(lambda s: _fitted(*s, base, look, prepared), promising))
     best = _simplest_of_the_best([t for t in tried if t is not None])
     return best if best is not None and better(left, best, len(terms)) else None
 
