@@ -49,6 +49,7 @@ def _diagnosed(
 ) -> dict[str, bytes]:  # fmt: skip
     """Diagnose one record, print the diagnosis, and give the files' contents."""
     from study.diagnose import diagnosis_report
+    from study.diagnose.confirmed_faults import confirmed
     from study.diagnose.diagnosis_files import files, in_words, unneeded_in_words
     from study.diagnose.needless import needless
     from study.diagnose.verdict import diagnose
@@ -59,15 +60,15 @@ def _diagnosed(
         without = tuple(arguments.without)
         diagnosis = diagnose(accounted.comparison, extra=own, without=without, progress=lambda _: step(""))
         unneeded = needless(accounted.comparison)
-        words = in_words(diagnosis)
+        words, faults = in_words(diagnosis), confirmed(accounted.faults, diagnosis)
     print(f"{record.name}: {diagnosis.verdict.replace('_', ' ')}")
     print(diagnosis_report.table(diagnosis))
     print("\n" + words)
-    if accounted.faults:
-        print("\n" + paragraph(accounted.faults))
+    if faults:
+        print("\n" + paragraph(faults))
     if unneeded:
         print(f"\n{unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
-    return files(diagnosis, words, unneeded, accounted.faults)
+    return files(diagnosis, words, unneeded, faults)
 
 
 COMMAND = Command(

@@ -7,8 +7,10 @@ from study.compare.by_estimator import FREE_RUN
 from study.compare.comparison import Comparison, compare
 from study.equations.model import Model
 from study.faults.correction import corrected
-from study.faults.fault import Fault
+from study.faults.fault import FORCE_NOISE, Fault
+from study.faults.force_noise import force_noise
 from study.faults.imposed import FAULTS
+from study.faults.leftover import leftover
 from study.faults.search import first_faults, search
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -17,7 +19,7 @@ from study.records.prepared import Prepared
 from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE
 
-__all__ = ["Accounted", "accounted", "corrected", "find_faults"]
+__all__ = ["Accounted", "accounted", "corrected", "find_faults", "still_seen"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,3 +102,13 @@ def find_faults(comparison: Comparison, switched_off: Sequence[str] = ()) -> tup
     if any(fault.corrected for fault in faults):
         fit = fit_model(comparison.model, corrected(comparison.prepared, faults))
     return search(comparison.prepared, fit, faults, asked)[0]
+
+
+def still_seen(faults: Sequence[Fault], fit: FreeRunFit, prepared: Prepared) -> tuple[Fault, ...]:
+    """The faults without noise on the force where a fuller model, fitted to the corrected record, shows none.
+
+    What passes through the structure may be a force that the model lacked.
+    """
+    left = leftover(fit, prepared) if any(fault.fault == FORCE_NOISE for fault in faults) else None
+    gone = left is not None and force_noise(left, len(FAULTS)) is None
+    return tuple(fault for fault in faults if not (gone and fault.fault == FORCE_NOISE))

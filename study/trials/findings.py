@@ -12,7 +12,7 @@ from study.diagnose.credibility import credible
 from study.diagnose.verdict import MISSING, Diagnosis
 from study.equations.model import Model
 from study.faults import accounting
-from study.faults.fault import fields
+from study.faults.fault import Fault
 from study.records.prepared import Prepared
 
 Row = dict[str, Any]
@@ -21,10 +21,10 @@ WHATEVER_ITS_P_VALUE = 0  # effects asked for: a p value times none is below any
 FAR = 20.0  # standard errors: rivals that are farther behind stand in no tie set
 
 
-def accounted(model: Model, prepared: Prepared) -> tuple[Comparison, tuple[Found, ...]]:
+def accounted(model: Model, prepared: Prepared) -> tuple[Comparison, tuple[Fault, ...]]:
     """The comparison that a diagnosis begins with, and the faults of the measurement that it accounts for."""
     found = accounting.accounted(model, prepared)
-    return found.comparison, tuple(fields(fault) for fault in found.faults)
+    return found.comparison, found.faults
 
 
 def tie_set(diagnosis: Diagnosis) -> tuple[str, ...]:

@@ -15,7 +15,9 @@ import numpy as np
 from study.compare.comparison import Comparison
 from study.compare.prediction import predict
 from study.diagnose.adding import added
+from study.diagnose.confirmed_faults import confirmed
 from study.diagnose.verdict import diagnose
+from study.faults.fault import fields
 from study.faults.imposed import FAULTS
 from study.identify.time_domain.part_fit import fit_part
 from study.records.prepared import Prepared, prepare_record
@@ -129,7 +131,8 @@ def _judged(order: Order, trial: Trial) -> Row:
         "error_true": error_of_truth(trial, before.prepared, after.fit.steps_per_sample),
         "noise_floor": before.prediction.floor,
     }  # fmt: skip
-    row |= evidence(diagnosis, order.hidden) | measurement(faults, trial.fault) | intervals(after, trial.truth)
+    found = [fields(fault) for fault in confirmed(faults, diagnosis)]
+    row |= evidence(diagnosis, order.hidden) | measurement(found, trial.fault) | intervals(after, trial.truth)
     if named and order.kind == PAIR:
         row |= _second(after, trial)
     if named and order.kind == REMOVED:
