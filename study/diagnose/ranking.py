@@ -30,8 +30,12 @@ def rank(candidates: Sequence[Candidate], comparison: Comparison) -> list[Ranked
     if not candidates:
         return []
     before = comparison.prediction
+
+    def row(candidate: Candidate) -> Ranked:
+        return examined(candidate, before)
+
     with ThreadPoolExecutor(cores()) as pool:
-        rows = list(pool.map(lambda c: examined(c, before), candidates))
+        rows = list(pool.map(row, candidates))
     rows.sort(key=lambda r: float(r.residual @ r.residual))
     noise = autoregression(rows[0].fit.residual)
     white = {r.name: r.held_out.white(noise) for r in rows}

@@ -47,11 +47,17 @@ def missing(left: Leftover) -> Leftover | None:
         base = shape_search.baseline(near, look)
     except StudyError:
         return None
+
+    def begun(term: Term) -> list[shape_search.Start]:
+        return shape_search.starts(term, base, look)[:POINTS]
+
+    def fitted(start: tuple[Term, list[shape_search.Start]]) -> Leftover | None:
+        return _fitted(*start, base, look, prepared)
+
     with ThreadPoolExecutor(cores()) as pool:
-        points = list(pool.map(lambda term: shape_search.starts(term, base, look)[:POINTS], terms))
-        starts = [(term, found) for term, found in zip(terms, points, strict=True) if found]
+        starts = [(term, found) for term, found in zip(terms, pool.map(begun, terms), strict=True) if found]
         promising = sorted(starts, key=lambda s: -s[1][0].share)[:FITTED]
-        tried = list(pool.map(lambda s: _fitted(*s, base, look, prepared), promising))
+        tried = list(pool.map(fitted, promising))
     best = _simplest_of_the_best([t for t in tried if t is not None])
     return best if best is not None and better(left, best, len(terms)) else None
 
