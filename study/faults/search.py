@@ -233,11 +233,9 @@ def _needs(one: Refined, effect: Leftover) -> bool:
 def _beyond_reason(stage: Stage, effect: Leftover) -> bool:
     """Whether a harmonic force would have to be larger than the whole measured one."""
     values = effect.fit.model.numbers()
-    entry = next((e for e in effect.fit.model.terms if e.name == "harmonic_force"), None)
-    if entry is None:
-        return False
-    force = stage.given.record["force"][slice(*stage.given.plan.fit)]
-    return math.hypot(*(values[s] for s in entry.term.symbols)) > float(np.max(np.abs(force)))
+    harmonic = [e.term.symbols for e in effect.fit.model.terms if len(e.term.symbols) == 2]  # a force of any phase
+    largest = float(np.max(np.abs(stage.given.record["force"][slice(*stage.given.plan.fit)])))
+    return any(math.hypot(*(values[s] for s in symbols)) > largest for symbols in harmonic)
 
 
 def _pruned(rich: Leftover, left: Leftover) -> Leftover:

@@ -183,7 +183,7 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
         raise StudyError(f"asked for {estimator}")
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("study.compare.comparison.compare", asked)
+    monkeypatch.setattr("study.faults.accounting.compare", asked)
     write_csv(record(), Path("rig.csv"))
     Path("rig.yaml").write_text(f"name: rig\nterms: [{', '.join(NAMES)}]\n")
     for words, name in (([], "output_error"), (["--estimator", "local_polynomial"], "local_polynomial")):

@@ -234,8 +234,9 @@ class _Problem:
             return None
         continuity = None
         if self.weights is not None:
-            gaps = self.weights * (arrivals[:, :, 0] - states[1:])
-            continuity = ContinuityGaps(gaps, self.weights[:, None] * arrivals[:, :, 1:], self.weights)
+            with np.errstate(over="ignore", invalid="ignore"):  # what is out of range is refused by point_at
+                gaps = self.weights * (arrivals[:, :, 0] - states[1:])
+                continuity = ContinuityGaps(gaps, self.weights[:, None] * arrivals[:, :, 1:], self.weights)
         residual = self.measured - response
         if self.kept is not None:
             residual, jacobian = residual * self.kept, jacobian * self.kept[:, None]

@@ -12,9 +12,7 @@ from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
 from study.identify.time_domain.shooting import (
     ShootingSegments,
     even_restarts,
-    is_forgotten,
     needed_restarts,
-    propagators,
 )
 from study.records.prepared import Prepared
 from study.records.record import Record
@@ -90,18 +88,11 @@ def is_poor(fit: FreeRunFit, measured: Floats) -> bool:
 
 
 def is_chaotic(fit: FreeRunFit, prepared: Prepared) -> bool:
-    """Whether a fitted free run magnifies disturbances, and has not forgotten one at its beginning by its end.
-
-    A strongly nonlinear system may magnify them for a cycle or two; its free run still finds back to the motion.
-    """
+    """Whether disturbances of a fitted free run grow along the part that it was fitted to."""
     record, response, span = prepared.record, prepared.response, fit.span
     segments = ShootingSegments(record, response, span, even_restarts(record, response, span), fit.steps_per_sample)
-    if not segments.restarts:  # a motion of a single period or less
-        return False
-    along = fit.model, record, segments.passing(fit.model, fit.restarts, fit.initial), span, segments.restarts
-    if not needed_restarts(*along, fit.steps_per_sample):
-        return False
-    return not is_forgotten(propagators(*along, fit.steps_per_sample))
+    states = segments.passing(fit.model, fit.restarts, fit.initial)
+    return bool(needed_restarts(fit.model, record, states, span, segments.restarts, fit.steps_per_sample))
 
 
 def _continuous(

@@ -79,7 +79,8 @@ def integration_shift(fit: FreeRunFit, prepared: Prepared, jacobian: Floats) -> 
 def uncertainty(fit: FreeRunFit, prepared: Prepared, jacobian: Floats) -> Floats:
     """Covariance of a fit's estimates, shape (keys + 2, keys + 2): of the noise, and of the integration's own error."""
     moved = integration_shift(fit, prepared, jacobian)
-    return covariance_of(fit, jacobian) + np.outer(moved, moved)
+    with np.errstate(over="ignore"):  # where a run drifts away the shift is beyond all measure
+        return covariance_of(fit, jacobian) + np.outer(moved, moved)
 
 
 @dataclass(frozen=True)

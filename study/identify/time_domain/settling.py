@@ -22,6 +22,7 @@ SHIFT = 0.3  # standard errors by which the integration may shift a coefficient
 ORDER = 4  # of the integrator: what it shifts falls with this power of the steps
 FAR = 1e6  # times the shift that would matter: more asks for no more steps than this
 MOST_STEPS = 8  # in a sampling interval, unless the model's own rates ask for more
+LOST = 0.5  # of what one free run leaves: where segments leave less, that run has lost the motion
 KEPT = 40  # free runs of a fit that is kept
 
 
@@ -43,7 +44,7 @@ def _settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
         return fit
     if is_chaotic(fit, prepared):
         apart = _in_segments(fit, prepared)
-        return apart if apart is not None and (apart.converged or is_poor(fit, prepared.fitted)) else fit
+        return apart if apart is not None and (apart.converged or apart.rms < LOST * fit.rms) else fit
     near = from_segments(fit.model, prepared, fit.held, fit.steps_per_sample)
     best = better(fit, near) or fit
     if near is None or _stands(best, prepared) or not is_chaotic(near, prepared):

@@ -5,7 +5,6 @@ run has nothing to do with the measured motion, however true the model. Segments
 growth, each with an initial state of its own, keep the fit well posed (multiple shooting; H. G. Bock, 1983).
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,7 +17,6 @@ from study.records.states import REACH, angular_rate, starting_states
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError
 
-FORGOTTEN = 1e-3  # share of a disturbance at the beginning that may be left at the end
 GROWTH = 10.0  # factor by which a disturbance may be magnified within a segment
 PERIODS = 1.0  # length of the segments that a search from afar begins with
 REACHES = (0.07, 0.15, REACH, 0.3)  # widths of smoothing, in periods, that are tried for the first states
@@ -37,14 +35,19 @@ def needed_restarts(
 ) -> tuple[int, ...]:  # fmt: skip
     """Which restarts of a fitted model have to stay, given the state at the beginning of each segment.
 
-    Products of the segments' :func:`propagators` say how a disturbance at any restart grows until any later one.
+    The derivative of the state at a segment's end by that at its beginning is taken from a free run; products
+    of them say how a disturbance at any restart grows until any later one. Displacement and velocity are
+    weighted by the angular rate of the motion, so that a linear system without damping has growth one.
     """
     if not restarts:  # a motion of a single period or less
         return ()
+    run = prepare(model, record, steps_per_sample=steps_per_sample, span=span, restarts=restarts)
+    motion, _, arrivals = run.respond_by_segment({}, states, 2)
+    rate = angular_rate(motion, record.dt)
+    weighted = arrivals[:, :2, 1:] * np.array([[1.0, rate], [1.0 / rate, 1.0]])
     kept: list[int] = []
     grown: list[Floats] = []  # from each restart that matters to where the present segment ends
-    through_each = propagators(model, record, states, span, restarts, steps_per_sample)
-    for begin, through in zip((span[0], *restarts[:-1]), through_each, strict=True):
+    for begin, through in zip((span[0], *restarts[:-1]), weighted, strict=True):
         grown = [through @ p for p in grown] + [through]
         sizes = [float(np.linalg.norm(p, 2)) for p in grown]
         if max(sizes) > GROWTH and len(grown) > 1:
@@ -53,32 +56,6 @@ def needed_restarts(
         # What has shrunk can grow no further than what begins here will.
         grown = [p for p, size in zip(grown, sizes, strict=True) if size > 1.0]
     return tuple(kept)
-
-
-def is_forgotten(through_each: Floats) -> bool:
-    """Whether a disturbance at the first sample has died out by the last, given the :func:`propagators`."""
-    grown, size = np.eye(2), 0.0
-    for through in through_each:
-        grown = through @ grown
-        length = float(np.linalg.norm(grown, 2))
-        if length == 0.0:
-            return True
-        grown, size = grown / length, size + math.log(length)
-    return size < math.log(FORGOTTEN)
-
-
-def propagators(
-    model: Model, record: Record, states: Floats, span: tuple[int, int], restarts: Sequence[int], steps_per_sample: int
-) -> Floats:  # fmt: skip
-    """Derivative of displacement and velocity at a segment's end by those at its beginning, of all but the last.
-
-    Shape (segments - 1, 2, 2). Velocity is taken over the angular rate of the motion, so that a linear system without
-    damping has growth one.
-    """
-    run = prepare(model, record, steps_per_sample=steps_per_sample, span=span, restarts=restarts)
-    motion, _, arrivals = run.respond_by_segment({}, states, 2)
-    rate = angular_rate(motion, record.dt)
-    return arrivals[:, :2, 1:] * np.array([[1.0, rate], [1.0 / rate, 1.0]])
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ def _agree(plain: FreeRunFit, other: FreeRunFit, prepared: Prepared) -> bool:
 
     Of a true model weighting lowers the variance, so what moves an estimate is less than that (Hausman, 1978).
     """
-    if other.rms - plain.rms > TOLERANCE * prepared.spread:
+    if other.rms > (1.0 + TOLERANCE) * plain.rms:
         return False
     deviations = np.sqrt(np.diag(covariance_of(plain, linearise(plain, prepared))))[: len(plain.keys)]
     return bool(np.all(np.abs(other.values - plain.values) <= K * deviations))
