@@ -28,6 +28,7 @@ from study.support.statistics import Gain
 
 Floats = NDArray[np.float64]
 DEGREE = 7
+KNOTS = 24  # of a function of displacement or velocity in detail
 TAUS = (0.1, 0.3, 1.0, 3.0, 10.0)
 LONGEST = 16384  # samples of either part that are looked at
 
@@ -102,7 +103,11 @@ def significant(left: Leftover, level: float) -> float:
 
 def _families(left: Leftover) -> dict[str, Gain]:
     families = {**left.shapes, "past": _passed(left, _states(left)), "time": _passed(left, _times(left))}
-    return {name: statistics.gain(*_held_out(left, columns)) for name, columns in families.items()}
+    found = {name: statistics.gain(*_held_out(left, columns)) for name, columns in families.items()}
+    for name, x in (("displacement", left.displacement), ("velocity", left.velocity)):
+        detailed = statistics.gain(*_held_out(left, _passed(left, _hats(x))))
+        found[name] = max(found[name], detailed, key=lambda gain: gain.explained)
+    return found
 
 
 def _one_by_one(left: Leftover, columns: Floats) -> list[Gain]:
@@ -138,6 +143,12 @@ def _states(left: Leftover) -> list[Floats]:
     rate = float(np.std(steps) / np.std(left.velocity))  # time step in units of displacement over velocity
     relaxed = [_relaxed(steps, float(np.exp(-rate / tau))) for tau in TAUS]
     return relaxed + [_hysteresis(steps, beta) for beta in (0.5, 1.5, 4.0)]
+
+
+def _hats(x: Floats) -> list[Floats]:
+    """Piecewise linear functions that add up to any function of ``x`` without detail below a step, each shape (n,)."""
+    knots = np.linspace(float(np.min(x)), float(np.max(x)), KNOTS)
+    return [np.clip(1.0 - np.abs(x - knot) / (knots[1] - knots[0]), 0.0, None) for knot in knots]
 
 
 def _relaxed(steps: Floats, kept: float) -> Floats:

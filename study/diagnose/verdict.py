@@ -160,4 +160,5 @@ def _left(fit: FreeRunFit, prediction: Prediction) -> float:
     """
     look = prediction.prepared.shortened(min(len(fit.residual), LONG))
     left = dependence.leftover(shape_search.baseline(continued(fit, look), look), look)
-    return prediction.error * float(np.sqrt(dependence.significant(left, ALPHA)))
+    nameless = 0.1 * ALPHA  # what no candidate explains is believed less easily than what one does
+    return prediction.error * float(np.sqrt(dependence.significant(left, nameless)))

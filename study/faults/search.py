@@ -23,12 +23,14 @@ from study.faults.spikes import spikes
 from study.faults.spotted import drop_outs, spotted, widened
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.settling import settled
-from study.records.prepared import Prepared
+from study.records.prepared import Prepared, limited
 from study.support.arrays import Floats
 from study.support.statistics import gain
 from study.support.thresholds import ALPHA
 
 ROUNDS = 12  # faults and effects looked for one after the other
+PLAIN = (DRIFT, SPIKES, DROP_OUTS)  # which no physics imitates
+LONG = 8192  # samples of either part in which faults compete with physics
 EFFECTS = 3  # of the library that are added before a fault is believed
 
 
@@ -72,19 +74,40 @@ def search(
     """All faults of a record, those that are known first, and the model fitted to the corrected record.
 
     ``asked`` are the names that are looked for, ``fit`` is the model fitted to the record with the known faults
-    corrected. The fit that is given back begins there and searches no further.
+    corrected. The fit that is given back begins there and searches no further. Of a long record, faults that compete
+    with physics are looked for in a stretch of either part; the others everywhere.
     """
-    left = leftover(fit, corrected(given, faults))
-    if left is None:
+    look = limited(given, LONG)
+    if look is given:
+        stage = _searched(given, fit, fit, faults, asked)
+        return (tuple(faults), fit) if stage is None else (stage.faults, stage.left.fit)
+    near = physics.refitted(fit, corrected(look, faults))
+    part = None if near is None else _searched(look, near, near, faults, asked)
+    if part is None:
         return tuple(faults), fit
-    stage = _beyond_the_limits(Stage(given, tuple(faults), left, left))
+    known = tuple(f for f in part.faults if f.fault not in PLAIN)
+    left, rich = (physics.refitted(one.fit, corrected(given, known)) for one in (part.left, part.rich))
+    plain = tuple(name for name in asked if name in PLAIN)
+    stage = None if left is None or rich is None else _searched(given, left, rich, known, plain)
+    return (tuple(faults), fit) if stage is None else (stage.faults, stage.left.fit)
+
+
+def _searched(
+    given: Prepared, fit: FreeRunFit, rich: FreeRunFit, faults: Sequence[Fault], asked: Sequence[str]
+) -> Stage | None:  # fmt: skip
+    """Where a search ends; None where the model does not run. ``rich`` is the model with the effects known by now."""
+    prepared = corrected(given, faults)
+    left = leftover(fit, prepared)
+    more = left if rich is fit else leftover(rich, prepared)
+    if left is None or more is None:
+        return None
+    stage = _beyond_the_limits(Stage(given, tuple(faults), left, more))
     for _ in range(ROUNDS):
         following = _next(stage, asked)
         if following is None:
             break
         stage = following
-    stage = _needed(stage, len(asked))
-    return stage.faults, stage.left.fit
+    return _needed(stage, len(asked))
 
 
 def _beyond_the_limits(stage: Stage) -> Stage:
@@ -101,7 +124,7 @@ def _next(stage: Stage, asked: Sequence[str]) -> Stage | None:
     found = [f.fault for f in stage.faults]
     names = [name for name in asked if name not in found or name in (HUM, SPIKES)]
     plain = _plain(stage, names, len(asked))
-    if plain is not None:
+    if plain is not None or set(asked) <= set(PLAIN):
         return plain
     return _contested(stage, [n for n in names if n not in [f.fault for f in stage.faults if f.rivals]], len(asked))
 
@@ -251,16 +274,23 @@ def _pruned(rich: Leftover, left: Leftover) -> Leftover:
 def _needed(stage: Stage, asked: int) -> Stage:
     """Without the faults that the effects found after them have made needless."""
     for fault in stage.faults:
-        if fault.fault in adjustable.ADJUSTABLE and fault.corrected and not fault.held:
+        if fault.fault in (*adjustable.ADJUSTABLE, DRIFT) and fault.corrected and not fault.held:
             others = tuple(f for f in stage.faults if f is not fault)
             prepared = corrected(stage.given, others)
             left, rich = (_again(one, prepared) for one in (stage.left, stage.rich))
             if left is None or rich is None:
                 continue
-            needed = share(rich, adjustable.columns(fault.fault, rich), leading=True)
-            if needed is None or not needed.significant(asked):
+            if not _still_there(fault, rich, asked):
                 stage = Stage(stage.given, others, left, rich)
     return stage
+
+
+def _still_there(fault: Fault, rich: Leftover, asked: int) -> bool:
+    """Whether the record shows a fault beside all effects that it asks for."""
+    if fault.fault == DRIFT:
+        return drift(rich, asked) is not None
+    needed = share(rich, adjustable.columns(fault.fault, rich), leading=True)
+    return needed is not None and needed.significant(asked)
 
 
 def _again(left: Leftover, prepared: Prepared) -> Leftover | None:

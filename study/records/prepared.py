@@ -93,6 +93,15 @@ class Prepared:
         return self.with_fit(*((last - samples, last) if self.plan.judge[0] == last else (first, first + samples)))
 
 
+def limited(prepared: Prepared, samples: int) -> Prepared:
+    """The same with no more than so many samples to fit and to judge; itself where it has no more."""
+    first, last = prepared.plan.judge
+    shorter = prepared.shortened(samples)
+    if last - first <= samples:
+        return shorter
+    return replace(shorter, plan=replace(shorter.plan, judge=(first, first + samples)))
+
+
 def prepare_record(record: Record, plan: Plan | None = None, cutoff: float | None = None) -> Prepared:
     """Convert a record to consistent units, complete its motions, and decide what is fitted and judged.
 
