@@ -35,7 +35,7 @@ TITLES = MappingProxyType(
     {
         OFFSET: "Offset", DRIFT: "Drift", HUM: "Hum", DELAY: "Delay", HIGH_PASS: "High-pass", SPIKES: "Spikes",
         DROP_OUTS: "Drop-outs", CLIPPING: "Clipping", CONVERTER_STEPS: "Steps of the converter",
-        GAIN_CHANGE: "Gain that changes", FORCE_NOISE: "Noise on the force",
+        GAIN_CHANGE: "Changing gain", FORCE_NOISE: "Noise on the force",
     }
 )  # fmt: skip
 USUAL = 300  # samples that are shown of a fault that is not listed
