@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: study report test checks lint picture readme estimators trials clean
+.PHONY: study report test checks lint picture fault_pictures readme estimators trials clean
 
 study: $(READY)
 	$(BIN)/snakemake -j2
@@ -27,6 +27,9 @@ lint: $(READY)
 picture: $(READY)
 	$(BIN)/snakemake -j2 silverbox_climb
 	$(BIN)/python scripts/page_picture.py results/silverbox/climb.html docs/explore.png 1
+
+fault_pictures: $(READY)
+	$(BIN)/python scripts/fault_pictures.py models docs/faults
 
 readme: study
 	$(BIN)/python scripts/readme.py

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import Diagnosis
+from study.figures.labels import term_names
 
 SHOWN = 10
 FURTHEST = (-4.0, 6.0)  # of a coefficient, relative to its value: what lies beyond is no constant
@@ -27,13 +28,13 @@ def ranking(axes: Axes, diagnosis: Diagnosis) -> Axes:
     axes.axvline(100.0 * before, color="0.1", linewidth=1.4, linestyle="-", label="without it")
     floor = rows[0].prediction.floor if rows else diagnosis.comparison.prediction.floor
     axes.axvline(100.0 * floor, color="0.1", linewidth=1.4, linestyle=":", label="noise floor")
-    axes.set_xlabel("held-out error of the response after adding it / %")
+    axes.set_xlabel("held-out error of the response after adding it (%)")
     return axes
 
 
 def _label(row: Ranked, first: Ranked) -> str:
     tied = row.name in first.tied_with or (row is first and bool(first.tied_with))
-    return row.name.replace("_", " ") + (" (tie)" if tied else "")
+    return term_names(row.name) + (" (tie)" if tied else "")
 
 
 def constancy(frequency: Axes, amplitude: Axes, rows: Sequence[Ranked]) -> None:
@@ -44,14 +45,14 @@ def constancy(frequency: Axes, amplitude: Axes, rows: Sequence[Ranked]) -> None:
         for axes, curve in ((frequency, row.flatness), (amplitude, row.steadiness)):
             if curve is None:
                 continue
-            relative = curve.value.real / row.coefficient
+            relative = curve.value.real / abs(row.coefficient)  # a curve is one of sizes: along the coefficient's sign
             low, high = min(low, *relative), max(high, *relative)
             axes.errorbar(
                 curve.at, relative, 1.96 * curve.error / abs(row.coefficient),
-                marker=marker, linestyle=line, color=colour, capsize=2.0, label=row.name.replace("_", " "),
+                marker=marker, linestyle=line, color=colour, capsize=2.0, label=term_names(row.name),
             )  # fmt: skip
-    for axes, what in ((frequency, "frequency / Hz"), (amplitude, "strength of the effect / its mean")):
+    for axes, what in ((frequency, "frequency (Hz)"), (amplitude, "strength of the effect relative to its mean")):
         axes.axhline(1.0, color="0.8", linewidth=0.8, zorder=0)
         axes.set_xlabel(what)
         axes.set_ylim(max(1.1 * low, FURTHEST[0]), min(1.1 * high, FURTHEST[1]))
-    frequency.set_ylabel("coefficient there / coefficient")
+    frequency.set_ylabel("coefficient, relative to its value")

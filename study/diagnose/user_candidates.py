@@ -12,6 +12,6 @@ def own_candidates(given: Sequence[str]) -> list[Term]:
     for text in given:
         name, sign, formula = text.partition("=")
         if not sign:
-            raise StudyError(f"{text!r} is no candidate; NAME=FORMULA such as 'bracket=u*abs(u)' is right")
+            raise StudyError(f"{text!r} is no candidate; expected NAME=FORMULA such as 'bracket=u*abs(u)'")
         terms.append(custom(name.strip(), formula.strip()))
     return terms
