@@ -28,7 +28,8 @@ from study.support.statistics import Gain
 
 Floats = NDArray[np.float64]
 DEGREE = 7
-KNOTS = 24  # of a function of displacement or velocity in detail
+KNOTS = 24  # of a function of displacement or velocity in detail ...
+EDGES = (0.01, 0.99)  # ... between these quantiles: what lies beyond is too rare to tell a detail
 TAUS = (0.1, 0.3, 1.0, 3.0, 10.0)
 LONGEST = 16384  # samples of either part that are looked at
 
@@ -147,8 +148,9 @@ def _states(left: Leftover) -> list[Floats]:
 
 def _hats(x: Floats) -> list[Floats]:
     """Piecewise linear functions that add up to any function of ``x`` without detail below a step, each shape (n,)."""
-    knots = np.linspace(float(np.min(x)), float(np.max(x)), KNOTS)
-    return [np.clip(1.0 - np.abs(x - knot) / (knots[1] - knots[0]), 0.0, None) for knot in knots]
+    knots = np.linspace(*np.quantile(x, EDGES), KNOTS)
+    inside = np.clip(x, knots[0], knots[-1])
+    return [np.clip(1.0 - np.abs(inside - knot) / (knots[1] - knots[0]), 0.0, None) for knot in knots]
 
 
 def _relaxed(steps: Floats, kept: float) -> Floats:
