@@ -17,7 +17,9 @@ from study.support.least_squares import least_squares
 from study.support.thresholds import ALPHA, TOLERANCE
 
 MEMORIES = (0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.9)  # correlation of neighbouring samples
-ROUNDS = 30  # of the search for both densities
+ROUNDS = 100  # of Fisher's scoring, at most
+HALVINGS = 14  # of one step, at most
+SHRINKING = 1e-3  # to which share of itself an amount may fall in one step
 LINEAR = {"m": "inertia", "c": "linear_damping", "k": "linear_stiffness"}
 
 
@@ -70,22 +72,32 @@ def _transfer(left: Leftover, omega: Complexes) -> Complexes:
 
 
 def _likely(power: Floats, shape: Floats) -> _Noise:
-    """The most likely amounts of a shape and of white noise, both zero or more, by Fisher's scoring."""
+    """The most likely amounts of a shape and of white noise, neither below zero, by Fisher's scoring.
+
+    A step that does not raise the likelihood (Whittle, 1953) is halved.
+    """
     columns = np.column_stack([shape, np.ones_like(shape)])
     mean = float(np.mean(power))
     amounts = np.array([0.5 * mean / float(np.mean(shape)), 0.5 * mean])
+    cost = _cost(columns @ amounts, power)
     for _ in range(ROUNDS):
         spectrum = columns @ amounts
-        again = least_squares(columns / spectrum[:, None], power / spectrum)
-        again = np.maximum(again, 1e-9 * mean)
-        done = bool(np.all(np.abs(again - amounts) < 1e-6 * mean))
-        amounts = again
-        if done:
+        step = least_squares(columns / spectrum[:, None], power / spectrum) - amounts
+        tried = [np.maximum(amounts + step / 2**k, SHRINKING * amounts) for k in range(HALVINGS)]
+        better = next((t for t in tried if _cost(columns @ t, power) < cost), None)
+        if better is None:
+            break
+        amounts, before, cost = better, cost, _cost(columns @ better, power)
+        if before - cost < 1e-6:
             break
     spectrum = columns @ amounts
     information = (columns / spectrum[:, None]).T @ (columns / spectrum[:, None])
-    error = float(np.sqrt(np.linalg.pinv(information)[0, 0]))
-    return _Noise(float(amounts[0]), error, float(np.sum(np.log(spectrum) + power / spectrum)))
+    return _Noise(float(amounts[0]), float(np.sqrt(np.linalg.pinv(information)[0, 0])), cost)
+
+
+def _cost(spectrum: Floats, power: Floats) -> float:
+    """Twice the negative logarithm of the likelihood of a periodogram, but for a constant."""
+    return float(np.sum(np.log(spectrum) + power / spectrum))
 
 
 def _first_order(memory: float, turn: Floats) -> Floats:
