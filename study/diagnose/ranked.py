@@ -15,7 +15,7 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import linearise, uncertainty
 from study.support import statistics
 from study.support.statistics import Gain
-from study.support.thresholds import ENOUGH, GOOD, UNSTEADY
+from study.support.thresholds import ENOUGH, GOOD, NEARLY, UNSTEADY
 
 Floats = NDArray[np.float64]
 
@@ -63,9 +63,12 @@ class Ranked:
         """Whether its coefficient, of so many that are asked for, moves as that of a true term would not.
 
         Where little is left, the faults of the rest of the model move the coefficient of what is added to it: it may
-        change by a share of itself then.
+        change by a share of itself then; by no more than itself, where it takes a tenth of what a good model leaves.
         """
-        if self.response_error <= GOOD or self.gain.explained >= ENOUGH:
+        good = self.response_error <= GOOD
+        if good and self.gain.explained > 1.0 - NEARLY:
+            return self.unsteadiness > 1.0
+        if good or self.gain.explained >= ENOUGH:
             return self.unsteadiness > UNSTEADY
         return wavers(self.steadiness, asked)
 
