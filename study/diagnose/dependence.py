@@ -148,8 +148,9 @@ def _states(left: Leftover) -> list[Floats]:
 
 def _hats(x: Floats) -> list[Floats]:
     """Piecewise linear functions that add up to any function of ``x`` without detail below a step, each shape (n,)."""
-    knots = np.linspace(*np.quantile(x, EDGES), KNOTS)
-    inside = np.clip(x, knots[0], knots[-1])
+    first, last = (float(edge) for edge in np.quantile(x, EDGES))
+    knots = np.linspace(first, last, KNOTS)
+    inside = np.clip(x, first, last)
     return [np.clip(1.0 - np.abs(inside - knot) / (knots[1] - knots[0]), 0.0, None) for knot in knots]
 
 
