@@ -28,11 +28,6 @@ class HeldOut:
         """Both strung together, filtered with the coefficients of an autoregressive noise, shape (n,)."""
         return np.concatenate([whitened(part, noise) for part in (self.judged, self.fitted) if len(part)])
 
-    @property
-    def alone(self) -> "HeldOut":
-        """The judging part alone."""
-        return HeldOut(self.judged, self.fitted[:0])
-
 
 def held_out(fit: FreeRunFit, prediction: Prediction, jacobian: Floats, prepared: Prepared) -> HeldOut:
     """Held-out residuals of a fitted model on the parts of a record; ``jacobian`` is :func:`linearise` of the fit."""

@@ -19,8 +19,6 @@ from study.records.prepared import Prepared
 from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE
 
-__all__ = ["Accounted", "accounted", "corrected", "find_faults", "still_seen"]
-
 
 @dataclass(frozen=True, eq=False)
 class Accounted:
@@ -92,16 +90,6 @@ def _compared(
         prepared = replace(prepared, notes=(*prepared.notes, *(fault.note for fault in faults)))
     again = fit if estimator == FREE_RUN else None
     return Accounted(compare(model, prepared, search=again, estimator=estimator, progress=progress), faults)
-
-
-def find_faults(comparison: Comparison, switched_off: Sequence[str] = ()) -> tuple[Fault, ...]:
-    """The faults of the measurement in a record that a model has been compared with."""
-    asked = tuple(name for name in FAULTS if name not in switched_off)
-    faults = first_faults(comparison.prepared, {}, asked)
-    fit = comparison.fit
-    if any(fault.corrected for fault in faults):
-        fit = fit_model(comparison.model, corrected(comparison.prepared, faults))
-    return search(comparison.prepared, fit, faults, asked)[0]
 
 
 def still_seen(faults: Sequence[Fault], fit: FreeRunFit, prepared: Prepared) -> tuple[Fault, ...]:
