@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: study report test checks lint picture fault_pictures readme estimators trials clean
+.PHONY: study report test checks lint picture fault_pictures notebooks readme estimators trials clean
 
 study: $(READY)
 	$(BIN)/snakemake -j2
@@ -30,6 +30,9 @@ picture: $(READY)
 
 fault_pictures: $(READY)
 	$(BIN)/python scripts/fault_pictures.py models docs/faults
+
+notebooks: $(READY)
+	$(BIN)/python scripts/notebooks.py docs/notebooks/*.ipynb
 
 readme: study
 	$(BIN)/python scripts/readme.py

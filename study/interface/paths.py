@@ -43,7 +43,7 @@ class Identification:
     band : pair of float
         Lines that the parameters are fitted to, in hertz.
     heard : float
-        Highest frequency in hertz at which the force has power: beyond it axes show nothing.
+        Highest frequency in hertz at which force and motion are heard: there the axes end.
     """
 
     result: Identified
@@ -129,7 +129,7 @@ class Identification:
         analysis = self._coherences()
         if analysis is None:
             raise StudyError(f"{self.estimator} has no coherences; expected an estimator such as miso")
-        kept = analysis.frequency > 0.0
+        kept = (analysis.frequency > 0.0) & (analysis.frequency <= self.heard)
         shares = [
             InputCoherence(item.shape, " + ".join(item.terms), analysis.frequency[kept], analysis.cumulative[j][kept])
             for j, item in enumerate(self.result.inputs)
@@ -137,6 +137,7 @@ class Identification:
         with panels(ax) as (axes,):
             coherence.cumulative(axes, shares)
             axes.set_xlim(0.0, self.heard)
+            axes.set_ylabel("cumulative coherence")
             axes.legend(loc="lower left")
         return axes
 
@@ -156,7 +157,7 @@ class Identification:
         count = len(self.inputs)
         expect(1 <= number <= count, f"there is no input {number}; expected 1 to {count}: {', '.join(self.inputs)}")
         found, j = self._responses(), number - 1
-        kept = found.frequency > 0.0
+        kept = (found.frequency > 0.0) & (found.frequency <= self.heard)
         error = np.sqrt(np.maximum(found.covariance[kept, j, j].real, 0.0))
         curve = Curve(self.estimator, found.frequency[kept], found.response[j][kept], error)
         return InputResponse(number, self.inputs[j], (curve,), found.frequency[kept], None)
@@ -202,6 +203,7 @@ def identify(
     prepared = prepare_record(record)
     part = prepared.record.part(*prepared.inner((0, len(record))))
     cut = segments_of(len(part)) if segment is None else Segments(length=segment)
-    lines = band or followed_band(part, prepared.band, cut)
+    followed = followed_band(part, prepared.band, cut)
+    lines = band or followed
     found = estimators.identify(estimator, model.equation, part, Settings(cut, lines))
-    return Identification(found, estimator, Record.of(part), lines, prepared.band[1])
+    return Identification(found, estimator, Record.of(part), lines, max(followed[1], lines[1]))

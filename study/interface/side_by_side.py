@@ -3,7 +3,7 @@
 # Matplotlib leaves the **kwargs of its methods untyped.
 # pyright: reportUnknownMemberType=false
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -162,13 +162,16 @@ def compare(fits: Sequence[Fit]) -> Ranking:
     expect(fits, "no fit is given; expected one or more")
     ordered = sorted(fits, key=lambda fit: fit.error)
     names = [fit.given.name for fit in ordered]
-    return Ranking(tuple(_row(fit, ordered[0], _told_apart(fit, names)) for fit in ordered))
+    common = set(ordered[0].given.terms).intersection(*(fit.given.terms for fit in ordered))
+    return Ranking(tuple(_row(fit, ordered[0], _told_apart(fit, names, common)) for fit in ordered))
 
 
-def _told_apart(fit: Fit, names: Sequence[str]) -> str:
+def _told_apart(fit: Fit, names: Sequence[str], common: Set[str]) -> str:
+    """The model's name, with the terms that not all have where several are called so."""
     if names.count(fit.given.name) == 1:
         return fit.given.name
-    return f"{fit.given.name}: {', '.join(fit.given.terms)}"
+    own = [name for name in fit.given.terms if name not in common]
+    return " + ".join([fit.given.name, *own])
 
 
 def _row(fit: Fit, best: Fit, name: str) -> Row:
