@@ -33,7 +33,9 @@ def main(results: Path, readme: Path, docs: Path) -> None:
     for page, mark, names in ((docs / "reproduction.md", "numbers", SHOWN), (readme, "first", FIRST)):
         document.put(page, mark, [summary.statements(table.loc[list(names)].reset_index())])
     if (climbed := results / "silverbox" / "history.json").is_file():
-        document.put(docs / "tool.md", "history", [errors_by_step(json.loads(climbed.read_text(encoding="utf-8"))["steps"])])
+        document.put(
+            docs / "tool.md", "history", [errors_by_step(json.loads(climbed.read_text(encoding="utf-8"))["steps"])]
+        )
 
 
 def errors_by_step(steps: list[dict]) -> document.Block:

@@ -15,7 +15,8 @@ from tests.reproduction.test_summary import CLAIMS, ERRORS, PARAMETERS, READING,
 PNG = bytes.fromhex("89504e470d0a1a0a") + b"picture"
 LONG = pd.DataFrame(
     [
-        ("long", "Section 5.3", "Many things hold", "1 N, 2 N, 3 N", "; ".join(f"level {i} {'x' * 90}" for i in range(9)),
+        ("long", "Section 5.3", "Many things hold", "1 N, 2 N, 3 N",
+         "; ".join(f"level {i} {'x' * 90}" for i in range(9)),
          "; ".join(f"condition {i}" for i in range(9)), "partly", "because of much"),
     ],
     columns=list(CLAIMS.columns),
@@ -47,7 +48,7 @@ class Outline(HTMLParser):
         if self.inside in ("h2", "h3"):
             self.headings.append(data)
 
-    def handle_endtag(self, tag):
+    def handle_endtag(self, _tag):
         self.inside = ""
 
 
