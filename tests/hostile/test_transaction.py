@@ -234,7 +234,8 @@ MALFORMED = [
     "[" * 100_000, '{"steps": ' + "9" * 6000 + "}", "{", "\0", "\ufeff",
     *(json.dumps({"steps": [{**STEP, **wrong}]}) for wrong in (
         {"terms": "inertia"}, {"terms": [1]}, {"record": 5}, {"unit": None}, {"rms": "big"}, {"rms": True},
-        {"error": 1}, {"error": {"force": "x", "response": 1}}, {"error": {"force": 1}}, {"noise_floor": {}}, {"added": 3},
+        {"error": 1}, {"error": {"force": "x", "response": 1}}, {"error": {"force": 1}}, {"noise_floor": {}},
+        {"added": 3},
         {"dropped": []}, {"rms": 10**400}, {"error": {"force": 1, "response": [1]}},
     )),
 ]  # fmt: skip
