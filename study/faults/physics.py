@@ -62,6 +62,11 @@ def missing(left: Leftover) -> Leftover | None:
     return best if best is not None and better(left, best, len(terms)) else None
 
 
+def unphysical(fit: FreeRunFit, names: Sequence[str]) -> bool:
+    """Whether any of these effects is fitted outside of what makes it physical."""
+    return any(e.term.physical(fit.model.values) for e in fit.model.terms if e.name in names)
+
+
 def _simplest_of_the_best(tried: Sequence[Leftover]) -> Leftover | None:
     """Of those that are not worse than the best by what chance makes of it, the one with the fewest unknowns."""
     best = min(tried, key=lambda t: float(np.sum(t.residual[1] ** 2)), default=None)
@@ -98,17 +103,39 @@ def _fitted(
 ) -> Leftover | None:  # fmt: skip
     """What the model with an effect leaves, its shape held at first, with few runs; None where it does not run."""
     held, shapes = base.fit.held, tuple(f"{term.name}.{p.name}" for p in term.parameters)
-    entries = [ModelTerm(term, point.coefficients, point.parameters) for point in points]
-    first = [_tried(base.fit.model.with_term(e), look, (*held, *shapes), base.fit.steps_per_sample) for e in entries]
-    best = min((fit for fit in first if fit is not None), key=lambda fit: fit.rms, default=None)
-    for part in (look, prepared) if best is not None and shapes else (prepared,):
-        best = None if best is None else _tried(best.model, part, held, best.steps_per_sample)
-    return None if best is None else leftover(best, prepared)
+    begun = [_begun(term, point, base, look, (*held, *shapes)) for point in points]
+    for best in sorted((fit for fit in begun if fit is not None), key=lambda fit: fit.rms):
+        for part in (look, prepared) if shapes else (prepared,):
+            best = None if best is None else _tried(best.model, part, held, best.steps_per_sample, best)
+        found = None if best is None else leftover(best, prepared)
+        if found is not None:  # the run of a fit that follows one part may leave all bounds on the other
+            return found
+    return None
 
 
-def _tried(model: Model, part: Prepared, held: Sequence[str], steps: int) -> FreeRunFit | None:
+def _begun(
+    term: Term, point: shape_search.Start, base: shape_search.Baseline, look: Prepared, held: Sequence[str]
+) -> FreeRunFit | None:  # fmt: skip
+    """The model with an effect of a held shape, from the amounts that the search tells; None where it does not run.
+
+    These are linear, the model's own coefficients standing still. Where that is too far, the fit begins from nothing.
+    """
+    fit = None
+    for coefficients in (point.coefficients, (0.0,) * len(point.coefficients)):
+        entry = ModelTerm(term, coefficients, point.parameters)
+        fit = _tried(base.fit.model.with_term(entry), look, held, base.fit.steps_per_sample)
+        if fit is not None and fit.rms <= base.fit.rms:
+            break
+    return fit
+
+
+def _tried(
+    model: Model, part: Prepared, held: Sequence[str], steps: int, near: FreeRunFit | None = None
+) -> FreeRunFit | None:  # fmt: skip
+    """A short fit, in the state as well from where ``near`` stands if that begins there; None if it does not run."""
+    initial = np.atleast_2d(near.initial) if near is not None and near.first == part.plan.fit[0] else None
     try:
-        return fit_part(model, part, held, steps=steps, max_iterations=RUNS)
+        return fit_part(model, part, held, steps=steps, max_iterations=RUNS, initial=initial)
     except StudyError:
         return None
 

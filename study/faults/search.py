@@ -166,7 +166,7 @@ def _contested(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
     one = None if one is None or _may_be_none(one.fault, asked) else one
     effect = _effect(stage, one)
     if one is None:
-        return _noisy_force(stage, names, asked) if effect is None else replace(stage, rich=effect)
+        return _noisy_force(stage, names, asked) if effect is None else _beside(effect, stage)
     if effect is None:
         return _accepted(stage, one)
     fault_needed = share(effect, _columns(one.fault, effect), leading=one.fault.fault != HUM)
@@ -174,7 +174,7 @@ def _contested(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
     if needed == (False, False):
         return _tied(stage, one, effect)
     if needed == (False, True) or (all(needed) and relative_power(effect) < relative_power(one.left)):
-        return replace(stage, rich=effect)
+        return _beside(effect, stage)
     return _accepted(stage, one)
 
 
@@ -184,7 +184,7 @@ def _noisy_force(stage: Stage, names: Sequence[str], asked: int) -> Stage | None
         return None
     effect = physics.missing(stage.rich)
     if effect is not None:
-        return replace(stage, rich=effect)
+        return _beside(effect, stage)
     # What an integration in few steps leaves is shaped by the structure too.
     left = leftover(settled(stage.rich.fit, stage.rich.prepared), stage.rich.prepared)
     noise = None if left is None else force_noise(left, asked)
@@ -234,15 +234,32 @@ def _accepted(stage: Stage, one: Refined) -> Stage | None:
     return following if again is None else stage.without(_explaining(again.fault, stage.rich, again.left))
 
 
+def _beside(effect: Leftover, stage: Stage) -> Stage:
+    """The stage with an effect more, and the values of its faults found again beside it: its lack has moved them."""
+    stage = replace(stage, rich=effect)
+    for fault in stage.faults:
+        if fault.fault in adjustable.ADJUSTABLE and fault.corrected and not fault.held:
+            others = tuple(f for f in stage.faults if f is not fault)
+            again = refined(fault.fault, stage.given, others, stage.rich, fault.value)
+            following = None if again is None else replace(stage, faults=others).without(
+                replace(again.fault, explained=fault.explained)
+            )  # fmt: skip
+            stage = following or stage
+    return stage
+
+
 def _explaining(fault: Fault, before: Leftover, after: Leftover) -> Fault:
     return replace(fault, explained=gain(before.residual[1], after.residual[1]).explained)
 
 
 def _tied(stage: Stage, one: Refined, effect: Leftover) -> Stage | None:
-    """What becomes of a fault and an effect neither of which is needed beside the other: the fault is mentioned."""
-    if one.fault.fault == HUM and _beyond_reason(stage, effect):
-        return _accepted(stage, one)
+    """What becomes of a fault and an effect neither of which is needed beside the other: the fault is mentioned.
+
+    Not so beside an effect that is none, as a Maxwell element of negative stiffness, which hastens what is late.
+    """
     names = [e.name for e in effect.fit.model.terms if e.name not in stage.rich.fit.model]
+    if physics.unphysical(effect.fit, names) or (one.fault.fault == HUM and _beyond_reason(stage, effect)):
+        return _accepted(stage, one)
     fault = _explaining(one.fault, stage.rich, one.left).with_rivals(*names)
     return replace(stage, faults=(*stage.faults, fault), rich=effect)
 
