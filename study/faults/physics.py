@@ -38,7 +38,10 @@ def asks_for_more(left: Leftover) -> bool:
 
 
 def missing(left: Leftover) -> Leftover | None:
-    """What is left beside the effect that explains most; None if none explains any of it."""
+    """What is left beside the effect that explains most; None if none explains any of it.
+
+    One outside of what makes it physical, which is another effect or a fault in disguise, only where no other does.
+    """
     prepared, fit = left.prepared, left.fit
     look = prepared.shortened(LOOKED_AT)
     terms = [t for t in LIBRARY.values() if t.name not in fit.model and t.name != "inertia"]
@@ -57,9 +60,13 @@ def missing(left: Leftover) -> Leftover | None:
     with ThreadPoolExecutor(cores()) as pool:
         starts = [(term, found) for term, found in zip(terms, pool.map(begun, terms), strict=True) if found]
         promising = sorted(starts, key=lambda s: -s[1][0].share)[:FITTED]
-        tried = list(pool.map(fitted, promising))
-    best = _simplest_of_the_best([t for t in tried if t is not None])
-    return best if best is not None and better(left, best, len(terms)) else None
+        tried = [t for t in pool.map(fitted, promising) if t is not None]
+    names = [t.name for t in terms]
+    for group in ([t for t in tried if not unphysical(t.fit, names)], tried):
+        best = _simplest_of_the_best(group)
+        if best is not None and better(left, best, len(terms)):
+            return best
+    return None
 
 
 def unphysical(fit: FreeRunFit, names: Sequence[str]) -> bool:
