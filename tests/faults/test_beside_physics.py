@@ -20,14 +20,16 @@ def test_the_value_of_a_fault_is_found_again_beside_an_effect_that_the_search_ad
     """The delay is first found beside a linear model, which a quintic stiffness has spoilt: 0.69 samples."""
     value, faults = found(520270, "quintic_stiffness", 0.1, "velocity", "delay")
     (delay,) = faults
-    assert delay.fault == "delay" and abs(delay.value - value) < 3.0 * delay.error < 0.1
+    assert delay.fault == "delay"
+    assert abs(delay.value - value) < 3.0 * delay.error < 0.1
 
 
 def test_an_effect_that_is_none_does_not_rival_a_fault():
     """A response that is read early looks like a Maxwell element of negative stiffness."""
     value, faults = found(520259, "harmonic_force", 0.01, "displacement", "delay")
     (delay,) = faults
-    assert delay.corrected and abs(delay.value - value) < 3.0 * delay.error
+    assert delay.corrected
+    assert abs(delay.value - value) < 3.0 * delay.error
 
 
 def test_an_effect_whose_linear_share_is_too_much_of_it_is_tried_from_nothing():
@@ -40,7 +42,8 @@ def test_an_effect_whose_linear_share_is_too_much_of_it_is_tried_from_nothing():
 def test_a_mass_that_friction_holds_has_not_dropped_out_and_its_reversals_are_no_spikes():
     value, faults = found(520277, "coulomb_friction", 0.0, "acceleration", "force_noise", completed=True)
     (noise,) = faults
-    assert noise.fault == "force_noise" and abs(noise.value - value) < 3.0 * noise.error
+    assert noise.fault == "force_noise"
+    assert abs(noise.value - value) < 3.0 * noise.error
 
 
 @pytest.mark.parametrize("fault", ["spikes", "drop_outs"])
