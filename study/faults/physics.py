@@ -110,30 +110,19 @@ def _fitted(
 ) -> Leftover | None:  # fmt: skip
     """What the model with an effect leaves, its shape held at first, with few runs; None where it does not run."""
     held, shapes = base.fit.held, tuple(f"{term.name}.{p.name}" for p in term.parameters)
-    begun = [_begun(term, point, base, look, (*held, *shapes)) for point in points]
-    for best in sorted((fit for fit in begun if fit is not None), key=lambda fit: fit.rms):
-        for part in (look, prepared) if shapes else (prepared,):
-            best = None if best is None else _tried(best.model, part, held, best.steps_per_sample, best)
-        found = None if best is None else leftover(best, prepared)
-        if found is not None:  # the run of a fit that follows one part may leave all bounds on the other
-            return found
+    steps = base.fit.steps_per_sample
+    for part_of_it in (1.0, 0.0):  # linear amounts, the model's own held, may be too far: then from nothing
+        entries = [ModelTerm(term, tuple(part_of_it * c for c in p.coefficients), p.parameters) for p in points]
+        begun = [
+            _tried(base.fit.model.with_term(e), look, (*held, *shapes), base.fit.steps_per_sample) for e in entries
+        ]
+        for best in sorted((fit for fit in begun if fit is not None), key=lambda fit: fit.rms):
+            for part in (look, prepared) if shapes else (prepared,):
+                best = None if best is None else _tried(best.model, part, held, best.steps_per_sample, best)
+            found = None if best is None else leftover(best, prepared)
+            if found is not None:  # the run of a fit that follows one part may leave all bounds on the other
+                return found
     return None
-
-
-def _begun(
-    term: Term, point: shape_search.Start, base: shape_search.Baseline, look: Prepared, held: Sequence[str]
-) -> FreeRunFit | None:  # fmt: skip
-    """The model with an effect of a held shape, from the amounts that the search tells; None where it does not run.
-
-    These are linear, the model's own coefficients standing still. Where that is too far, the fit begins from nothing.
-    """
-    fit = None
-    for coefficients in (point.coefficients, (0.0,) * len(point.coefficients)):
-        entry = ModelTerm(term, coefficients, point.parameters)
-        fit = _tried(base.fit.model.with_term(entry), look, held, base.fit.steps_per_sample)
-        if fit is not None and fit.rms <= base.fit.rms:
-            break
-    return fit
 
 
 def _tried(
