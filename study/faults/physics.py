@@ -117,9 +117,10 @@ def _fitted(
             _tried(base.fit.model.with_term(e), look, (*held, *shapes), base.fit.steps_per_sample) for e in entries
         ]
         for best in sorted((fit for fit in begun if fit is not None), key=lambda fit: fit.rms):
+            fit: FreeRunFit | None = best
             for part in (look, prepared) if shapes else (prepared,):
-                best = None if best is None else _tried(best.model, part, held, best.steps_per_sample, best)
-            found = None if best is None else leftover(best, prepared)
+                fit = None if fit is None else _tried(fit.model, part, held, fit.steps_per_sample, fit)
+            found = None if fit is None else leftover(fit, prepared)
             if found is not None:  # the run of a fit that follows one part may leave all bounds on the other
                 return found
     return None
