@@ -110,7 +110,6 @@ def _fitted(
 ) -> Leftover | None:  # fmt: skip
     """What the model with an effect leaves, its shape held at first, with few runs; None where it does not run."""
     held, shapes = base.fit.held, tuple(f"{term.name}.{p.name}" for p in term.parameters)
-    steps = base.fit.steps_per_sample
     for part_of_it in (1.0, 0.0):  # linear amounts, the model's own held, may be too far: then from nothing
         entries = [ModelTerm(term, tuple(part_of_it * c for c in p.coefficients), p.parameters) for p in points]
         begun = [
