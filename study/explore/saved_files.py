@@ -22,7 +22,7 @@ def files(session: Session, name: str, text: str, values: bool = False) -> dict[
     stem = name.rpartition(".")[0] or name
     contents = {
         name: model_file.revised(text, name, model).encode(),
-        f"{stem}.history.json": history.as_bytes(steps),
+        history.name_for(name): history.as_bytes(steps),
         "comparison.json": as_json(document([now.comparison])),
         **{f"{table}.csv": content for table, content in tables([now.comparison]).items()},
         PAGE: saved(session),

@@ -11,7 +11,7 @@ from study.compare.comparison import Comparison
 from study.compare.force_map import CELLS, curve, surface
 from study.compare.links import links
 from study.diagnose.ranked import Ranked
-from study.explore import checks, decimate, preview, words
+from study.explore import check_columns, decimate, preview, words
 from study.explore.axis_scales import Columns, Floats, Scales, heard, least_force, scales_of, within
 from study.explore.page_units import Scale, in_text
 from study.explore.session import Stage
@@ -54,7 +54,7 @@ def view(stage: Stage, step: int, live: bool = True) -> View:
         "against_v": _against(v, missing, scales.velocity, force, least),
         "constancy": _constancy(rows),
         **preview.columns(stage, scales),
-        **checks.columns(comparison, scales),
+        **check_columns.columns(comparison, scales),
         **_links(comparison, scales),
         "words": words.words(stage, rows, step, live, force.unit),
     }
