@@ -15,10 +15,11 @@ import numpy as np
 
 from study.equations import kernels
 from study.equations.graph import Op, Program
+from study.equations.machine_code import Variation, machine_code
 from study.equations.model import Model, forward_graph, named_channels, with_registers
 from study.records.interpolation import between_samples
 from study.records.record import MOTIONS, Record
-from study.support.arrays import Floats, Ints
+from study.support.arrays import Floats
 from study.support.errors import DivergenceError, StudyError
 
 SHARED = 4096  # steps from which on two threads share the segments; with fewer, a thread costs more than it saves
@@ -35,10 +36,8 @@ class FreeRun:
     ----------
     program : Program
         Slopes of the states, then their partial derivatives; held values are in its registers.
-    slots : int array, shape (states - 1, 1 + states + keys)
-        Registers of each slope (but velocity), of its partial derivatives by the states and by the keys.
-    side : int
-        Register that stands for sgn v, -1 if no force of the model jumps with it.
+    variation : Variation
+        Where in the program slopes and partial derivatives lie.
     keys : tuple of str
         The coefficients and shape parameters to differentiate by.
     drive : array, shape (2 steps (samples - 1) + 3, 1 + channels)
@@ -58,8 +57,7 @@ class FreeRun:
     """
 
     program: Program
-    slots: Ints
-    side: int
+    variation: Variation
     keys: tuple[str, ...]
     drive: Floats
     dt: float
@@ -68,6 +66,11 @@ class FreeRun:
     samples: int
     row: int
     cuts: tuple[int, ...] = ()
+
+    @property
+    def states(self) -> int:
+        """Displacement, velocity and the terms' own."""
+        return self.variation.states
 
     def respond(
         self, values: Mapping[str, float], initial: Sequence[float] | Floats, free_states: int = 0
@@ -121,7 +124,7 @@ class FreeRun:
         program = with_registers(self.program, {key: values[key] for key in self.keys})
         first_free = 1 + len(self.keys)
         out = np.empty((self.samples, first_free + free_states))
-        state = np.zeros((len(states), len(self.slots) + 1, out.shape[1]))  # one array for all segments is faster
+        state = np.zeros((len(states), self.states, out.shape[1]))  # one array for all segments is faster
         state[:, : states.shape[1], 0] = states
         state[:, range(free_states), range(first_free, out.shape[1])] = 1.0
         if len(states) == 1 or self.samples * self.steps < SHARED:
@@ -140,7 +143,10 @@ class FreeRun:
         ``initial`` gives the state of those segments that begin anew, by their numbers; the first, 0, is one of them.
         """
         bounds = (0, *self.cuts, self.samples)
-        states, state = np.empty((len(bounds) - 1, len(self.slots) + 1)), np.empty((1, len(self.slots) + 1, 1))
+        states, state = (
+            np.empty((len(bounds) - 1, self.states)),
+            np.empty((1, self.states, 1)),
+        )
         room = np.empty((self.samples, 1))
         for i, segment in enumerate(pairwise(bounds)):
             if i in initial:
@@ -151,8 +157,9 @@ class FreeRun:
 
     def _integrate(self, program: Program, bounds: Sequence[int], states: Floats, out: Floats) -> None:
         """Response and derivatives into ``out``; ``states`` become those at which the next segments begin."""
+        code = machine_code(self.variation, out.shape[1])
         failed = kernels.integrate_segments(
-            program.code, program.first, program.registers.copy(), self.slots, self.side, self.start, self.dt,
+            code.addresses, program.registers.copy(), self.variation.side, self.start, self.dt,
             self.steps, self.drive, np.array(bounds), states, self.row, out,
         )  # fmt: skip
         if failed >= 0:
@@ -203,12 +210,15 @@ def prepare(
     if steps_per_sample < 1:
         raise StudyError(f"steps_per_sample is {steps_per_sample}; at least 1 is needed")
     channels = named_channels(model, record.extra)
-    program, slots, side = _differentiated(model, channels, tuple(keys))
+    variation = _differentiated(model, channels, tuple(keys))
+    program = with_registers(
+        variation.program, {k: v for k, v in model.values.items() if k not in keys and v is not None}
+    )
     factor = 2 * steps_per_sample
     part = slice(factor * first, factor * (last - 1) + 1)
     drive = np.column_stack([_between(record[name].tobytes(), factor)[part] for name in ("force", *channels)])
     return FreeRun(
-        program, slots, side, tuple(keys), drive, record.dt, steps_per_sample,
+        program, variation, tuple(keys), drive, record.dt, steps_per_sample,
         record.start + first * record.dt, last - first, MOTIONS.index(response), tuple(r - first for r in restarts),
     )  # fmt: skip
 
@@ -231,20 +241,17 @@ def _checked_span(record: Record, span: tuple[int, int] | None) -> tuple[int, in
     return first, last
 
 
-def _differentiated(model: Model, channels: tuple[str, ...], keys: tuple[str, ...]) -> tuple[Program, Ints, int]:
-    """Program of slopes and partial derivatives, their registers, and that of sgn v."""
-    held = {key: value for key, value in model.values.items() if key not in keys}
-    if missing := [key for key, value in held.items() if value is None]:
+def _differentiated(model: Model, channels: tuple[str, ...], keys: tuple[str, ...]) -> Variation:
+    """Program of slopes and partial derivatives of a model that gives every value but those of the keys."""
+    if missing := [key for key, value in model.values.items() if value is None and key not in keys]:
         raise StudyError(f"model {model.name!r} gives no value for {', '.join(missing)}; a free run needs all")
     if unknown := [key for key in keys if key not in model.values]:
         raise StudyError(f"model {model.name!r} has no {', '.join(unknown)}; it has {', '.join(model.values)}")
-    program, slots, side = _compiled(model.with_values(dict.fromkeys(model.values)), channels, keys)
-    values = {key: value for key, value in held.items() if value is not None}
-    return with_registers(program, values), slots, side
+    return _compiled(model.with_values(dict.fromkeys(model.values)), channels, keys)
 
 
 @lru_cache(maxsize=COMPILED)
-def _compiled(model: Model, channels: tuple[str, ...], keys: tuple[str, ...]) -> tuple[Program, Ints, int]:
+def _compiled(model: Model, channels: tuple[str, ...], keys: tuple[str, ...]) -> Variation:
     """As :func:`_differentiated`, of a model without values: a diagnosis runs each of its models many times."""
     forward = forward_graph(model, channels)
     graph = forward.graph
@@ -252,7 +259,7 @@ def _compiled(model: Model, channels: tuple[str, ...], keys: tuple[str, ...]) ->
     rows = [[slope, *(graph.derivative(slope, node) for node in by)] for slope in forward.slopes]
     graph.input(SIDE)
     program, side = _with_side(graph.program([node for row in rows for node in row]), graph.program(forward.slopes))
-    return program, program.outputs.reshape(len(rows), 1 + len(by)), side
+    return Variation(program, program.outputs.reshape(len(rows), 1 + len(by)), side, 1 + len(channels))
 
 
 def _with_side(program: Program, slopes: Program) -> tuple[Program, int]:

@@ -3,12 +3,25 @@
 import sys
 from collections.abc import Callable
 from functools import cache, partial
+from types import SimpleNamespace
 from typing import Any, ParamSpec, TypeVar, cast
 
-from numba import njit  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
+import numba  # pyright: ignore[reportMissingTypeStubs]
+from llvmlite import ir  # pyright: ignore[reportMissingTypeStubs]
+from numba.core import cgutils  # pyright: ignore[reportMissingTypeStubs]
+from numba.extending import intrinsic as _intrinsic  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
+from numba.np import arrayobj  # pyright: ignore[reportMissingTypeStubs]
 
 P = ParamSpec("P")
 R = TypeVar("R")
+_untyped: Any = SimpleNamespace(numba=numba, ir=ir, cgutils=cgutils, arrayobj=arrayobj)
+builders: Any = SimpleNamespace(  # what an intrinsic writes its machine code with
+    void=_untyped.numba.types.void,
+    nothing=_untyped.ir.VoidType(),
+    function_type=_untyped.ir.FunctionType,
+    make_array=_untyped.arrayobj.make_array,
+    unpack_tuple=_untyped.cgutils.unpack_tuple,
+)
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
@@ -25,9 +38,14 @@ def inlined(function: Callable[P, R]) -> Callable[P, R]:
     return cast(Callable[P, R], _decorated(function, forceinline=True))
 
 
+def intrinsic(function: Callable[..., Any]) -> Callable[..., None]:
+    """What a compiled kernel may call for its effect, and whose machine code the function itself describes."""
+    return cast(Callable[..., None], cast(Any, _intrinsic)(function))
+
+
 def _decorated(function: Callable[..., Any], **options: bool) -> Any:
     """Numba's dispatcher; it keeps nothing where neither the installation nor the user has a folder to write to."""
-    decorate = partial(cast(Any, njit), nogil=True, error_model="numpy", **options)
+    decorate = partial(_untyped.numba.njit, nogil=True, error_model="numpy", **options)
     try:
         return decorate(cache=True)(function)
     except RuntimeError as error:

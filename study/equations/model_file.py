@@ -198,7 +198,7 @@ def _entry(item: object, number: int) -> ModelTerm:
         mapping = as_mapping(item)
         if mapping is None:
             raise StudyError(f"is {shown(item)}; expected a name or a mapping such as {{term: inertia, value: 1.0}}")
-        return _mapping(mapping)
+        return entry_from(mapping)
     except StudyError as error:
         raise StudyError(f"entry {number} of 'terms': {error}") from None
 
@@ -208,7 +208,8 @@ def _refuse_long(name: str) -> None:
         raise StudyError(f"the name {shown(name)} has {len(name)} characters; at most {LONGEST_NAME} are read")
 
 
-def _mapping(item: Mapping[object, object]) -> ModelTerm:
+def entry_from(item: Mapping[object, object]) -> ModelTerm:
+    """An entry of ``terms`` from its mapping, as a file or a caller gives it; raises as :func:`parse_model`."""
     name = item.get("term")
     if not isinstance(name, str):
         content = shown(name) if "term" in item else f"missing in {shown(item)}"

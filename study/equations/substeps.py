@@ -34,7 +34,7 @@ def needed_steps(model: Model, record: Record, response: str = "displacement", m
 def _rates(model: Model, record: Record, response: str) -> Floats:
     """Magnitude of the largest eigenvalue at each point, in rad/s, shape (points,)."""
     run = prepare(model, record, steps_per_sample=1)
-    states = len(run.slots) + 1
+    states = run.states
     samples = np.unique(np.linspace(0, len(record) - 1, POINTS).astype(np.int64))
     point = np.column_stack([starting_states(record, response, samples.tolist()), record.time[samples]])
     data = np.column_stack([point, run.drive[2 * samples]])
@@ -43,7 +43,7 @@ def _rates(model: Model, record: Record, response: str) -> Floats:
     with np.errstate(all="ignore"):
         kernels.evaluate(
             run.program.code, run.program.first, run.program.registers.copy(), columns, data,
-            run.slots[:, 1 : 1 + states].ravel(), partial,
+            run.variation.slots[:, 1 : 1 + states].ravel(), partial,
         )  # fmt: skip
     if not np.all(np.isfinite(partial)):
         return np.full(len(samples), np.inf)

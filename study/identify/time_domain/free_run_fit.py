@@ -164,7 +164,7 @@ def fit_free_run(
         model, record, tuple(begin), response=response, steps_per_sample=steps_per_sample, span=span, restarts=restarts
     )
     first = 0 if span is None else span[0]
-    free = 0 if resting else len(run.slots) + 1
+    free = 0 if resting else run.states
     states = np.zeros((len(run.cuts) + 1, free))
     if not isinstance(initial, str):
         states[:] = initial
@@ -218,7 +218,7 @@ class _Problem:
 
     def states(self, x: Floats) -> Floats:
         """Initial states in the variables, shape (segments, states)."""
-        states = np.zeros((len(self.run.cuts) + 1, len(self.run.slots) + 1))
+        states = np.zeros((len(self.run.cuts) + 1, self.run.states))
         states[:, : self.free_states] = x[len(self.run.keys) :].reshape(len(states), self.free_states)
         return states
 
