@@ -23,6 +23,7 @@ RANGE = re.compile(r"([0-9]{0,15}):([0-9]{0,15})")
 MOTIONS = ("displacement", "velocity", "acceleration")
 RESULTS = Path("results")
 GIVEN = ("dt", "fs", "group", "period", "accept_saturated", "accept_swapped")  # as ``ReadOptions`` calls them
+DIGITS = 10  # of the number of a column; more are a name
 Span = tuple[int, int | None]
 
 
@@ -90,7 +91,7 @@ def read_options(arguments: argparse.Namespace) -> "ReadOptions":
 
     columns = assignments(arguments.column, "--column")
     return ReadOptions(
-        {role: int(name) if name.isdecimal() else name for role, name in columns.items()},
+        {role: int(name) if name.isdecimal() and len(name) < DIGITS else name for role, name in columns.items()},
         assignments(arguments.unit, "--unit"),
         **{name: getattr(arguments, name) for name in GIVEN},
     )
@@ -196,7 +197,7 @@ def written_together(
 
     results = {folder / "comparison.json": as_json(document(reached))}
     keep(inputs_of(arguments), results)
-    made(folder)
     model: Path = arguments.model
     changed = {model: text.encode(), history.path_of(model): history.as_bytes(steps)}
-    replace_together(model, changed, results)
+    with made(folder):
+        replace_together(model, changed, results)
