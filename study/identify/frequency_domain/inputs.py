@@ -129,7 +129,10 @@ def _finite(values: Floats, item: Input, record: Record) -> Floats:
         bad = np.flatnonzero(~(np.abs(values) < LARGEST))
     if bad.size:
         formula, time = item.shape if item.state is None else item.state, record.time[bad[0]]
-        raise StudyError(f"the formula {formula!r} has no finite value at t = {time:.6g} s of {record.name}")
+        raise StudyError(
+            f"the formula {formula!r} has no finite value at t = {time:.6g} s of {record.name}; "
+            "expected a formula that has one all along the motion"
+        )
     return values
 
 
