@@ -145,7 +145,8 @@ def _columns(wanted: Sequence[str], formula: str, record: Record) -> list[Floats
         if name != "t" and channel not in (record if name in motion else record.extra):
             beside = "" if name in motion else " beside force and motion"
             raise StudyError(
-                f"the formula {formula!r} needs the channel {channel!r}, which {record.name} lacks{beside}"
+                f"the formula {formula!r} needs the channel {channel!r}, which {record.name} lacks{beside}; "
+                "expected one that it has"
             )
         columns.append(record.time if name == "t" else record[channel])
     return columns
