@@ -15,7 +15,7 @@ import numpy as np
 
 from study.equations import kernels
 from study.equations.graph import Op, Program
-from study.equations.machine_code import Variation, machine_code
+from study.equations.machine_code import OFTEN, Variation, machine_code
 from study.equations.model import Model, forward_graph, named_channels, with_registers
 from study.records.interpolation import between_samples
 from study.records.record import MOTIONS, Record
@@ -157,7 +157,7 @@ class FreeRun:
 
     def _integrate(self, program: Program, bounds: Sequence[int], states: Floats, out: Floats) -> None:
         """Response and derivatives into ``out``; ``states`` become those at which the next segments begin."""
-        code = machine_code(self.variation, out.shape[1])
+        code = machine_code(self.variation, out.shape[1], self.samples * self.steps >= OFTEN)
         failed = kernels.integrate_segments(
             code.addresses, program.registers.copy(), self.variation.side, self.start, self.dt,
             self.steps, self.drive, np.array(bounds), states, self.row, out,

@@ -38,7 +38,10 @@ def asks_for_more(left: Leftover) -> bool:
 
 
 def missing(left: Leftover) -> Leftover | None:
-    """What is left beside the effect that explains most; None if none explains any of it."""
+    """What is left beside the effect that explains most; None if none explains any of it.
+
+    One outside of what makes it physical, which is another effect or a fault in disguise, only where no other does.
+    """
     prepared, fit = left.prepared, left.fit
     look = prepared.shortened(LOOKED_AT)
     terms = [t for t in LIBRARY.values() if t.name not in fit.model and t.name != "inertia"]
@@ -57,9 +60,18 @@ def missing(left: Leftover) -> Leftover | None:
     with ThreadPoolExecutor(cores()) as pool:
         starts = [(term, found) for term, found in zip(terms, pool.map(begun, terms), strict=True) if found]
         promising = sorted(starts, key=lambda s: -s[1][0].share)[:FITTED]
-        tried = list(pool.map(fitted, promising))
-    best = _simplest_of_the_best([t for t in tried if t is not None])
-    return best if best is not None and better(left, best, len(terms)) else None
+        tried = [t for t in pool.map(fitted, promising) if t is not None]
+    names = [t.name for t in terms]
+    for group in ([t for t in tried if not unphysical(t.fit, names)], tried):
+        best = _simplest_of_the_best(group)
+        if best is not None and better(left, best, len(terms)):
+            return best
+    return None
+
+
+def unphysical(fit: FreeRunFit, names: Sequence[str]) -> bool:
+    """Whether any of these effects is fitted outside of what makes it physical."""
+    return any(e.term.physical(fit.model.values) for e in fit.model.terms if e.name in names)
 
 
 def _simplest_of_the_best(tried: Sequence[Leftover]) -> Leftover | None:
@@ -98,17 +110,28 @@ def _fitted(
 ) -> Leftover | None:  # fmt: skip
     """What the model with an effect leaves, its shape held at first, with few runs; None where it does not run."""
     held, shapes = base.fit.held, tuple(f"{term.name}.{p.name}" for p in term.parameters)
-    entries = [ModelTerm(term, point.coefficients, point.parameters) for point in points]
-    first = [_tried(base.fit.model.with_term(e), look, (*held, *shapes), base.fit.steps_per_sample) for e in entries]
-    best = min((fit for fit in first if fit is not None), key=lambda fit: fit.rms, default=None)
-    for part in (look, prepared) if best is not None and shapes else (prepared,):
-        best = None if best is None else _tried(best.model, part, held, best.steps_per_sample)
-    return None if best is None else leftover(best, prepared)
+    for part_of_it in (1.0, 0.0):  # linear amounts, the model's own held, may be too far: then from nothing
+        entries = [ModelTerm(term, tuple(part_of_it * c for c in p.coefficients), p.parameters) for p in points]
+        begun = [
+            _tried(base.fit.model.with_term(e), look, (*held, *shapes), base.fit.steps_per_sample) for e in entries
+        ]
+        for best in sorted((fit for fit in begun if fit is not None), key=lambda fit: fit.rms):
+            fit: FreeRunFit | None = best
+            for part in (look, prepared) if shapes else (prepared,):
+                fit = None if fit is None else _tried(fit.model, part, held, fit.steps_per_sample, fit)
+            found = None if fit is None else leftover(fit, prepared)
+            if found is not None:  # the run of a fit that follows one part may leave all bounds on the other
+                return found
+    return None
 
 
-def _tried(model: Model, part: Prepared, held: Sequence[str], steps: int) -> FreeRunFit | None:
+def _tried(
+    model: Model, part: Prepared, held: Sequence[str], steps: int, near: FreeRunFit | None = None
+) -> FreeRunFit | None:  # fmt: skip
+    """A short fit, in the state as well from where ``near`` stands if that begins there; None if it does not run."""
+    initial = np.atleast_2d(near.initial) if near is not None and near.first == part.plan.fit[0] else None
     try:
-        return fit_part(model, part, held, steps=steps, max_iterations=RUNS)
+        return fit_part(model, part, held, steps=steps, max_iterations=RUNS, initial=initial)
     except StudyError:
         return None
 

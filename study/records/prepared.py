@@ -10,6 +10,8 @@ from study.records.plan import Plan, make_plan
 from study.records.record import MOTIONS, Record
 from study.support.arrays import Floats
 
+QUIET = 0.5  # of the motion's size: a stretch that shows less is no picture of the record
+
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
@@ -94,12 +96,30 @@ class Prepared:
 
 
 def limited(prepared: Prepared, samples: int) -> Prepared:
-    """The same with no more than so many samples to fit and to judge; itself where it has no more."""
+    """The same with no more than so many samples to fit and to judge; itself where it has no more.
+
+    Those where the parts meet; where either is quiet there, as at the end of a sweep, stretches as far from the
+    beginning of both parts as shows most of the motion. A force that is repeated has the same frequencies in these.
+    """
     first, last = prepared.plan.judge
     shorter = prepared.shortened(samples)
     if last - first <= samples:
         return shorter
-    return replace(shorter, plan=replace(shorter.plan, judge=(first, first + samples)))
+    meeting = replace(shorter, plan=replace(shorter.plan, judge=(first, first + samples)))
+    if shorter is prepared or _shown(meeting, prepared) > QUIET:
+        return meeting
+    begin, length = prepared.plan.fit[0], min(prepared.plan.fit[1] - prepared.plan.fit[0], last - first)
+    moved = [
+        replace(prepared, plan=replace(prepared.plan, fit=(begin + k, begin + k + samples),
+                                       judge=(first + k, first + k + samples)))
+        for k in range(0, length - samples + 1, samples // 4)
+    ]  # fmt: skip
+    return max([meeting, *moved], key=lambda part: _shown(part, prepared))
+
+
+def _shown(part: Prepared, whole: Prepared) -> float:
+    """Size of the motion in a stretch over that in the whole of the same part, the smaller of both parts'."""
+    return min(float(np.std(part.fitted)) / whole.spread, float(np.std(part.judged)) / float(np.std(whole.judged)))
 
 
 def prepare_record(record: Record, plan: Plan | None = None, cutoff: float | None = None) -> Prepared:
