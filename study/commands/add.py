@@ -82,7 +82,10 @@ def _refuse_second(path: Path, model: "Model", term: "Term") -> None:
     from study.equations.redundancy import repeated_force
     from study.support.errors import expect
 
-    expect(term.name not in model, f"{path}: {term.name} is in the model already; an effect can be added once")
+    expect(
+        term.name not in model,
+        f"{path}: {term.name} is in the model already; expected another effect, each can be added once",
+    )
     fault = repeated_force(model.with_term(term))
     expect(fault is None, f"{path}: {fault}")
 

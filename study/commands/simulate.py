@@ -32,11 +32,15 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.equations.simulate import Integrator, simulate
     from study.records.excitation import Excitation, force
     from study.records.record import write_csv
+    from study.support.errors import at, expect
     from study.support.file_sets import keep
     from study.support.files import replacing
 
     keep([arguments.model, path_of(arguments.model)], [arguments.out])
     model = read_model(arguments.model)
+    expect("inertia" in model, f"{arguments.model}: the model has no inertia; expected a term 'inertia'")
+    with at(arguments.model):
+        model.numbers()
     excitation = Excitation(level=arguments.level, cutoff=arguments.cutoff)
     history = force(excitation, arguments.samples, arguments.dt, arguments.seed)
     record = simulate(model, history, arguments.dt, Integrator(steps_per_sample=arguments.steps))

@@ -151,7 +151,7 @@ class _Builder:
     def divide(self, left: int, right: int) -> int:
         x, y = self.graph.constant_value(left), self.graph.constant_value(right)
         if y == 0.0:
-            raise self.refuse("divides by zero")
+            raise self.refuse("divides by zero; expected a divisor that moves, or another number")
         if x is not None and y is not None:
             return self.graph.const(x / y)
         return self.graph.div(left, right)

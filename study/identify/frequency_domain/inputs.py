@@ -129,7 +129,10 @@ def _finite(values: Floats, item: Input, record: Record) -> Floats:
         bad = np.flatnonzero(~(np.abs(values) < LARGEST))
     if bad.size:
         formula, time = item.shape if item.state is None else item.state, record.time[bad[0]]
-        raise StudyError(f"the formula {formula!r} has no finite value at t = {time:.6g} s of {record.name}")
+        raise StudyError(
+            f"the formula {formula!r} has no finite value at t = {time:.6g} s of {record.name}; "
+            "expected a formula that has one all along the motion"
+        )
     return values
 
 
@@ -142,7 +145,8 @@ def _columns(wanted: Sequence[str], formula: str, record: Record) -> list[Floats
         if name != "t" and channel not in (record if name in motion else record.extra):
             beside = "" if name in motion else " beside force and motion"
             raise StudyError(
-                f"the formula {formula!r} needs the channel {channel!r}, which {record.name} lacks{beside}"
+                f"the formula {formula!r} needs the channel {channel!r}, which {record.name} lacks{beside}; "
+                "expected one that it has"
             )
         columns.append(record.time if name == "t" else record[channel])
     return columns

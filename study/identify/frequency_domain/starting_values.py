@@ -61,7 +61,7 @@ def coherent_lines(prepared: Prepared) -> Lines:
     found, _ = _lines(part, response, length)
     if len(found.omega) >= FEWEST_LINES:
         return found
-    while length < len(part) // 2:
+    while len(part) >= SHORT and length < len(part) // 2:
         length = min(2 * length, len(part) // 2)
         found, chance = _lines(part, response, length)
         if len(found.omega) > max(1.0, chance):  # two lines are four equations

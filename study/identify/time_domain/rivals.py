@@ -88,6 +88,7 @@ def larger(residual: Floats, than: Floats) -> bool:
     One-sided, by Student's t; of residuals that are alike to the last bit neither is.
     """
     rise = block_powers(residual) - block_powers(than)
+    rise = np.ldexp(rise, -int(np.frexp(np.max(np.abs(rise)))[1]))  # by a power of two: squares of 1e160 are no numbers
     count, mean = len(rise), float(np.mean(rise))
     error = float(np.std(rise, ddof=1)) / np.sqrt(count)
     chance = np.asarray(stdtr(count - 1, -mean / max(error, np.finfo(float).tiny)), dtype=np.float64)

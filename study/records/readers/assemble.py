@@ -88,7 +88,10 @@ def _range(path: Path, length: int, options: ReadOptions) -> tuple[int, int]:
     end = length if last is None else last
     asked = f"from {first} on" if last is None else f"{first} to {last}"
     inside = first < length and end <= length
-    expect(inside, f"{path}: samples {asked} are asked for; the record has {length}, counted from 0")
+    expect(
+        inside,
+        f"{path}: samples {asked} are asked for; the record has {length}; expected a range within, counted from 0",
+    )
     few = f"{path}: {end - first} samples are too few; expected {checks.FEWEST_SAMPLES} or more"
     expect(end - first >= checks.FEWEST_SAMPLES, few)
     return first, end
@@ -146,7 +149,7 @@ def _period(path: Path, roles: Mapping[str, Column], force: Floats, options: Rea
     if period is None:
         return roles["force"].period
     given = f"{path}: a period of {period} samples is given"
-    expect(period <= length, f"{given}; the record has {length}")
+    expect(period <= length, f"{given}, and the record has {length}; expected one that it holds")
     change = checks.change_after(force, period)
     differs = f"the force {period} samples later differs by {100.0 * change:.0f} % of its rms"
     expect(change <= AGAIN, f"{given}, and {differs}; expected the number of samples after which it repeats")
