@@ -5,9 +5,11 @@ set -euo pipefail
 project=$(cd "$(dirname "$0")/.." && pwd)
 work=$(mktemp -d)
 python=${PYTHON:-$project/.venv/bin/python}
+known=/etc/slurm/slurm.conf  # where jobs look for it: nothing of the environment reaches their steps
 started=()
 finish() {
   for process in "${started[@]}"; do kill "$process" 2>/dev/null || true; done
+  [ -L "$known" ] && rm -f "$known"
   echo "what the test wrote stands in $work"
 }
 trap finish EXIT
@@ -24,7 +26,7 @@ mkdir -p "$work"/{state,spool,munge}
 head -c 1024 /dev/urandom > "$work/munge/munge.key"
 chmod 700 "$work/munge" && chmod 600 "$work/munge/munge.key"
 munged --foreground --force --socket="$work/munge/socket" --key-file="$work/munge/munge.key" \
-  --pid-file="$work/munge/pid" --log-file="$work/munge/log" --seed-file="$work/munge/seed" &
+  --pid-file="$work/munge/pid" --log-file="$work/munge/log" --seed-file="$work/munge/seed" 2>/dev/null &
 started+=($!)
 cat > "$work/slurm.conf" <<CONF
 ClusterName=one
@@ -53,9 +55,10 @@ SlurmdPort=16818
 NodeName=$host NodeAddr=127.0.0.1 CPUs=$(nproc) RealMemory=4000 State=UNKNOWN
 PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
 CONF
-export SLURM_CONF=$work/slurm.conf
-slurmctld -D & started+=($!)
-slurmd -D & started+=($!)
+if [ -e "$known" ] && [ ! -L "$known" ]; then echo "$known: this machine has a SLURM of its own"; exit 2; fi
+mkdir -p "${known%/*}" && ln -sfn "$work/slurm.conf" "$known"
+slurmctld -D 2>/dev/null & started+=($!)
+slurmd -D 2>/dev/null & started+=($!)
 for _ in $(seq 60); do sinfo -h -o %T 2>/dev/null | grep -q idle && break; sleep 1; done
 sinfo
 
