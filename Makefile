@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: study report test checks lint picture fault_pictures notebooks docs readme estimators trials clean
+.PHONY: study report test test-cluster checks lint picture fault_pictures notebooks docs readme estimators trials clean
 
 study: $(READY)
 	$(BIN)/snakemake -j2
@@ -14,6 +14,10 @@ report: study
 
 test: $(READY)
 	$(MAKE) --no-print-directory -j2 lint checks
+
+# A one-node SLURM on this machine (Debian, as root), and the same bytes on it as without.
+test-cluster: $(READY)
+	scripts/test_cluster.sh
 
 # As many workers as cores: more threads would only wait for each other.
 checks: $(READY)

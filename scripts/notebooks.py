@@ -44,11 +44,14 @@ def executed(source: str, where: str, namespace: dict[str, Any], kept: bool) -> 
     from matplotlib import pyplot
 
     tree = ast.parse(source, where)
-    last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
+    end = tree.body[-1] if tree.body else None
+    last = ast.Expression(end.value) if isinstance(end, ast.Expr) else None
+    if last is not None:
+        tree.body.pop()
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         exec(compile(tree, where, "exec"), namespace)
-        value = eval(compile(ast.Expression(last.value), where, "eval"), namespace) if last is not None else None
+        value = eval(compile(last, where, "eval"), namespace) if last is not None else None
     outputs: list[dict[str, Any]] = []
     if printed.getvalue():
         outputs.append({"output_type": "stream", "name": "stdout", "text": lines(printed.getvalue())})

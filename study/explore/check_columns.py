@@ -39,7 +39,7 @@ def _gapped(angle: Floats) -> Floats:
 
 def _checks(comparison: Comparison) -> dict[str, Columns]:
     found = residual_checks(comparison.prediction)
-    normal = np.linspace(found.edges[0], found.edges[-1], 81)
+    normal = np.linspace(float(found.edges[0]), float(found.edges[-1]), 81).astype(np.float64)
     return {
         "autocorrelation": {"lag": found.lag, "value": found.autocorrelation},
         "autocorrelation_band": _band(found.lag, found.band),
