@@ -8,6 +8,7 @@ content above its Nyquist frequency.
 import numpy as np
 from scipy.fft import irfft, rfft
 
+from study.records.record import Record
 from study.support.arrays import Floats
 
 EDGE = 512  # samples by which a record that does not close on itself is continued at each end
@@ -32,6 +33,20 @@ def between_samples(values: Floats, factor: int) -> Floats:
     if _top_energy(values) <= CLOSES * _top_energy(continued):
         return _periodic(values, factor)[: factor * (n - 1) + 1]
     return _periodic(continued, factor)[factor * edge : factor * (edge + n - 1) + 1]
+
+
+def between_stretches(record: Record, name: str, factor: int) -> Floats:
+    """A channel of a record that is strung together on a grid ``factor`` times as fine, shape (factor n,).
+
+    Each stretch as its source has it, so that no joint is seen; between two stretches the last value holds.
+    """
+    parts: list[Floats] = []
+    for begin, stretch in zip((0, *record.begins), record.stretches, strict=True):
+        first, last, own = stretch.first, stretch.last, name in record.changed
+        whole = record[name][begin : begin + len(stretch)] if own else stretch.source[name]
+        fine = between_samples(whole, factor)[0 if own else factor * first :][: factor * (last - first)]
+        parts.append(np.pad(fine, (0, factor * (last - first) - len(fine)), mode="edge"))
+    return np.concatenate(parts)
 
 
 def _top_energy(values: Floats) -> float:

@@ -164,12 +164,13 @@ def fit_free_run(
         model, record, tuple(begin), response=response, steps_per_sample=steps_per_sample, span=span, restarts=restarts
     )
     first = 0 if span is None else span[0]
-    free = 0 if resting else len(run.slots) + 1
+    free = 0 if resting else run.states
     states = np.zeros((len(run.cuts) + 1, free))
     if not isinstance(initial, str):
         states[:] = initial
     elif free:
-        states[:, :2] = starting_states(record, response, (first, *restarts))
+        begins = (first, *(first + cut for cut in run.cuts))
+        states[:, : run.moving] = starting_states(record, response, begins)[:, : run.moving]
     measured = record[response][first : first + run.samples]
     positive = tuple(key for entry in model.terms for key in entry.term.positive if key in begin)
     kept = None if lost is None else (~lost[first : first + run.samples]).astype(np.float64)
@@ -218,7 +219,7 @@ class _Problem:
 
     def states(self, x: Floats) -> Floats:
         """Initial states in the variables, shape (segments, states)."""
-        states = np.zeros((len(self.run.cuts) + 1, len(self.run.slots) + 1))
+        states = np.zeros((len(self.run.cuts) + 1, self.run.states))
         states[:, : self.free_states] = x[len(self.run.keys) :].reshape(len(states), self.free_states)
         return states
 
@@ -255,7 +256,7 @@ class _Problem:
         point = self.linearise(x)
         if point is None:
             values = ", ".join(f"{key} = {v:g}" for key, v in zip(self.run.keys, x, strict=False))
-            raise DivergenceError(f"the free run diverges with the starting values {values}", self.run.start)
+            raise DivergenceError(f"the free run diverges with the starting values {values}", self.run.time(0))
         return minimise(self.linearise, point, float(np.linalg.norm(self.measured)), max_iterations, offset)
 
 

@@ -57,9 +57,12 @@ def run_of(
 
 
 def linearise(fit: FreeRunFit, prepared: Prepared) -> Floats:
-    """Derivatives of the response on the samples that were fitted, shape (n, keys + 2): keys, then initial states."""
-    values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
-    return prepared.known(run_of(fit, prepared, fit.keys).respond(values, fit.initial, 2)[1], fit.span)
+    """Derivatives of the response on the samples that were fitted, shape (n, keys + 2): keys, then initial states.
+
+    These are two for each stretch of the record, and none where the motion is prescribed.
+    """
+    values, run = dict(zip(fit.keys, fit.values.tolist(), strict=True)), run_of(fit, prepared, fit.keys)
+    return prepared.known(run.respond(values, fit.initial, run.moving)[1], fit.span)
 
 
 def covariance_of(fit: FreeRunFit, jacobian: Floats) -> Floats:
@@ -122,7 +125,7 @@ class JudgingRun:
         """As :func:`linearise`, on the judging part, of a fit with the same motion."""
         values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
         run = self._run(fit.keys, self.prepared.response, 1, fit.model)
-        derivatives = run.respond(values, self.initial, 2)[1][self.prepared.plan.judge[0] - self.first :]
+        derivatives = run.respond(values, self.initial, run.moving)[1][self.prepared.plan.judge[0] - self.first :]
         return self.prepared.known(derivatives, self.prepared.plan.judge)
 
     def _run(self, keys: Sequence[str], motion: str, finer: int, model: Model | None = None) -> FreeRun:
@@ -141,7 +144,8 @@ def judging_run(fit: FreeRunFit, prepared: Prepared) -> JudgingRun:
         If it leaves the range of finite numbers.
     """
     plan = prepared.plan
-    if plan.judge[0] == fit.span[1] and not fit.restarts:
+    begun = plan.judge[0] in prepared.record.begins
+    if plan.judge[0] == fit.span[1] and not (fit.restarts or begun):
         return JudgingRun(fit, prepared, fit.first, fit.initial)
     again = fit_free_run(
         fit.model, prepared.record, held=tuple(fit.model.values), response=plan.response,

@@ -58,8 +58,8 @@ class Baseline:
         m, c and k of the best linear oscillator, whatever the model's terms are.
     dt : float
         Sampling interval in seconds.
-    row : int
-        Place of the measured response in ``MOTIONS``.
+    row : int or None
+        Place of the measured response in ``MOTIONS``; None where it is the force of a prescribed motion.
     """
 
     fit: FreeRunFit
@@ -68,10 +68,12 @@ class Baseline:
     linear: dict[str, float]
     approximation: dict[str, float]
     dt: float
-    row: int
+    row: int | None
 
     def transfer(self, omega: Complexes) -> Complexes:
         """Frequency response function from a small force to the measured response at ``omega = j 2 pi f``."""
+        if self.row is None:
+            return np.ones_like(omega)
         own = self.approximation
         return np.asarray(omega**self.row / (own["m"] * omega**2 + own["c"] * omega + own["k"]), dtype=np.complex128)
 
@@ -92,7 +94,8 @@ def baseline(fit: FreeRunFit, prepared: Prepared) -> Baseline:
     basis = np.linalg.qr(jacobian / np.where(scale > 0.0, scale, 1.0))[0]
     displacement, _ = run_of(fit, prepared, motion="displacement").respond({}, fit.initial)
     linear, approximation = _linear(fit, prepared)
-    return Baseline(fit, basis, displacement, linear, approximation, prepared.dt, MOTIONS.index(prepared.response))
+    row = MOTIONS.index(prepared.response) if prepared.response in MOTIONS else None
+    return Baseline(fit, basis, displacement, linear, approximation, prepared.dt, row)
 
 
 def _linear(fit: FreeRunFit, prepared: Prepared) -> tuple[dict[str, float], dict[str, float]]:

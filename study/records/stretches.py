@@ -1,0 +1,117 @@
+"""Several stretches as one record: each goes on without a break and begins from a state of its own.
+
+Decays between blows, decays from several heights, parts of a long record that are fitted and judged in turn, pieces of
+the motion of a mass without a spring, several records of one structure: all are stretches, strung together to one
+prepared record whose first part is fitted and whose second is judged. A free run begins anew at each of them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from study.records.completion import CompletedRecord
+from study.records.plan import FEWEST, Plan
+from study.records.prepared import Prepared
+from study.records.record import MOTIONS, Record, Stretch
+from study.records.states import angular_rate
+from study.support.errors import StudyError, expect
+
+PERIODS = 10.0  # of the motion in a block, at least: shorter, its own state takes up what the model should tell
+BLOCKS = 16  # of a stretch, at most
+HORIZON = 4.0  # periods of its motion over which a mass without a spring is judged ...
+PIECES = 4  # ... and in how many pieces each part is cut at least
+
+
+def strung_together(
+    fit: Sequence[Stretch], judge: Sequence[Stretch], response: str, completed: Sequence[CompletedRecord],
+    notes: Sequence[str] = (),
+) -> Prepared:  # fmt: skip
+    """One prepared record of the stretches to fit and those to judge; ``completed`` are the records they come from.
+
+    Raises
+    ------
+    StudyError
+        If the records differ in sampling, channels' units or what was measured, or a part is too short.
+    """
+    first = completed[0].record
+    for other in completed[1:]:
+        _refuse_different(first, other.record)
+    stretches = (*fit, *judge)
+    shared = [c for c in first.channels if all(c in s.source for s in stretches)]
+    channels = {c: np.concatenate([s.source[c][s.first : s.last] for s in stretches]) for c in shared}
+    split, total = sum(map(len, fit)), sum(map(len, stretches))
+    for part, samples in (("fit", split), ("judge", total - split)):
+        expect(samples >= FEWEST, f"{first.name}: {samples} samples are left to {part}; expected {FEWEST} or more")
+    record = Record(first.dt, channels, first.units, first.name, first.start, None, tuple(stretches))
+    band = max(c.band[0] for c in completed), min(c.band[1] for c in completed)
+    said = tuple(dict.fromkeys((*(n for c in completed for n in c.notes), *notes)))
+    return Prepared(record, Plan(response, (0, split), (split, total)), band, 0, said)
+
+
+def _refuse_different(first: Record, other: Record) -> None:
+    if abs(other.dt / first.dt - 1.0) > 1e-6:
+        raise StudyError(
+            f"{first.name} is sampled at {1.0 / first.dt:g} Hz and {other.name} at {1.0 / other.dt:g} Hz; expected the "
+            "same for records that are judged together"
+        )
+    for channel in ("force", *MOTIONS):
+        one, two = first.units.get(channel, ""), other.units.get(channel, "")
+        expect(
+            one == two,
+            f"{channel} is in {one} in {first.name} and in {two} in {other.name}; expected the same unit in records that "
+            "are judged together",
+        )
+
+
+def sure(completed: CompletedRecord, first: int, last: int) -> Stretch:
+    """A stretch of a completed record without the samples at its ends that derivatives and integrals leave uncertain."""
+    edge = completed.edge
+    low, high = max(first, edge), min(last, len(completed.record) - edge)
+    expect(
+        high - low >= FEWEST,
+        f"{completed.record.name}: samples {first} to {last} leave {max(high - low, 0)} that are sure; expected "
+        f"{FEWEST} or more",
+    )
+    return Stretch(completed.record, low, high)
+
+
+def alternating(stretches: Sequence[Stretch], response: str) -> tuple[list[Stretch], list[Stretch]]:
+    """Every other block of the stretches to be fitted, and those between them to be judged.
+
+    Where a stretch before began with a block that is fitted, the next begins with one that is judged, so that neither
+    has all the loud ones.
+    """
+    fit, judge = list[Stretch](), list[Stretch]()
+    for number, stretch in enumerate(stretches):
+        for place, block in enumerate(_blocks(stretch, response)):
+            (fit if (number + place) % 2 == 0 else judge).append(block)
+    return fit, judge
+
+
+def _blocks(stretch: Stretch, response: str) -> list[Stretch]:
+    period = period_of(stretch, response)
+    most = int(len(stretch) / max(PERIODS * period, FEWEST))
+    return cut(stretch, int(np.clip(most, 2, BLOCKS)))
+
+
+def period_of(stretch: Stretch, response: str) -> float:
+    """Samples in a period of the motion."""
+    values = stretch.source[response][stretch.first : stretch.last]
+    return 2.0 * np.pi / (angular_rate(values, stretch.source.dt) * stretch.source.dt)
+
+
+def cut(stretch: Stretch, count: int) -> list[Stretch]:
+    """A stretch in so many parts of about equal length."""
+    bounds = np.linspace(stretch.first, stretch.last, count + 1).round().astype(int).tolist()
+    return [replace(stretch, first=a, last=b) for a, b in zip(bounds, bounds[1:], strict=False)]
+
+
+def within_the_horizon(stretches: Sequence[Stretch], response: str) -> tuple[list[Stretch], float]:
+    """Stretches in pieces of some periods of the motion, and their mean length in seconds."""
+    pieces = list[Stretch]()
+    for stretch in stretches:
+        wanted = len(stretch) / (HORIZON * period_of(stretch, response))
+        count = min(max(round(wanted), -(-PIECES // len(stretches))), max(len(stretch) // FEWEST, 1))
+        pieces += cut(stretch, count)
+    return pieces, float(np.mean([len(p) for p in pieces])) * stretches[0].source.dt
