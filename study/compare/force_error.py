@@ -76,7 +76,7 @@ def force_error(model: Model, prediction: Prediction) -> ForceError:
         record = record.with_channels({"force": -model.numbers()["m"] * record["acceleration"]})
     channels = [h[first:last] for h in histories(inputs, record)]
     channels += [record[prepared.response][first:last], record["force"][first:last]]
-    begins = record.part(first, last).begins
+    begins = record.part(first, last).joints
     cut = _segments([b - a for a, b in pairwise((0, *begins, last - first))], len(inputs))
     within = cross_spectra_within(channels, begins, record.dt, cut) if begins else None
     matrix = within or cross_spectra(channels, record.dt, cut)

@@ -55,7 +55,7 @@ def leftover(base: Baseline, prepared: Prepared) -> Leftover:
     families = _formulas(*(float(np.std(x)) for x in motions))
     shaped = _with_shapes(fit, [text for texts in families.values() for text in texts])
     # Of segments, each initial state matters to its own samples alone; those of stretches are taken out of all columns.
-    joined = bool(prepared.record.begins)
+    joined = bool(prepared.record.stretches)
     states = 0 if fit.restarts or joined or prepared.response == FORCE else 2
     rows = [*motions, fit.residual, _columns(linearise(shaped, prepared), len(shaped.keys), states, joined)]
     try:

@@ -21,15 +21,16 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part, linearise
 from study.identify.time_domain.settling import continued
 from study.identify.time_domain.shape_search import Baseline
-from study.records.prepared import Prepared
+from study.records.prepared import FORCE, Prepared
 from study.support import statistics
 from study.support.errors import DivergenceError
-from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE, UNSTEADY
+from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE, UNSTEADY, K
 
 Floats = NDArray[np.float64]
 MISSING, NOTHING, UNKNOWN = "missing_effect", "nothing_missing", "unknown_effect"
 SHORT, LONG = 2048, 16384  # samples: a search uses half of the fitting part, within these limits
 SETTLED = 4  # of the candidates, the best: fitted on the whole fitting part and with enough steps
+MOST = 0.5  # of what is unexplained: what an effect of a component explains that is named before all others
 PAIRED = 1  # the best so many candidates are tried together with every other
 
 
@@ -72,6 +73,8 @@ def search_part(prepared: Prepared) -> Prepared:
 
     More where that is a quiet stretch, such as the end of a sweep, which shows less than half of the motion's size.
     """
+    if prepared.record.stretches:  # what is loud and what is quiet lie in stretches of their own
+        return prepared.shortened(LONG)
     first, last = prepared.plan.fit
     look = prepared.shortened(int(np.clip((last - first) // 2, SHORT, LONG)))
     return look if look.spread > 0.5 * prepared.spread else prepared.shortened(LONG)
@@ -111,12 +114,23 @@ def _decide(
     rows = [first] + [r for r in rows if r is not first]
     if (first.gain.explained >= ENOUGH or left <= GOOD) and not first.wanders(len(rows)):
         return MISSING, rows, left, ()
+    if _stands_out(first, rows, comparison.prepared):
+        return MISSING, rows, left, ()
     slight = first.response_error <= GOOD  # two effects that explain little alone explain little together
     pair = None if slight else _explaining_pair(rows, base, comparison.prepared)
     if pair is None:
         return UNKNOWN, rows, left, ()
     first = next(r for r in rows if r.name == pair.names[0])
     return MISSING, [first] + [r for r in rows if r is not first], _left(pair.fit, pair.prediction), pair.names
+
+
+def _stands_out(first: Ranked, rows: list[Ranked], prepared: Prepared) -> bool:
+    """Whether an effect of a component explains most of what is missing, and more than any other by no chance.
+
+    A component of a structure is seldom one effect alone: what is left beside the first is asked for when it is added.
+    """
+    others = all(r.distance > K for r in rows if r is not first)
+    return prepared.response == FORCE and first.gain.explained > MOST and not first.unphysical and others
 
 
 def _explaining_pair(rows: list[Ranked], base: Baseline, prepared: Prepared) -> Pair | None:

@@ -17,7 +17,7 @@ import numpy as np
 from study.equations import kernels
 from study.equations.graph import Op, Program
 from study.equations.model import Model, forward_graph, named_channels, with_registers
-from study.records.interpolation import between_samples, between_stretches
+from study.records.interpolation import between_runs, between_samples, runs_of
 from study.records.record import MOTIONS, Record
 from study.support.arrays import Floats, Ints
 from study.support.errors import DivergenceError, StudyError
@@ -50,9 +50,11 @@ class FreeRun:
     steps : int
         Steps in each sampling interval.
     starts : tuple of (int, float)
-        Samples at which the stretches begin that the record is strung together of, and their times in seconds.
+        Samples at which motions begin anew, and their times in seconds.
     samples : int
         Samples in the stretch.
+    places : int array, shape (samples,), optional
+        Where the samples lie along the motions, which run on between stretches; all that they run along if left out.
     row : int
         Which motion is the response: its place in ``MOTIONS``.
     cuts : tuple of int
@@ -77,6 +79,7 @@ class FreeRun:
     cuts: tuple[int, ...] = ()
     motion: Floats | None = None
     known: bool = False
+    places: Ints | None = None
 
     @property
     def states(self) -> int:
@@ -89,9 +92,20 @@ class FreeRun:
         return 0 if self.known else 2
 
     def time(self, sample: int) -> float:
-        """Time of a sample in seconds."""
+        """Time of a sample along the motions in seconds."""
         begin, start = self.starts[bisect_right(self.starts, sample, key=lambda s: s[0]) - 1]
         return start + (sample - begin) * self.dt
+
+    @property
+    def length(self) -> int:
+        """Samples that the motions run along."""
+        return len(self.drive) // (2 * self.steps) if self.places is not None else self.samples
+
+    def along(self, bounds: Sequence[int]) -> list[int]:
+        """Where samples of the stretch, and its end, lie along the motions."""
+        if self.places is None:
+            return list(bounds)
+        return [int(self.places[b]) if b < self.samples else self.length for b in bounds]
 
     def respond(
         self, values: Mapping[str, float], initial: Sequence[float] | Floats, free_states: int = 0
@@ -144,7 +158,7 @@ class FreeRun:
             raise StudyError(f"{len(states)} initial states were given; {len(bounds) - 1} segments need one each")
         program = with_registers(self.program, {key: values[key] for key in self.keys})
         first_free = 1 + len(self.keys)
-        out = np.empty((self.samples, first_free + free_states))
+        out = np.empty((self.length, first_free + free_states))
         state = np.zeros((len(states), self.states, out.shape[1]))  # one array for all segments is faster
         state[:, : states.shape[1], 0] = states
         state[:, range(free_states), range(first_free, out.shape[1])] = 1.0
@@ -156,6 +170,8 @@ class FreeRun:
                 other = beside.submit(self._integrate, program, bounds[half:], state[half:], out)
                 self._integrate(program, bounds[: half + 1], state[:half], out)
                 other.result()
+        if self.places is not None:
+            out = out[self.places]
         if self.motion is not None:
             return self.motion, np.zeros_like(out[:, 1:]), state[:-1]
         return out[:, 0], out[:, 1:], state[:-1]
@@ -167,7 +183,7 @@ class FreeRun:
         """
         bounds = (0, *self.cuts, self.samples)
         states, state = np.empty((len(bounds) - 1, self.states)), np.empty((1, self.states, 1))
-        room = np.empty((self.samples, 1))
+        room = np.empty((self.length, 1))
         for i, segment in enumerate(pairwise(bounds)):
             if i in initial:
                 state[0, :, 0] = initial[i]
@@ -175,8 +191,9 @@ class FreeRun:
             self._integrate(self.program, segment, state, room)
         return states
 
-    def _integrate(self, program: Program, bounds: Sequence[int], states: Floats, out: Floats) -> None:
+    def _integrate(self, program: Program, cuts: Sequence[int], states: Floats, out: Floats) -> None:
         """Response and derivatives into ``out``; ``states`` become those at which the next segments begin."""
+        bounds = self.along(cuts)
         starts = np.array([self.time(begin) for begin in bounds[:-1]])
         if self.known:
             failed = kernels.integrate_known(
@@ -241,37 +258,38 @@ def prepare(
     channels = named_channels(model, record.extra)
     program, slots, side = _differentiated(model, channels, tuple(keys))
     factor = 2 * steps_per_sample
-    part = slice(factor * first, factor * (last - 1) + 1)
     driving = (*MOTIONS[:2], *channels) if known else (FORCE, *channels)
-    drive = np.column_stack([_finely(record, name, factor)[part] for name in driving])
+    starts, places = ((0, record.start + first * record.dt),), None
+    if record.stretches:
+        drive, starts, places = _along_stretches(record, (first, last), driving, factor)
+    else:
+        part = slice(factor * first, factor * (last - 1) + 1)
+        drive = np.column_stack([_between(record[name].tobytes(), factor)[part] for name in driving])
     row = MOTIONS.index(response) if response in MOTIONS else len(MOTIONS)
     motion = record[response][first:last] if known and response in MOTIONS else None
     return FreeRun(
-        program, slots, side, tuple(keys), drive, record.dt, steps_per_sample, _starts(record, first, last),
-        last - first, row, tuple(c - first for c in cuts), motion, known,
+        program, slots, side, tuple(keys), drive, record.dt, steps_per_sample, starts, last - first, row,
+        tuple(c - first for c in cuts), motion, known, places,
     )  # fmt: skip
 
 
-def _starts(record: Record, first: int, last: int) -> tuple[tuple[int, float], ...]:
-    """Where in a span the stretches of a record begin, counted from the span's first sample, and their times."""
-    if not record.stretches:
-        return ((0, record.start + first * record.dt),)
-    part, begin, starts = record.part(first, last), 0, list[tuple[int, float]]()
-    for stretch in part.stretches:
-        starts.append((begin, float(stretch.time[0])))
-        begin += len(stretch)
-    return tuple(starts)
-
-
-def _finely(record: Record, name: str, factor: int) -> Floats:
-    return _between_joined(record, name, factor) if record.stretches else _between(record[name].tobytes(), factor)
-
-
 @lru_cache(maxsize=REMEMBERED)
-def _between_joined(record: Record, name: str, factor: int) -> Floats:
-    fine = between_stretches(record, name, factor)
-    fine.flags.writeable = False
-    return fine
+def _along_stretches(
+    record: Record, span: tuple[int, int], driving: tuple[str, ...], factor: int
+) -> tuple[Floats, tuple[tuple[int, float], ...], Ints]:
+    """What drives the motions of a record that is strung together, where they begin and when, and its samples' places.
+
+    The motions of a span begin with its first sample.
+    """
+    part = record.part(*span)
+    runs, places = runs_of(part)
+    starts, begin = list[tuple[int, float]](), 0
+    for run in runs:
+        starts.append((begin, float(run.source.time[run.first])))
+        begin += len(run)
+    drive = np.column_stack([between_runs(part, name, factor) for name in driving])
+    drive.flags.writeable = False
+    return drive, tuple(starts), places
 
 
 @lru_cache(maxsize=REMEMBERED)

@@ -39,7 +39,7 @@ def _rates(model: Model, record: Record, response: str) -> Floats:
         return _rates_of_memories(run, record, samples)
     states = run.states
     point = np.column_stack([starting_states(record, response, samples.tolist()), record.time[samples]])
-    data = np.column_stack([point, run.drive[2 * samples]])
+    data = np.column_stack([point, run.drive[2 * np.array(run.along(samples.tolist()))]])
     columns = np.arange(data.shape[1], dtype=np.int64)
     partial = np.empty((len(samples), (states - 1) * states))
     with np.errstate(all="ignore"):
@@ -60,7 +60,7 @@ def _rates_of_memories(run: FreeRun, record: Record, samples: Ints) -> Floats:
     states = run.states
     if states == 0:
         return np.zeros(1)
-    drive = run.drive[2 * samples]
+    drive = run.drive[2 * np.array(run.along(samples.tolist()))]
     data = np.column_stack([drive[:, :2], record.time[samples], drive[:, 2:]])
     columns = np.array([0, 1, 2, *range(4, data.shape[1] + 1)], dtype=np.int64)
     partial = np.empty((len(samples), states * states))

@@ -78,7 +78,7 @@ def accounted(
 
 def _may_be_asked(prepared: Prepared) -> bool:
     """Whether a record shows faults by what it leaves of a driven response; they pass through no joint of stretches."""
-    return not (prepared.record.begins or prepared.free or prepared.response == FORCE)
+    return not (prepared.record.stretches or prepared.free or prepared.response == FORCE)
 
 
 def _fitted(model: Model, prepared: Prepared, near: FreeRunFit) -> FreeRunFit:

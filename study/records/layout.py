@@ -45,8 +45,9 @@ class Layout:
 def laid_out(records: Sequence[Record], layout: Layout, *, prescribed: bool = False, drifts: bool = False) -> Prepared:
     """Records made ready: motions completed, and the parts to fit and to judge settled.
 
-    A single stretch under a force is fitted in its first half and judged in its second. Of several stretches, of a free
-    decay, whose second half is quiet, and where the user says so, every other block is judged.
+    A single stretch under a force is fitted in its first half and judged in its second. Every other block is judged of
+    several stretches, of a free decay, whose second half is quiet, of a prescribed motion, which is often a program of
+    amplitudes and frequencies, and where the user says so.
 
     Parameters
     ----------
@@ -72,7 +73,8 @@ def laid_out(records: Sequence[Record], layout: Layout, *, prescribed: bool = Fa
     records = [r for r, _ in readied]
     free = not prescribed and all(_unforced(r, layout) for r in records)
     several = len(records) > 1 or len(layout.use) > 1
-    if not (several or layout.use or layout.alternate or drifts or (free and not explicit)):
+    turns = several or layout.alternate or ((free or prescribed) and not explicit)
+    if not (turns or layout.use or drifts):
         return _plain(records[0], layout, response, [n for _, notes in readied for n in notes])
     completed = [complete(record, layout.cutoff) for record in records]
     notes = [n for _, said in readied for n in said]
@@ -81,7 +83,7 @@ def laid_out(records: Sequence[Record], layout: Layout, *, prescribed: bool = Fa
         fit, judge = [sure(completed[0], *plan.fit)], [sure(completed[0], *plan.judge)]
     else:
         stretches = _stretches(completed, layout)
-        if several or layout.alternate or free:
+        if turns:
             fit, judge = alternating(stretches, _seen(response))
             notes.append(_said(fit, judge, len(stretches)))
         else:

@@ -98,7 +98,7 @@ class Prepared:
         first, last = self.plan.fit
         if last - first <= samples:
             return self
-        if self.record.begins:
+        if self.record.joints:
             return self._of_stretches(samples)
         return self.with_fit(*((last - samples, last) if self.plan.judge[0] == last else (first, first + samples)))
 

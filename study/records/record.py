@@ -16,11 +16,16 @@ SI_UNITS = {"time": "s", "force": "N", "displacement": "m", "velocity": "m/s", "
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Samples ``first`` to ``last`` (exclusive) of a record, along which the motion goes on without a break."""
+    """Samples ``first`` to ``last`` (exclusive) of a record, along which the motion goes on without a break.
+
+    It ``continues`` where it comes after the stretch before it in the same record, and a motion runs through what lies
+    between them; else the motion begins anew.
+    """
 
     source: "Record"
     first: int
     last: int
+    continues: bool = False
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -51,7 +56,7 @@ class Record:
     period : int, optional
         Samples in one period, where the excitation is periodic.
     stretches : tuple of Stretch
-        What it is strung together of, at each of which the motion begins anew; empty for a record of its own.
+        What it is strung together of; empty for a record of its own.
     changed : set of str
         Channels that are no longer those of its stretches.
     """
@@ -86,12 +91,18 @@ class Record:
 
     @property
     def begins(self) -> tuple[int, ...]:
-        """Samples at which the motion begins anew: the first of each stretch after the first."""
+        """Samples at which the motion begins anew, the first aside."""
+        pairs = zip(self.joints, self.stretches[1:], strict=True)
+        return tuple(joint for joint, stretch in pairs if not stretch.continues)
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """Samples at which its stretches begin, the first aside."""
         return tuple(accumulate(len(stretch) for stretch in self.stretches[:-1]))
 
     def stretch_of(self, sample: int) -> tuple[int, int]:
         """First sample of the stretch that holds this one, and the one after its last."""
-        bounds = (0, *self.begins, len(self))
+        bounds = (0, *self.joints, len(self))
         place = bisect_right(bounds, sample, hi=len(bounds) - 1)
         return bounds[place - 1], bounds[place]
 
@@ -109,10 +120,11 @@ class Record:
     def _stretches(self, first: int, last: int) -> tuple[Stretch, ...]:
         """The stretches, or parts of them, that samples ``first`` to ``last`` come from."""
         kept: list[Stretch] = []
-        for begin, stretch in zip((0, *self.begins), self.stretches, strict=False):
+        for begin, stretch in zip((0, *self.joints), self.stretches, strict=False):
             low, high = max(first - begin, 0), min(last - begin, len(stretch))
             if high > low:
-                kept.append(Stretch(stretch.source, stretch.first + low, stretch.first + high))
+                going_on = stretch.continues and bool(kept)
+                kept.append(Stretch(stretch.source, stretch.first + low, stretch.first + high, going_on))
         return tuple(kept)
 
     def with_channels(self, channels: Mapping[str, Floats]) -> "Record":

@@ -17,8 +17,8 @@ from study.records.record import MOTIONS, Record, Stretch
 from study.records.states import angular_rate
 from study.support.errors import StudyError, expect
 
-PERIODS = 10.0  # of the motion in a block, at least: shorter, its own state takes up what the model should tell
-BLOCKS = 16  # of a stretch, at most
+PERIODS = 5.0  # of the motion in a block, at least
+BLOCKS = 24  # of a stretch, at most
 HORIZON = 4.0  # periods of its motion over which a mass without a spring is judged ...
 PIECES = 4  # ... and in how many pieces each part is cut at least
 
@@ -79,12 +79,14 @@ def sure(completed: CompletedRecord, first: int, last: int) -> Stretch:
 def alternating(stretches: Sequence[Stretch], response: str) -> tuple[list[Stretch], list[Stretch]]:
     """Every other block of the stretches to be fitted, and those between them to be judged.
 
+    Each part has one motion in every stretch, that runs on through the blocks of the other.
     Where a stretch before began with a block that is fitted, the next begins with one that is judged, so that neither
     has all the loud ones.
     """
     fit, judge = list[Stretch](), list[Stretch]()
     for number, stretch in enumerate(stretches):
         for place, block in enumerate(_blocks(stretch, response)):
+            block = replace(block, continues=place > 1)  # the motion runs on through the blocks between
             (fit if (number + place) % 2 == 0 else judge).append(block)
     return fit, judge
 

@@ -5,6 +5,7 @@ from scipy.fft import rfft, rfftfreq
 
 from study.equations.free_run import prepare
 from study.equations.model import Model
+from study.equations.substeps import needed_steps
 from study.records.prepared import FORCE, Prepared
 from study.records.record import Record
 from study.support.arrays import Floats
@@ -41,7 +42,7 @@ def frequency_and_rate(part: Record, response: str) -> tuple[float, float]:
     The frequency is that of the highest line of the longest stretch; the rate a regression over windows of a period,
     loud ones weighing more, each stretch from a level of its own.
     """
-    spans = list(zip((0, *part.begins), (*part.begins, len(part)), strict=True))
+    spans = list(zip((0, *part.joints), (*part.joints, len(part)), strict=True))
     pieces = [part[response][a:b] - np.mean(part[response][a:b]) for a, b in spans]
     longest = max(pieces, key=len)
     lines = PADDED * len(longest)
@@ -77,7 +78,10 @@ def along_the_motion(model: Model, prepared: Prepared, wanted: list[str]) -> dic
     """
     symbols = [s for t in model.terms for s in t.term.symbols]
     begun = model.with_values(dict.fromkeys(symbols, 0.0))
-    run = prepare(begun, prepared.record, symbols, response=FORCE, span=prepared.plan.fit)
+    steps = needed_steps(begun, prepared.record, FORCE)
+    run = prepare(
+        begun, prepared.record, symbols, response=FORCE, span=prepared.plan.fit, steps_per_sample=max(steps, 2)
+    )
     zeros = np.zeros((len(run.cuts) + 1, run.states))
     shapes = prepared.known(run.respond(dict.fromkeys(symbols, 0.0), zeros)[1], prepared.plan.fit)
     columns = [symbols.index(s) for s in wanted]

@@ -117,8 +117,8 @@ def history(item: Input, record: Record) -> Floats:
     program = with_registers(graph.program([formulas.build(graph, formula, known)]), dict(item.parameters))
     positions = np.array([program.inputs[n] for n in wanted], dtype=np.int64)
     registers, output = program.registers.copy(), program.outputs
-    if item.state is not None and record.begins:  # each stretch begins at zero, as a record does
-        bounds = pairwise((0, *record.begins, len(record)))
+    if item.state is not None and record.joints:  # each stretch begins at zero, as a record does
+        bounds = pairwise((0, *record.joints, len(record)))
         return np.concatenate([history(item, _alone(record.part(a, b))) for a, b in bounds])
     if item.state is not None:
         fine = np.column_stack([between_samples(x, 2 * STATE_STEPS) for x in data])

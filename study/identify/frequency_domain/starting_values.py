@@ -38,8 +38,8 @@ def linear_start(model: Model, prepared: Prepared) -> dict[str, float]:
     part = record.part(*prepared.plan.fit)
     length = min(LONGEST, 2 ** int(np.log2(max(len(part) // 8, 16))))
     force, motion = (part[name] - np.mean(part[name]) for name in ("force", response))
-    if part.begins:
-        matrix = cross_spectra_within([force, motion], part.begins, part.dt, Segments(length=length))
+    if part.joints:
+        matrix = cross_spectra_within([force, motion], part.joints, part.dt, Segments(length=length))
     else:
         matrix = cross_spectra([force, motion], part.dt, Segments(length=length))
     g, f = matrix.density[1:-1], matrix.frequency[1:-1]
@@ -93,8 +93,8 @@ def reverse_start(model: Model, prepared: Prepared) -> dict[str, float]:
         inputs = without_inertia(inputs)
     cut = Segments(length=int(np.clip(2 ** int(np.log2(len(part) / PARTS)), SHORTEST, LONGEST)))
     channels = [*histories(inputs, part), part["force"]]
-    if part.begins:
-        matrix = cross_spectra_within(channels, part.begins, part.dt, cut)
+    if part.joints:
+        matrix = cross_spectra_within(channels, part.joints, part.dt, cut)
         cut = matrix.segments
     else:
         matrix = cross_spectra(channels, part.dt, cut)

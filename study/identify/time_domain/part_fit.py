@@ -144,7 +144,7 @@ def judging_run(fit: FreeRunFit, prepared: Prepared) -> JudgingRun:
         If it leaves the range of finite numbers.
     """
     plan = prepared.plan
-    begun = plan.judge[0] in prepared.record.begins
+    begun = plan.judge[0] in prepared.record.joints
     if plan.judge[0] == fit.span[1] and not (fit.restarts or begun):
         return JudgingRun(fit, prepared, fit.first, fit.initial)
     again = fit_free_run(

@@ -15,7 +15,7 @@ from study.equations.term import Parameter, Term
 from study.identify.frequency_domain.starting_values import linear_start, oscillator
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import linearise, run_of
-from study.records.prepared import Prepared
+from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
@@ -23,6 +23,7 @@ from study.support.least_squares import least_squares
 
 SEARCHED = 4096  # samples that a search for open shape parameters looks at, if they show anything
 PEAKS = 6  # lines of a spectrum that are tried as the frequency of a periodic effect
+SHARP = (15.0, 40.0, 100.0, 250.0)  # per amplitude: loops that close within a small part of a stroke
 STARTS = 4  # points of the search that start a fit
 SPREAD = 5  # points that start a fit where the search is blunt, from one end of the range to the other
 
@@ -104,6 +105,8 @@ def _linear(fit: FreeRunFit, prepared: Prepared) -> tuple[dict[str, float], dict
         return linear_start(fit.model, prepared), oscillator(prepared)
     except StudyError:
         own = fit.model.numbers()
+        if prepared.response == FORCE:  # nothing passes through a structure there
+            return own, {}
         slowest = (2.0 * np.pi / (len(fit.residual) * prepared.dt)) ** 2
         approximation = {"m": own["m"], "c": own.get("c", 0.0), "k": own.get("k") or own["m"] * slowest}
         return {key: own[key] if key in approximation else 0.0 for key in own}, approximation
@@ -172,6 +175,8 @@ def _places(parameter: Parameter, point: tuple[float, ...], base: Baseline) -> l
         case "times of the motion":
             tried = places / float(np.std(np.gradient(u, base.dt)) / np.std(u))
         case "per amplitude":
+            if base.row is None:  # a prescribed stroke may be many times the slip that closes a loop
+                places = np.concatenate([places, SHARP])
             tried = places * (1.0 / float(np.std(u)))
         case "shares of the one before":
             tried = places * point[-1]
