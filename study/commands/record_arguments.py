@@ -22,6 +22,7 @@ RANGE = re.compile(r"([0-9]{0,15}):([0-9]{0,15})")
 MOTIONS = ("displacement", "velocity", "acceleration")
 RESULTS = Path("results")
 ALTERNATE = "every-other-block"
+LOST = 0.3  # of the rms response: a free run through several blocks that misses so much has lost the motion
 GIVEN = ("dt", "fs", "group", "period", "accept_saturated", "accept_swapped", "free")  # as ``ReadOptions`` calls them
 Span = tuple[int, int | None]
 
@@ -168,6 +169,7 @@ def accounted_together(
     """The same of several records of one structure, to all of which one model is fitted."""
     from study.faults.accounting import accounted
     from study.faults.instrument_settings import NOTHING_ASKED, settings_beside
+    from study.records.stretches import apart, runs_on
 
     settings = NOTHING_ASKED if arguments.no_measurement else settings_beside(path)
     prepared = prepared_of(arguments, records, model)
@@ -175,7 +177,11 @@ def accounted_together(
         from study.equations.common_factor import per_unit_mass
 
         model, prepared = per_unit_mass(model, prepared)
-    return accounted(model, prepared, held=settings.held, switched_off=settings.switched_off, **options)
+    known = {"held": settings.held, "switched_off": settings.switched_off, **options}
+    found = accounted(model, prepared, **known)
+    if runs_on(prepared) and found.comparison.prediction.error > LOST:
+        return accounted(model, apart(prepared), **known)
+    return found
 
 
 def _within(given: Span | None, record: "Record") -> tuple[int, int] | None:

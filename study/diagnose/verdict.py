@@ -24,13 +24,13 @@ from study.identify.time_domain.shape_search import Baseline
 from study.records.prepared import FORCE, Prepared
 from study.support import statistics
 from study.support.errors import DivergenceError
-from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE, UNSTEADY, K
+from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE, UNSTEADY
 
 Floats = NDArray[np.float64]
 MISSING, NOTHING, UNKNOWN = "missing_effect", "nothing_missing", "unknown_effect"
 SHORT, LONG = 2048, 16384  # samples: a search uses half of the fitting part, within these limits
 SETTLED = 4  # of the candidates, the best: fitted on the whole fitting part and with enough steps
-MOST = 0.5  # of what is unexplained: what an effect of a component explains that is named before all others
+MOST = 0.5  # of what is unexplained: what an effect of a component, or of a decay, explains that is named first
 PAIRED = 1  # the best so many candidates are tried together with every other
 
 
@@ -114,23 +114,21 @@ def _decide(
     rows = [first] + [r for r in rows if r is not first]
     if (first.gain.explained >= ENOUGH or left <= GOOD) and not first.wanders(len(rows)):
         return MISSING, rows, left, ()
-    if _stands_out(first, rows, comparison.prepared):
-        return MISSING, rows, left, ()
     slight = first.response_error <= GOOD  # two effects that explain little alone explain little together
     pair = None if slight else _explaining_pair(rows, base, comparison.prepared)
     if pair is None:
-        return UNKNOWN, rows, left, ()
+        return MISSING if _stands_out(first, comparison.prepared) else UNKNOWN, rows, left, ()
     first = next(r for r in rows if r.name == pair.names[0])
     return MISSING, [first] + [r for r in rows if r is not first], _left(pair.fit, pair.prediction), pair.names
 
 
-def _stands_out(first: Ranked, rows: list[Ranked], prepared: Prepared) -> bool:
-    """Whether an effect of a component explains most of what is missing, and more than any other by no chance.
+def _stands_out(first: Ranked, prepared: Prepared) -> bool:
+    """Whether an effect of a component or of a decaying motion explains most of what is missing.
 
-    A component of a structure is seldom one effect alone: what is left beside the first is asked for when it is added.
+    Measured ones seldom lack one effect alone: what is left beside the first is asked for when it is added.
     """
-    others = all(r.distance > K for r in rows if r is not first)
-    return prepared.response == FORCE and first.gain.explained > MOST and not first.unphysical and others
+    alone = prepared.response == FORCE or prepared.free
+    return alone and first.gain.explained > MOST and not first.unphysical
 
 
 def _explaining_pair(rows: list[Ranked], base: Baseline, prepared: Prepared) -> Pair | None:

@@ -168,5 +168,5 @@ def _said(fit: Sequence[Stretch], judge: Sequence[Stretch], stretches: int) -> s
     of = f" of {stretches} stretches" if stretches > 1 else ""
     return (
         f"every other block{of} is judged: {len(fit)} are fitted and {len(judge)} judged, of {length:.3g} s each on "
-        "average, and each begins from a state of its own"
+        "average, and the free run of either part runs on through the other's"
     )

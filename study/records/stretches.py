@@ -12,7 +12,7 @@ import numpy as np
 
 from study.records.completion import CompletedRecord
 from study.records.plan import FEWEST, Plan
-from study.records.prepared import Prepared
+from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record, Stretch
 from study.records.states import angular_rate
 from study.support.errors import StudyError, expect
@@ -89,6 +89,26 @@ def alternating(stretches: Sequence[Stretch], response: str) -> tuple[list[Stret
             block = replace(block, continues=place > 1)  # the motion runs on through the blocks between
             (fit if (number + place) % 2 == 0 else judge).append(block)
     return fit, judge
+
+
+def runs_on(prepared: Prepared) -> bool:
+    """Whether a motion runs on between stretches of the record."""
+    return any(s.continues for s in prepared.record.stretches)
+
+
+def apart(prepared: Prepared) -> Prepared:
+    """The same record with motions of a few periods, each from a state of its own: for a model that loses the motion."""
+    response = MOTIONS[0] if prepared.response == FORCE else prepared.response
+    samples = PERIODS * 2.0 * np.pi / (angular_rate(prepared.record[response], prepared.dt) * prepared.dt)
+    pieces: list[Stretch] = []
+    for stretch in prepared.record.stretches:
+        pieces += cut(replace(stretch, continues=False), max(round(len(stretch) / max(samples, FEWEST)), 1))
+    said = (
+        f"the free run of this model loses the motion on its way, so it begins anew every "
+        f"{len(prepared.record) / len(pieces) * prepared.dt:.3g} s, from a state of its own"
+    )
+    record = replace(prepared.record, stretches=tuple(pieces))
+    return replace(prepared, record=record, notes=(*prepared.notes, said))
 
 
 def _blocks(stretch: Stretch, response: str) -> list[Stretch]:
