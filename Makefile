@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: study report test checks lint picture fault_pictures readme estimators trials clean
+.PHONY: study report test checks lint picture fault_pictures notebooks docs readme estimators trials clean
 
 study: $(READY)
 	$(BIN)/snakemake -j2
@@ -31,6 +31,13 @@ picture: $(READY)
 fault_pictures: $(READY)
 	$(BIN)/python scripts/fault_pictures.py models docs/faults
 
+notebooks: $(READY)
+	$(BIN)/python scripts/notebooks.py docs/notebooks/*.ipynb
+
+docs: $(READY)
+	$(BIN)/mkdocs build --strict --quiet
+	@echo "open site/index.html"
+
 readme: study
 	$(BIN)/python scripts/readme.py
 	$(BIN)/python scripts/trial_docs.py
@@ -53,4 +60,4 @@ $(READY): requirements.lock pyproject.toml
 	@touch $@
 
 clean:
-	rm -rf results figures .snakemake report.html
+	rm -rf results figures .snakemake report.html site

@@ -2,17 +2,6 @@
 # wildcard can say: one rule a case.
 from study.reproduction.config import IDENTIFIED
 
-DESCRIBED = {
-    "linear": "A_1: magnitude and phase",
-    "nonlinear": "A_2 (A_3): real and imaginary part",
-    "coherence": "cumulative coherence",
-    "histogram": "histogram of the response",
-    "pattern": "restoring force against displacement",
-    "autospectrum": "autospectrum of the response",
-    "force_history": "force history and autospectrum",
-    "force_histogram": "histogram of the force",
-}
-
 for _case in STUDY.cases:
 
     rule:

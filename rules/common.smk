@@ -20,6 +20,16 @@ CODE = {
 }
 STYLE = "study/figures/study.mplstyle"
 ENDINGS = ("png", "svg")
+DESCRIBED = {
+    "linear": "A_1: magnitude and phase",
+    "nonlinear": "A_2 (A_3): real and imaginary part",
+    "coherence": "cumulative coherence",
+    "histogram": "histogram of the response",
+    "pattern": "restoring force against displacement",
+    "autospectrum": "autospectrum of the response",
+    "force_history": "force history and autospectrum",
+    "force_histogram": "histogram of the force",
+}
 IDENTIFIED_FILES = ("frequency_response.csv", "coherence.csv", "noise.csv", "parameters.csv")
 
 

@@ -11,7 +11,14 @@ PAGES = {
     "excitation_reading": "Reading of unit variance",
     "integrator_steps": "Steps of the integrator",
 }
-SUMMARY_RESULTS = ["results/parameters.csv", "results/summary.md"] + [f"results/pages/{name}.html" for name in PAGES]
+# Of results/study.html, in the order of the cases: where a figure is, whose it is, and what it shows.
+PICTURES = [
+    {"file": f"figures/{stem}.png", "system": case.title, "number": stem.replace("_", " ").capitalize() if stem.startswith("figure_") else "Not in the report", "shows": DESCRIBED[kind]}
+    for case in STUDY.cases.values()
+    for kind, stem in case.figures.items()
+]
+SUMMARY_RESULTS = [f"results/{name}" for name in ("parameters.csv", "summary.md", "estimators.md", "study.html")]
+SUMMARY_RESULTS += [f"results/pages/{name}.html" for name in PAGES]
 
 
 rule parameters:
@@ -38,9 +45,14 @@ rule summary:
         reading="results/excitation_reading.csv",
         errors="results/estimators.csv",
         benchmarks=BENCHMARKS,
+        pictures=[picture["file"] for picture in PICTURES],
+        style="study/reproduction/study_page.css",
+        behaviour="study/reproduction/study_page.js",
         code=CODE["summary"],
     output:
         page="results/summary.md",
+        estimators="results/estimators.md",
+        study="results/study.html",
         html=report(
             "results/pages/summary.html",
             caption="captions/summary.rst",
@@ -48,7 +60,7 @@ rule summary:
             labels={"page": "The report, run again"},
         ),
     params:
-        told={"noise": STUDY.noise, "setting": STUDY.settings.excitations["report"].reading},
+        told={"noise": STUDY.noise, "setting": STUDY.settings.excitations["report"].reading, "pictures": PICTURES},
     script:
         "../scripts/summary.py"
 

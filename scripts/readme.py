@@ -1,4 +1,4 @@
-"""Write measured numbers into README.md and docs/tool.md from the tables of results/: ``make readme``.
+"""Write measured numbers into README.md and docs/ from the tables of results/: ``make readme``.
 
 The Silverbox is a target of its own; where its history is not there, its place is left as it is. ``trial_docs.py``
 writes what is said of the trials.
@@ -22,14 +22,20 @@ SHOWN = (
 )  # fmt: skip
 
 
-def main(results: Path, readme: Path, tool: Path) -> None:
+FIRST = ("siso_stiffness", "duffing_cubic", "dead_band_stiffness", "noise_random_only")  # on the first page
+
+
+def main(results: Path, readme: Path, docs: Path) -> None:
     claims = results / "claims.csv"
     if not claims.is_file():
         raise StudyError(f"{claims}: there is no such file; run 'make study' first")
-    table = pd.read_csv(claims, keep_default_na=False).set_index("id").loc[list(SHOWN)].reset_index()
-    document.put(readme, "numbers", [summary.statements(table)])
+    table = pd.read_csv(claims, keep_default_na=False).set_index("id")
+    for page, mark, names in ((docs / "reproduction.md", "numbers", SHOWN), (readme, "first", FIRST)):
+        document.put(page, mark, [summary.statements(table.loc[list(names)].reset_index())])
     if (climbed := results / "silverbox" / "history.json").is_file():
-        document.put(tool, "history", [errors_by_step(json.loads(climbed.read_text(encoding="utf-8"))["steps"])])
+        document.put(
+            docs / "tool.md", "history", [errors_by_step(json.loads(climbed.read_text(encoding="utf-8"))["steps"])]
+        )
 
 
 def errors_by_step(steps: list[dict]) -> document.Block:
@@ -43,4 +49,4 @@ def errors_by_step(steps: list[dict]) -> document.Block:
 
 if __name__ == "__main__":
     with one_sentence():
-        main(Path("results"), Path("README.md"), Path("docs/tool.md"))
+        main(Path("results"), Path("README.md"), Path("docs"))

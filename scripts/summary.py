@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from study.reproduction import summary
+from study.reproduction import study_page, summary
 from study.support import document
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
@@ -23,7 +23,7 @@ def run_times(paths: Sequence[str]) -> pd.DataFrame:
 
 def main(
     parameters: Sequence[str], inputs: Mapping[str, str], benchmarks: Sequence[str], told: Mapping[str, Any],
-    page: str, html: str,
+    outputs: Mapping[str, str],
 ) -> None:  # fmt: skip
     tables = summary.Tables(
         parameters=pd.concat([pd.read_csv(path) for path in parameters], ignore_index=True),
@@ -35,12 +35,17 @@ def main(
         setting=told["setting"],
     )
     blocks = summary.blocks(tables)
-    replace_file(Path(page), document.markdown(blocks).encode())
-    replace_file(Path(html), document.page("The report, run again", blocks).encode())
+    replace_file(Path(outputs["page"]), document.markdown(blocks).encode())
+    replace_file(Path(outputs["html"]), document.page(study_page.TITLE, blocks).encode())
+    replace_file(Path(outputs["estimators"]), document.markdown(summary.estimators(tables)).encode())
+    pictures = [
+        study_page.Picture(p["system"], p["number"], p["shows"], Path(p["file"]).read_bytes()) for p in told["pictures"]
+    ]
+    replace_file(Path(outputs["study"]), study_page.page(tables, pictures))
 
 
 if "snakemake" in globals():
     step = globals()["snakemake"]
     tables = {name: getattr(step.input, name) for name in ("claims", "reading", "errors")}
     with one_sentence():
-        main(step.input.parameters, tables, step.input.benchmarks, step.params.told, step.output.page, step.output.html)
+        main(step.input.parameters, tables, step.input.benchmarks, step.params.told, dict(step.output.items()))

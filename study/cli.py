@@ -3,11 +3,12 @@
 import os
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
 
 from study.commands.parser import parser
 from study.support.errors import StudyError
+from study.support.terminal import harmless, shown_on
 
 BAD_INPUT, FAULT, INTERRUPTED, PIPE_CLOSED = 2, 1, 130, 141  # the last two as shells report SIGINT and SIGPIPE
 
@@ -27,7 +28,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         output went away; 1 for a fault in this program.
     """
     try:
-        _run(argv)
+        with shown_on(sys.stdout) if sys.stdout else nullcontext():  # None where the shell has closed it
+            _run(argv)
         _flush()
         return 0
     except StudyError as error:
@@ -75,7 +77,7 @@ def _end(code: int, message: str = "") -> int:
     if message:
         line = " ".join(message.split())
         with suppress(OSError):
-            print("study:", "".join(c if c.isprintable() else "?" for c in line), file=sys.stderr)
+            print("study:", harmless(line), file=sys.stderr)
     try:
         _flush()
     except OSError:  # what could not be written is tried again at exit, and complained of, unless it goes nowhere

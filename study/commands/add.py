@@ -11,6 +11,7 @@ from study.commands.record_arguments import (
     add_reading_arguments,
     out_folder,
     read_records,
+    written_together,
 )
 
 if TYPE_CHECKING:
@@ -30,17 +31,25 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    from study.compare import history
-    from study.compare.comparison_report import as_json, document, history_step, summary
-    from study.diagnose.adding import added
-    from study.diagnose.needless import needless, of_records
-    from study.equations.model_file import add_term, read_model
-    from study.support.file_sets import write_files
+    from study.equations.model_file import read_model, text_with
+    from study.support.transaction import locked
 
     folder = out_folder(arguments)
     term = _term(arguments)
-    model = read_model(arguments.model)
-    _refuse_second(arguments.model, model, term)
+    _refuse_second(arguments.model, read_model(arguments.model), term)
+    with locked(arguments.model):  # another run may have changed it meanwhile
+        model = read_model(arguments.model)
+        _refuse_second(arguments.model, model, term)
+        _added(arguments, model, term, text_with(arguments.model, term), folder)
+
+
+def _added(arguments: argparse.Namespace, model: "Model", term: "Term", text: str, folder: Path) -> None:
+    """Fit without and with the term, write model and history, and say what was reached."""
+    from study.compare import history
+    from study.compare.comparison_report import history_step, summary
+    from study.diagnose.adding import added
+    from study.diagnose.needless import needless, of_records
+
     steps = history.read(arguments.model)
     records = read_records(arguments)
     pairs: list[tuple[Comparison, Comparison]] = []
@@ -56,9 +65,7 @@ def _run(arguments: argparse.Namespace) -> None:
     said = of_records([record.name for record in records], unneeded, any_more=True)
     for before, after in pairs:
         steps = history.climbed(steps, history_step(before), history_step(after, term.name))
-    history.write(arguments.model, steps)
-    add_term(arguments.model, term)
-    write_files(folder, {"comparison.json": as_json(document([after for _, after in pairs]))})
+    written_together(arguments, text, steps, [after for _, after in pairs], folder)
     print(summary([after for _, after in pairs]))
     print("\n" + history.table(steps) + (f"\n\n{said}" if said else ""))
 

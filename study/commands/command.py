@@ -6,6 +6,8 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from study.support.terminal import harmless
+
 QUIET = 2.0  # seconds of work before progress is shown
 
 
@@ -25,11 +27,11 @@ def progress(unit: str, total: int | None = None, name: str = "") -> Generator[C
     """A line of progress; what is given back counts a step, and says what is done in it unless that is empty."""
     from tqdm import tqdm
 
-    with tqdm(total=total, delay=QUIET, leave=False, unit=unit, desc=name or None) as bar:
+    with tqdm(total=total, delay=QUIET, leave=False, unit=unit, desc=harmless(name) or None) as bar:
 
         def step(doing: str) -> None:
             if doing:
-                bar.set_description(doing, refresh=False)
+                bar.set_description(harmless(doing), refresh=False)
             bar.update()
 
         yield step

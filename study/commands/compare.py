@@ -4,7 +4,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from study.commands.command import Command, progress
-from study.commands.record_arguments import accounted_for, add_record_arguments, out_folder, read_records
+from study.commands.record_arguments import accounted_for, add_record_arguments, inputs_of, out_folder, read_records
 from study.identify.estimators import ESTIMATORS
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def _run(arguments: argparse.Namespace) -> None:
     files |= level_pictures(levels, comparisons[0].record.units.get("force", "N"))
     files |= {f"{name}.csv": content for name, content in tables(comparisons, levels).items()}
     files["comparison.json"] = as_json(document(comparisons, levels) | {"measurement": measurement})
-    write_files(folder, files)
+    write_files(folder, files, inputs_of(arguments))
     print(summary(comparisons, levels))
     page = f"no page ({unpaged})" if unpaged else "a page for each record" if many else PAGE
     count = {kind: sum(name.endswith(kind) for name in files) for kind in (".csv", ".png")}

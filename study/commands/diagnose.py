@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from study.commands.command import Command, progress
-from study.commands.record_arguments import accounted_for, add_record_arguments, out_folder, read_records
+from study.commands.record_arguments import accounted_for, add_record_arguments, inputs_of, out_folder, read_records
 
 if TYPE_CHECKING:
     from study.equations.model import Model
@@ -40,7 +40,7 @@ def _run(arguments: argparse.Namespace) -> None:
     for record, path in zip(records, arguments.records, strict=True):
         prefix = f"{record.name}_" if len(records) > 1 else ""
         files |= {prefix + name: data for name, data in _diagnosed(model, record, path, arguments, own).items()}
-    write_files(folder, files)
+    write_files(folder, files, inputs_of(arguments))
     print(f"\n{folder}: {', '.join(name for name in files if not name.endswith('.svg'))}")
 
 

@@ -11,11 +11,13 @@ from study.commands.record_arguments import (
     add_reading_arguments,
     out_folder,
     read_records,
+    written_together,
 )
 
 if TYPE_CHECKING:
     from study.compare.comparison import Comparison
     from study.diagnose.needless import Needless
+    from study.equations.model import Model
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,20 +29,28 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    from study.compare import history
-    from study.compare.comparison_report import as_json, document, history_step, summary
-    from study.diagnose.dropping import check_can_go, dropped
-    from study.diagnose.needless import needless, of_records
-    from study.equations.model_file import drop_term, read_model, text_without
+    from study.diagnose.dropping import check_can_go
+    from study.equations.model_file import read_model, text_without
     from study.support.errors import at
-    from study.support.file_sets import write_files
+    from study.support.transaction import locked
 
     folder = out_folder(arguments)
-    model, name = read_model(arguments.model), arguments.term
-    with at(arguments.model):
-        check_can_go(model, name)
-    text_without(arguments.model, name)  # refuses a layout that it cannot change, before anything is fitted
-    steps = history.read(arguments.model)
+    read_model(arguments.model)
+    with locked(arguments.model):  # another run may have changed it meanwhile
+        model, name = read_model(arguments.model), arguments.term
+        with at(arguments.model):
+            check_can_go(model, name)
+        _dropped(arguments, model, text_without(arguments.model, name), folder)
+
+
+def _dropped(arguments: argparse.Namespace, model: "Model", text: str, folder: Path) -> None:
+    """Fit with and without the term, write model and history, and say what was reached."""
+    from study.compare import history
+    from study.compare.comparison_report import history_step, summary
+    from study.diagnose.dropping import dropped
+    from study.diagnose.needless import needless, of_records
+
+    steps, name = history.read(arguments.model), arguments.term
     records = read_records(arguments)
     pairs: list[tuple[Comparison, Comparison]] = []
     unneeded: list[tuple[Needless, ...]] = []
@@ -55,9 +65,7 @@ def _run(arguments: argparse.Namespace) -> None:
     said = of_records([record.name for record in records], unneeded)
     for before, after in pairs:
         steps = history.climbed(steps, history_step(before), history_step(after, dropped=name))
-    history.write(arguments.model, steps)
-    drop_term(arguments.model, name)
-    write_files(folder, {"comparison.json": as_json(document([after for _, after in pairs]))})
+    written_together(arguments, text, steps, [after for _, after in pairs], folder)
     print(summary([after for _, after in pairs]))
     print("\n" + history.table(steps) + (f"\n\n{said}" if said else ""))
 

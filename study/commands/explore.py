@@ -3,7 +3,7 @@
 import argparse
 
 from study.commands.command import Command, progress, whole
-from study.commands.record_arguments import accounted_for, add_record_arguments, out_folder, read_records
+from study.commands.record_arguments import accounted_for, add_record_arguments, inputs_of, out_folder, read_records
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -22,17 +22,19 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.explore import session as sessions
     from study.explore.desk import Desk
     from study.explore.server import serve
+    from study.support.file_sets import keep
     from study.support.files import read_text
 
     folder = out_folder(arguments)
+    keep([arguments.model], [folder / arguments.model.name])
+    steps = history.read(arguments.model)
     text = read_text(arguments.model, WANTED)
     model = parse_model(text, arguments.model)
-    steps = history.read(arguments.model)
     (record,) = read_records(arguments)
     with progress("step", STEPS) as step:
         accounted = accounted_for(arguments, model, record, arguments.records[0], progress=step)
         session = sessions.begin_with(accounted.comparison, earlier=steps)
-    desk = Desk(session, arguments.model, text, folder)
+    desk = Desk(session, arguments.model, text, folder, inputs_of(arguments))
     try:
         serve(desk, arguments.port, lambda address: _ready(address, not arguments.no_browser))
     except KeyboardInterrupt:

@@ -26,7 +26,8 @@ def _run(arguments: argparse.Namespace) -> None:
         from study.support.file_sets import check_folder, write_files
 
         check_folder(arguments.out)
-        write_files(arguments.out, files(steps, arguments.model.stem) | {"history.json": history.as_bytes(steps)})
+        found = files(steps, arguments.model.stem) | {"history.json": history.as_bytes(steps)}
+        write_files(arguments.out, found, [arguments.model, history.path_of(arguments.model)])
 
 
 COMMAND = Command(

@@ -12,6 +12,8 @@ from study.support.errors import at, expect
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from study.compare.comparison import Comparison
+    from study.compare.history import Step
     from study.equations.model import Model
     from study.faults.accounting import Accounted
     from study.records.prepared import Prepared
@@ -201,3 +203,29 @@ def out_folder(arguments: argparse.Namespace) -> Path:
     folder: Path = arguments.out if arguments.out is not None else RESULTS / (first.stem or "record")
     check_folder(folder)
     return folder
+
+
+def inputs_of(arguments: argparse.Namespace) -> list[Path]:
+    """What a command reads, which nothing may be written over: records, what stands beside them, and the model."""
+    from study.compare.history import path_of
+    from study.records.readers.options import beside
+
+    model: Path = arguments.model
+    return [*arguments.records, *(beside(path) for path in arguments.records), model, path_of(model)]
+
+
+def written_together(
+    arguments: argparse.Namespace, text: str, steps: "list[Step]", reached: "list[Comparison]", folder: Path
+) -> None:
+    """Write the model's new text, its history and the comparison, all or none; the model must be locked."""
+    from study.compare import history
+    from study.compare.comparison_report import as_json, document
+    from study.support.file_sets import keep, made
+    from study.support.transaction import replace_together
+
+    results = {folder / "comparison.json": as_json(document(reached))}
+    keep(inputs_of(arguments), results)
+    made(folder)
+    model: Path = arguments.model
+    changed = {model: text.encode(), history.path_of(model): history.as_bytes(steps)}
+    replace_together(model, changed, results)

@@ -25,12 +25,15 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
+    from study.compare.history import path_of
     from study.equations.model_file import read_model
     from study.equations.simulate import Integrator, simulate
     from study.records.excitation import Excitation, force
     from study.records.record import write_csv
+    from study.support.file_sets import keep
     from study.support.files import replacing
 
+    keep([arguments.model, path_of(arguments.model)], [arguments.out])
     model = read_model(arguments.model)
     excitation = Excitation(level=arguments.level, cutoff=arguments.cutoff)
     history = force(excitation, arguments.samples, arguments.dt, arguments.seed)

@@ -15,13 +15,16 @@ NARROWEST = 24
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", nargs="?", help="a term to show in detail; all of them if left out")
+    parser.add_argument("name", nargs="?", help="a term to show in detail, or a word of some: all if left out")
 
 
 def _run(arguments: argparse.Namespace) -> None:
     from study.equations import terms
 
-    print(details(terms.get(arguments.name)) if arguments.name else table(tuple(terms.LIBRARY.values())))
+    found = tuple(terms.LIBRARY.values())
+    if arguments.name:
+        found = (terms.LIBRARY[arguments.name],) if arguments.name in terms.LIBRARY else terms.search(arguments.name)
+    print(details(found[0]) if len(found) == 1 else table(found))
 
 
 def table(library: "tuple[Term, ...]", width: int | None = None) -> str:
@@ -67,5 +70,9 @@ def _given(term: "Term") -> list[str]:
 
 
 COMMAND = Command(
-    "terms", "list the effects a model may hold", "study terms\n  study terms cubic_stiffness", _arguments, _run
+    "terms",
+    "list the effects a model may hold",
+    "study terms\n  study terms cubic_stiffness\n  study terms friction",
+    _arguments,
+    _run,
 )

@@ -47,7 +47,7 @@ def fit_by(name: str, model: Model, prepared: Prepared) -> tuple[FreeRunFit, Est
         )
     part = prepared.record.part(*prepared.inner(prepared.plan.fit))
     cut = segments_of(len(part))
-    band = _lines(part, prepared.band, cut)
+    band = followed_band(part, prepared.band, cut)
     identified = estimators.identify(name, model, part, Settings(cut, band))
     estimate = _together(identified.estimate, identified.shapes)
     missing = [key for key, value in model.values.items() if value is None and key not in estimate]
@@ -67,7 +67,7 @@ def fit_by(name: str, model: Model, prepared: Prepared) -> tuple[FreeRunFit, Est
     return replace(run, converged=not identified.note, message=identified.note or run.message), estimate
 
 
-def _lines(part: Record, within: tuple[float, float], cut: Segments) -> tuple[float, float]:
+def followed_band(part: Record, within: tuple[float, float], cut: Segments) -> tuple[float, float]:
     """The band in which the force is heard, up to where noise takes over from the displacement."""
     matrix = cross_spectra([part["force"], part["displacement"]], part.dt, cut)
     g, frequency = matrix.density, matrix.frequency

@@ -251,7 +251,12 @@ def summary(comparisons: Sequence[Comparison], moving: Sequence[Level] = ()) -> 
     body = _levels(moving, comparisons) if moving else _values(first)
     text = f"{_headline(first)}\n\n{errors}\n\n{body}\n\n{says_of_all(comparisons, moving)}"
     notes = list(dict.fromkeys(note for c in comparisons for note in c.notes))
-    return text + ("\n(" + "; ".join(notes) + ")" if notes else "")
+    return text + footnotes(notes)
+
+
+def footnotes(notes: Sequence[str]) -> str:
+    """What was converted, integrated or left out: a number and a line each, below all else; empty if nothing was."""
+    return "\n" + "".join(f"\n[{number}] {note}" for number, note in enumerate(notes, start=1)) if notes else ""
 
 
 def _in_units(comparison: Comparison) -> str:

@@ -1,44 +1,91 @@
 """The history: every model tried on a record so far, its errors, and the noise floor, kept beside the model file."""
 
 import json
+import math
+from collections.abc import Mapping
 from pathlib import Path
+from types import NoneType
 from typing import Any, cast
 
 from study.support.errors import StudyError
-from study.support.files import read_text, replace_file
+from study.support.files import read_text
 from study.support.numbers import percent
+from study.support.transaction import recovered
+from study.support.yaml_text import shown
 
 Step = dict[str, Any]
+WANTED = "the steps as 'study add' writes them"
+KINDS: Mapping[str, Any] = {  # what a step holds
+    "terms": list, "record": str, "unit": str, "rms": int | float, "error.response": int | float,
+    "error.force": int | float | NoneType, "noise_floor.response": int | float, "added": str | NoneType,
+    "dropped": str | NoneType,
+}  # fmt: skip
+OPTIONAL = ("added", "dropped")
 
 
 def path_of(model: Path) -> Path:
-    """Where the history of a model file is kept: ``rig.yaml`` has ``rig.history.json`` beside it."""
-    return model.with_name(f"{model.stem}.history.json")
+    """Where the history of a model file is kept.
+
+    ``rig.yaml`` has ``rig.history.json`` beside it; ``rig.yml``, which is another model, ``rig.yml.history.json``.
+    """
+    return model.with_name(name_for(model.name))
+
+
+def name_for(model: str) -> str:
+    """The name of the history's file by that of the model's."""
+    stem, _, ending = model.rpartition(".")
+    return f"{stem if stem and ending == 'yaml' else f'{stem}.{ending}'}.history.json"
 
 
 def read(model: Path) -> list[Step]:
-    """The steps so far, oldest first, none where nothing was added; a ``StudyError`` if the file is no history."""
+    """The steps so far, oldest first, none where nothing was added; a ``StudyError`` if the file is no history.
+
+    What a killed run has left half changed is put back first.
+    """
+    recovered(model)
     path = path_of(model)
     if not path.exists():
         return []
-    wanted = "the steps as 'study add' writes them"
     try:
-        content: object = json.loads(read_text(path, wanted))
+        content: object = json.loads(read_text(path, WANTED))
     except json.JSONDecodeError as error:
-        raise StudyError(f"{path}: line {error.lineno} is not JSON; expected {wanted}") from None
+        raise StudyError(f"{path}: line {error.lineno} is not JSON; expected {WANTED}") from None
+    except RecursionError:
+        raise StudyError(f"{path}: it is nested too deeply; expected {WANTED}") from None
+    except ValueError:  # Python reads no number of thousands of digits
+        raise StudyError(f"{path}: it holds a number of too many digits; expected {WANTED}") from None
     steps = cast(Step, content).get("steps") if isinstance(content, dict) else None
-    if not isinstance(steps, list) or not all(_is_step(s) for s in cast(list[object], steps)):
-        raise StudyError(f"{path}: it holds no list of steps with terms, record and errors; expected {wanted}")
+    if not isinstance(steps, list):
+        raise StudyError(f"{path}: it holds no list of steps; expected {WANTED}")
+    for number, step in enumerate(cast(list[object], steps)):
+        if fault := _fault(step):
+            raise StudyError(f"{path}: step {number} {fault}; expected {WANTED}")
     return cast(list[Step], steps)
 
 
-def _is_step(step: object) -> bool:
-    return isinstance(step, dict) and {"terms", "record", "error", "noise_floor"} <= set(cast(Step, step))
+def _fault(step: object) -> str:
+    """What is wrong with a step; empty if nothing is."""
+    if not isinstance(step, dict):
+        return f"is {shown(step)}"
+    given = cast(Step, step)
+    for keys, kinds in KINDS.items():
+        value: Any = given
+        for key in keys.split("."):
+            if not isinstance(value, dict) or (key not in value and keys not in OPTIONAL):
+                return f"has no {keys!r}"
+            value = cast(Step, value).get(key)
+        if not isinstance(value, kinds) or isinstance(value, bool) or not _fits(value):
+            return f"has {keys} = {shown(value)}"
+    names = cast(list[object], given["terms"])
+    return "" if all(isinstance(name, str) for name in names) else f"has terms = {shown(names)}"
 
 
-def write(model: Path, steps: list[Step]) -> None:
-    """Keep the steps, the old file surviving any failure."""
-    replace_file(path_of(model), as_bytes(steps))
+def _fits(value: object) -> bool:
+    """Whether a number is one that a table can show: a float is, a whole number of hundreds of digits is not."""
+    try:
+        return not isinstance(value, int) or math.isfinite(float(value))
+    except OverflowError:
+        return False
 
 
 def as_bytes(steps: list[Step]) -> bytes:

@@ -1,6 +1,7 @@
 """A term added to a fitted model: the fit begins where the candidate ended, and never ends worse."""
 
 from study.compare.comparison import Comparison, compare
+from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import search_base, search_part
 from study.equations.model import free
 from study.equations.terms import Term
@@ -20,3 +21,10 @@ def added(comparison: Comparison, term: Term) -> Comparison:
     fit = with_term(base.fit, free(term), base, search_part(prepared))
     fit = finished(fit, prepared)
     return compare(comparison.model.with_term(term), prepared, fit=fit)
+
+
+def added_candidate(comparison: Comparison, candidate: Ranked) -> Comparison:
+    """The comparison of the model with a candidate of its diagnosis, begun where the candidate's fit ended."""
+    prepared = comparison.prepared
+    fit = finished(candidate.fit, prepared)
+    return compare(comparison.model.with_term(candidate.term), prepared, fit=fit)

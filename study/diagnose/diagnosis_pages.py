@@ -14,11 +14,10 @@ def pages(diagnosis: Diagnosis, record: str) -> dict[str, Figure]:
     """Figures by the stem of their file name; the caller applies the style sheet."""
     ranking, (axes,) = page.page(
         f"What is missing from the model of {record}", f"verdict: {diagnosis.verdict.replace('_', ' ')}",
-        panel=3.4, legend_rows=1, headed=False,
+        panel=3.4, legend_rows=0, headed=False,
     )  # fmt: skip
     ranking.subplots_adjust(left=0.34)
     diagnosis_pictures.ranking(axes, diagnosis)
-    page.legend(ranking, [axes])
     constancy, panels = page.page(
         f"Is the coefficient a constant? {record}", "that of a true term is, along frequency and along amplitude",
         columns=2, width=page.width(2), panel=2.8, share=False,

@@ -11,24 +11,32 @@ from matplotlib.axes import Axes
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import Diagnosis
 from study.figures.labels import term_names
+from study.support.numbers import percent
 
 SHOWN = 10
+LEAST = -30.0  # per cent: a candidate that explains less than nothing is drawn no further
 FURTHEST = (-4.0, 6.0)  # of a coefficient, relative to its value: what lies beyond is no constant
 
 
 def ranking(axes: Axes, diagnosis: Diagnosis) -> Axes:
-    """Held-out error of the response after adding each candidate, beside the error before and the noise floor."""
-    rows, before = diagnosis.candidates[:SHOWN], diagnosis.comparison.prediction.error
+    """Share of the held-out difference that each candidate explains, with its standard error."""
+    rows = diagnosis.candidates[:SHOWN]
     place = np.arange(len(rows))
-    values = [100.0 * min(r.response_error, 10.0 * before) for r in rows]
-    axes.barh(place, values, height=0.62, color=["0.25" if i == 0 else "0.7" for i in place])
+    shares = np.array([100.0 * r.gain.explained for r in rows])
+    errors = np.array([100.0 * r.gain.error for r in rows])
+    axes.barh(place, np.clip(shares, LEAST, 100.0), height=0.62, color=["0.25" if i == 0 else "0.7" for i in place])
+    axes.errorbar(
+        np.clip(shares, LEAST, 100.0), place, xerr=errors, fmt="none", ecolor="0.05", elinewidth=1.0, capsize=2.5
+    )
     axes.set_yticks(place, [_label(r, rows[0]) for r in rows])
     axes.invert_yaxis()
-    axes.set_xlim(0.0, 118.0 * before)
-    axes.axvline(100.0 * before, color="0.1", linewidth=1.4, linestyle="-", label="without it")
-    floor = rows[0].prediction.floor if rows else diagnosis.comparison.prediction.floor
-    axes.axvline(100.0 * floor, color="0.1", linewidth=1.4, linestyle=":", label="noise floor")
-    axes.set_xlabel("held-out error of the response after adding it (%)")
+    axes.set_xlim(min(0.0, 1.1 * float(np.min(np.clip(shares, LEAST, 0.0), initial=0.0))), 136.0)
+    axes.set_xticks([0, 20, 40, 60, 80, 100])
+    for y, row in zip(place, rows, strict=True):
+        axes.annotate(f"leaves {percent(row.response_error)}", (1.0, y), xycoords=("axes fraction", "data"),
+                      xytext=(-3, 0), textcoords="offset points", ha="right", va="center", fontsize=8)  # fmt: skip
+    before = diagnosis.comparison.prediction
+    axes.set_xlabel(f"share of the held-out difference ({percent(before.error)} of the response) explained (%)")
     return axes
 
 
@@ -39,20 +47,30 @@ def _label(row: Ranked, first: Ranked) -> str:
 
 def constancy(frequency: Axes, amplitude: Axes, rows: Sequence[Ranked]) -> None:
     """The coefficient of the first candidates along frequency and amplitude, relative to its value."""
+    followed(frequency, rows, "frequency")
+    followed(amplitude, rows, "amplitude")
+    low, high = (f(frequency.get_ylim()[i], amplitude.get_ylim()[i]) for i, f in enumerate((min, max)))
+    for axes in (frequency, amplitude):
+        axes.set_ylim(low, high)
+    amplitude.set_ylabel("")
+
+
+def followed(axes: Axes, rows: Sequence[Ranked], along: str) -> Axes:
+    """The coefficient of candidates along ``frequency`` or ``amplitude``, relative to its value."""
     low, high = -0.5, 2.5
     styles = (("o", "-", "0.1"), ("s", "--", "0.45"), ("^", ":", "0.6"))
     for row, (marker, line, colour) in zip(rows, styles, strict=False):
-        for axes, curve in ((frequency, row.flatness), (amplitude, row.steadiness)):
-            if curve is None:
-                continue
-            relative = curve.value.real / abs(row.coefficient)  # a curve is one of sizes: along the coefficient's sign
-            low, high = min(low, *relative), max(high, *relative)
-            axes.errorbar(
-                curve.at, relative, 1.96 * curve.error / abs(row.coefficient),
-                marker=marker, linestyle=line, color=colour, capsize=2.0, label=term_names(row.name),
-            )  # fmt: skip
-    for axes, what in ((frequency, "frequency (Hz)"), (amplitude, "strength of the effect relative to its mean")):
-        axes.axhline(1.0, color="0.8", linewidth=0.8, zorder=0)
-        axes.set_xlabel(what)
-        axes.set_ylim(max(1.1 * low, FURTHEST[0]), min(1.1 * high, FURTHEST[1]))
-    frequency.set_ylabel("coefficient, relative to its value")
+        curve = row.flatness if along == "frequency" else row.steadiness
+        if curve is None:
+            continue
+        relative = curve.value.real / abs(row.coefficient)  # a curve is one of sizes: along the coefficient's sign
+        low, high = min(low, *relative), max(high, *relative)
+        axes.errorbar(
+            curve.at, relative, 1.96 * curve.error / abs(row.coefficient),
+            marker=marker, linestyle=line, color=colour, capsize=2.0, label=term_names(row.name),
+        )  # fmt: skip
+    axes.axhline(1.0, color="0.8", linewidth=0.8, zorder=0)
+    axes.set_xlabel("frequency (Hz)" if along == "frequency" else "strength of the effect relative to its mean")
+    axes.set_ylim(max(1.1 * low, FURTHEST[0]), min(1.1 * high, FURTHEST[1]))
+    axes.set_ylabel("coefficient, relative to its value")
+    return axes

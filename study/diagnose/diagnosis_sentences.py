@@ -1,6 +1,7 @@
 """The diagnosis in plain sentences, composed from its numbers and from nothing else."""
 
 import math
+from collections.abc import Sequence
 
 from study.diagnose.constancy import wavers
 from study.diagnose.ranked import Ranked
@@ -10,6 +11,7 @@ from study.support.numbers import percent
 from study.support.thresholds import ALPHA, UNSTEADY
 
 DEPENDENCE = 0.1  # held-out share from which the unexplained force is said to depend on something
+NAMED = 3  # effects that cannot be told apart, before the others are counted
 CLOSE = 0.05  # families this close to the best one are named with it
 
 
@@ -49,7 +51,7 @@ def _missing(diagnosis: Diagnosis) -> list[str]:
     if first.unphysical:
         said.append(f"As fitted it is no physical effect: {first.unphysical}.")
     if first.tied_with:
-        said.append(f"This record cannot tell it from {', '.join(term_names(n) for n in first.tied_with)}.")
+        said.append(f"This record cannot tell it from {_named(first.tied_with)}.")
     return said
 
 
@@ -106,6 +108,13 @@ def _shape(row: Ranked, length: str) -> str:
         for name, value in row.parameters.items()
     ]
     return f", with {', '.join(parts)}" if parts else ""
+
+
+def _named(names: Sequence[str]) -> str:
+    """A few names in words, and how many more there are."""
+    shown = [term_names(name) for name in (names if len(names) <= NAMED + 1 else names[:NAMED])]
+    more = f" and {len(names) - len(shown)} more" if len(names) > len(shown) else ""
+    return ", ".join(shown) + more
 
 
 def _words(name: str) -> str:

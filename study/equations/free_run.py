@@ -16,6 +16,7 @@ import numpy as np
 
 from study.equations import kernels
 from study.equations.graph import Op, Program
+from study.equations.machine_code import OFTEN, Variation, machine_code
 from study.equations.model import Model, forward_graph, named_channels, with_registers
 from study.records.interpolation import between_runs, between_samples, runs_of
 from study.records.record import MOTIONS, Record
@@ -37,10 +38,8 @@ class FreeRun:
     ----------
     program : Program
         Slopes of the states, then their partial derivatives; held values are in its registers.
-    slots : int array, shape (states - 1, 1 + states + keys)
-        Registers of each slope (but velocity), of its partial derivatives by the states and by the keys.
-    side : int
-        Register that stands for sgn v, -1 if no force of the model jumps with it.
+    variation : Variation
+        Where in the program slopes and partial derivatives lie.
     keys : tuple of str
         The coefficients and shape parameters to differentiate by.
     drive : array, shape (2 steps (samples - 1) + 3, 1 + channels)
@@ -67,8 +66,7 @@ class FreeRun:
     """
 
     program: Program
-    slots: Ints
-    side: int
+    variation: Variation
     keys: tuple[str, ...]
     drive: Floats
     dt: float
@@ -80,11 +78,6 @@ class FreeRun:
     motion: Floats | None = None
     known: bool = False
     places: Ints | None = None
-
-    @property
-    def states(self) -> int:
-        """How many states it has: displacement, velocity and the terms' own, or these alone."""
-        return len(self.slots) - 1 if self.known else len(self.slots) + 1
 
     @property
     def moving(self) -> int:
@@ -106,6 +99,11 @@ class FreeRun:
         if self.places is None:
             return list(bounds)
         return [int(self.places[b]) if b < self.samples else self.length for b in bounds]
+
+    @property
+    def states(self) -> int:
+        """How many states it has: displacement, velocity and the terms' own, or these alone."""
+        return len(self.variation.slots) - 1 if self.known else self.variation.states
 
     def respond(
         self, values: Mapping[str, float], initial: Sequence[float] | Floats, free_states: int = 0
@@ -197,12 +195,13 @@ class FreeRun:
         starts = np.array([self.time(begin) for begin in bounds[:-1]])
         if self.known:
             failed = kernels.integrate_known(
-                program.code, program.first, program.registers.copy(), self.slots, starts, self.dt,
+                program.code, program.first, program.registers.copy(), self.variation.slots, starts, self.dt,
                 self.steps, self.drive, np.array(bounds), states, out,
             )  # fmt: skip
         else:
+            code = machine_code(self.variation, out.shape[1], self.length * self.steps >= OFTEN)
             failed = kernels.integrate_segments(
-                program.code, program.first, program.registers.copy(), self.slots, self.side, starts, self.dt,
+                code.addresses, program.registers.copy(), self.variation.side, starts, self.dt,
                 self.steps, self.drive, np.array(bounds), states, self.row, out,
             )  # fmt: skip
         if failed >= 0:
@@ -256,7 +255,10 @@ def prepare(
     if steps_per_sample < 1:
         raise StudyError(f"steps_per_sample is {steps_per_sample}; at least 1 is needed")
     channels = named_channels(model, record.extra)
-    program, slots, side = _differentiated(model, channels, tuple(keys))
+    variation = _differentiated(model, channels, tuple(keys))
+    program = with_registers(
+        variation.program, {k: v for k, v in model.values.items() if k not in keys and v is not None}
+    )
     factor = 2 * steps_per_sample
     driving = (*MOTIONS[:2], *channels) if known else (FORCE, *channels)
     starts, places = ((0, record.start + first * record.dt),), None
@@ -268,7 +270,7 @@ def prepare(
     row = MOTIONS.index(response) if response in MOTIONS else len(MOTIONS)
     motion = record[response][first:last] if known and response in MOTIONS else None
     return FreeRun(
-        program, slots, side, tuple(keys), drive, record.dt, steps_per_sample, starts, last - first, row,
+        program, variation, tuple(keys), drive, record.dt, steps_per_sample, starts, last - first, row,
         tuple(c - first for c in cuts), motion, known, places,
     )  # fmt: skip
 
@@ -310,20 +312,17 @@ def _checked_span(record: Record, span: tuple[int, int] | None) -> tuple[int, in
     return first, last
 
 
-def _differentiated(model: Model, channels: tuple[str, ...], keys: tuple[str, ...]) -> tuple[Program, Ints, int]:
-    """Program of slopes and partial derivatives, their registers, and that of sgn v."""
-    held = {key: value for key, value in model.values.items() if key not in keys}
-    if missing := [key for key, value in held.items() if value is None]:
+def _differentiated(model: Model, channels: tuple[str, ...], keys: tuple[str, ...]) -> Variation:
+    """Program of slopes and partial derivatives of a model that gives every value but those of the keys."""
+    if missing := [key for key, value in model.values.items() if value is None and key not in keys]:
         raise StudyError(f"model {model.name!r} gives no value for {', '.join(missing)}; a free run needs all")
     if unknown := [key for key in keys if key not in model.values]:
         raise StudyError(f"model {model.name!r} has no {', '.join(unknown)}; it has {', '.join(model.values)}")
-    program, slots, side = _compiled(model.with_values(dict.fromkeys(model.values)), channels, keys)
-    values = {key: value for key, value in held.items() if value is not None}
-    return with_registers(program, values), slots, side
+    return _compiled(model.with_values(dict.fromkeys(model.values)), channels, keys)
 
 
 @lru_cache(maxsize=COMPILED)
-def _compiled(model: Model, channels: tuple[str, ...], keys: tuple[str, ...]) -> tuple[Program, Ints, int]:
+def _compiled(model: Model, channels: tuple[str, ...], keys: tuple[str, ...]) -> Variation:
     """As :func:`_differentiated`, of a model without values: a diagnosis runs each of its models many times."""
     forward = forward_graph(model, channels)
     graph, known = forward.graph, "inertia" not in model
@@ -331,10 +330,10 @@ def _compiled(model: Model, channels: tuple[str, ...], keys: tuple[str, ...]) ->
     rows = [[slope, *(graph.derivative(slope, node) for node in by)] for slope in forward.slopes]
     if known:
         program = graph.program([node for row in rows for node in row])
-        return program, program.outputs.reshape(len(rows), 1 + len(by)), -1
+        return Variation(program, program.outputs.reshape(len(rows), 1 + len(by)), -1, len(channels))
     graph.input(SIDE)
     program, side = _with_side(graph.program([node for row in rows for node in row]), graph.program(forward.slopes))
-    return program, program.outputs.reshape(len(rows), 1 + len(by)), side
+    return Variation(program, program.outputs.reshape(len(rows), 1 + len(by)), side, 1 + len(channels))
 
 
 def _with_side(program: Program, slopes: Program) -> tuple[Program, int]:

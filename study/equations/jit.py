@@ -1,12 +1,27 @@
 """Numba, with the settings every kernel shares, behind one typed decorator."""
 
+import sys
 from collections.abc import Callable
+from functools import cache, partial
+from types import SimpleNamespace
 from typing import Any, ParamSpec, TypeVar, cast
 
-from numba import njit  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
+import numba  # pyright: ignore[reportMissingTypeStubs]
+from llvmlite import ir  # pyright: ignore[reportMissingTypeStubs]
+from numba.core import cgutils  # pyright: ignore[reportMissingTypeStubs]
+from numba.extending import intrinsic as _intrinsic  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
+from numba.np import arrayobj  # pyright: ignore[reportMissingTypeStubs]
 
 P = ParamSpec("P")
 R = TypeVar("R")
+_untyped: Any = SimpleNamespace(numba=numba, ir=ir, cgutils=cgutils, arrayobj=arrayobj)
+builders: Any = SimpleNamespace(  # what an intrinsic writes its machine code with
+    void=_untyped.numba.types.void,
+    nothing=_untyped.ir.VoidType(),
+    function_type=_untyped.ir.FunctionType,
+    make_array=_untyped.arrayobj.make_array,
+    unpack_tuple=_untyped.cgutils.unpack_tuple,
+)
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
@@ -15,11 +30,35 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     ``error_model="numpy"`` makes a division by zero an infinity instead of an exception: the
     integrators look for non-finite states themselves and name the time at which they appear.
     """
-    decorate = cast(Any, njit(cache=True, nogil=True, error_model="numpy"))
-    return cast(Callable[P, R], decorate(function))
+    return cast(Callable[P, R], _decorated(function))
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
     """The same, as part of every kernel that calls it: for what is called in each step, with many arrays."""
-    decorate = cast(Any, njit(cache=True, nogil=True, error_model="numpy", forceinline=True))
-    return cast(Callable[P, R], decorate(function))
+    return cast(Callable[P, R], _decorated(function, forceinline=True))
+
+
+def intrinsic(function: Callable[..., Any]) -> Callable[..., None]:
+    """What a compiled kernel may call for its effect, and whose machine code the function itself describes."""
+    return cast(Callable[..., None], cast(Any, _intrinsic)(function))
+
+
+def _decorated(function: Callable[..., Any], **options: bool) -> Any:
+    """Numba's dispatcher; it keeps nothing where neither the installation nor the user has a folder to write to."""
+    decorate = partial(_untyped.numba.njit, nogil=True, error_model="numpy", **options)
+    try:
+        return decorate(cache=True)(function)
+    except RuntimeError as error:
+        if "cache" not in str(error):
+            raise
+    _say_once()
+    return decorate()(function)
+
+
+@cache
+def _say_once() -> None:
+    print(
+        "study: compiled code cannot be kept (the installation is read-only and there is no writable home), so each run"
+        " compiles anew; set NUMBA_CACHE_DIR to a writable folder to save that time",
+        file=sys.stderr,
+    )

@@ -3,15 +3,18 @@
 All kernels are in this one file, because Numba's disk cache notices a change of the file that holds
 a function but not of one it calls. A state is ``(u, v, z...)``; the program computes its derivatives
 ``(v, a, dz...)`` from registers (see ``model.forward_program``): 0 u, 1 v, 2 t, 3 force, then the extra
-channels, the states z, coefficients and shape parameters.
+channels, the states z, coefficients and shape parameters. Free runs with sensitivities call machine code.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 
-from study.equations.jit import compiled, inlined
+from study.equations.jit import builders, compiled, inlined, intrinsic
 from study.support.arrays import Floats, Ints
+
+Native = tuple[int, int]  # addresses of a Runge-Kutta step and of the slopes, with sensitivities (``machine_code``)
 
 
 @compiled
@@ -189,83 +192,41 @@ def integrate_abm4(
     return -1
 
 
-@compiled
-def _variation(
-    code: Ints, first: int, r: Floats, slots: Ints, side: int, time: float, drive: Floats, j: int, w: Floats
-) -> None:  # fmt: skip
-    """Derivatives of ``w[1]`` into ``w[2]``: state in the first column, its sensitivities s in the others.
+@intrinsic
+def _call(_: Any, address: Any, r: Any, w: Any, numbers: Any, drive: Any, j: Any) -> Any:
+    """Call the function at an address (``machine_code``) with r, w, each of the numbers, and row j of the drive."""
 
-    The variational equations are ``ds/dt = (df/dx) s + df/dp``; row i of ``slots`` names the registers of
-    ``f_i``, ``df_i/dx`` and ``df_i/dp``. Columns of s beyond the p's are those of the initial state.
-    """
-    n, columns = w.shape[1], w.shape[2]
-    channels = drive.shape[1]
-    r[0] = w[1, 0, 0]
-    r[1] = w[1, 1, 0]
-    r[2] = time
-    for c in range(channels):
-        r[3 + c] = drive[j, c]
-    for i in range(2, n):
-        r[1 + channels + i] = w[1, i, 0]
-    run(code, first, r)
-    for c in range(columns):
-        w[2, 0, c] = w[1, 1, c]
-    for i in range(1, n):
-        w[2, i, 0] = r[np.uint64(slots[i - 1, 0])]
-        known = min(columns, slots.shape[1] - n)
-        for c in range(1, known):
-            w[2, i, c] = r[np.uint64(slots[i - 1, n + c])]
-        for c in range(known, columns):
-            w[2, i, c] = 0.0
-        for m in range(n):
-            partial = r[np.uint64(slots[i - 1, 1 + m])]
-            if partial != 0.0:
-                for c in range(1, columns):
-                    w[2, i, c] += partial * w[1, m, c]
-    if side >= 0 and r[side] == 0.0:  # friction holds the mass
-        for c in range(columns):
-            w[2, 1, c] = 0.0
+    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        kinds = signature.args
+        registers, states, driven = (builders.make_array(kinds[i])(context, builder, given[i]) for i in (1, 2, 4))
+        values = builders.unpack_tuple(builder, given[3], kinds[3].count)
+        channels = builders.unpack_tuple(builder, driven.shape, 2)[1]
+        row = builder.gep(driven.data, [builder.mul(given[5], channels)])
+        passed = [registers.data, states.data, *values, row]
+        function = builders.function_type(builders.nothing, [value.type for value in passed])
+        builder.call(builder.inttoptr(given[0], function.as_pointer()), passed)
+        return context.get_dummy_value()
 
-
-@compiled
-def _rk4_variation_step(
-    code: Ints, first: int, r: Floats, slots: Ints, side: int, time: float, h: float, drive: Floats, j: int, w: Floats
-) -> None:  # fmt: skip
-    """One Runge-Kutta step of ``w[0]`` in place; ``w[1]`` to ``w[3]`` are room for trial, slope and their sum."""
-    w[1] = w[0]
-    w[3] = 0.0
-    for stage in range(4):
-        late = (stage + 1) // 2
-        _variation(code, first, r, slots, side, time + 0.5 * h * late, drive, j + late, w)
-        weight = h / 3.0 if late == 1 else h / 6.0
-        ahead = h if stage == 2 else 0.5 * h
-        for i in range(w.shape[1]):
-            for c in range(w.shape[2]):
-                w[3, i, c] += weight * w[2, i, c]
-                w[1, i, c] = w[0, i, c] + ahead * w[2, i, c]
-    for i in range(w.shape[1]):
-        for c in range(w.shape[2]):
-            w[0, i, c] += w[3, i, c]
+    return builders.void(address, r, w, numbers, drive, j), generate
 
 
 @compiled
 def _pull(
-    code: Ints, first: int, r: Floats, slots: Ints, side: int, sign: float,
-    time: float, drive: Floats, j: int, w: Floats, row: int,
+    native: Native, r: Floats, side: int, sign: float, time: float, drive: Floats, j: int, w: Floats, row: int
 ) -> float:  # fmt: skip
     """Acceleration at the state ``w[row]`` if sgn v is ``sign``, which the register of the side then holds."""
     r[side] = sign
     w[1] = w[row]
-    _variation(code, first, r, slots, side, time, drive, j, w)
+    _call(native[1], r, w, (time,), drive, j)
     return float(w[2, 1, 0])
 
 
 @compiled
 def _substep(
-    code: Ints, first: int, r: Floats, slots: Ints, side: int, time: float, h: float,
-    begin: float, end: float, drive: Floats, j: int, local: Floats, w: Floats,
+    native: Native, r: Floats, time: float, h: float, begin: float, end: float,
+    drive: Floats, j: int, local: Floats, w: Floats,
 ) -> None:  # fmt: skip
-    """From ``w[4]`` into ``w[0]``: the part of a step between two fractions of it, sgn v held.
+    """From ``w[3]`` into ``w[0]``: the part of a step between two fractions of it, sgn v held.
 
     ``local`` gets the drive at both and between, from the parabola through the step's three points.
     """
@@ -274,8 +235,8 @@ def _substep(
         for c in range(drive.shape[1]):
             outer = (1.0 - x) * drive[j, c] - x * drive[j + 2, c]
             local[i, c] = (1.0 - 2.0 * x) * outer + 4.0 * x * (1.0 - x) * drive[j + 1, c]
-    w[0] = w[4]
-    _rk4_variation_step(code, first, r, slots, side, time + begin * h, (end - begin) * h, local, 0, w)
+    w[0] = w[3]
+    _call(native[0], r, w, (time + begin * h, (end - begin) * h), local, 0)
 
 
 @compiled
@@ -293,7 +254,7 @@ def _zero(v0: float, v1: float, mean: float) -> float:
 
 @compiled
 def _to_crossing(
-    code: Ints, first: int, r: Floats, slots: Ints, side: int, time: float, h: float,
+    native: Native, r: Floats, side: int, time: float, h: float,
     begin: float, x: float, drive: Floats, j: int, local: Floats, w: Floats,
 ) -> float:  # fmt: skip
     """Step to where v vanishes and switch there; returns that fraction of the step.
@@ -308,12 +269,12 @@ def _to_crossing(
     for _ in range(3):
         x = min(max(x, 0.0), 1.0)
         end = begin + x * (1.0 - begin)
-        _substep(code, first, r, slots, side, time, h, begin, end, drive, j, local, w)
-        before = _pull(code, first, r, slots, side, sign, time + end * h, local, 2, w, 0)
+        _substep(native, r, time, h, begin, end, drive, j, local, w)
+        before = _pull(native, r, side, sign, time + end * h, local, 2, w, 0)
         if before * sign >= 0.0:
             break
         x -= w[0, 1, 0] / (before * span)
-    after = _pull(code, first, r, slots, side, -sign, time + end * h, local, 2, w, 0)
+    after = _pull(native, r, side, -sign, time + end * h, local, 2, w, 0)
     through = after * sign < 0.0
     r[side] = -sign if through else 0.0
     w[0, 1, 0] = 0.0
@@ -324,30 +285,30 @@ def _to_crossing(
 
 @compiled
 def _to_release(
-    code: Ints, first: int, r: Floats, slots: Ints, side: int, time: float, h: float,
+    native: Native, r: Floats, side: int, time: float, h: float,
     begin: float, drive: Floats, j: int, local: Floats, w: Floats,
 ) -> float:  # fmt: skip
     """Step to where the other forces overcome friction; returns that fraction of the step, 1 if they do not."""
     sign = 1.0
-    late = _pull(code, first, r, slots, side, sign, time + h, local, 2, w, 0)
+    late = _pull(native, r, side, sign, time + h, local, 2, w, 0)
     if late <= 0.0:
         sign = -1.0
-        late = _pull(code, first, r, slots, side, sign, time + h, local, 2, w, 0)
+        late = _pull(native, r, side, sign, time + h, local, 2, w, 0)
     if sign * late <= 0.0:
         r[side] = 0.0
         return 1.0
-    early = _pull(code, first, r, slots, side, sign, time + begin * h, local, 0, w, 4)
+    early = _pull(native, r, side, sign, time + begin * h, local, 0, w, 3)
     x = min(max(early / (early - late), 0.0), 1.0)
     r[side] = 0.0
     end = begin + x * (1.0 - begin)
-    _substep(code, first, r, slots, side, time, h, begin, end, drive, j, local, w)
+    _substep(native, r, time, h, begin, end, drive, j, local, w)
     r[side] = sign
     return end
 
 
 @compiled
 def _switching_step(
-    code: Ints, first: int, r: Floats, slots: Ints, side: int, time: float, h: float,
+    native: Native, r: Floats, side: int, time: float, h: float,
     drive: Floats, j: int, local: Floats, w: Floats,
 ) -> None:  # fmt: skip
     """One step of a model with sgn v in it, cut where v changes sign, stops, or sets off again.
@@ -357,16 +318,16 @@ def _switching_step(
     """
     begin = 0.0
     for _ in range(6):
-        w[4] = w[0]
-        _substep(code, first, r, slots, side, time, h, begin, 1.0, drive, j, local, w)
+        w[3] = w[0]
+        _substep(native, r, time, h, begin, 1.0, drive, j, local, w)
         if r[side] == 0.0:
-            begin = _to_release(code, first, r, slots, side, time, h, begin, drive, j, local, w)
+            begin = _to_release(native, r, side, time, h, begin, drive, j, local, w)
         else:  # the mean velocity is the change of displacement: it shows a dip below zero between two steps
-            mean = (w[0, 0, 0] - w[4, 0, 0]) / ((1.0 - begin) * h)
-            x = _zero(r[side] * w[4, 1, 0], r[side] * w[0, 1, 0], r[side] * mean)
+            mean = (w[0, 0, 0] - w[3, 0, 0]) / ((1.0 - begin) * h)
+            x = _zero(r[side] * w[3, 1, 0], r[side] * w[0, 1, 0], r[side] * mean)
             if x > 1.0:
                 return
-            begin = _to_crossing(code, first, r, slots, side, time, h, begin, x, drive, j, local, w)
+            begin = _to_crossing(native, r, side, time, h, begin, x, drive, j, local, w)
         if begin >= 1.0:
             return
     if r[side] * w[0, 1, 0] < 0.0:
@@ -375,29 +336,30 @@ def _switching_step(
 
 @compiled
 def integrate_variation(
-    code: Ints, first: int, r: Floats, slots: Ints, side: int, start: float, dt: float,
+    native: Native, r: Floats, side: int, start: float, dt: float,
     steps: int, drive: Floats, y: Floats, row: int, out: Floats,
 ) -> int:  # fmt: skip
     """A free run with its exact derivatives by Runge-Kutta; ``y`` is the state beside its sensitivities.
 
     It becomes that at the last sample. ``out`` gets response ``row`` (0 displacement, 1 velocity,
     2 acceleration) of each sample beside its derivatives. ``side`` is the register that stands for sgn v, -1 if
-    the model has none. Other arguments and result as in :func:`integrate_rk4` and :func:`_variation`.
+    the model has none. ``native`` is the machine code of step and
+    slopes. Other arguments and result as in :func:`integrate_rk4`.
     """
     h = dt / steps
-    w = np.zeros((5, y.shape[0], y.shape[1]))
+    w = np.zeros((4, y.shape[0], y.shape[1]))
     local = np.zeros((3, drive.shape[1]))
     w[0] = y
     if side >= 0:
         if y[1, 0] != 0.0:
             r[side] = math.copysign(1.0, y[1, 0])
-        elif _pull(code, first, r, slots, side, 1.0, start, drive, 0, w, 0) <= 0.0:
-            held = _pull(code, first, r, slots, side, -1.0, start, drive, 0, w, 0) >= 0.0
+        elif _pull(native, r, side, 1.0, start, drive, 0, w, 0) <= 0.0:
+            held = _pull(native, r, side, -1.0, start, drive, 0, w, 0) >= 0.0
             r[side] = 0.0 if held else -1.0
     for sample in range(out.shape[0]):
         j = 2 * steps * sample
         w[1] = w[0]
-        _variation(code, first, r, slots, side, start + sample * dt, drive, j, w)
+        _call(native[1], r, w, (start + sample * dt,), drive, j)
         if not (abs(w[0, 0, 0]) < 1e150 and abs(w[0, 1, 0]) < 1e150 and math.isfinite(w[2, 1, 0])):
             return sample
         for c in range(y.shape[1]):
@@ -406,16 +368,16 @@ def integrate_variation(
             for m in range(steps):
                 time = start + sample * dt + m * h
                 if side < 0:
-                    _rk4_variation_step(code, first, r, slots, side, time, h, drive, j + 2 * m, w)
+                    _call(native[0], r, w, (time, h), drive, j + 2 * m)
                 else:
-                    _switching_step(code, first, r, slots, side, time, h, drive, j + 2 * m, local, w)
+                    _switching_step(native, r, side, time, h, drive, j + 2 * m, local, w)
     y[:] = w[0]
     return -1
 
 
 @compiled
 def integrate_segments(
-    code: Ints, first: int, r: Floats, slots: Ints, side: int, starts: Floats, dt: float,
+    native: Native, r: Floats, side: int, starts: Floats, dt: float,
     steps: int, drive: Floats, bounds: Ints, states: Floats, row: int, out: Floats,
 ) -> int:  # fmt: skip
     """:func:`integrate_variation` of one segment after the other, between neighbouring ``bounds``, each from its state.
@@ -430,9 +392,7 @@ def integrate_segments(
             target = out[begin : end + 1]
         else:
             target = np.empty((min(end + 1, out.shape[0]) - begin, out.shape[1]))
-        failed = integrate_variation(
-            code, first, r, slots, side, starts[i], dt, steps, ahead, states[i], row, target
-        )
+        failed = integrate_variation(native, r, side, starts[i], dt, steps, ahead, states[i], row, target)
         if failed >= 0:
             return int(begin + failed)
         if i + 2 == bounds.shape[0]:

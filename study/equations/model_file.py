@@ -28,6 +28,7 @@ from study.equations.terms import Term
 from study.support import yaml_text
 from study.support.errors import StudyError
 from study.support.files import read_text, replace_file
+from study.support.transaction import recovered
 from study.support.yaml_text import as_list, as_mapping, scalar, shown
 
 MOST_TERMS = 200
@@ -38,11 +39,14 @@ WANTED = "a YAML file with 'name' and 'terms', such as models/duffing.yaml"
 def read_model(path: Path) -> Model:
     """Read a model file; a coefficient or shape parameter that it leaves out is None, to be fitted.
 
+    What a killed run has left half changed is put back first.
+
     Raises
     ------
     StudyError
         If the file cannot be read or is no model, naming the file, the value and what was expected.
     """
+    recovered(path)
     return parse_model(read_text(path, WANTED), path)
 
 
@@ -89,6 +93,13 @@ def add_term(path: Path, entry: Term | ModelTerm) -> Model:
     StudyError
         If the file is no model, has the term already, or cannot be written.
     """
+    text = text_with(path, entry)
+    replace_file(path, text.encode())
+    return parse_model(text, path)
+
+
+def text_with(path: Path, entry: Term | ModelTerm) -> str:
+    """The text of a model file with a term more; raises as :func:`add_term`."""
     text = read_text(path, WANTED)
     before = parse_model(text, path)
     new = entry if isinstance(entry, ModelTerm) else free(entry)
@@ -96,11 +107,9 @@ def add_term(path: Path, entry: Term | ModelTerm) -> Model:
         raise StudyError(f"{path}: the term {new.name!r} is already in this model; add another one, or edit its entry")
     line = format_entry(new)
     extended = yaml_text.with_entry(text, "terms", line)
-    after = before.with_term(new)
-    if not _holds(extended, path, after):
+    if not _holds(extended, path, before.with_term(new)):
         raise StudyError(f"{path}: its layout leaves no clear place for a new term; add '- {line}' to 'terms' by hand")
-    replace_file(path, extended.encode())
-    return after
+    return extended
 
 
 def drop_term(path: Path, name: str) -> Model:
@@ -188,7 +197,7 @@ def _entry(item: object, number: int) -> ModelTerm:
         mapping = as_mapping(item)
         if mapping is None:
             raise StudyError(f"is {shown(item)}; expected a name or a mapping such as {{term: inertia, value: 1.0}}")
-        return _mapping(mapping)
+        return entry_from(mapping)
     except StudyError as error:
         raise StudyError(f"entry {number} of 'terms': {error}") from None
 
@@ -198,7 +207,8 @@ def _refuse_long(name: str) -> None:
         raise StudyError(f"the name {shown(name)} has {len(name)} characters; at most {LONGEST_NAME} are read")
 
 
-def _mapping(item: Mapping[object, object]) -> ModelTerm:
+def entry_from(item: Mapping[object, object]) -> ModelTerm:
+    """An entry of ``terms`` from its mapping, as a file or a caller gives it; raises as :func:`parse_model`."""
     name = item.get("term")
     if not isinstance(name, str):
         content = shown(name) if "term" in item else f"missing in {shown(item)}"

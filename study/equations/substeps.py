@@ -45,7 +45,7 @@ def _rates(model: Model, record: Record, response: str) -> Floats:
     with np.errstate(all="ignore"):
         kernels.evaluate(
             run.program.code, run.program.first, run.program.registers.copy(), columns, data,
-            run.slots[:, 1 : 1 + states].ravel(), partial,
+            run.variation.slots[:, 1 : 1 + states].ravel(), partial,
         )  # fmt: skip
     if not np.all(np.isfinite(partial)):
         return np.full(len(samples), np.inf)
@@ -66,6 +66,6 @@ def _rates_of_memories(run: FreeRun, record: Record, samples: Ints) -> Floats:
     partial = np.empty((len(samples), states * states))
     kernels.evaluate(
         run.program.code, run.program.first, run.program.registers.copy(), columns, data,
-        run.slots[1:, 1 : 1 + states].ravel(), partial,
+        run.variation.slots[1:, 1 : 1 + states].ravel(), partial,
     )  # fmt: skip
     return np.max(np.abs(partial), axis=1)

@@ -211,6 +211,23 @@ def get(name: str) -> Term:
     return LIBRARY[name]
 
 
+def search(word: str) -> tuple[Term, ...]:
+    """The library's terms that a word finds: in the name, or where no name has it, in formula, meaning or cause.
+
+    Raises
+    ------
+    StudyError
+        If it finds none.
+    """
+    sought = word.strip().lower().replace(" ", "_")
+    named = tuple(t for t in LIBRARY.values() if sought in t.name)
+    plain = sought.replace("_", " ")
+    found = named or tuple(t for t in LIBRARY.values() if plain in f"{t.formula} {t.meaning} {t.cause}".lower())
+    if not found:
+        get(word)  # which names the nearest
+    return found
+
+
 def custom(name: str, force: str) -> Term:
     """A user's own term: ``force`` is a formula of u, v, t and the names of extra measured channels.
 

@@ -6,7 +6,7 @@ event loop. A diagnosis goes on by itself after every change; one that was overt
 
 import threading
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -38,10 +38,10 @@ class OvertakenError(Exception):
 class Desk:
     """One session and whoever looks at it."""
 
-    def __init__(self, session: Session, model: Path, text: str, folder: Path) -> None:
+    def __init__(self, session: Session, model: Path, text: str, folder: Path, inputs: Sequence[Path] = ()) -> None:
         self.session = session
         self.state = State()
-        self.model, self.text, self.folder = model, text, folder
+        self.model, self.text, self.folder, self.inputs = model, text, folder, tuple(inputs)
         self.watchers: dict[object, Callable[[], None]] = {}
         self._lock = threading.RLock()
         self._rest = threading.Event()  # never set but to end
@@ -116,7 +116,7 @@ class Desk:
         self._behind.submit(self._examine, session.own)
 
     def _save(self, _: str) -> None:
-        write_files(self.folder, files(self.session, self.model.name, self.text))
+        write_files(self.folder, files(self.session, self.model.name, self.text), self.inputs)
         self._tell(notice=f"Saved in {self.folder}: {self.model.name}, {PAGE}, pictures and tables")
 
     def _examine(self, own: object = None) -> None:

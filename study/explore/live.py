@@ -25,7 +25,8 @@ class Watcher:
         self.state = ColumnDataSource(self._state(), name="state")
         self.page = html_page.build(self._view(), html_page.history_columns(self.shown), [self.asked, self.state])
         self.span: tuple[float, float] | None = None
-        self._lay()
+        with document.models.freeze():  # what belongs to the document is gathered once, not anew for each panel
+            self._lay()
         desk.watch(self, self._changed)
         document.on_session_destroyed(lambda _: desk.leave(self))
 

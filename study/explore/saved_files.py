@@ -18,7 +18,7 @@ def files(session: Session, name: str, text: str) -> dict[str, bytes]:
     stem = name.rpartition(".")[0] or name
     contents = {
         name: model_file.revised(text, name, now.model).encode(),
-        f"{stem}.history.json": history.as_bytes(steps),
+        history.name_for(name): history.as_bytes(steps),
         "comparison.json": as_json(document([now.comparison])),
         PAGE: saved(session),
     }

@@ -1,21 +1,26 @@
 """The server: bound to this machine alone, and open to no page but its own."""
 
 import errno
+import secrets
 from collections.abc import Callable
 from typing import Any
 
 from bokeh.application import Application
 from bokeh.application.handlers import FunctionHandler
 from bokeh.document import Document
-from bokeh.server.server import Server
+from bokeh.server.server import BaseServer
 from bokeh.server.util import bind_sockets
+from tornado.httpserver import HTTPServer
+from tornado.ioloop import IOLoop
 
 from study.explore.desk import Desk
+from study.explore.guard import GuardedTornado, one_line_each
 from study.explore.live import Watcher
 from study.support.errors import StudyError
 
 HOST = "127.0.0.1"
 USUAL = 5006
+LARGEST = 1_000_000  # bytes of a request: a page sends none
 DAY = 86400  # seconds within which a page that was fetched must open its socket
 
 
@@ -29,11 +34,12 @@ def serve(desk: Desk, port: int | None, ready: Callable[[str], None]) -> None:
         Watcher(desk, document)
 
     application = Application(FunctionHandler(show))
-    server = _bound(application, port)
+    one_line_each()
+    server, bound = _bound(application, port)
     server.start()
     desk.diagnose()
     loop: Any = server.io_loop  # Tornado leaves what its callbacks give back untyped
-    loop.add_callback(ready, f"http://{HOST}:{server.port}/")
+    loop.add_callback(ready, f"http://{HOST}:{bound}/")
     try:
         loop.start()
     finally:
@@ -41,8 +47,8 @@ def serve(desk: Desk, port: int | None, ready: Callable[[str], None]) -> None:
         server.stop()
 
 
-def _bound(application: Application, port: int | None) -> Server:
-    """A server on a port; Bokeh lets a browser's page open the socket only if its origin is one of these two."""
+def _bound(application: Application, port: int | None) -> tuple[BaseServer, int]:
+    """A server, and the port that it has."""
     try:
         return _server(application, USUAL if port is None else port)
     except OSError as error:
@@ -53,12 +59,12 @@ def _bound(application: Application, port: int | None) -> Server:
         return _server(application, 0)
 
 
-def _server(application: Application, port: int) -> Server:
+def _server(application: Application, port: int) -> tuple[BaseServer, int]:
     sockets, bound = bind_sockets(HOST, port)
-    for socket in sockets:
-        socket.close()
-    origins = [f"{host}:{bound}" for host in (HOST, "localhost")]
-    return Server(
-        {"/": application}, address=HOST, port=bound, allow_websocket_origin=origins, session_token_expiration=DAY,
+    guarded = GuardedTornado(
+        {"/": application}, bound, secrets.token_hex(32).encode(), session_token_expiration=DAY,
         check_unused_sessions_milliseconds=1000, unused_session_lifetime_milliseconds=2000,
     )  # fmt: skip
+    http = HTTPServer(guarded, max_body_size=LARGEST)
+    http.add_sockets(sockets)
+    return BaseServer(IOLoop.current(), guarded, http), bound

@@ -13,6 +13,7 @@ from study.compare.comparison import Comparison, compare
 from study.compare.comparison_report import history_step
 from study.compare.missing_force import MissingForce, missing_force
 from study.diagnose import candidates, dropping
+from study.diagnose.adding import added_candidate
 from study.diagnose.candidates import Candidate
 from study.diagnose.diagnosis_files import in_words, unneeded_in_words
 from study.diagnose.needless import Needless, needless
@@ -22,7 +23,6 @@ from study.diagnose.verdict import Diagnosis, diagnose, search_base, search_part
 from study.equations import formulas
 from study.equations.model import Model
 from study.equations.terms import LIBRARY, Term, custom
-from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import Prepared
 from study.support.errors import StudyError, expect
 
@@ -109,9 +109,7 @@ def candidate(session: Session, name: str) -> Ranked:
 
 def with_added(session: Session, name: str) -> Session:
     """The session with a candidate added to the model, as its diagnosis fitted it."""
-    row, prepared = candidate(session, name), session.prepared
-    fit = finished(row.fit, prepared)
-    comparison = compare(session.now.model.with_term(row.term), prepared, fit=fit)
+    comparison = added_candidate(session.now.comparison, candidate(session, name))
     return climbed(session, comparison, f"+ {name}", name)
 
 

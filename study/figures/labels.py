@@ -119,7 +119,9 @@ def estimated(parameters: pd.DataFrame) -> str:
         factor, unit = prefixed(units_of[str(row["parameter"])], abs(value))
         digits = MOST_DIGITS if error == 0.0 else min(max(0, -math.floor(math.log10(error / factor))), MOST_DIGITS)
         symbol = _symbol(str(row["parameter"]))
-        stated = f"${symbol}$ = {value / factor:.{digits}f}"
+        shown = f"{value / factor:.{digits}f}"
+        shown = shown.rstrip("0").rstrip(".") if digits == MOST_DIGITS else shown  # zeros beside an error say something
+        stated = f"${symbol}$ = {shown}"
         within = f" ± {error / factor:.{digits}f}" if digits < MOST_DIGITS else ""
         texts.append(f"{stated}{within} {dimensions.pretty(unit)} (given {float(row['true']) / factor:g})")
     return ", ".join(texts)

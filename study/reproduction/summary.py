@@ -7,7 +7,8 @@ from typing import Any
 import pandas as pd
 
 from study.reproduction import error_pages
-from study.reproduction.claims.judgement import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED, SEPARATOR
+from study.reproduction.claims.claim_pages import shortened, verdict
+from study.reproduction.claims.judgement import REPRODUCED
 from study.support.document import Block, Bullets, Heading, Text, table
 from study.support.numbers import percent
 
@@ -24,6 +25,8 @@ FILES = (
     ("`results/<case>/parameters.csv`", "parameters of the case; `results/parameters.csv` holds those of all cases"),
     ("`figures/figure_<number>.png`, `.svg`", "the report's Figures 2 to 8 and 16 to 61, by its numbers"),
     ("`results/estimators.csv`, `figures/estimators.png`", "error of each estimator, and its gain over MI/SO"),
+    ("`results/study.html`", "all of it for a browser, in one file: pictures by system, tables that sort, claims"),
+    ("`results/estimators.md`", "how far each estimator is off, by parameter and case"),
     ("`results/claims.md`, `claims.csv`", "every checkable statement: reported, measured, criterion, verdict"),
     ("`results/excitation_reading.csv`", 'both readings of "unit variance" against the numbers that the report quotes'),
     ("`results/integrator_steps.md`, `.csv`", "what the report's one step a sample does to each recovered parameter"),
@@ -48,32 +51,31 @@ class Tables:
 def blocks(tables: Tables) -> list[Block]:
     """The whole page."""
     sections: list[tuple[str, Callable[[Tables], list[Block]]]] = [
-        ("How far each estimator is off", lambda t: error_pages.opening(t.errors, t.noise)),
-        ("What was reproduced", counts),
+        ("What is not reproduced, or only partly, and why", failing),
         ("The report's numbers beside ours", numbers),
         ("Parameters by case", parameters),
-        ("Claims that are not or only partly reproduced", failing),
-        ("Claims that are reproduced", reproduced),
         ('What "unit variance" refers to', reading),
         ("Where everything is", lambda _: [table(["where", "what"], FILES)]),
         ("Run times", run_times),
     ]
-    page: list[Block] = [Heading("The report, run again", 1), Text(INTRODUCTION)]
+    page: list[Block] = [Heading("The report, run again", 1), *counts(tables), Text(INTRODUCTION)]
     for title, section in sections:
         page += [Heading(title), *section(tables)]
     return page
 
 
+def estimators(tables: Tables) -> list[Block]:
+    """The page of the estimators: how far each is off."""
+    return [Heading("How far each estimator is off", 1), *error_pages.opening(tables.errors, tables.noise)]
+
+
 def counts(tables: Tables) -> list[Block]:
     """How many claims and parameters hold, in sentences."""
-    verdicts = tables.claims.loc[~tables.claims["where"].str.startswith(BESIDE), "verdict"]
-    whole, part, none = (int((verdicts == verdict).sum()) for verdict in (REPRODUCED, PARTLY, NOT_REPRODUCED))
     own = tables.parameters[tables.parameters["estimator"] == "miso"]
     quiet = own[own["case"].map(tables.noise) == 0.0]
     noisy = own[own["case"].map(tables.noise) > 0.0]
     lines = [
-        f"Of {len(verdicts)} statements of the report, **{whole} are reproduced**, {part} partly, {none} not: "
-        "each of these has its reason below.",
+        f"{verdict(tables.claims)} Each that is not has its reason below.",
         f"Without noise, MI/SO recovers {_met(quiet)} parameters of {quiet['case'].nunique()} cases within "
         "tolerances that were set before looking.",
     ]
@@ -103,8 +105,7 @@ def numbers(tables: Tables) -> list[Block]:
 def statements(claims: pd.DataFrame) -> Block:
     """One row a claim; of what was measured as many parts as the report gives numbers, those that fail first."""
     ours = [
-        SEPARATOR.join(measured.split(SEPARATOR)[: len(reported.split(", "))])  # "as stated" counts as one number
-        for reported, measured in zip(claims["reported"], claims["measured"], strict=True)
+        shortened({"reported": r, "measured": m}) for r, m in zip(claims["reported"], claims["measured"], strict=True)
     ]
     columns = claims.assign(ours=ours)[["where", "claim", "reported", "ours", "verdict"]]
     return table(["where", "what", "report", "ours", "verdict"], columns.to_numpy().tolist())
@@ -150,11 +151,6 @@ def failing(tables: Tables) -> list[Block]:
     """What is not reproduced, or partly, and why."""
     failed = tables.claims[tables.claims["verdict"] != REPRODUCED].sort_values("verdict", kind="stable")
     return [_columns(failed, "verdict", "where", "claim", "why")]
-
-
-def reproduced(tables: Tables) -> list[Block]:
-    """What is reproduced, and what was measured."""
-    return [_columns(tables.claims[tables.claims["verdict"] == REPRODUCED], "where", "claim", "measured")]
 
 
 def _columns(frame: pd.DataFrame, *names: str) -> Block:

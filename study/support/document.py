@@ -59,7 +59,16 @@ class Image:
     path: str
 
 
-Block = Heading | Text | Bullets | Table | Image
+@dataclass(frozen=True)
+class Fold:
+    """Blocks that are shown when their title is clicked; ``anchor`` is what a link on the page leads to."""
+
+    title: str
+    blocks: "tuple[Block, ...]"
+    anchor: str = ""
+
+
+Block = Heading | Text | Bullets | Table | Image | Fold
 
 
 def table(heading: Sequence[str], rows: Sequence[Sequence[object]]) -> Block:
@@ -84,6 +93,9 @@ def _markdown(block: Block) -> str:
             return "\n".join(f"- {item}" for item in items)
         case Image(words, path):
             return f"![{words}]({path})"
+        case Fold(title, blocks, anchor):
+            place = f'<a id="{html.escape(anchor)}"></a>' if anchor else ""
+            return f"<details>{place}<summary>{_inline(title)}</summary>\n\n{markdown(blocks)}\n</details>"
         case Table(heading, rows):
             cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
             return tabulate(cells, headers=list(heading), tablefmt="pipe", disable_numparse=True)
@@ -115,11 +127,16 @@ def put(path: Path, mark: str, blocks: Sequence[Block]) -> None:
 
 def page(title: str, blocks: Sequence[Block]) -> str:
     """The page as one HTML file that asks for nothing from anywhere."""
-    body = "\n".join(_html(block) for block in blocks)
+    body = fragment(blocks)
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f"<title>{html.escape(title)}</title>\n<style>\n{STYLE}\n</style>\n</head>\n<body>\n{body}\n</body>\n</html>\n"
     )
+
+
+def fragment(blocks: Sequence[Block]) -> str:
+    """The blocks as a part of an HTML page."""
+    return "\n".join(_html(block) for block in blocks)
 
 
 def _html(block: Block) -> str:
@@ -132,6 +149,9 @@ def _html(block: Block) -> str:
             return "<ul>" + "".join(f"<li>{_inline(item)}</li>" for item in items) + "</ul>"
         case Image(words, path):
             return f"<p>{_inline(words)}: <code>{html.escape(PurePosixPath(path).name)}</code></p>"
+        case Fold(title, blocks, anchor):
+            place = f' id="{html.escape(anchor)}"' if anchor else ""
+            return f"<details{place}><summary>{_inline(title)}</summary>\n{fragment(blocks)}\n</details>"
         case Table(heading, rows):
             head = "".join(f"<th>{_inline(cell)}</th>" for cell in heading)
             lines = ["<tr>" + "".join(f"<td>{_inline(cell)}</td>" for cell in row) + "</tr>" for row in rows]

@@ -1,12 +1,13 @@
 """All files of a comparison at once: either every one is in its place, or none is."""
 
 import os
-from collections.abc import Mapping
-from contextlib import ExitStack
+from collections.abc import Callable, Generator, Iterable, Mapping
+from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 
 from study.support.errors import StudyError, expect
-from study.support.files import reason, replacing
+from study.support.files import move, reason, written_beside
 
 
 def check_folder(folder: Path) -> None:
@@ -18,7 +19,7 @@ def check_folder(folder: Path) -> None:
     expect(usable, f"{folder}: cannot be written to ({there}: {why}); expected a writable folder")
 
 
-def write_files(folder: Path, files: Mapping[str, bytes]) -> None:
+def write_files(folder: Path, files: Mapping[str, bytes], inputs: Iterable[Path] = ()) -> None:
     """Write files into a folder, which is made if need be.
 
     All are written beside their places first and moved there when the last is complete: on a full disk
@@ -27,12 +28,37 @@ def write_files(folder: Path, files: Mapping[str, bytes]) -> None:
     Raises
     ------
     StudyError
-        If they cannot be written.
+        If they cannot be written, or one would take the place of one of the ``inputs``.
     """
+    keep(inputs, (folder / name for name in files))
+    made(folder)
+    with staged({folder / name: content for name, content in files.items()}) as moves:
+        for move in moves:
+            move()
+
+
+def made(folder: Path) -> None:
+    """See that a folder is there."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StudyError(f"{folder}: cannot be made ({reason(error)}); expected a writable folder") from None
+
+
+def keep(inputs: Iterable[Path], outputs: Iterable[Path]) -> None:
+    """Refuse to write over what is read, by whatever name."""
+    kept = {os.path.realpath(path): path for path in inputs}
+    for path in outputs:
+        same = kept.get(os.path.realpath(path))
+        expect(same is None, f"{path}: this would be written over the input {same}; expected another --out")
+
+
+@contextmanager
+def staged(files: Mapping[Path, bytes]) -> Generator[list[Callable[[], None]], None, None]:
+    """All files written beside their places; each call given moves one of them there. What was not moved goes."""
     with ExitStack() as stack:
-        for name, content in files.items():
-            stack.enter_context(replacing(folder / name)).write_bytes(content)
+        moves: list[Callable[[], None]] = []
+        for path, content in files.items():
+            beside = stack.enter_context(written_beside(path, content))
+            moves.append(partial(move, beside, path))
+        yield moves

@@ -5,7 +5,7 @@ import os
 import secrets
 import stat
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from study.support.errors import StudyError, expect
@@ -58,24 +58,60 @@ def replacing(path: Path) -> Generator[Path, None, None]:
     StudyError
         If it cannot be written (no permission, no space).
     """
-    target = Path(os.path.realpath(path))
-    beside = target.with_name(f"{BESIDE}{secrets.token_hex(8)}{target.suffix}")
-    try:
-        mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
-        if mode is not None and not os.access(target, os.W_OK):
-            raise PermissionError(errno.EACCES, "it is write-protected")
+    with _beside(path) as beside:
         try:
             yield beside
-            with beside.open("rb") as written:
-                os.fsync(written.fileno())
-            if mode is not None:
-                beside.chmod(mode)
-            beside.replace(target)
-        finally:
+        except OSError as error:
+            raise _unwritten(path, error) from None
+        move(beside, path)
+
+
+@contextmanager
+def written_beside(path: Path, data: bytes) -> Generator[Path, None, None]:
+    """A complete file that waits beside ``path`` for :func:`move`, and is gone behind the block if it was not moved."""
+    with _beside(path) as beside:
+        try:
+            beside.write_bytes(data)
+            _flushed(beside)
+        except OSError as error:
+            raise _unwritten(path, error) from None
+        yield beside
+
+
+@contextmanager
+def _beside(path: Path) -> Generator[Path, None, None]:
+    """A name for a file beside ``path``; nothing is left under it."""
+    target = Path(os.path.realpath(path))
+    beside = target.with_name(f"{BESIDE}{secrets.token_hex(8)}{target.suffix}")
+    if target.exists() and not os.access(target, os.W_OK):
+        raise _unwritten(path, PermissionError(errno.EACCES, "it is write-protected"))
+    try:
+        yield beside
+    finally:
+        with suppress(OSError):
             beside.unlink(missing_ok=True)
+
+
+def move(beside: Path, path: Path) -> None:
+    """Have a file beside ``path`` take its place; a ``StudyError`` if that cannot be."""
+    target = Path(os.path.realpath(path))
+    try:
+        _flushed(beside)
+        if target.exists():
+            beside.chmod(stat.S_IMODE(target.stat().st_mode))
+        beside.replace(target)
     except OSError as error:
-        why = f"cannot be written ({reason(error)}) and is as it was"
-        raise StudyError(f"{path}: {why}; expected a writable folder with free space") from None
+        raise _unwritten(path, error) from None
+
+
+def _flushed(path: Path) -> None:
+    with path.open("rb") as written:
+        os.fsync(written.fileno())
+
+
+def _unwritten(path: Path, error: OSError) -> StudyError:
+    why = f"cannot be written ({reason(error)}) and is as it was"
+    return StudyError(f"{path}: {why}; expected a writable folder with free space")
 
 
 def reason(error: Exception) -> str:

@@ -9,6 +9,7 @@ from typing import TextIO
 
 from study.support.errors import StudyError
 from study.support.files import BESIDE
+from study.support.terminal import harmless
 
 FAILED = 2  # as the command line ends on input that cannot be used
 
@@ -19,7 +20,7 @@ def one_sentence() -> Generator[None, None, None]:
     try:
         yield
     except StudyError as error:
-        print("study:", " ".join(str(error).split()), file=sys.stderr)
+        print("study:", harmless(" ".join(str(error).split())), file=sys.stderr)
         sys.exit(FAILED)
 
 

@@ -313,3 +313,23 @@ def test_limits_of_numbers() -> None:
     for read, text in ((number(above=0.0), "0"), (number(least=1.0), "0.9"), (number(), "inf"), (whole(0, 5), "6")):
         with pytest.raises(argparse.ArgumentTypeError, match=text):
             read(text)
+
+
+def test_help_begins_with_what_to_type(capsys: pytest.CaptureFixture[str]) -> None:
+    for words in ([], ["diagnose"]):
+        assert cli.main([*words, "--help"]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert lines[0] == "example:"
+        assert lines[1].strip().startswith("study ")
+    for line in parser.EXAMPLE.splitlines():
+        assert parser.parser().parse_args(shlex.split(line, comments=True)[1:]).run
+
+
+def test_a_word_finds_terms_by_name_or_by_what_they_mean(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["terms", "cubic"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines[2:-2] if not line.startswith(" ")] == ["cubic_stiffness", "cubic_damping"]
+    assert cli.main(["terms", "Dead Band"]) == 0
+    assert capsys.readouterr().out.startswith("dead_band: ")
+    assert cli.main(["terms", "bolted"]) == 0
+    assert "hysteresis" in capsys.readouterr().out

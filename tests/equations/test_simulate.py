@@ -180,8 +180,10 @@ def test_more_steps_are_advised_only_where_they_may_help(systems: dict[str, Mode
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 1990])
 def test_the_example_of_the_first_page_stays_at_the_studys_level(seed: int, tmp_path: Path) -> None:
-    """A system that a reader copies from README.md must not run away under the study's excitation."""
-    block = re.search(r"  ```yaml\n(.*?)  ```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    """A system that a reader copies from docs/reproduction.md must not run away under the study's excitation."""
+    block = re.search(
+        r"  ```yaml\n(.*?)  ```", (ROOT / "docs" / "reproduction.md").read_text(encoding="utf-8"), re.DOTALL
+    )
     assert block is not None
     (tmp_path / "softening.yaml").write_text(textwrap.dedent(block[1]), encoding="utf-8")
     model = read_model(tmp_path / "softening.yaml")

@@ -52,16 +52,23 @@ def flat(text):
     return " ".join(text.split())
 
 
-def test_the_errors_of_the_estimators_open_the_page(tables):
-    page = flat(document.markdown(summary.blocks(tables)))
+def test_the_verdict_opens_the_page_and_the_reasons_follow(tables):
+    page = document.markdown(summary.blocks(tables))
+    assert "1 of 3 statements are reproduced" in "".join(page.splitlines()[:4])
+    order = [page.index(words) for words in ("because of c", "500 N/m", "Parameters by case", "Run times")]
+    assert order == sorted(order)
+
+
+def test_the_errors_of_the_estimators_have_a_page_of_their_own(tables):
+    page = flat(document.markdown(summary.estimators(tables)))
     assert "| quiet | k | 2 % | 0.04 % (x 50) |" in page
     assert "![Errors of the estimators by parameter and case](../figures/estimators.png)" in page
-    assert page.index("How far each estimator is off") < page.index("What was reproduced")
+    assert "Errors of the estimators by parameter" not in document.markdown(summary.blocks(tables))
 
 
 def test_counts_are_counted(tables):
     page = flat(document.markdown(summary.blocks(tables)))
-    assert "Of 3 statements of the report, **1 are reproduced**, 1 partly, 1 not" in page
+    assert "**1 of 3 statements are reproduced**, 1 partly, 1 not." in page
     assert "Without noise, MI/SO recovers 2 of 2 parameters of 1 cases" in page
     assert "With noise on the displacement, 0 of 1 parameters of 1 cases" in page
 
@@ -86,16 +93,16 @@ def test_failing_claims_come_with_their_reasons_the_worst_first(tables):
 
 def test_numbers_show_what_was_stated_with_a_number(tables):
     page = flat(document.markdown(summary.numbers(tables)))
-    assert "| 500 N/m | 512 +- 3 | reproduced |" in page
+    assert "| 500 N/m | 512 +- 3 … | reproduced |" in page
     assert "All is well" not in page
 
 
 @pytest.mark.parametrize(
     ("reported", "shown"),
     [
-        ("500 N/m", "a 1"),
-        ("as stated", "a 1"),
-        ("2 Hz, 4 Hz", "a 1; b 2"),
+        ("500 N/m", "a 1 …"),
+        ("as stated", "a 1 …"),
+        ("2 Hz, 4 Hz", "a 1; b 2 …"),
         ("0.2 N^2, 0.5 N^2, 1 N^2, 2 N^2", "a 1; b 2; c 3"),
     ],
 )

@@ -11,6 +11,7 @@ import numpy as np
 from study.records.readers import hdf5, matlab, parquet, uff
 from study.records.readers.assemble import record_from
 from study.records.readers.options import ReadOptions, assignments, beside, read_options
+from study.records.readers.source import EXPECTED, readable
 from study.records.readers.swapped import suspect_swapped
 from study.records.readers.table import Table
 from study.records.record import Record
@@ -31,7 +32,6 @@ OTHERS = {
     b"PK\x03\x04": "a ZIP archive or spreadsheet", b"\x1f\x8b": "a gzip archive",
     b"\xd0\xcf\x11\xe0": "an old spreadsheet", b"\x93NUMPY": "a NumPy array", b"%PDF": "a PDF",
 }  # fmt: skip
-EXPECTED = "expected CSV, MATLAB, HDF5, UFF or Parquet"
 
 
 def read_record(path: Path, mapping: ReadOptions | None = None) -> Record:
@@ -56,11 +56,13 @@ def read_record(path: Path, mapping: ReadOptions | None = None) -> Record:
         If it cannot be read, or is no evenly sampled record.
     """
     path = Path(path)
-    head = _head(path)
     options = mapping or ReadOptions()
-    if beside(path).is_file():
-        options = options.over(read_options(beside(path)))
-    record = record_from(path, _table(path, head, options), options)
+    with readable(path) as source:
+        head = _head(path, source)
+        if beside(path).is_file():
+            options = options.over(read_options(beside(path)))
+        table = _table(path, source, head, options)
+    record = record_from(path, table, options)
     unforced = not np.any(record["force"])
     suspicion = None if options.accept_swapped or unforced else suspect_swapped(record)
     if suspicion is not None:
@@ -68,16 +70,13 @@ def read_record(path: Path, mapping: ReadOptions | None = None) -> Record:
     return record
 
 
-def _head(path: Path) -> bytes:
-    """The first bytes of a file that is there and may be read."""
+def _head(path: Path, source: Path) -> bytes:
+    """The first bytes of a file."""
     try:
-        expect(not path.is_dir(), f"{path}: this is a folder; {EXPECTED}")
-        with path.open("rb") as stream:
+        with source.open("rb") as stream:
             head = stream.read(MAGIC)
-    except FileNotFoundError:
-        raise StudyError(f"{path}: there is no such file; {EXPECTED}") from None
-    except (OSError, ValueError) as error:  # ValueError: a path with a null byte
-        raise StudyError(f"{str(path)!r}: cannot be read ({reason(error)}); {EXPECTED}") from None
+    except OSError as error:
+        raise StudyError(f"{path}: cannot be read ({reason(error)}); {EXPECTED}") from None
     expect(head, f"{path}: the file is empty; {EXPECTED}")
     return head
 
@@ -100,18 +99,23 @@ def _kind(path: Path, head: bytes) -> str:
     return "text"
 
 
-def _table(path: Path, head: bytes, options: ReadOptions) -> Table:
+def _table(path: Path, source: Path, head: bytes, options: ReadOptions) -> Table:
     kind = _kind(path, head)
-    if kind == "text":
-        from study.records.readers import text
-
-        return text.read(path, path.read_bytes())
     try:
+        if kind == "text":
+            from study.records.readers import text
+
+            return text.read(path, source.read_bytes())
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return BINARY[kind](path, options.group)
+            return BINARY[kind](source, options.group)
     except StudyError:
         raise
+    except MemoryError as error:
+        why = f"it holds more than there is memory for ({error or 'out of memory'})"
+        raise StudyError(f"{path}: {why}; expected a record that fits, or a --group of it that does") from None
     except Exception as error:  # decoders fail in many ways on a damaged file, and all mean this
+        if kind == "text":
+            raise
         why = (str(error).splitlines() or [""])[0][:80] or type(error).__name__
         raise StudyError(f"{path}: the {kind.upper()} file is damaged or cut short ({why}); {EXPECTED}") from None

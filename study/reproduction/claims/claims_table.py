@@ -18,10 +18,11 @@ from study.reproduction.claims import (
     response,
     simulation,
 )
+from study.reproduction.claims.claim_pages import by_claim
 from study.reproduction.claims.evidence import Evidence
-from study.reproduction.claims.judgement import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED, Claim, conclude
+from study.reproduction.claims.judgement import Claim, conclude
 from study.reproduction.claims.reported import Reported
-from study.support.document import unpadded
+from study.support import document
 
 SECTIONS = (
     simulation, response, preliminary_claims, linear_system, duffing, damping, mathieu, dead_band, levels,
@@ -49,8 +50,5 @@ def judge_all(
 
 
 def page(table: pd.DataFrame) -> str:
-    """The table as a page: counts, then every claim."""
-    verdicts = table.loc[~table["where"].str.startswith(BESIDE), "verdict"]
-    counts = ", ".join(f"{(verdicts == verdict).sum()} {verdict}" for verdict in (REPRODUCED, PARTLY, NOT_REPRODUCED))
-    rows = unpadded([str(column) for column in table.columns], table.to_numpy().tolist())
-    return f"# Claims of the report\n\n{len(verdicts)} statements: {counts}.\n\n{rows}\n"
+    """The table as a page: counts, one line a claim, and below it the conditions of each, folded."""
+    return document.markdown([document.Heading("Claims of the report", 1), *by_claim(table)])

@@ -1,0 +1,63 @@
+"""The frequency response function of force and response, measured and as the fitted model predicts it.
+
+Both by H1 = G_fx / G_ff from the same force on the same samples, so that what a nonlinear system does to H1 shows in
+both alike (Bendat and Piersol, Random Data, 2010, Section 9.1).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from study.compare.noise import segments_of
+from study.compare.prediction import Prediction
+from study.records.spectra import SpectralMatrix, cross_spectra
+from study.support.arrays import Complexes, Floats
+
+LOUD = 1e-3  # of the force's largest density: what is divided by less is no response
+
+
+@dataclass(frozen=True)
+class ResponseFunctions:
+    """Response over force at each line; arrays of shape (lines,)."""
+
+    frequency: Floats  # in hertz
+    measured: Complexes  # unit of the response over that of the force
+    predicted: Complexes  # the same of the model's free run
+    error: Floats  # standard error of the measured magnitude: |H| sqrt((1 - g) / (2 n g)), with g the coherence
+    coherence: Floats  # ordinary coherence of force and measured response
+    coherence_predicted: Floats  # the same of the model's: below one where it is nonlinear
+
+    @property
+    def magnitude(self) -> tuple[Floats, Floats]:
+        """|H|, measured and predicted."""
+        return np.abs(self.measured), np.abs(self.predicted)
+
+    @property
+    def phase(self) -> tuple[Floats, Floats]:
+        """Phase in degrees from -180 to 180, measured and predicted."""
+        return np.degrees(np.angle(self.measured)), np.degrees(np.angle(self.predicted))
+
+
+def response_functions(prediction: Prediction) -> ResponseFunctions:
+    """H1 of the judging part, where the force has power, up to the record's highest frequency that is judged."""
+    prepared = prediction.prepared
+    force = prepared.record["force"][slice(*prepared.plan.judge)]
+    cut = segments_of(len(force))
+    measured = cross_spectra([force, prediction.measured], prediction.dt, cut)
+    predicted = cross_spectra([force, prediction.predicted], prediction.dt, cut)
+    power = measured.density[:, 0, 0].real
+    kept = (measured.frequency > 0.0) & (power > LOUD * np.max(power))
+    (h, coherence), (model, of_model) = _h1(measured), _h1(predicted)
+    spread = np.sqrt((1.0 - coherence) / (2.0 * measured.averages * np.maximum(coherence, np.finfo(float).eps)))
+    return ResponseFunctions(
+        measured.frequency[kept], h[kept], model[kept], (np.abs(h) * spread)[kept], coherence[kept], of_model[kept]
+    )
+
+
+def _h1(matrix: SpectralMatrix) -> tuple[Complexes, Floats]:
+    """H1 of channel 1 over channel 0, and their coherence."""
+    tiny = np.finfo(float).tiny
+    force, response = matrix.density[:, 0, 0].real, matrix.density[:, 1, 1].real
+    cross = matrix.density[:, 0, 1]
+    coherence = np.clip(np.abs(cross) ** 2 / np.maximum(force * response, tiny), 0.0, 1.0)
+    return (cross / np.maximum(force, tiny)).astype(np.complex128), coherence

@@ -1,0 +1,234 @@
+"""Records: read from files or made of arrays, with their tables and pictures."""
+
+# Matplotlib and pandas leave some of their arguments untyped.
+# pyright: reportUnknownMemberType=false
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from study.interface.showing import pairs_html, panels
+from study.records import record as records
+from study.support.errors import StudyError
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+    from study.records.readers import ReadOptions
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Record(records.Record):
+    """What was measured or simulated: evenly sampled force and motion with their units.
+
+    Attributes
+    ----------
+    dt : float
+        Sampling interval in seconds.
+    channels : mapping of float64 arrays, shape (n,)
+        ``force``, and at least one of ``displacement``, ``velocity``, ``acceleration``; any further ones.
+    units : mapping of str
+        Unit of each channel.
+    name : str
+        What it is called in tables.
+    start : float
+        Time of the first sample in seconds.
+    period : int, optional
+        Samples in one period, where the excitation is periodic.
+    source : Path, optional
+        The file that it was read from.
+    """
+
+    source: Path | None = None
+
+    @classmethod
+    def of(cls, record: records.Record, source: Path | None = None) -> "Record":
+        """A record of the packages below as one of this interface."""
+        if isinstance(record, cls):
+            return record
+        own = {f.name: getattr(record, f.name) for f in fields(records.Record)}
+        return cls(**own, source=source)
+
+    def __repr__(self) -> str:
+        """One line: name, length, rate and channels."""
+        return f"<Record {self.name}: {self._size()}; {self._channels()}>"
+
+    def _repr_html_(self) -> str:
+        return pairs_html(f"Record {self.name}", {"samples": self._size(), "channels": self._channels()})
+
+    def _size(self) -> str:
+        return f"{len(self):,} samples at {1.0 / self.dt:.6g} Hz, {len(self) * self.dt:.4g} s"
+
+    def _channels(self) -> str:
+        return ", ".join(f"{name} [{self.units.get(name, '?')}]" for name in self.channels)
+
+    def to_frame(self) -> "pd.DataFrame":
+        """The channels as columns, indexed by the time in seconds."""
+        import pandas as pd
+
+        return pd.DataFrame(dict(self.channels), index=pd.Index(self.time, name="time"))
+
+    def save(self, path: str | Path) -> None:
+        """Write time and channels as CSV with all digits of a double, in the form that :func:`read` reads.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written; one that was there survives.
+        """
+        from study.support.files import replacing
+
+        with replacing(Path(path)) as beside:
+            records.write_csv(self, beside)
+
+    def plot(self, channel: str | None = None, ax: "Axes | None" = None) -> "Axes":
+        """One channel over time; the first measured motion if none is named.
+
+        Raises
+        ------
+        StudyError
+            If there is no such channel.
+        """
+        name = self._known(channel or next(m for m in records.MOTIONS if m in self))
+        with panels(ax) as (axes,):
+            axes.plot(self.time, self[name], linewidth=0.8)
+            axes.set(xlabel="time (s)", ylabel=f"{name} ({self.units.get(name, '')})", title=self.name)
+        return axes
+
+    def plot_spectrum(self, channel: str = "force", ax: "Axes | None" = None) -> "Axes":
+        """Root of one channel's autospectral density (Welch, Hann, half overlap), in unit/sqrt(Hz).
+
+        Raises
+        ------
+        StudyError
+            If there is no such channel.
+        """
+        from study.compare.noise import segments_of
+        from study.records.spectra import autospectrum
+
+        values = self[self._known(channel)]
+        frequency, density = autospectrum(values, self.dt, segments_of(len(values)))
+        with panels(ax) as (axes,):
+            axes.semilogy(frequency[1:], np.sqrt(density[1:]), linewidth=1.0)
+            unit = f"{self.units.get(channel, '')}/" + r"$\sqrt{\mathrm{Hz}}$"
+            axes.set(xlabel="frequency (Hz)", ylabel=f"{channel} ({unit})", title=self.name)
+        return axes
+
+    def _known(self, channel: str) -> str:
+        if channel not in self:
+            raise StudyError(f"{self.name} has no channel {channel!r}; expected one of {', '.join(self.channels)}")
+        return channel
+
+
+def read(
+    path: str | Path,
+    *,
+    columns: Mapping[str, str | int] | None = None,
+    units: Mapping[str, str] | None = None,
+    fs: float | None = None,
+    dt: float | None = None,
+    group: str | None = None,
+    samples: tuple[int, int | None] | None = None,
+    period: int | None = None,
+    accept_saturated: bool = False,
+    accept_swapped: bool = False,
+) -> Record:
+    """Read a measured record: CSV and other text tables, MATLAB to 7.3, HDF5, UFF (dataset 58), or Parquet.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file. What ``<stem>.record.yaml`` beside it says holds where the arguments say nothing.
+    columns : mapping, optional
+        Role (force, displacement, velocity, acceleration, time, or a name for a further channel) to the column's name,
+        or its number counted from 1.
+    units : mapping of str, optional
+        Role to unit: ``{"force": "kN"}``.
+    fs, dt : float, optional
+        Sampling rate in hertz, or interval in seconds, if there is no column of times.
+    group : str, optional
+        Folder of an HDF5 file, or structure of a MATLAB file, that holds the channels.
+    samples : pair of int, optional
+        The first sample, counted from 0, and the one after the last.
+    period : int, optional
+        Samples in a period of a periodic excitation.
+    accept_saturated, accept_swapped : bool
+        Take a channel that rests at its extreme, or force and response that seem exchanged, for what they are.
+
+    Returns
+    -------
+    Record
+
+    Raises
+    ------
+    StudyError
+        If it cannot be read or is no evenly sampled record, naming the file, the value and what was expected.
+    """
+    from study.records.readers import ReadOptions, read_record
+
+    options = ReadOptions(
+        dict(columns or {}), dict(units or {}), dt, fs, group, samples, period, accept_saturated, accept_swapped
+    )
+    return Record.of(read_record(Path(path), options), Path(path))
+
+
+def record(
+    channels: "Mapping[str, ArrayLike] | pd.DataFrame",
+    *,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    fs: float | None = None,
+    dt: float | None = None,
+    name: str = "record",
+    period: int | None = None,
+    accept_saturated: bool = False,
+    accept_swapped: bool = False,
+) -> Record:
+    """Make a record of arrays or of a table, with the checks that a file has to pass.
+
+    Parameters
+    ----------
+    channels : mapping of arrays of shape (n,), or DataFrame
+        Named as :func:`read` would find them in a file (``force``, ``displacement``, ...), or as ``columns`` says.
+    columns, units, fs, dt, period, accept_saturated, accept_swapped
+        As for :func:`read`.
+    name : str
+        What it is called in tables.
+
+    Raises
+    ------
+    StudyError
+        If they make no evenly sampled record.
+    """
+    from study.records.readers import ReadOptions
+
+    options = ReadOptions(
+        dict(columns or {}), dict(units or {}), dt, fs, None, None, period, accept_saturated, accept_swapped
+    )
+    return Record.of(_from_arrays({str(key): values for key, values in channels.items()}, name, options))
+
+
+def _from_arrays(arrays: Mapping[str, Any], name: str, options: "ReadOptions") -> records.Record:
+    from study.records.readers import suspect_swapped
+    from study.records.readers.assemble import record_from
+    from study.records.readers.table import Column, Table, split_unit
+
+    columns: list[Column] = []
+    for heading, values in arrays.items():
+        array = np.asarray(values)
+        if array.ndim != 1 or array.dtype.kind not in "biuf":
+            raise StudyError(
+                f"{name}: {heading!r} has the shape {array.shape} of {array.dtype}; expected one row of numbers"
+            )
+        title, unit = split_unit(heading)
+        columns.append(Column(title, array.astype(np.float64), unit))
+    made = record_from(Path(name), Table(tuple(columns)), options)
+    suspicion = None if options.accept_swapped else suspect_swapped(made)
+    if suspicion is not None:
+        raise StudyError(f"{name}: {suspicion}")
+    return made

@@ -1,0 +1,255 @@
+"""Models: equations of motion made of terms."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from study.equations import model as equations
+from study.equations import model_file, terms
+from study.equations.model import ModelTerm
+from study.equations.redundancy import repeated_force
+from study.interface.data import Record
+from study.interface.showing import html_table
+from study.support.errors import expect
+from study.support.files import replace_file
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from study.interface.fitted import Fit
+
+
+def term(name: str, *, force: str | None = None, **values: float) -> ModelTerm:
+    """A term with values that a fit holds.
+
+    Parameters
+    ----------
+    name : str
+        An effect of the library (:func:`library`), or a name of your own with ``force``.
+    force : str, optional
+        Formula of your own effect, such as ``"u*abs(u)"``: of u, v, t and further channels. Parsed, never evaluated.
+    **values : float
+        ``value`` of its coefficient (``amplitude`` and ``phase`` of a periodic one) and shape parameters by name, in
+        the units of the record. What is left out is fitted.
+
+    Raises
+    ------
+    StudyError
+        If there is no such effect, or it has no such value.
+
+    Examples
+    --------
+    >>> term("cubic_stiffness", value=2e7)
+    <Term cubic_stiffness: u**3; k3 = 2e+07>
+    """
+    given: dict[object, object] = {"term": name, **({} if force is None else {"force": force}), **values}
+    return Term.of(model_file.entry_from(given))
+
+
+@dataclass(frozen=True, repr=False)
+class Term(ModelTerm):
+    """A term in a model with what is known of it."""
+
+    @classmethod
+    def of(cls, entry: ModelTerm) -> "Term":
+        """An entry of the packages below as one of this interface."""
+        return cls(entry.term, entry.coefficients, entry.parameters)
+
+    def __repr__(self) -> str:
+        """One line: name, formula and what is held."""
+        known = [f"{key} = {value:g}" for key, value in self.values.items() if value is not None]
+        return f"<Term {'; '.join([f'{self.name}: {self.term.formula}', *known])}>"
+
+
+def library(word: str = "") -> "pd.DataFrame":
+    """The effects a model may hold, one row each, indexed by name: those that a word finds, or all of them.
+
+    Columns are formula, shape parameters, meaning and common cause. ``library("cubic")`` finds every effect with the
+    word in its name, formula, meaning or cause.
+    """
+    import pandas as pd
+
+    found = terms.search(word) if word else tuple(terms.LIBRARY.values())
+    rows = [
+        {"term": t.name, "formula": t.formula, "parameters": ", ".join(p.name for p in t.parameters),
+         "meaning": t.meaning, "cause": t.cause} for t in found
+    ]  # fmt: skip
+    return pd.DataFrame(rows, columns=["term", "formula", "parameters", "meaning", "cause"]).set_index("term")
+
+
+@dataclass(frozen=True, repr=False, init=False)
+class Model:
+    """An equation of motion: the sum of its terms is the force.
+
+    Parameters
+    ----------
+    *terms : str or Term
+        Names of effects of the library, or :func:`term` with values that a fit holds.
+    name : str
+        What it is called in tables.
+
+    Attributes
+    ----------
+    equation : study.equations.model.Model
+        What the packages below work with.
+
+    Raises
+    ------
+    StudyError
+        If an effect is not known, or two of them are the same force.
+
+    Examples
+    --------
+    >>> Model("inertia", "linear_damping", "linear_stiffness", term("cubic_stiffness", value=2e7), name="rig")
+    <Model rig: inertia, linear_damping, linear_stiffness, cubic_stiffness (k3 = 2e+07)>
+    """
+
+    equation: equations.Model
+
+    def __init__(self, *terms: "str | ModelTerm", name: str = "model") -> None:
+        entries = tuple(term(t) if isinstance(t, str) else t for t in terms)
+        expect(entries, "a model needs terms; expected some such as Model('inertia', 'linear_stiffness')")
+        made = equations.Model(name, tuple(ModelTerm(e.term, e.coefficients, e.parameters) for e in entries))
+        fault = repeated_force(made)
+        expect(fault is None, str(fault))
+        object.__setattr__(self, "equation", made)
+
+    @classmethod
+    def of(cls, equation: equations.Model) -> "Model":
+        """A model of the packages below as one of this interface."""
+        made = object.__new__(cls)
+        object.__setattr__(made, "equation", equation)
+        return made
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Model":
+        """Read a model file (YAML); what it gives is held by a fit, the rest is fitted.
+
+        Raises
+        ------
+        StudyError
+            If the file cannot be read or is no model, naming the file, the value and what was expected.
+        """
+        return cls.of(model_file.read_model(Path(path)))
+
+    def save(self, path: str | Path, *, values: bool = True) -> None:
+        """Write a model file, with the values that are known or (``values=False``) without any.
+
+        A fit of the file holds the values that it gives: save without them to fit anew.
+
+        Raises
+        ------
+        StudyError
+            If a value is not finite.
+        OSError
+            If the file cannot be written; one that was there survives.
+        """
+        kept = self if values else self.free()
+        replace_file(Path(path), model_file.format_model(kept.equation).encode())
+
+    @property
+    def name(self) -> str:
+        """What it is called in tables."""
+        return self.equation.name
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Names of its terms."""
+        return tuple(t.name for t in self.equation.terms)
+
+    @property
+    def values(self) -> dict[str, float | None]:
+        """Coefficients and shape parameters by key; None where nothing is given."""
+        return self.equation.values
+
+    def hold(self, values: Mapping[str, float] | None = None, **more: float) -> "Model":
+        """The model with values given, by key (``k3``, or ``dead_band.u_g`` in a mapping), which a fit then holds.
+
+        Raises
+        ------
+        StudyError
+            If it has no such value.
+        """
+        given = {**(values or {}), **more}
+        self._check(tuple(given))
+        return Model.of(self.equation.with_values(given))
+
+    def free(self, *keys: str) -> "Model":
+        """The model with these values left open, or all of them.
+
+        Raises
+        ------
+        StudyError
+            If it has no such value.
+        """
+        self._check(keys)
+        return Model.of(self.equation.with_values(dict.fromkeys(keys or self.values)))
+
+    def _check(self, keys: tuple[str, ...]) -> None:
+        for key in keys:
+            expect(key in self.values, f"model {self.name!r} has no value {key!r}; expected {', '.join(self.values)}")
+
+    def add(self, added: "str | ModelTerm") -> "Model":
+        """The model with a term more; a ``StudyError`` if it has that force already."""
+        return Model(*self.equation.terms, added, name=self.name)
+
+    def drop(self, name: str) -> "Model":
+        """The model without a term; a ``StudyError`` if it lacks it or has no other."""
+        expect(name in self.terms, f"model {self.name!r} has no term {name!r}; expected {', '.join(self.terms)}")
+        return Model(*(t for t in self.equation.terms if t.name != name), name=self.name)
+
+    def fit(
+        self, record: Record, *, fit: tuple[int, int] | None = None, judge: tuple[int, int] | None = None,
+        response: str | None = None, cutoff: float | None = None, estimator: str = "output_error",
+        measurement: Mapping[str, float | None] | bool | None = None,
+    ) -> "Fit":  # fmt: skip
+        """Fit what the model leaves open to one part of a record, and judge it on the other.
+
+        Parameters
+        ----------
+        record : Record
+            What was measured.
+        fit, judge : pair of int, optional
+            First sample and the one after the last of the parts to fit and to judge; by default the halves, or the
+            longer of what one leaves of the record.
+        response : str, optional
+            The measured motion that free runs are held against; the first of displacement, velocity, acceleration.
+        cutoff : float, optional
+            Integrate measured accelerations above this frequency in hertz and judge nothing below.
+        estimator : str
+            What finds the coefficients: the fit in free run, or one of :func:`identify`.
+        measurement : mapping, or False
+            Faults of the measurement: False to look for none; by name a value that is known, or None for one that is
+            not to be looked for. If left out, what stands beside the record's file.
+
+        Raises
+        ------
+        StudyError
+            If the model cannot be fitted to the record.
+        """
+        from study.interface.fitted import fitted
+
+        return fitted(
+            self, record, fit=fit, judge=judge, response=response, cutoff=cutoff, estimator=estimator,
+            measurement=measurement,
+        )  # fmt: skip
+
+    def __repr__(self) -> str:
+        """One line: name, terms and what is held."""
+        shown: list[str] = []
+        for entry in self.equation.terms:
+            known = ", ".join(f"{k} = {v:g}" for k, v in entry.values.items() if v is not None)
+            shown.append(f"{entry.name} ({known})" if known else entry.name)
+        return f"<Model {self.name}: {', '.join(shown)}>"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [
+                t.name,
+                t.term.formula,
+                ", ".join(f"{k} = {'fitted' if v is None else f'{v:.6g}'}" for k, v in t.values.items()),
+            ]
+            for t in self.equation.terms
+        ]
+        return html_table(f"Model {self.name}", ["term", "force", "values"], rows, self.equation.equation())

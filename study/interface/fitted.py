@@ -1,0 +1,310 @@
+"""A model fitted to one part of a record and judged on the other."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from study.compare.comparison import Comparison, compare
+from study.compare.fitted_coefficients import Coefficient
+from study.compare.residual_checks import ResidualChecks
+from study.compare.response_functions import ResponseFunctions
+from study.equations.model import ModelTerm
+from study.faults.accounting import accounted
+from study.faults.fault import Fault
+from study.faults.instrument_settings import NOTHING_ASKED, Settings, settings_beside, settings_of
+from study.interface.data import Record
+from study.interface.equation import Model, term
+from study.interface.forces import Force, simulate
+from study.interface.pictures import FitPictures
+from study.interface.showing import Words, html_table
+from study.records.plan import make_plan
+from study.records.prepared import Prepared, prepare_record
+from study.support.errors import StudyError, at, expect
+from study.support.numbers import percent
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from study.interface.found import Candidate, Diagnosis
+    from study.interface.side_by_side import Across
+
+Span = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Number:
+    """An estimate that follows from coefficients, with its standard error."""
+
+    value: float
+    error: float  # NaN where the coefficients were held
+    unit: str = ""
+
+    def __repr__(self) -> str:
+        """Value, standard error and unit."""
+        return f"{self.value:.5g} +- {self.error:.2g} {self.unit}".rstrip()
+
+    def __float__(self) -> float:
+        """The value."""
+        return self.value
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fit(FitPictures):
+    """What :meth:`Model.fit` gives.
+
+    Attributes
+    ----------
+    comparison : study.compare.comparison.Comparison
+        Everything that was found, as the packages below hold it.
+    faults : tuple of Fault
+        Faults of the measurement that the record is corrected for.
+    """
+
+    comparison: Comparison
+    faults: tuple[Fault, ...] = ()
+
+    @property
+    def model(self) -> Model:
+        """The model with its fitted values."""
+        return Model.of(self.comparison.fit.model)
+
+    @property
+    def given(self) -> Model:
+        """The model as it was given: what it leaves open was fitted."""
+        return Model.of(self.comparison.model)
+
+    @property
+    def record(self) -> Record:
+        """The record as it was fitted: completed, in consistent units, corrected."""
+        return Record.of(self.comparison.record)
+
+    @property
+    def coefficients(self) -> dict[str, Coefficient]:
+        """Every coefficient and shape parameter by key: ``value``, ``error``, ``interval`` (95 %), ``unit``."""
+        return {c.key: c for c in self.comparison.coefficients}
+
+    @property
+    def f_n(self) -> Number | None:
+        """Natural frequency of the linear part in hertz, (4.4); None without mass, or stiffness above zero."""
+        return self._modal()[0]
+
+    @property
+    def zeta(self) -> Number | None:
+        """Damping ratio of the linear part, (4.5); None without mass, damping, or stiffness above zero."""
+        return self._modal()[1]
+
+    def _modal(self) -> tuple[Number | None, Number | None]:
+        from study.compare.modal import modal
+
+        found = modal(self.comparison.fit, self.comparison.prepared)
+        return tuple(None if n is None else Number(*n) for n in found)  # pyright: ignore[reportReturnType]
+
+    @property
+    def error(self) -> float:
+        """Rms of the held-out difference over that of the response."""
+        return self.comparison.prediction.error
+
+    @property
+    def floor(self) -> float:
+        """The part of the error that no model could explain, as far as this residual shows."""
+        return self.comparison.prediction.floor
+
+    @property
+    def force_error(self) -> float:
+        """Share of the force's power that the model does not explain in reverse."""
+        return self.comparison.force.total
+
+    @property
+    def fit_percent(self) -> float:
+        """100 (1 - error): the measure of fit of MATLAB's ``compare``, in per cent."""
+        return 100.0 * (1.0 - self.error)
+
+    @property
+    def says(self) -> Words:
+        """What to know of it, in two or three sentences."""
+        from study.compare.comparison_sentences import says
+
+        return Words(says(self.comparison))
+
+    def response_functions(self) -> ResponseFunctions:
+        """Response over force by frequency, measured and predicted, with coherences."""
+        from study.compare.response_functions import response_functions
+
+        return response_functions(self.comparison.prediction)
+
+    def residual_checks(self) -> ResidualChecks:
+        """Correlations of the held-out residual with itself and with the force, with 99 % bands, and its histogram."""
+        from study.compare.residual_checks import residual_checks
+
+        return residual_checks(self.comparison.prediction)
+
+    def summary(self) -> Words:
+        """The lines that ``study compare`` prints."""
+        from study.compare.comparison_report import summary
+
+        return Words(summary([self.comparison]))
+
+    def to_frame(self) -> "pd.DataFrame":
+        """The coefficients, one row a key: term, value, standard error, 95 % interval, unit, held or not."""
+        import pandas as pd
+
+        rows = [
+            {"key": c.key, "term": c.term, "value": c.value, "error": np.nan if c.error is None else c.error,
+             "low": (c.interval or (np.nan,))[0], "high": (c.interval or (np.nan,))[-1], "unit": c.unit,
+             "held": c.held} for c in self.comparison.coefficients
+        ]  # fmt: skip
+        return pd.DataFrame(rows).set_index("key")
+
+    def predict(self, force: "Force | Record | ArrayLike", *, initial: Sequence[float] = (0.0, 0.0)) -> Record:
+        """The response of the fitted model to a force.
+
+        Parameters
+        ----------
+        force : Force, Record or array of shape (n,)
+            An array has the sampling interval of the record that was fitted.
+        initial : sequence of float
+            Displacement and velocity at the first sample.
+
+        Raises
+        ------
+        StudyError
+            If the response does not stay finite.
+        """
+        if not isinstance(force, Force | Record):
+            values = np.asarray(force, dtype=np.float64)
+            expect(values.ndim == 1 and len(values) > 1, f"force has the shape {values.shape}; expected one row")
+            force = Force(values, self.comparison.record.dt)
+        return simulate(self.model, force, initial=initial, name=f"{self.model.name}_predicted")
+
+    def diagnose(
+        self, candidates: Mapping[str, str] | None = None, without: Sequence[str] = ()
+    ) -> "Diagnosis":  # fmt: skip
+        """Which effect is missing: every effect of the library is tried, and formulas of your own.
+
+        Parameters
+        ----------
+        candidates : mapping of str, optional
+            Name to formula: ``{"bushing": "u*abs(u)"}``.
+        without : sequence of str
+            Effects of the library to leave out.
+
+        Raises
+        ------
+        StudyError
+            If a formula is refused, or there is no such effect.
+        """
+        from study.interface.found import diagnosed
+
+        return diagnosed(self, candidates or {}, without)
+
+    def add(self, added: "Candidate | str | ModelTerm") -> "Fit":
+        """The fit of the model with an effect more.
+
+        A candidate of its diagnosis begins where its fit ended; of an effect of the library by name, or a :func:`term`,
+        what it gives is held and the rest is fitted as a diagnosis would.
+
+        Raises
+        ------
+        StudyError
+            If the model has that force already, or has no finite response with it.
+        """
+        from study.diagnose.adding import added as grown
+        from study.diagnose.adding import added_candidate
+        from study.interface.found import Candidate
+
+        if isinstance(added, Candidate):
+            return replace(self, comparison=added_candidate(self.comparison, added.ranked))
+        entry = term(added) if isinstance(added, str) else added
+        larger = self.given.add(entry)
+        if any(value is not None for value in entry.values.values()):
+            return replace(self, comparison=compare(larger.equation, self.comparison.prepared))
+        return replace(self, comparison=grown(self.comparison, entry.term))
+
+    def drop(self, name: str) -> "Fit":
+        """The fit of the model without one of its terms; a ``StudyError`` if it cannot go."""
+        from study.diagnose.dropping import dropped
+
+        return replace(self, comparison=dropped(self.comparison, name))
+
+    def across(self, records: "Sequence[Record]") -> "Across":
+        """The same model fitted to several records: do its coefficients move with the level?
+
+        Raises
+        ------
+        StudyError
+            If there are fewer than two records, or their units differ.
+        """
+        from study.interface.side_by_side import across
+
+        return across([self.given.fit(record) for record in records])
+
+    def page(self) -> bytes:
+        """The page of ``study compare`` as one HTML file; a ``StudyError`` says what is to be installed for it."""
+        from study.support.extras import needed
+
+        needed("bokeh", "the page", "explore")
+        from study.explore.saved import of_comparison
+
+        return of_comparison(self.comparison)
+
+    def __repr__(self) -> str:
+        """One line: record, model and errors."""
+        return f"<Fit of {self.given.name} to {self.record.name}: {self._errors()}>"
+
+    def _errors(self) -> str:
+        return f"held-out error {percent(self.error)}, noise floor {percent(self.floor)}"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [c.key, c.term, f"{c.value:.5g}", "held" if c.error is None else f"± {1.96 * c.error:.2g}", c.unit]
+            for c in self.comparison.coefficients
+        ]
+        caption = f"{self.given.name} fitted to {self.record.name}: {self._errors()}"
+        return html_table(caption, ["", "term", "value", "95 %", "unit"], rows, self.says)
+
+
+def fitted(
+    model: Model, record: Record, *, fit: Span | None, judge: Span | None, response: str | None, cutoff: float | None,
+    estimator: str, measurement: Mapping[str, float | None] | bool | None,
+) -> Fit:  # fmt: skip
+    """What :meth:`Model.fit` does; its arguments."""
+    settings = _settings(record, measurement)
+    prepared = prepared_part(record, fit, judge, response, cutoff)
+    found = accounted(
+        model.equation, prepared, held=settings.held, switched_off=settings.switched_off, estimator=estimator
+    )
+    return Fit(found.comparison, found.faults)
+
+
+def prepared_part(
+    record: Record, fit: Span | None = None, judge: Span | None = None, response: str | None = None,
+    cutoff: float | None = None,
+) -> Prepared:  # fmt: skip
+    """A record made ready: its motions completed, and what to fit and to judge of it settled.
+
+    A part that is left out is the longer of what the other leaves.
+    """
+    parts = [fit, judge]
+    for place, other in ((0, judge), (1, fit)):
+        if parts[place] is None and other is not None:
+            parts[place] = max(((other[1], len(record)), (0, other[0])), key=lambda part: part[1] - part[0])
+    with at(record.name):
+        plan = make_plan(record, parts[0], parts[1], response)
+        expect(
+            plan.response in record, f"no {plan.response} was measured; expected one of {', '.join(record.channels)}"
+        )
+    return prepare_record(record, plan, cutoff)
+
+
+def _settings(record: Record, measurement: Mapping[str, float | None] | bool | None) -> Settings:
+    if measurement is None or measurement is True:
+        return settings_beside(record.source) if record.source is not None else Settings()
+    if measurement is False:
+        return NOTHING_ASKED
+    try:
+        return settings_of(measurement)
+    except StudyError as error:
+        raise StudyError(f"measurement of {record.name}: {error}") from None

@@ -1,0 +1,193 @@
+"""Which effect is missing: the diagnosis of a fit."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from study.diagnose import diagnosis_report
+from study.diagnose import verdict as verdicts
+from study.diagnose.confirmed_faults import confirmed
+from study.diagnose.diagnosis_files import in_words
+from study.diagnose.ranked import Ranked
+from study.equations import terms
+from study.faults.fault import Fault
+from study.interface.fitted import Fit
+from study.interface.showing import Words, html_table, panels
+from study.support.errors import expect
+from study.support.numbers import percent
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+MISSING, NOTHING, UNKNOWN = verdicts.MISSING, verdicts.NOTHING, verdicts.UNKNOWN
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Candidate:
+    """An effect that may be missing, as it was fitted.
+
+    Attributes
+    ----------
+    ranked : study.diagnose.ranked.Ranked
+        Everything that was found, as the packages below hold it.
+    unit : str
+        Of the coefficient.
+    """
+
+    ranked: Ranked
+    unit: str
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.ranked.name
+
+    @property
+    def coefficient(self) -> float:
+        """Its coefficient; the amplitude, for an effect of any phase."""
+        return self.ranked.coefficient
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % confidence interval of the coefficient."""
+        return self.ranked.interval
+
+    @property
+    def explained(self) -> float:
+        """Share of the held-out difference that it explains."""
+        return self.ranked.gain.explained
+
+    @property
+    def error(self) -> float:
+        """Held-out error of the response with it."""
+        return self.ranked.response_error
+
+    @property
+    def p_value(self) -> float:
+        """Probability of such a gain if the effect is not there, the number of candidates accounted for."""
+        return self.ranked.p_value
+
+    @property
+    def tied_with(self) -> tuple[str, ...]:
+        """Candidates that this record cannot tell from it."""
+        return self.ranked.tied_with
+
+    def __repr__(self) -> str:
+        """One line: name, what it explains, coefficient."""
+        half = 1.96 * self.ranked.error
+        return (
+            f"<Candidate {self.name}: explains {percent(self.explained, '.3g')}, "
+            f"{self.coefficient:.4g} +- {half:.2g} {self.unit}>"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis:
+    """What :meth:`Fit.diagnose` gives.
+
+    Attributes
+    ----------
+    result : study.diagnose.verdict.Diagnosis
+        Everything that was found, as the packages below hold it.
+    faults : tuple of Fault
+        Faults of the measurement that the record shows beside the missing effect.
+    says : str
+        What to tell the engineer, in sentences, with the test that would tell tied candidates apart.
+    """
+
+    result: verdicts.Diagnosis
+    faults: tuple[Fault, ...]
+    says: Words
+
+    @property
+    def verdict(self) -> str:
+        """``missing_effect``, ``nothing_missing`` or ``unknown_effect``."""
+        return self.result.verdict
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """All that were tried, best first."""
+        units = self.result.comparison.record.units
+        force, length = units.get("force", "N"), units.get("displacement", "m")
+        return tuple(
+            Candidate(r, r.term.unit(r.term.symbols[0], force, length)) for r in self.result.candidates
+        )  # fmt: skip
+
+    @property
+    def best(self) -> Candidate | None:
+        """The missing effect; None unless the verdict is that one is missing."""
+        return self.candidates[0] if self.verdict == MISSING else None
+
+    @property
+    def pair(self) -> tuple[str, ...]:
+        """Two effects that explain together what none does alone; empty otherwise."""
+        return self.result.pair
+
+    def __getitem__(self, name: str) -> Candidate:
+        """The candidate of this name; a ``StudyError`` if there is none."""
+        found = {c.name: c for c in self.candidates}
+        expect(name in found, f"{name!r} is no candidate; expected one of {', '.join(found)}")
+        return found[name]
+
+    def table(self) -> Words:
+        """The first candidates as ``study diagnose`` prints them."""
+        return Words(diagnosis_report.table(self.result))
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Every candidate, best first, indexed by name."""
+        import pandas as pd
+
+        rows = [
+            {"term": c.name, "explained": c.explained, "explained_error": c.ranked.gain.error, "error": c.error,
+             "coefficient": c.coefficient, "low": c.interval[0], "high": c.interval[1], "unit": c.unit,
+             "p_value": c.p_value, "changes_by": c.ranked.unsteadiness, "tied_with": ", ".join(c.tied_with)}
+            for c in self.candidates
+        ]  # fmt: skip
+        names = (
+            "term", "explained", "explained_error", "error", "coefficient", "low", "high", "unit", "p_value",
+            "changes_by", "tied_with",
+        )  # fmt: skip
+        return pd.DataFrame(rows, columns=list(names)).set_index("term")
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Share of the held-out difference that each of the first candidates explains."""
+        from study.diagnose.diagnosis_pictures import ranking
+
+        with panels(ax) as (axes,):
+            return ranking(axes, self.result)
+
+    def plot_constancy(self, ax: "Axes | None" = None, *, along: str = "amplitude") -> "Axes":
+        """The coefficient of the first candidates along ``amplitude`` or ``frequency``: that of a true term is one.
+
+        Relative to its value, with 95 % intervals.
+        """
+        from study.diagnose.diagnosis_pages import FOLLOWED
+        from study.diagnose.diagnosis_pictures import followed
+
+        expect(along in ("amplitude", "frequency"), f"along is {along!r}; expected amplitude or frequency")
+        with panels(ax) as (axes,):
+            return followed(axes, self.result.candidates[:FOLLOWED], along)
+
+    def __repr__(self) -> str:
+        """One line: verdict, and the best candidate if there is one."""
+        best = f": {self.best!r}" if self.best is not None else ""
+        return f"<Diagnosis {self.verdict.replace('_', ' ')}{best}>"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [str(place), c.name, f"{percent(c.explained, 'z.1f')}", percent(c.error),
+             f"{c.coefficient:.4g} ± {1.96 * c.ranked.error:.2g} {c.unit}", f"{c.p_value:.1g}"]
+            for place, c in enumerate(self.candidates[: diagnosis_report.SHOWN], start=1)
+        ]  # fmt: skip
+        heads = ["", "effect", "explains", "error with it", "coefficient", "p"]
+        return html_table(f"Verdict: {self.verdict.replace('_', ' ')}", heads, rows, self.says)
+
+
+def diagnosed(fit: Fit, own: Mapping[str, str], without: Sequence[str]) -> Diagnosis:
+    """What :meth:`Fit.diagnose` does; its arguments."""
+    for name in without:
+        terms.get(name)
+    extra = [terms.custom(name, formula) for name, formula in own.items()]
+    result = verdicts.diagnose(fit.comparison, extra=extra, without=tuple(without))
+    return Diagnosis(result, confirmed(fit.faults, result), Words(in_words(result)))

@@ -1,0 +1,107 @@
+"""The pictures of a fit: each on the axes that are given, or on those of a new figure."""
+
+# Matplotlib leaves the **kwargs of its methods untyped.
+# pyright: reportUnknownMemberType=false
+
+from typing import TYPE_CHECKING
+
+from study.equations import dimensions
+from study.interface.showing import panels
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from study.compare.comparison import Comparison
+
+
+class FitPictures:
+    """Methods that draw; all take an ``ax`` and give back the axes that were drawn on."""
+
+    comparison: "Comparison"
+
+    def plot(self, ax: "Axes | None" = None, *, closeup: bool = False) -> "Axes":
+        """Measured and predicted response of the judging part, or some cycles where the model misses most."""
+        from study.compare.panels import response
+
+        prediction = self.comparison.prediction
+        part = prediction.closeup if closeup else slice(None)
+        with panels(ax) as (axes,):
+            response(axes, prediction.time[part], prediction.measured[part], prediction.predicted[part], self._unit())
+            axes.legend(loc="upper right")
+            axes.set_title(f"{self.comparison.record.name}: model {self.comparison.model.name}")
+        return axes
+
+    def plot_residual(self, ax: "Axes | None" = None) -> "Axes":
+        """What the model misses of the judging part, beside twice the noise floor."""
+        from study.compare.panels import residual
+
+        prediction = self.comparison.prediction
+        with panels(ax) as (axes,):
+            residual(axes, prediction.time, prediction.residual, prediction.noise.rms, self._unit())
+            axes.legend(loc="upper right")
+        return axes
+
+    def plot_frf(self, ax: "Axes | None" = None, *, part: str = "magnitude") -> "Axes":
+        """Response over force by frequency, of the record and of the model's free run under the same force.
+
+        ``part`` is ``magnitude``, ``phase`` or ``coherence``.
+        """
+        from study.compare import fit_panels
+        from study.compare.response_functions import response_functions
+        from study.support.errors import expect
+
+        expect(part in ("magnitude", "phase", "coherence"), f"part is {part!r}; expected magnitude, phase or coherence")
+        functions, highest = response_functions(self.comparison.prediction), self.comparison.force.highest
+        with panels(ax) as (axes,):
+            if part == "magnitude":
+                unit = f"{self._unit()}/{self.comparison.record.units.get('force', '')}"
+                return fit_panels.magnitude(axes, functions, unit, highest)
+            return (fit_panels.phase if part == "phase" else fit_panels.coherence)(axes, functions, highest)
+
+    def plot_autocorrelation(self, ax: "Axes | None" = None) -> "Axes":
+        """Autocorrelation of the held-out residual with the 99 % band of white noise."""
+        from study.compare import fit_panels
+        from study.compare.residual_checks import residual_checks
+
+        with panels(ax) as (axes,):
+            return fit_panels.autocorrelation(axes, residual_checks(self.comparison.prediction))
+
+    def plot_force_correlation(self, ax: "Axes | None" = None) -> "Axes":
+        """Correlation of the held-out residual with the force, with the 99 % band of independent ones."""
+        from study.compare import fit_panels
+        from study.compare.residual_checks import residual_checks
+
+        with panels(ax) as (axes,):
+            return fit_panels.with_force(axes, residual_checks(self.comparison.prediction))
+
+    def plot_histogram(self, ax: "Axes | None" = None) -> "Axes":
+        """Distribution of the held-out residual beside the normal one."""
+        from study.compare import fit_panels
+        from study.compare.residual_checks import residual_checks
+
+        with panels(ax) as (axes,):
+            return fit_panels.histogram(axes, residual_checks(self.comparison.prediction))
+
+    def plot_missing_force(self, against: str = "displacement", ax: "Axes | None" = None) -> "Axes":
+        """Mean force that the model lacks against ``displacement`` or ``velocity``, with 95 % intervals."""
+        from study.compare.force_map import curve
+        from study.compare.panels import force_curve
+        from study.support.errors import expect
+
+        expect(against in ("displacement", "velocity"), f"against is {against!r}; expected displacement or velocity")
+        lacking, units = self.comparison.missing_force, dict(self.comparison.record.units)
+        motion = lacking.displacement if against == "displacement" else lacking.velocity
+        with panels(ax) as (axes,):
+            return force_curve(axes, curve(motion[lacking.inner], lacking.force[lacking.inner]), against, units)
+
+    def plot_force_error(self, ax: "Axes | None" = None) -> "Axes":
+        """Unexplained share of the force by frequency."""
+        from study.compare.panels import force_error
+
+        with panels(ax) as (axes,):
+            drawn = force_error(axes, self.comparison.force, self.comparison.force.highest)
+            drawn.legend(loc="upper right")
+        return drawn
+
+    def _unit(self) -> str:
+        return dimensions.pretty(self.comparison.record.units.get(self.comparison.plan.response, ""))

@@ -1,0 +1,65 @@
+"""A read-only installation whose user has no writable home, as in a container: it works, and says what it lacks."""
+
+import ctypes
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+DROP_CAPABILITY, OVERRIDES = 24, (1, 2)  # prctl's PR_CAPBSET_DROP; what lets root write where nobody may
+SEEN = """import study.equations.jit as jit
+
+@jit.compiled
+def more(x):
+    return x + 1.0
+
+@jit.inlined
+def same(x):
+    return x
+
+assert more(1.0) == 2.0
+assert same(1.0) == 1.0
+"""
+
+
+def _without_privileges() -> None:
+    libc = ctypes.CDLL(None)
+    for capability in OVERRIDES:
+        libc.prctl(DROP_CAPABILITY, capability, 0, 0, 0)
+
+
+@pytest.fixture
+def installed() -> Iterator[Path]:
+    """A copy of the package that nobody can write to."""
+    folder = Path(tempfile.mkdtemp())
+    shutil.copytree(
+        ROOT / "study" / "equations", folder / "study" / "equations", ignore=shutil.ignore_patterns("__py*")
+    )
+    shutil.copytree(ROOT / "study" / "support", folder / "study" / "support", ignore=shutil.ignore_patterns("__py*"))
+    shutil.copy(ROOT / "study" / "__init__.py", folder / "study")
+    (folder / "probe.py").write_text(SEEN)
+    (folder / "home").mkdir()
+    for path in (folder, *folder.rglob("*")):
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    yield folder
+    for path in (folder, *folder.rglob("*")):
+        path.chmod(0o755 if path.is_dir() else 0o644)
+    shutil.rmtree(folder)
+
+
+def test_a_read_only_installation_works_and_says_once_what_it_cannot_keep(installed: Path) -> None:
+    bare = {k: v for k, v in os.environ.items() if not k.startswith(("NUMBA", "XDG", "PYTHON"))}
+    done = subprocess.run(
+        [sys.executable, str(installed / "probe.py")], cwd=installed, capture_output=True, text=True, timeout=120,
+        env={**bare, "HOME": str(installed / "home"), "PYTHONPATH": str(installed)}, preexec_fn=_without_privileges,
+        check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.startswith("study: compiled code cannot be kept")
+    assert done.stderr.count("\n") == 1
