@@ -181,8 +181,10 @@ def accounted_together(
         model, prepared = per_unit_mass(model, prepared)
     known = {"held": settings.held, "switched_off": settings.switched_off, **options}
     found = accounted(model, prepared, **known)
-    if runs_on(prepared) and found.comparison.prediction.error > LOST:
-        return accounted(model, apart(prepared), **known)
+    if runs_on(prepared):
+        anew = apart(prepared)
+        while found.comparison.prediction.error > LOST and (shorter := next(anew, None)) is not None:
+            found = accounted(model, shorter, **known)
     return found
 
 

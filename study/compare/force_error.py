@@ -124,8 +124,9 @@ def from_noise(frequency: Floats, inputs: Sequence[Input], model: Model, respons
     if response == "force":
         return density
     linear = next((i.response(frequency, model.numbers()) for i in inputs if i.shape == "u"), np.zeros(len(frequency)))
-    stiffness = np.abs(linear) ** 2
     omega = 2.0 * np.pi * np.maximum(frequency, 0.5 * frequency[1])
+    with np.errstate(over="ignore"):  # a mass that nothing holds may run off
+        stiffness = np.abs(linear) ** 2
     return stiffness * density / omega ** (2 * MOTIONS.index(response))
 
 

@@ -5,7 +5,7 @@ the motion of a mass without a spring, several records of one structure: all are
 prepared record whose first part is fitted and whose second is judged. A free run begins anew at each of them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -96,13 +96,22 @@ def runs_on(prepared: Prepared) -> bool:
     return any(s.continues for s in prepared.record.stretches)
 
 
-def apart(prepared: Prepared) -> Prepared:
-    """The same record with motions of a few periods, each from a state of its own: for a model that loses the motion."""
+def apart(prepared: Prepared) -> Iterator[Prepared]:
+    """The same record with motions that begin anew, from a state of its own each: for a model that loses the motion.
+
+    First in every stretch, then every few periods.
+    """
+    yield _begun_anew(prepared, [replace(s, continues=False) for s in prepared.record.stretches])
     response = MOTIONS[0] if prepared.response == FORCE else prepared.response
     samples = PERIODS * 2.0 * np.pi / (angular_rate(prepared.record[response], prepared.dt) * prepared.dt)
     pieces: list[Stretch] = []
     for stretch in prepared.record.stretches:
         pieces += cut(replace(stretch, continues=False), max(round(len(stretch) / max(samples, FEWEST)), 1))
+    if len(pieces) > len(prepared.record.stretches):
+        yield _begun_anew(prepared, pieces)
+
+
+def _begun_anew(prepared: Prepared, pieces: Sequence[Stretch]) -> Prepared:
     said = (
         f"the free run of this model loses the motion on its way, so it begins anew every "
         f"{len(prepared.record) / len(pieces) * prepared.dt:.3g} s, from a state of its own"
