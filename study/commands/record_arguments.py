@@ -3,6 +3,7 @@
 import argparse
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,6 +64,9 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     reading.add_argument(
         "--accept-swapped", action="store_true", help="take force and response as named, though they seem exchanged"
     )
+    reading.add_argument(
+        "--absolute", action="store_true", help="on a moving base (columns base_acceleration ...): the response is absolute"
+    )  # fmt: skip
     reading.add_argument("--free", action="store_true", help="no force acts: a free decay (a column of it is left out)")
     reading.add_argument(
         "--no-measurement", action="store_true", help="look for no faults of the measurement: drift, delay, spikes ..."
@@ -145,14 +149,19 @@ def prepared_of(arguments: argparse.Namespace, records: "Sequence[Record]", mode
         If the ranges overlap or leave the record, it lacks the response asked for, or cannot be completed.
     """
     from study.equations.model import has_spring
+    from study.records.base import on_a_moving_base, relative_to_base
     from study.records.layout import Layout, laid_out
 
     alternate, first = arguments.judge == ALTERNATE, records[0]
     fit, judge = _within(arguments.fit, first), None if alternate else _within(arguments.judge, first)
     fit, judge = fit or _other(judge, first), judge or _other(fit, first)
+    mass = model.values.get("m")
+    moved = [relative_to_base(r, mass, arguments.absolute) if on_a_moving_base(r) else (r, ()) for r in records]
     layout = Layout(tuple(arguments.use), fit, judge, alternate, arguments.response, arguments.cutoff)
     prescribed = "inertia" not in model
-    return laid_out(records, layout, prescribed=prescribed, drifts=not prescribed and not has_spring(model))
+    drifts = not prescribed and not has_spring(model)
+    prepared = laid_out([r for r, _ in moved], layout, prescribed=prescribed, drifts=drifts)
+    return replace(prepared, notes=(*(n for _, said in moved for n in said), *prepared.notes))
 
 
 def accounted_for(
@@ -169,16 +178,18 @@ def accounted_together(
     arguments: argparse.Namespace, model: "Model", records: "Sequence[Record]", path: Path, **options: Any
 ) -> "Accounted":
     """The same of several records of one structure, to all of which one model is fitted."""
+    from study.equations.common_factor import per_unit_mass, with_known_mass
     from study.faults.accounting import accounted
     from study.faults.instrument_settings import NOTHING_ASKED, settings_beside
+    from study.records.base import on_a_moving_base
     from study.records.stretches import apart, runs_on
 
     settings = NOTHING_ASKED if arguments.no_measurement else settings_beside(path)
     prepared = prepared_of(arguments, records, model)
     if prepared.free:
-        from study.equations.common_factor import per_unit_mass
-
         model, prepared = per_unit_mass(model, prepared)
+    if any(on_a_moving_base(record) for record in records):
+        model = with_known_mass(model)
     known = {"held": settings.held, "switched_off": settings.switched_off, **options}
     found = accounted(model, prepared, **known)
     if runs_on(prepared):

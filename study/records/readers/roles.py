@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
+from study.records.base import BASE
 from study.records.readers.options import BESIDE, ReadOptions
 from study.records.readers.table import Column, Table
 from study.records.record import MOTIONS
@@ -39,7 +40,9 @@ def assign(path: Path, table: Table, options: ReadOptions) -> dict[str, Column]:
         guesses = _guessed(path, table, rest, named)
         named |= {role: column for role, column in guesses.items() if role == "time" or not complete}
     motion = any(m in named for m in MOTIONS)
-    if motion and "force" not in options.columns and (options.free or not _unknown(table, named)):
+    base = any(c.name in BASE for c in table.columns) or any(role in BASE for role in named)
+    unforced = options.free or not _unknown(table, named)
+    if motion and "force" not in options.columns and (unforced or (base and "force" not in named)):
         named.pop("force", None)  # a free decay: the user says so, or there is no column that could be a force
     elif "force" not in named or not motion:
         missing = "displacement, velocity or acceleration" if "force" in named else "force"
