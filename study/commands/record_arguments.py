@@ -3,7 +3,6 @@
 import argparse
 import math
 import re
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
     from study.compare.history import Step
     from study.equations.model import Model
     from study.faults.accounting import Accounted
-    from study.records.prepared import Prepared
+    from study.records.layout import Layout
     from study.records.readers import ReadOptions
     from study.records.record import Record
 
@@ -25,7 +24,6 @@ RANGE = re.compile(r"([0-9]{0,15}):([0-9]{0,15})")
 MOTIONS = ("displacement", "velocity", "acceleration")
 RESULTS = Path("results")
 ALTERNATE = "every-other-block"
-LOST = 0.3  # of the rms response: a free run through several blocks that misses so much has lost the motion
 GIVEN = ("dt", "fs", "group", "period", "accept_saturated", "accept_swapped", "free")  # as ``ReadOptions`` calls them
 Span = tuple[int, int | None]
 
@@ -140,28 +138,14 @@ def read_records(arguments: argparse.Namespace) -> list["Record"]:
     return list(distinct([read_record(path, options) for path in arguments.records]))
 
 
-def prepared_of(arguments: argparse.Namespace, records: "Sequence[Record]", model: "Model") -> "Prepared":
-    """Records of one structure made ready: their motions completed, and what to fit and to judge of them settled.
+def layout_of(arguments: argparse.Namespace, record: "Record") -> "Layout":
+    """What the user says of the parts to use, to fit and to judge."""
+    from study.records.layout import Layout
 
-    Raises
-    ------
-    StudyError
-        If the ranges overlap or leave the record, it lacks the response asked for, or cannot be completed.
-    """
-    from study.equations.model import has_spring
-    from study.records.base import on_a_moving_base, relative_to_base
-    from study.records.layout import Layout, laid_out
-
-    alternate, first = arguments.judge == ALTERNATE, records[0]
-    fit, judge = _within(arguments.fit, first), None if alternate else _within(arguments.judge, first)
-    fit, judge = fit or _other(judge, first), judge or _other(fit, first)
-    mass = model.values.get("m")
-    moved = [relative_to_base(r, mass, arguments.absolute) if on_a_moving_base(r) else (r, ()) for r in records]
-    layout = Layout(tuple(arguments.use), fit, judge, alternate, arguments.response, arguments.cutoff)
-    prescribed = "inertia" not in model
-    drifts = not prescribed and not has_spring(model)
-    prepared = laid_out([r for r, _ in moved], layout, prescribed=prescribed, drifts=drifts)
-    return replace(prepared, notes=(*(n for _, said in moved for n in said), *prepared.notes))
+    alternate = arguments.judge == ALTERNATE
+    fit, judge = _within(arguments.fit, record), None if alternate else _within(arguments.judge, record)
+    fit, judge = fit or _other(judge, record), judge or _other(fit, record)
+    return Layout(tuple(arguments.use), fit, judge, alternate, arguments.response, arguments.cutoff)
 
 
 def accounted_for(
@@ -178,25 +162,14 @@ def accounted_together(
     arguments: argparse.Namespace, model: "Model", records: "Sequence[Record]", path: Path, **options: Any
 ) -> "Accounted":
     """The same of several records of one structure, to all of which one model is fitted."""
-    from study.equations.common_factor import per_unit_mass, with_known_mass
-    from study.faults.accounting import accounted
     from study.faults.instrument_settings import NOTHING_ASKED, settings_beside
-    from study.records.base import on_a_moving_base
-    from study.records.stretches import apart, runs_on
+    from study.faults.kinds_of_tests import accounted_test
 
     settings = NOTHING_ASKED if arguments.no_measurement else settings_beside(path)
-    prepared = prepared_of(arguments, records, model)
-    if prepared.free:
-        model, prepared = per_unit_mass(model, prepared)
-    if any(on_a_moving_base(record) for record in records):
-        model = with_known_mass(model)
-    known = {"held": settings.held, "switched_off": settings.switched_off, **options}
-    found = accounted(model, prepared, **known)
-    if runs_on(prepared):
-        anew = apart(prepared)
-        while found.comparison.prediction.error > LOST and (shorter := next(anew, None)) is not None:
-            found = accounted(model, shorter, **known)
-    return found
+    return accounted_test(
+        records, model, layout_of(arguments, records[0]), absolute=arguments.absolute, held=settings.held,
+        switched_off=settings.switched_off, **options,
+    )  # fmt: skip
 
 
 def _within(given: Span | None, record: "Record") -> tuple[int, int] | None:

@@ -9,12 +9,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
 
 from study.records.completion import CompletedRecord
 from study.records.plan import FEWEST, Plan
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record, Stretch
-from study.records.states import angular_rate
+from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 
 PERIODS = 5.0  # of the motion in a block, at least
@@ -103,7 +104,7 @@ def apart(prepared: Prepared) -> Iterator[Prepared]:
     """
     yield _begun_anew(prepared, [replace(s, continues=False) for s in prepared.record.stretches])
     response = MOTIONS[0] if prepared.response == FORCE else prepared.response
-    samples = PERIODS * 2.0 * np.pi / (angular_rate(prepared.record[response], prepared.dt) * prepared.dt)
+    samples = PERIODS * _period(prepared.record[response])
     pieces: list[Stretch] = []
     for stretch in prepared.record.stretches:
         pieces += cut(replace(stretch, continues=False), max(round(len(stretch) / max(samples, FEWEST)), 1))
@@ -128,8 +129,16 @@ def _blocks(stretch: Stretch, response: str) -> list[Stretch]:
 
 def period_of(stretch: Stretch, response: str) -> float:
     """Samples in a period of the motion."""
-    values = stretch.source[response][stretch.first : stretch.last]
-    return 2.0 * np.pi / (angular_rate(values, stretch.source.dt) * stretch.source.dt)
+    return _period(stretch.source[response][stretch.first : stretch.last])
+
+
+def _period(values: Floats) -> float:
+    """Four times the lag at which the autocorrelation first vanishes: white noise does not move it."""
+    n, centred = len(values), values - np.mean(values)
+    size = next_fast_len(2 * n)
+    correlation = irfft(np.abs(rfft(centred, size)) ** 2, size)[:n]
+    below = np.flatnonzero(correlation <= 0.0)
+    return 4.0 * float(below[0]) if len(below) else 4.0 * n
 
 
 def cut(stretch: Stretch, count: int) -> list[Stretch]:

@@ -7,7 +7,7 @@ from study.equations.free_run import prepare
 from study.equations.model import Model
 from study.equations.substeps import needed_steps
 from study.records.prepared import FORCE, Prepared
-from study.records.record import Record
+from study.records.record import MOTIONS, Record
 from study.support.arrays import Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
@@ -93,3 +93,31 @@ def along_the_motion(model: Model, prepared: Prepared, wanted: list[str]) -> dic
         zip(wanted, least_squares(shapes[:, columns], target, 1e-9).tolist(), strict=True)
     )
 
+
+
+def drift_start(model: Model, prepared: Prepared) -> dict[str, float]:
+    """Mass and damping of a body without a spring from integrals of the force, which noise on the motion hardly moves.
+
+    ``m u + c int u = double int F + a + b t`` along each stretch (one integral less of a velocity, two of an
+    acceleration), by least squares. Zero for everything else.
+    """
+    part, wanted = prepared.record.part(*prepared.plan.fit), [key for key in ("m", "c") if key in model.values]
+    values, order = part[prepared.response], MOTIONS.index(prepared.response)
+    spans = list(zip((0, *part.joints), (*part.joints, len(part)), strict=True))
+    rows, targets = list[Floats](), list[Floats]()
+    for a, b in spans:
+        at = np.linspace(-1.0, 1.0, b - a)
+        target = part[FORCE][a:b]
+        for _ in range(2 - order):
+            target = part.dt * np.cumsum(target)
+        own = {"m": values[a:b], "c": part.dt * np.cumsum(values[a:b])}
+        columns = np.column_stack([*(own[key] for key in wanted), target])
+        unknown = np.vander(at, 3 - order)  # where the motion began, and how fast
+        left = columns - unknown @ np.linalg.lstsq(unknown, columns, rcond=None)[0]
+        rows.append(left[:, :-1])
+        targets.append(left[:, -1])
+    found = least_squares(np.concatenate(rows), np.concatenate(targets), 1e-9)
+    start = dict.fromkeys(model.values, 0.0) | dict(zip(wanted, found.tolist(), strict=True))
+    if not start.get("m", 0.0) > 0.0:
+        raise StudyError(f"force and {prepared.response} of {part.name!r} show no mass")
+    return start

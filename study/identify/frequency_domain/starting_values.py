@@ -12,7 +12,7 @@ import numpy as np
 from study.equations.model import Model, free
 from study.equations.terms import get
 from study.identify.frequency_domain import coefficients, conditioned
-from study.identify.frequency_domain.decay_start import along_the_motion, decay_start, scaled
+from study.identify.frequency_domain.decay_start import along_the_motion, decay_start, drift_start, scaled
 from study.identify.frequency_domain.inputs import histories, reverse_inputs, without_inertia
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS
@@ -48,6 +48,8 @@ def linear_start(model: Model, prepared: Prepared) -> dict[str, float]:
     coherence = np.clip(coherence, 0.0, 1.0 - 1e-6)
     by_chance = 1.0 - CHANCE ** (1.0 / max(matrix.averages - 1.0, 1.0))
     keep = (coherence > by_chance) & (g[:, 0, 0].real > FAINT * np.max(g[:, 0, 0].real))
+    if np.count_nonzero(keep) < 4 and "k" not in model.values and part.joints:
+        return drift_start(model, prepared)
     if np.count_nonzero(keep) < 4:
         if len(part) < SHORT:
             raise StudyError(
@@ -72,7 +74,15 @@ def oscillator(prepared: Prepared) -> dict[str, float]:
     """m, c and k of the best linear oscillator, whatever the model's terms are."""
     names = ("linear_damping", "linear_stiffness")
     names = names if prepared.response == FORCE else ("inertia", *names)
-    return linear_start(Model("linear", tuple(free(get(name)) for name in names)), prepared)
+    model = Model("linear", tuple(free(get(name)) for name in names))
+    try:
+        return linear_start(model, prepared)
+    except StudyError:
+        if not prepared.record.joints:
+            raise
+    drifting = drift_start(model.without_term("linear_stiffness"), prepared)
+    first, last = prepared.plan.fit
+    return drifting | {"k": drifting["m"] * (2.0 * np.pi / ((last - first) * prepared.dt)) ** 2}
 
 
 def reverse_start(model: Model, prepared: Prepared) -> dict[str, float]:
