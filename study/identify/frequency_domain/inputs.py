@@ -121,12 +121,15 @@ def history(item: Input, record: Record) -> Floats:
         bounds = pairwise((0, *record.joints, len(record)))
         return np.concatenate([history(item, _alone(record.part(a, b))) for a, b in bounds])
     if item.state is not None:
-        fine = np.column_stack([between_samples(x, 2 * STATE_STEPS) for x in data])
         states = np.empty(len(record))
-        kernels.integrate_state(
-            program.code, program.first, registers, positions, program.inputs["z"], int(output[0]),
-            record.dt / STATE_STEPS, STATE_STEPS, fine, states,
-        )  # fmt: skip
+        for steps in (STATE_STEPS, 4 * STATE_STEPS, 16 * STATE_STEPS):  # loops that close sharply ask for more
+            fine = np.column_stack([between_samples(x, 2 * steps) for x in data])
+            kernels.integrate_state(
+                program.code, program.first, registers, positions, program.inputs["z"], int(output[0]),
+                record.dt / steps, steps, fine, states,
+            )  # fmt: skip
+            if np.all(np.isfinite(states)):
+                break
         return _finite(states, item, record)
     table = np.column_stack(data) if data else np.zeros((len(record), 0))
     out = np.empty((len(record), 1))

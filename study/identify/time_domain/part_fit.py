@@ -11,11 +11,13 @@ from study.equations.model import Model
 from study.identify.time_domain.free_run_fit import WHITE, FreeRunFit, fit_free_run
 from study.records.prepared import Prepared
 from study.support.autoregression import whitened
+from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares
 from study.support.levenberg_marquardt import OFFSET
 from study.support.statistics import clustered_covariance
 
 Floats = NDArray[np.float64]
+FAR = 1e150  # a shift beyond all measure
 STEPS = 2  # Runge-Kutta steps in a sampling interval while a search compares models
 
 
@@ -75,7 +77,10 @@ def covariance_of(fit: FreeRunFit, jacobian: Floats) -> Floats:
 
 def integration_shift(fit: FreeRunFit, prepared: Prepared, jacobian: Floats) -> Floats:
     """By how much halving the steps would move the estimates, shape (keys + 2,), by one step of Gauss and Newton."""
-    coarse, fine = (run_of(fit, prepared, finer=n).respond({}, fit.initial)[0] for n in (1, 2))
+    try:
+        coarse, fine = (run_of(fit, prepared, finer=n).respond({}, fit.initial)[0] for n in (1, 2))
+    except DivergenceError:  # a motion that stays finite by the error of its integration alone
+        return np.full(jacobian.shape[1], FAR)
     return least_squares(whitened(jacobian, fit.noise), whitened(np.subtract(coarse, fine), fit.noise))
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
 from study.equations.model import Model, ModelTerm
+from study.equations.substeps import needed_steps
 from study.equations.term import Parameter, Term
 from study.identify.frequency_domain.starting_values import linear_start, oscillator
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -132,8 +133,11 @@ def sensitivity(
     """
     entry = ModelTerm(term, (0.0,) * len(term.components), parameters)
     model = base.fit.model.with_term(entry)
+    steps = base.fit.steps_per_sample
+    if prepared.response == FORCE:  # a loop that closes sharply asks for more than any motion would
+        steps = max(steps, needed_steps(model, prepared.record, FORCE))
     try:
-        run = run_of(replace(base.fit, model=model), prepared, term.symbols)
+        run = run_of(replace(base.fit, model=model, steps_per_sample=steps), prepared, term.symbols)
         _, added = run.respond(dict.fromkeys(term.symbols, 0.0), base.fit.initial)
     except StudyError:
         return None
