@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from study.commands.command import Command, number, whole
+from study.support.errors import expect
 
 if TYPE_CHECKING:
     from study.trials import Trial
@@ -29,6 +30,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--fault", default="none", metavar="NAME",
         help="a fault of the measurement, such as delay; 'any' for one in half of the seeds (default: none)",
     )  # fmt: skip
+    parser.add_argument(
+        "--test", metavar="KIND",
+        help="another kind of test than a force on mass and spring: free_decay, blows, base, component or axis",
+    )  # fmt: skip
     parser.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="folder (default: this one)")
 
 
@@ -39,6 +44,14 @@ def _run(arguments: argparse.Namespace) -> None:
         print(sealed.sentences(sealed.unseal(arguments.open)))
         return
     hidden, noise, response = _names(arguments.hidden), arguments.noise, arguments.response
+    if arguments.test is not None:
+        from study.trials.kinds import make_test
+
+        other = response is not None or arguments.fault != "none"
+        expect(not other, "--test draws no --response and no --fault; expected neither of them beside it")
+        trial = make_test(arguments.test, arguments.seed, hidden, noise)
+        print(_written(trial, *sealed.write(trial, arguments.out)))
+        return
     trial = make_trial(arguments.seed, hidden, noise, response, arguments.fault, WIDE)
     print(_written(trial, *sealed.write(trial, arguments.out)))
 
@@ -51,7 +64,7 @@ def _names(text: str | None) -> tuple[str, ...] | None:
 
 def _written(trial: "Trial", record: Path, model: Path, answer: Path) -> str:
     return (
-        f"{record}: force and {trial.response}, {len(trial.record)} samples at {trial.record.dt:.4g} s\n"
+        f"{record}: {' and '.join(trial.record.channels)}, {len(trial.record)} samples at {trial.record.dt:.4g} s\n"
         f"{model}: the model its owner believes in ({', '.join(t.name for t in trial.believed.terms)})\n"
         f"{answer}: the answer, sealed; 'study trial --open {answer}' shows it\n\n"
         f"Try: study diagnose {record} --model {model}"
@@ -62,6 +75,7 @@ COMMAND = Command(
     "trial", "write a record with a hidden effect, and its answer sealed apart",
     "study trial --seed 7\n  study trial --seed 7 --hidden quadratic_damping --noise 0.05 --out trials\n"
     "  study trial --seed 8 --fault any\n"
+    "  study trial --seed 9 --test free_decay\n"
     "  study trial --open trial_7.answer.json",
     _arguments, _run,
 )  # fmt: skip

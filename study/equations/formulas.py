@@ -21,6 +21,7 @@ FUNCTIONS = {
     "sign": (Op.SGN, 1),
     "sin": (Op.SIN, 1),
     "cos": (Op.COS, 1),
+    "tan": (Op.DIV, 1),  # of sine and cosine
     "exp": (Op.EXP, 1),
     "log": (Op.LOG, 1),
     "sqrt": (Op.SQRT, 1),
@@ -164,6 +165,8 @@ class _Builder:
         if len(tree.args) != arity or tree.keywords:
             raise self.refuse(f"calls {name!r} with {len(tree.args)} arguments; it takes {arity}")
         arguments = [self.node(argument) for argument in tree.args]
+        if name == "tan":
+            return self.graph.div(self.graph.unary(Op.SIN, arguments[0]), self.graph.unary(Op.COS, arguments[0]))
         if arity == 1:
             return self.graph.unary(op, arguments[0])
         return self.graph.binary(op, arguments[0], arguments[1])

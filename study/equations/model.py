@@ -130,14 +130,14 @@ class Model:
         missing = [key for key in self.values if key not in known]
         if missing:
             raise StudyError(f"model {self.name!r} gives no value for {', '.join(missing)}; a simulation needs all")
-        if not known.get("m", 0.0) > 0.0:
+        if "m" in known and not known["m"] > 0.0:
             raise StudyError(f"model {self.name!r} has the mass {known.get('m', 0.0):g}; it must be above zero")
         return known
 
 
 @dataclass(frozen=True)
 class ForwardGraph:
-    """A model's equation of motion solved for its acceleration.
+    """A model's equation of motion solved for its acceleration; without inertia, for the force.
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ class ForwardGraph:
         The nodes; inputs are ``u, v, t, force``, channels (``channel:temperature``), states
         ``z:term``, then every key.
     slopes : tuple of int
-        Nodes of the acceleration and of each state's derivative.
+        Nodes of the acceleration, or of the force of a model without inertia, and of each state's derivative.
     states : tuple of int
         Nodes of u, v and each state z: what ``slopes`` (after v) are the derivatives of.
     """
@@ -160,8 +160,6 @@ def forward_graph(model: Model, channels: tuple[str, ...] = ()) -> ForwardGraph:
 
     ``channels`` are those of the user's own terms (:func:`named_channels`), in the order of the drive.
     """
-    if "inertia" not in model:
-        raise StudyError(f"model {model.name!r} has no inertia; a free run needs it")
     graph = Graph()
     fixed = {name: graph.input(name) for name in FIXED_INPUTS}
     measured = {name: graph.input(f"channel:{name}") for name in channels}
@@ -181,8 +179,18 @@ def forward_graph(model: Model, channels: tuple[str, ...] = ()) -> ForwardGraph:
             if component.order < 2:
                 unit = _unit_force(graph, component, names, rate)
                 force = graph.add(force, graph.mul(keys[component.symbol], unit))
-    acceleration = graph.div(graph.sub(fixed["force"], force), keys["m"])
-    return ForwardGraph(graph, (acceleration, *rates), (fixed["u"], fixed["v"], *states.values()))
+    slope = graph.div(graph.sub(fixed["force"], force), keys["m"]) if "inertia" in model else force
+    return ForwardGraph(graph, (slope, *rates), (fixed["u"], fixed["v"], *states.values()))
+
+
+def has_spring(model: Model) -> bool:
+    """Whether any force of a model depends on the displacement itself, and so brings its mass back or pushes it away.
+
+    What a term remembers of the motion is no spring: it gives way.
+    """
+    forward = forward_graph(model, model.channels)
+    place = forward.states[0]
+    return any(forward.graph.constant_value(forward.graph.derivative(s, place)) != 0.0 for s in forward.slopes)
 
 
 def named_channels(model: Model, available: Collection[str]) -> tuple[str, ...]:
@@ -225,6 +233,8 @@ def _unit_force(graph: Graph, component: Component, names: Mapping[str, int], ra
 
 def forward_program(model: Model, channels: tuple[str, ...] = ()) -> Program:
     """The program of a model whose values are all known, with the values in their registers."""
+    if "inertia" not in model:
+        raise StudyError(f"model {model.name!r} has no inertia; a simulation needs it")
     values, forward = model.numbers(), forward_graph(model, channels)
     return with_registers(forward.graph.program(forward.slopes), values)
 

@@ -6,6 +6,8 @@ What a file is is told by its content first and its name second. Packages for a 
 import warnings
 from pathlib import Path
 
+import numpy as np
+
 from study.records.readers import hdf5, matlab, parquet, uff
 from study.records.readers.assemble import record_from
 from study.records.readers.options import ReadOptions, assignments, beside, read_options
@@ -61,7 +63,8 @@ def read_record(path: Path, mapping: ReadOptions | None = None) -> Record:
             options = options.over(read_options(beside(path)))
         table = _table(path, source, head, options)
     record = record_from(path, table, options)
-    suspicion = None if options.accept_swapped else suspect_swapped(record)
+    unforced = not np.any(record["force"])
+    suspicion = None if options.accept_swapped or unforced else suspect_swapped(record)
     if suspicion is not None:
         raise StudyError(f"{path}: {suspicion}")
     return record
