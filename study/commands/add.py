@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from study.commands import structures
 from study.commands.command import Command, progress
 from study.commands.record_arguments import (
     accounted_for,
@@ -24,6 +25,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", type=Path, help="model file (YAML); the term is added to it")
     parser.add_argument("term", help="an effect of the library, or a name for your own with --force")
     parser.add_argument("--force", metavar="FORMULA", help="formula of your own effect, such as 'u*abs(u)'")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--between", nargs=2, metavar="PLACE", help="of a structure: two coordinates, or 'ground' and one")
+    where.add_argument("--at", metavar="COORDINATE", help="of a structure: the coordinate that it acts on")
     parser.add_argument("--data", dest="records", type=Path, nargs="+", required=True, metavar="RECORD")
     add_reading_arguments(parser)
     add_out_argument(parser)
@@ -38,8 +42,11 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.support.file_sets import write_files
 
     folder = out_folder(arguments)
-    term = _term(arguments)
     model = read_model(arguments.model)
+    if model.coordinates:
+        structures.add(arguments, model)
+        return
+    term = _term(arguments)
     _refuse_second(arguments.model, model, term)
     steps = history.read(arguments.model)
     records = read_records(arguments)
@@ -83,6 +90,7 @@ def _refuse_second(path: Path, model: "Model", term: "Term") -> None:
 COMMAND = Command(
     "add", "add an effect, fit again: error before and after",
     "study add rig.yaml quadratic_damping --data rig.csv\n"
-    "  study add rig.yaml bracket --force \"u*abs(u)\" --data rig.csv",
+    "  study add rig.yaml bracket --force \"u*abs(u)\" --data rig.csv\n"
+    "  study add frame.yaml one_sided_contact --between floor2 floor3 --data frame.csv",
     _arguments, _run,
 )  # fmt: skip

@@ -14,7 +14,7 @@ import numpy as np
 from study.equations.model import Model
 from study.records.record import MOTIONS
 from study.records.spectra import Segments, cross_spectra
-from study.structure.mass_matrix import linear_keys, patterns
+from study.structure.mass_matrix import linear_keys, matrices, patterns
 from study.structure.prepared_structure import PreparedStructure
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError, expect
@@ -25,8 +25,9 @@ FAINT, CHANCE = 1e-3, 0.01  # as for a single coordinate: share of the strongest
 LONGEST, SHARE = 2048, 6  # samples in a segment at most, and parts of the record
 LINES = 300  # at most
 CLEAN = 1e-4  # share of a response that counts as its error at least, where there is no noise
-POOR = 0.1  # share of the responses' power: a search that leaves more has ended at a local minimum
-ROUNDS, STARTS, TRIALS = 6, 40, 40  # weighted solutions; structures drawn where sensors are missing; runs of a search
+POOR = 0.01  # share of the responses' power: a search that leaves more has ended at a local minimum
+ROUNDS, TRIALS = 6, 40  # weighted solutions; runs of a search
+DRAWN, STARTS, BATCH = 200, 40, 10  # structures drawn; those that start a search, so many at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,11 +117,11 @@ class _Linear:
         jacobian = slopes.reshape(len(x), -1).T
         return point_at(x, _real(residual.ravel()), _real(jacobian), len(x), (0,))
 
-    def rounds(self) -> Floats | None:
-        """Weighted solutions of ``Z H = B``; None where a coordinate has no sensor."""
+    def rounds(self) -> list[Floats]:
+        """Solutions of ``Z H = B``, each weighted with the one before; none where a coordinate has no sensor."""
         n = self.force.shape[0]
         if sorted(self.rows) != list(range(n)):
-            return None
+            return []
         place = np.argsort(self.rows)
         motion = (self.measured / self.order[:, :, None])[:, place]
         weight = (np.abs(self.order)[:, :, None] / self.error)[:, place]
@@ -128,13 +129,14 @@ class _Linear:
         target = self.force - self.held @ motion
         size = np.sqrt(np.mean(np.abs(columns) ** 2, axis=(0, 2, 3))) * np.mean(1.0 / weight / np.abs(motion), axis=(1, 2))
         left: Complexes = np.broadcast_to(np.eye(n), self.held.shape) / size[:, None, None]
-        x = np.zeros(len(columns))
+        found: list[Floats] = []
         for k in range(ROUNDS):
             w = weight if k else np.ones_like(weight)
             design = _real(np.einsum("fij,kfjm->kfim", left, columns) * w).reshape(len(columns), -1).T
             x = least_squares(design, _real((left @ target) * w).ravel())
+            found.append(np.where([i in self.heavy for i in range(len(x))], np.abs(x), x))
             left = np.linalg.inv(self.stiffness(x))
-        return x
+        return found
 
 
 def _real(values: Complexes) -> Floats:
@@ -175,16 +177,29 @@ def linear_start(model: Model, prepared: PreparedStructure, held: Mapping[str, f
     problem, free = _problem(model, prepared, held)
     if not free:
         return {}
-    ends: list[End] = []
-    first = problem.rounds()
-    if first is not None:
-        ends += _searched(problem, np.where([i in problem.heavy for i in range(len(first))], np.abs(first), first))
+    points = [point for x in problem.rounds() if (point := problem.point(x)) is not None]
+    nearest = sorted(points, key=lambda point: point.cost)[:2]
+    ends = [end for point in nearest for end in _searched(problem, point.x)]
     if not any(_follows(problem, end) for end in ends):
-        ends += [end for x in _drawn(model, problem, free, held) for end in _searched(problem, x)]
+        drawn = [point for x in _drawn(model, problem, free, held) if (point := problem.point(x)) is not None]
+        drawn.sort(key=lambda point: point.cost)
+        for first in range(0, STARTS, BATCH):
+            ends += [end for point in drawn[first : first + BATCH] for end in _searched(problem, point.x)]
+            if any(_follows(problem, end) for end in ends):
+                break
     if not ends:
         raise StudyError(f"no structure like {model.name!r} responds as {prepared.record.name!r} does")
-    best = min(ends, key=lambda end: end.point.cost)
-    return dict(zip(free, best.point.x.tolist(), strict=True))
+    structures = [(dict(zip(free, end.point.x.tolist(), strict=True)), end.point.cost) for end in ends]
+    return min(structures, key=lambda item: (not _comes_to_rest(model, {**held, **item[0]}), item[1]))[0]
+
+
+def _comes_to_rest(model: Model, values: Mapping[str, float]) -> bool:
+    """Whether the motion dies away when nothing drives it: that of others grows without end in a free run."""
+    stiffness, damping, mass = matrices(model, values)
+    n, inverse = len(mass), np.linalg.inv(mass)
+    system = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ stiffness, -inverse @ damping]])
+    roots = np.linalg.eigvals(system)
+    return bool(np.all(roots.real <= 1e-6 * np.max(np.abs(roots))))
 
 
 def _follows(problem: _Linear, end: End) -> bool:
@@ -204,7 +219,7 @@ def _drawn(model: Model, problem: _Linear, free: list[str], held: Mapping[str, f
     orders = linear_keys(model)
     strength = np.sum(np.abs(problem.measured / problem.order[:, :, None]) ** 2, axis=(1, 2))
     found: list[Floats] = []
-    for _ in range(STARTS):
+    for _ in range(DRAWN):
         rate = float(rng.choice(problem.omega, p=strength / np.sum(strength))) * float(np.exp(rng.uniform(0.0, 1.0)))
         base = {2: 1.0, 1: 0.04 * rate, 0: rate**2}
         x = np.array([base[orders[key]] * np.exp(0.7 * rng.standard_normal()) for key in free])

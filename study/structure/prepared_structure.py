@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from study.equations.model import Model
-from study.records.completion import complete
+from study.records.completion import CompletedRecord, complete
 from study.records.plan import FEWEST
 from study.records.record import MOTIONS, Record
 from study.structure.structure_record import Sensor, StructureRecord
@@ -36,6 +36,7 @@ class PreparedStructure:
     fit: tuple[int, int]
     judge: tuple[int, int]
     notes: tuple[str, ...] = ()
+    cutoff: float | None = None  # hertz: accelerations are integrated above it
 
     @property
     def dt(self) -> float:
@@ -67,9 +68,10 @@ class PreparedStructure:
         """Samples at each end that derivatives and integrals leave uncertain."""
         return max(self._completed(s.coordinate).edge for s in self.sensors)
 
-    def _completed(self, coordinate: str):  # noqa: ANN202
+    def _completed(self, coordinate: str) -> CompletedRecord:
         channels = {s.motion: x for s, x in self.record.motions.items() if s.coordinate == coordinate}
-        return complete(Record(self.dt, {"force": np.zeros(len(self.record)), **channels}, name=self.record.name))
+        still = np.zeros(len(self.record))
+        return complete(Record(self.dt, {"force": still, **channels}, name=self.record.name), self.cutoff)
 
     def _motion(self, coordinate: str) -> Floats:
         record = self._completed(coordinate).record
@@ -84,7 +86,8 @@ class PreparedStructure:
 
 
 def prepare_structure(
-    record: StructureRecord, model: Model, fit: tuple[int, int] | None = None, judge: tuple[int, int] | None = None
+    record: StructureRecord, model: Model, fit: tuple[int, int] | None = None, judge: tuple[int, int] | None = None,
+    cutoff: float | None = None,
 ) -> PreparedStructure:
     """Choose sensors and parts: the first half is fitted and the second judged by default.
 
@@ -104,8 +107,8 @@ def prepare_structure(
     sensors = tuple(first_of[c] for c in model.coordinates if c in first_of)
     blind = [c for c in model.coordinates if c not in first_of]
     _check_tied(model, blind)
-    notes = (f"no sensor is at {' and '.join(blind)}: the free run has its motion, the reverse system lacks it",) if blind else ()
-    return PreparedStructure(record, sensors, fit, judge, notes)
+    lacks = f"no sensor is at {' and '.join(blind)}: the free run has its motion, the reverse system lacks it"
+    return PreparedStructure(record, sensors, fit, judge, (lacks,) if blind else (), cutoff)
 
 
 def _check_tied(model: Model, blind: Sequence[str]) -> None:
