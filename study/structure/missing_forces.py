@@ -12,6 +12,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from study.compare.force_map import Curve, curve
+from study.compare.noise import SIGNIFICANT
 from study.equations import kernels
 from study.equations.model import Model, ModelTerm
 from study.equations.place import Place
@@ -129,10 +130,13 @@ def corrected_motion(
 
 
 def _above_noise(values: Floats, dt: float, low: float) -> Floats:
-    """Values in those bands where their density stands above that of white noise, shape (n,)."""
+    """Values in those bands where their density stands above that of white noise; none if noise alone would do."""
+    floor = noise_floor.floor(values, dt, low)
+    if floor.significance <= SIGNIFICANT:
+        return np.zeros_like(values)
     cut = Segments(length=max(32, min(1024, 2 ** int(np.log2(len(values) / 8)))))
     frequency, density = autospectrum(values, dt, cut)
-    white = noise_floor.floor(values, dt, low).noise ** 2 / (0.5 / dt - low)
+    white = floor.noise**2 / (0.5 / dt - low)
     smooth = np.convolve(np.pad(density, SMOOTH // 2, mode="edge"), np.ones(SMOOTH) / SMOOTH, "valid")
     limit = white * (1.0 + CLEAR / np.sqrt(cut.effective_averages(len(values)) * SMOOTH / cut.line_inflation()))
     gate = (smooth > limit) & (frequency >= low)

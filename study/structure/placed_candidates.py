@@ -4,8 +4,11 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
-from study.equations import formulas
-from study.equations.model import Model, ModelTerm, free
+import numpy as np
+
+from study.equations import formulas, kernels
+from study.equations.graph import Graph, Program
+from study.equations.model import Model, ModelTerm, free, with_registers
 from study.equations.place import Place
 from study.equations.term import Term
 from study.equations.terms import LIBRARY
@@ -58,6 +61,27 @@ def external(term: Term) -> bool:
     return not any({"u", "v"} & set(formulas.names(text)) for text in texts)
 
 
+def one_sided(term: Term) -> bool:
+    """Whether its force at the opposite motion is neither the same nor the opposite: it matters which end is second."""
+    values = {p.name: 0.3 for p in term.parameters}
+    motions = np.array([[0.7, 0.4], [1.3, -0.6], [0.2, 1.1]])
+    for component in term.components:
+        graph = Graph()
+        nodes = {n: graph.input(n) for n in ("u", "v", "t", "z", *values, *term.channels)}
+        program = graph.program([formulas.build(graph, component.shape, nodes)])
+        forces = [_value(program, {**values, "u": s * u, "v": s * v, "z": s * u}) for u, v in motions for s in (1.0, -1.0)]
+        if any(abs(abs(a) - abs(b)) > 1e-9 for a, b in zip(forces[::2], forces[1::2], strict=True)):
+            return True
+    return False
+
+
+def _value(program: Program, values: dict[str, float]) -> float:
+    known = {name: values.get(name, 0.3) for name in program.inputs}
+    registers = with_registers(program, known).registers.copy()
+    kernels.run(program.code, program.first, registers)
+    return float(registers[program.outputs[0]])
+
+
 def candidate_entries(model: Model, extra: Sequence[Term] = (), without: Sequence[str] = ()) -> list[ModelTerm]:
     """Every effect at every place where the model does not have it.
 
@@ -68,7 +92,7 @@ def candidate_entries(model: Model, extra: Sequence[Term] = (), without: Sequenc
     found: list[ModelTerm] = []
     for term in effects:
         places = [Place("at", (c,)) for c in model.coordinates] if external(term) else connections(model)
-        sided = any(p.search.kind == "quantiles of u" for p in term.parameters)
+        sided = not external(term) and one_sided(term)
         for place in places:
             if (term.name, place.path) not in known:
                 found.append(free(term, place))

@@ -1,9 +1,11 @@
-"""What a term at a place would explain: the residual of a free run against the response that the term would add.
+"""What a term at a place would explain, by the reverse system of all coordinates.
 
-A small force along the motion passes through the linear approximation of the structure to all sensors; what the
-model's own coefficients and initial state could do is taken out. The motion is that of the free run with what the
-sensors show above their noise, as the reverse system has it, so that the force is near its true one even where the
-model lacks much. The best points start fits in free run.
+With the linear part Z of the fitted structure, its nonlinear forces N and the measured motion x, ``B F - Z x - N(x)`` is
+what the equations leave. Any force that is missing, and any change of a coefficient, is a known history along x times
+an unknown amount, and linear least squares find the amounts, however much the model lacks. Everything is passed through
+Z^-1 to the sensors first, where noise is what it was on the motion (the equations of a place and of its other end are
+one regression: action equals reaction). The motion is that of the free run with what the sensors show above their
+noise; where a sensor is missing it is the free run's. The best points start fits in free run.
 """
 
 from collections.abc import Sequence
@@ -18,7 +20,7 @@ from study.equations.term import Parameter, Term
 from study.identify.frequency_domain.inputs import history
 from study.identify.time_domain.shape_search import highest_lines
 from study.records.record import MOTIONS, Record
-from study.structure.mass_matrix import LINEAR, matrices
+from study.structure.mass_matrix import LINEAR, linear_keys, matrices, patterns
 from study.structure.missing_forces import corrected_motion, placed_inputs, relative_record
 from study.structure.places import transfer
 from study.structure.prepared_structure import PreparedStructure
@@ -31,6 +33,7 @@ from study.support.least_squares import least_squares
 
 TRIED, KEPT = 15, 40  # free runs of a fit that tries a start, and of one that is kept
 NEAR = 0.01  # standard errors: as near a minimum as the fit of a search has to come
+CUTOFF = 1e-8  # of the largest singular value
 STARTS = 3  # points of the search that start a fit
 
 
@@ -44,44 +47,60 @@ class PlacedBaseline:
         The fit.
     prepared : PreparedStructure
         The record, with as much to fit as a search uses.
-    jacobian : array, shape (n s, keys + states)
-        Derivatives, weighted as the residual, sensors of one time side by side.
-    basis : array, shape (n s, p)
-        Orthonormal basis of these.
     motion : array, shape (3, n, c)
         Displacement, velocity and acceleration of all coordinates.
-    transfer : complex array, shape (lines, s, c)
+    paths : complex array, shape (lines, s, c)
         From a force on each coordinate to each sensor, on the lines of a transform of ``size`` samples.
     size : int
         With room for the response to die away.
+    columns : array, shape (n s, keys + states)
+        What a unit of each key, and of the initial state, adds to the sensors, weighted as the residual, sensors of one
+        time side by side.
+    basis : array, shape (n s, p)
+        Orthonormal basis of these.
+    violated : array, shape (n s,)
+        What the equations leave, passed to the sensors.
+    residual : array, shape (n s,)
+        The same less what the model's own coefficients could do.
     """
 
     fit: StructureFit
     prepared: PreparedStructure
-    jacobian: Floats
-    basis: Floats
-    residual: Floats
     motion: Floats
-    transfer: Complexes
+    paths: Complexes
     size: int
+    columns: Floats
+    basis: Floats
+    violated: Floats
+    residual: Floats
+
+    def passed(self, place: Place, forces: Sequence[Complexes]) -> Floats:
+        """What forces at a place, given by their lines, add to the sensors, shape (n s, forces)."""
+        return _passed(self.fit, self.paths, self.size, place, forces)
 
     def added(self, place: Place, forces: Sequence[Complexes]) -> Floats:
-        """What forces at a place, given by their lines, add to the sensors and the model cannot, (n s, forces)."""
-        e = np.array(place.direction(self.fit.model.coordinates))
-        path = -(self.transfer @ e)
-        n = len(self.fit.residual)
-        columns = np.stack([irfft(path * f[:, None], self.size, axis=0)[:n] for f in forces], axis=2)
-        weighted = flat(self.fit, columns)
-        return weighted - self.basis @ (self.basis.T @ weighted)
+        """The same less what the model's own coefficients could do."""
+        columns = self.passed(place, forces)
+        return columns - self.basis @ (self.basis.T @ columns)
 
     def lines(self, values: Floats) -> Complexes:
-        """Transform of a force along the fitting part."""
-        return np.asarray(rfft(values, self.size), dtype=np.complex128)
+        """Transform of forces along the fitting part, samples along the first axis."""
+        return np.asarray(rfft(values, self.size, axis=0), dtype=np.complex128)
+
+    def dated(self, record: Record) -> Record:
+        """A relative motion with the time at which it was."""
+        return replace(record, start=self.prepared.record.start + self.fit.first * self.prepared.dt)
 
     @property
     def omega(self) -> Complexes:
         """``j 2 pi f`` of the lines."""
         return np.asarray(2j * np.pi * rfftfreq(self.size, self.prepared.dt), dtype=np.complex128)
+
+
+def _passed(fit: StructureFit, paths: Complexes, size: int, place: Place, forces: Sequence[Complexes]) -> Floats:
+    e = np.array(place.direction(fit.model.coordinates))
+    path, n = -(paths @ e), len(fit.residual)
+    return flat(fit, np.stack([irfft(path * f[:, None], size, axis=0)[:n] for f in forces], axis=2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,38 +116,64 @@ class PlacedStart:
 
 def placed_baseline(fit: StructureFit, prepared: PreparedStructure) -> PlacedBaseline:
     """Prepare a fitted structure for the search."""
-    jacobian = flat(fit, linearise(fit, prepared))
-    scale = np.linalg.norm(jacobian, axis=0)
-    basis = np.linalg.qr(jacobian / np.where(scale > 0.0, scale, 1.0))[0]
-    coordinates = fit.model.coordinates
-    wanted = tuple(Sensor(c, m) for m in MOTIONS for c in coordinates)
-    run = prepare_run(fit.model, prepared.record, sensors=wanted, steps_per_sample=fit.steps, span=fit.span)
-    motion = corrected_motion(run.respond({}, fit.initial)[0].T, fit.residual, prepared, coordinates)
+    model = fit.model
+    wanted = tuple(Sensor(c, m) for m in MOTIONS for c in model.coordinates)
+    run = prepare_run(model, prepared.record, sensors=wanted, steps_per_sample=fit.steps, span=fit.span)
+    free = run.respond({}, fit.initial)[0].T
+    motion = corrected_motion(free, fit.residual, prepared, model.coordinates)
     size = next_fast_len(2 * len(fit.residual), real=True)
-    paths = transfer(_approximation(fit, prepared), prepared.sensors, coordinates, prepared.dt, size)
-    return PlacedBaseline(fit, prepared, jacobian, basis, flat(fit, fit.residual), motion, paths, size)
+    paths = transfer(matrices(model, model.numbers()), prepared.sensors, model.coordinates, prepared.dt, size)
+    left = flat(fit, fit.residual)
+    bare = PlacedBaseline(fit, prepared, motion, paths, size, free, free, left, left)
+    columns = flat(fit, linearise(fit, prepared))  # right for the initial state and for shape parameters
+    for i, column in _own_columns(bare).items():
+        columns[:, i] = column
+    scale = np.linalg.norm(columns, axis=0)
+    basis = np.linalg.qr(columns / np.where(scale > 0.0, scale, 1.0))[0]
+    violated = left - _drifted(bare, free)
+    residual = violated - basis @ (basis.T @ violated)
+    return replace(bare, columns=columns, basis=basis, violated=violated, residual=residual)
 
 
-def _approximation(fit: StructureFit, prepared: PreparedStructure) -> Floats:
-    """Stiffness, damping and mass of the structure, or of the best linear one where it is not linear."""
-    from study.structure.structure_start import known_linear
+def _own_columns(base: PlacedBaseline) -> dict[int, Floats]:
+    """What a unit of each estimated coefficient of the model adds along the motion, by the number of its key."""
+    fit, model = base.fit, base.fit.model
+    found: dict[int, Floats] = {}
+    own, orders, n = patterns(model), linear_keys(model), len(fit.residual)
+    for key in orders:
+        if key in fit.keys:
+            force = base.lines(base.motion[orders[key]] @ own[key])
+            column = irfft(-np.einsum("fsc,fc->fs", base.paths, force), base.size, axis=0)[:n]
+            found[fit.keys.index(key)] = flat(fit, column)
+    for entry in model.terms:
+        if entry.place is None or not set(entry.symbols) & set(fit.keys) or entry.symbols[0] in orders:
+            continue
+        record = base.dated(relative_record(entry.place, model, base.motion, base.prepared.dt))
+        columns = base.passed(entry.place, unit_lines(entry, record, base))
+        found |= {fit.keys.index(k): columns[:, i] for i, k in enumerate(entry.symbols) if k in fit.keys}
+    return found
 
-    terms = tuple(t for t in fit.model.terms if t.term.name in LINEAR)
-    if len(terms) < len(fit.model.terms):
-        held = {key: None for key in fit.keys}
-        linear = replace(fit.model, terms=terms).with_values(held)
-        try:
-            return matrices(linear, known_linear(linear, prepared))
-        except (StudyError, np.linalg.LinAlgError):
-            pass
-    return matrices(fit.model, fit.model.numbers())
+
+def _drifted(base: PlacedBaseline, free: Floats) -> Floats:
+    """By how much the model's nonlinear forces along the measured motion differ from those along its free run."""
+    model = base.fit.model
+    total = np.zeros_like(base.residual)
+    run = free.reshape(len(free), len(MOTIONS), -1).transpose(1, 0, 2)
+    for entry in model.terms:
+        if entry.term.name in LINEAR or entry.place is None:
+            continue
+        there, here = (
+            base.passed(entry.place, unit_lines(entry, base.dated(relative_record(entry.place, model, m, base.prepared.dt)), base))
+            for m in (base.motion, run)
+        )
+        total += (there - here) @ np.array([c or 0.0 for c in entry.coefficients])
+    return total
 
 
 def starts(term: Term, place: Place, base: PlacedBaseline, given: ModelTerm | None = None) -> list[PlacedStart]:
     """Points of the search over a term's shape parameters, best first; ``given`` are those that are known."""
     model = base.fit.model
-    record = relative_record(place, model, base.motion, base.prepared.dt)
-    record = replace(record, start=base.prepared.record.start + base.fit.first * base.prepared.dt)
+    record = base.dated(relative_record(place, model, base.motion, base.prepared.dt))
     known = given.parameters if given is not None else (None,) * len(term.parameters)
     found = [_try(term, place, point, record, base) for point in _grid(term, place, record["displacement"], base, known)]
     return sorted((p for p in found if p is not None), key=lambda p: -p.share)
@@ -143,7 +188,7 @@ def _try(term: Term, place: Place, point: tuple[float, ...], record: Record, bas
     added = base.added(place, forces)
     if not np.all(np.isfinite(added)) or not np.any(added):
         return None
-    amounts = least_squares(added, base.residual, 1e-8)
+    amounts = least_squares(added, base.residual, CUTOFF)
     power = float(base.residual @ base.residual)
     share = 1.0 - float(np.sum((base.residual - added @ amounts) ** 2)) / power if power > 0.0 else 0.0
     return PlacedStart(term, place, point, tuple(amounts.tolist()), share)
@@ -209,7 +254,7 @@ def _modulation_lines(u: Floats, place: Place, base: PlacedBaseline) -> Floats:
     """Lines at which a stiffness of this place that varies with time would explain most, by a matched filter."""
     n = len(u)
     e = np.array(place.direction(base.fit.model.coordinates))
-    path = (base.transfer @ e) / base.fit.noise.deviation
+    path = (base.paths @ e) / base.fit.noise.deviation
     residual = base.residual.reshape(n, -1)
     matched = irfft(np.sum(np.conj(path) * rfft(residual, base.size, axis=0), axis=1), base.size)[:n]
     numerator = np.abs(_windowed(matched * u)) ** 2
@@ -241,11 +286,11 @@ def with_placed_term(
     fits: list[StructureFit] = []
     for point in tried:
         own = dict(zip(entry.keys, (*point.coefficients, *point.parameters), strict=True)) | given
-        for start in (own | _moved(base, entry, point), own | dict.fromkeys(set(entry.symbols) - set(given), 0.0)):
-            found = _tried(grown.with_values(start), prepared, (*held, *shapes), fit, TRIED)
-            if found is not None:
-                fits.append(found)
-                break
+        begun = [own | _moved(base, entry, point) | given]
+        if point is tried[0] or not fits:  # and from where the model stands, which a false step cannot lead astray
+            begun.append(own | dict.fromkeys(entry.symbols, 0.0) | given)
+        found = [_tried(grown.with_values(start), prepared, (*held, *shapes), fit, TRIED) for start in begun]
+        fits += [f for f in found if f is not None]
     if not fits:
         raise StudyError(f"no values of {', '.join(entry.keys)} let {entry.name} follow {prepared.record.name}")
     best = min(fits, key=lambda f: f.cost)
@@ -255,15 +300,13 @@ def with_placed_term(
 
 
 def _moved(base: PlacedBaseline, entry: ModelTerm, point: PlacedStart) -> dict[str, float]:
-    """Where the model's own coefficients go beside so much of a term, by one step of Gauss and Newton."""
+    """Coefficients of the model beside so much of a term, from the reverse system."""
+    known = replace(entry, coefficients=point.coefficients, parameters=point.parameters, place=point.place)
     record = relative_record(point.place, base.fit.model, base.motion, base.prepared.dt)
-    record = replace(record, start=base.prepared.record.start + base.fit.first * base.prepared.dt)
-    known = ModelTerm(entry.term, point.coefficients, point.parameters)
-    e = np.array(point.place.direction(base.fit.model.coordinates))
-    force = np.sum([c * f for c, f in zip(point.coefficients, unit_lines(known, record, base), strict=True)], axis=0)
-    n = len(base.fit.residual)
-    column = irfft(-(base.transfer @ e) * force[:, None], base.size, axis=0)[:n]
-    step = least_squares(base.jacobian, base.residual - flat(base.fit, column))
+    force = np.sum(
+        [c * f for c, f in zip(point.coefficients, unit_lines(known, base.dated(record), base), strict=True)], axis=0
+    )
+    step = least_squares(base.columns, base.violated - base.passed(point.place, [force])[:, 0], CUTOFF)
     return dict(zip(base.fit.keys, (base.fit.values + step[: len(base.fit.keys)]).tolist(), strict=True))
 
 
