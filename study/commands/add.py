@@ -26,7 +26,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("term", help="an effect of the library, or a name for your own with --force")
     parser.add_argument("--force", metavar="FORMULA", help="formula of your own effect, such as 'u*abs(u)'")
     where = parser.add_mutually_exclusive_group()
-    where.add_argument("--between", nargs=2, metavar="PLACE", help="of a structure: two coordinates, or 'ground' and one")
+    where.add_argument(
+        "--between", nargs=2, metavar="PLACE", help="of a structure: two coordinates, or 'ground' and one"
+    )
     where.add_argument("--at", metavar="COORDINATE", help="of a structure: the coordinate that it acts on")
     parser.add_argument("--data", dest="records", type=Path, nargs="+", required=True, metavar="RECORD")
     add_reading_arguments(parser)

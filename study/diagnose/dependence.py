@@ -162,6 +162,7 @@ def relaxed(steps: Floats, kept: float) -> Floats:
 
 
 def hysteretic(steps: Floats, beta: float) -> Floats:
+    """A Bouc-Wen state along a motion's steps, no larger than one over ``beta``, shape (n,)."""
     state, z = np.zeros_like(steps), 0.0
     for i, step in enumerate(steps.tolist()):
         z = min(max(z + step - beta * abs(step) * z, -1.0 / beta), 1.0 / beta)

@@ -29,7 +29,9 @@ def decay_start(model: Model, prepared: PreparedStructure, held: Mapping[str, fl
     expect(not open_masses, sentence)
     lacking = ", ".join(c for c in model.coordinates if c not in prepared.complete)
     if lacking:
-        raise StudyError(f"nothing drives {model.name!r} and no sensor is at {lacking}; expected one at each coordinate")
+        raise StudyError(
+            f"nothing drives {model.name!r} and no sensor is at {lacking}; expected one at each coordinate"
+        )
     first, last = max(prepared.fit[0], prepared.edge), min(prepared.fit[1], len(prepared.record) - prepared.edge)
     motion = np.stack([prepared.complete[c][:, first:last] for c in model.coordinates], axis=1)  # (3, n, samples)
     weight = 1.0 / np.std(motion[2], axis=1)

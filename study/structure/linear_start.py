@@ -127,7 +127,9 @@ class _Linear:
         weight = (np.abs(self.order)[:, :, None] / self.error)[:, place]
         columns = np.einsum("kfij,fjm->kfim", self.units, motion)
         target = self.force - self.held @ motion
-        size = np.sqrt(np.mean(np.abs(columns) ** 2, axis=(0, 2, 3))) * np.mean(1.0 / weight / np.abs(motion), axis=(1, 2))
+        size = np.sqrt(np.mean(np.abs(columns) ** 2, axis=(0, 2, 3))) * np.mean(
+            1.0 / weight / np.abs(motion), axis=(1, 2)
+        )
         left: Complexes = np.broadcast_to(np.eye(n), self.held.shape) / size[:, None, None]
         found: list[Floats] = []
         for k in range(ROUNDS):

@@ -142,7 +142,8 @@ def _above_noise(values: Floats, dt: float, low: float) -> Floats:
     gate = (smooth > limit) & (frequency >= low)
     size = next_fast_len(2 * len(values), real=True)
     weight = np.interp(rfftfreq(size, dt), frequency, gate.astype(np.float64))
-    return np.asarray(irfft(rfft(values, size) * weight, size)[: len(values)], dtype=np.float64)
+    lines = np.asarray(rfft(values, size), dtype=np.complex128)
+    return np.asarray(irfft(lines * weight, size), dtype=np.float64)[: len(values)]
 
 
 def unbalanced_forces(model: Model, motion: Floats, prediction: StructurePrediction) -> tuple[Floats, Floats]:
@@ -180,9 +181,10 @@ def placed_inputs(entry: ModelTerm) -> tuple[Input, ...]:
 
 
 def relative_record(place: Place | None, model: Model, motion: Floats, dt: float) -> Record:
-    """The relative motion at a place as a record of a single coordinate; motion of shape (2 or 3, samples, coordinates)."""
+    """Relative motion at a place as a record of a single coordinate; ``motion`` as :func:`corrected_motion` has it."""
     assert place is not None, "every term of a structure has a place"
-    along = motion[:2] @ np.array(place.direction(model.coordinates))
+    e = np.array(place.direction(model.coordinates))
+    along: Floats = np.asarray(motion[:2] @ e, dtype=np.float64)
     return Record(dt, {"force": np.zeros(along.shape[1]), "displacement": along[0], "velocity": along[1]})
 
 
@@ -210,9 +212,7 @@ def _aligned(model: Model, prediction: StructurePrediction) -> tuple[tuple[Place
     return tuple(sorted(found, key=lambda item: -item[1]))
 
 
-def _maps(
-    places: Sequence[Place], names: list[str], displacement: Floats, residual: Floats
-) -> dict[str, Curve]:
+def _maps(places: Sequence[Place], names: list[str], displacement: Floats, residual: Floats) -> dict[str, Curve]:
     """Missing restoring force over relative displacement of each place, as the two equations that it is in have it."""
     found: dict[str, Curve] = {}
     for place in places:

@@ -95,7 +95,7 @@ def _roots(stiffness: Floats, damping: Floats, mass: Floats, omega: Floats) -> t
     n = len(mass)
     inverse = np.linalg.inv(mass)
     system = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ stiffness, -inverse @ damping]])
-    values, vectors = np.linalg.eig(system)
+    values, vectors = (np.asarray(x, dtype=np.complex128) for x in np.linalg.eig(system))
     chosen: list[int] = []
     for w in omega:
         upper = np.where(values.imag >= 0.0, np.abs(values - 1j * w), np.inf)

@@ -69,7 +69,9 @@ def one_sided(term: Term) -> bool:
         graph = Graph()
         nodes = {n: graph.input(n) for n in ("u", "v", "t", "z", *values, *term.channels)}
         program = graph.program([formulas.build(graph, component.shape, nodes)])
-        forces = [_value(program, {**values, "u": s * u, "v": s * v, "z": s * u}) for u, v in motions for s in (1.0, -1.0)]
+        forces = [
+            _value(program, {**values, "u": s * u, "v": s * v, "z": s * u}) for u, v in motions for s in (1.0, -1.0)
+        ]
         if any(abs(abs(a) - abs(b)) > 1e-9 for a, b in zip(forces[::2], forces[1::2], strict=True)):
             return True
     return False

@@ -143,7 +143,9 @@ def _examined(candidate: PlacedCandidate, before: StructurePrediction) -> Placed
     jacobian = linearise(fit, prepared)
     covariance = covariance_of(fit, prepared, jacobian)
     coefficient, error, parameters, errors = _amount(candidate.entry, fit, covariance)
-    flatness, steadiness = _curves(fit, candidate.entry, prepared.dt, jacobian / prepared.scale[:, None], prepared.scale)
+    flatness, steadiness = _curves(
+        fit, candidate.entry, prepared.dt, jacobian / prepared.scale[:, None], prepared.scale
+    )
     size = before.size
     return PlacedRanked(
         candidate.entry, fit, candidate.prediction,

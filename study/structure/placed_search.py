@@ -1,8 +1,8 @@
 """What a term at a place would explain, by the reverse system of all coordinates.
 
-With the linear part Z of the fitted structure, its nonlinear forces N and the measured motion x, ``B F - Z x - N(x)`` is
-what the equations leave. Any force that is missing, and any change of a coefficient, is a known history along x times
-an unknown amount, and linear least squares find the amounts, however much the model lacks. Everything is passed through
+With the linear part Z of the fitted structure, its nonlinear forces N and the measured motion x, what the equations
+leave is ``B F - Z x - N(x)``. Any force that is missing, and any change of a coefficient, is a known history times an
+unknown amount, and linear least squares find the amounts, however much the model lacks. Everything is passed through
 Z^-1 to the sensors first, where noise is what it was on the motion (the equations of a place and of its other end are
 one regression: action equals reaction). The motion is that of the free run with what the sensors show above their
 noise; where a sensor is missing it is the free run's. The best points start fits in free run.
@@ -143,8 +143,8 @@ def _own_columns(base: PlacedBaseline) -> dict[int, Floats]:
     for key in orders:
         if key in fit.keys:
             force = base.lines(base.motion[orders[key]] @ own[key])
-            column = irfft(-np.einsum("fsc,fc->fs", base.paths, force), base.size, axis=0)[:n]
-            found[fit.keys.index(key)] = flat(fit, column)
+            column = np.asarray(irfft(-np.einsum("fsc,fc->fs", base.paths, force), base.size, axis=0), dtype=np.float64)
+            found[fit.keys.index(key)] = flat(fit, column[:n])
     for entry in model.terms:
         if entry.place is None or not set(entry.symbols) & set(fit.keys) or entry.symbols[0] in orders:
             continue
@@ -163,7 +163,10 @@ def _drifted(base: PlacedBaseline, free: Floats) -> Floats:
         if entry.term.name in LINEAR or entry.place is None:
             continue
         there, here = (
-            base.passed(entry.place, unit_lines(entry, base.dated(relative_record(entry.place, model, m, base.prepared.dt)), base))
+            base.passed(
+                entry.place,
+                unit_lines(entry, base.dated(relative_record(entry.place, model, m, base.prepared.dt)), base),
+            )
             for m in (base.motion, run)
         )
         total += (there - here) @ np.array([c or 0.0 for c in entry.coefficients])
@@ -175,11 +178,15 @@ def starts(term: Term, place: Place, base: PlacedBaseline, given: ModelTerm | No
     model = base.fit.model
     record = base.dated(relative_record(place, model, base.motion, base.prepared.dt))
     known = given.parameters if given is not None else (None,) * len(term.parameters)
-    found = [_try(term, place, point, record, base) for point in _grid(term, place, record["displacement"], base, known)]
+    found = [
+        _try(term, place, point, record, base) for point in _grid(term, place, record["displacement"], base, known)
+    ]
     return sorted((p for p in found if p is not None), key=lambda p: -p.share)
 
 
-def _try(term: Term, place: Place, point: tuple[float, ...], record: Record, base: PlacedBaseline) -> PlacedStart | None:
+def _try(
+    term: Term, place: Place, point: tuple[float, ...], record: Record, base: PlacedBaseline
+) -> PlacedStart | None:
     entry = ModelTerm(term, (0.0,) * len(term.components), point)
     try:
         forces = unit_lines(entry, record, base)
@@ -256,13 +263,15 @@ def _modulation_lines(u: Floats, place: Place, base: PlacedBaseline) -> Floats:
     e = np.array(place.direction(base.fit.model.coordinates))
     path = (base.paths @ e) / base.fit.noise.deviation
     residual = base.residual.reshape(n, -1)
-    matched = irfft(np.sum(np.conj(path) * rfft(residual, base.size, axis=0), axis=1), base.size)[:n]
+    lines = np.sum(np.conj(path) * base.lines(residual), axis=1)
+    matched = np.asarray(irfft(lines, base.size), dtype=np.float64)[:n]
     numerator = np.abs(_windowed(matched * u)) ** 2
-    passband = irfft(np.sum(np.abs(path) ** 2, axis=1), base.size)[: base.size]
-    spread = irfft(np.abs(rfft(u, base.size)) ** 2, base.size)
-    denominator = np.abs(np.asarray(rfft(passband * spread))[: base.size : base.size // n][: len(numerator)])
-    floor = np.resize(denominator, len(numerator))
-    return np.array(highest_lines(numerator / np.maximum(floor, 1e-6 * np.max(floor))))
+    passband = np.asarray(irfft(np.sum(np.abs(path) ** 2, axis=1), base.size), dtype=np.float64)
+    spread = np.asarray(irfft(np.abs(base.lines(u)) ** 2, base.size), dtype=np.float64)
+    fine = np.abs(np.asarray(rfft(passband * spread), dtype=np.complex128))
+    at = np.linspace(0.0, len(fine) - 1.0, len(numerator))  # the record's own lines among those of the padded one
+    expected = np.interp(at, np.arange(len(fine)), fine)
+    return np.array(highest_lines(numerator / np.maximum(expected, 1e-6 * np.max(expected))))
 
 
 def with_placed_term(

@@ -35,9 +35,7 @@ def connections(model: Model) -> tuple[Place, ...]:
     return tuple(found.values())
 
 
-def transfer(
-    linear: Floats, sensors: Sequence[Sensor], coordinates: Sequence[str], dt: float, size: int
-) -> Complexes:
+def transfer(linear: Floats, sensors: Sequence[Sensor], coordinates: Sequence[str], dt: float, size: int) -> Complexes:
     """From a force on each coordinate to each sensor, shape (lines, sensors, coordinates).
 
     ``linear`` holds stiffness, damping and mass matrix; the lines are those of a transform of ``size`` samples.
@@ -45,7 +43,8 @@ def transfer(
     omega = np.asarray(2j * np.pi * rfftfreq(size, dt), dtype=np.complex128)
     omega[0] = omega[1]  # a structure that nothing ties down has no response to a constant
     stiffness, damping, mass = linear
-    inverse = np.linalg.inv(mass * omega[:, None, None] ** 2 + damping * omega[:, None, None] + stiffness)
+    dynamic = mass * omega[:, None, None] ** 2 + damping * omega[:, None, None] + stiffness
+    inverse = np.asarray(np.linalg.inv(dynamic), dtype=np.complex128)
     rows = [list(coordinates).index(s.coordinate) for s in sensors]
     order = np.stack([omega ** MOTIONS.index(s.motion) for s in sensors], axis=1)
     return np.asarray(inverse[:, rows] * order[:, :, None], dtype=np.complex128)

@@ -86,7 +86,10 @@ class PreparedStructure:
 
 
 def prepare_structure(
-    record: StructureRecord, model: Model, fit: tuple[int, int] | None = None, judge: tuple[int, int] | None = None,
+    record: StructureRecord,
+    model: Model,
+    fit: tuple[int, int] | None = None,
+    judge: tuple[int, int] | None = None,
     cutoff: float | None = None,
 ) -> PreparedStructure:
     """Choose sensors and parts: the first half is fitted and the second judged by default.
@@ -94,7 +97,7 @@ def prepare_structure(
     Raises
     ------
     StudyError
-        If the parts overlap or are too short, or the model has a coordinate of which neither it nor the record can know.
+        If the parts overlap or are too short, or nothing measures a coordinate and nothing ties it to another.
     """
     half = len(record) // 2
     fit, judge = fit or (0, half), judge or (half, len(record))
@@ -103,7 +106,8 @@ def prepare_structure(
         expect(good, f"the part to {name}, {first}:{last}, must hold {FEWEST} samples or more of {len(record)}")
     apart = fit[1] <= judge[0] or judge[1] <= fit[0]
     expect(apart, f"the parts to fit {fit[0]}:{fit[1]} and to judge {judge[0]}:{judge[1]} overlap; expected two parts")
-    first_of = {s.coordinate: s for s in reversed(sorted(record.sensors, key=lambda s: MOTIONS.index(s.motion)))}
+    ordered = sorted(record.sensors, key=lambda s: MOTIONS.index(s.motion), reverse=True)
+    first_of = {s.coordinate: s for s in ordered}
     sensors = tuple(first_of[c] for c in model.coordinates if c in first_of)
     blind = [c for c in model.coordinates if c not in first_of]
     _check_tied(model, blind)

@@ -1,20 +1,19 @@
 """A structure held against a record: how good it is, and where it fails."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from study.equations import model_file
+from study.equations import dimensions, model_file
 from study.equations.model import Model
 from study.equations.place import Place, in_words
 from study.equations.term import QUANTITIES
-from study.equations import dimensions
 from study.structure.missing_forces import MissingForces, missing_forces
 from study.structure.modes import Modes, modes_of, modes_table
 from study.structure.prepared_structure import PreparedStructure
-from study.structure.structure_fit import StructureFit, covariance_of, fit_structure, linearise, settled
+from study.structure.structure_fit import StructureFit, covariance_of, linearise, settled
 from study.structure.structure_prediction import StructurePrediction, predict_structure
 from study.structure.structure_start import first_fit
 from study.support.arrays import Floats
@@ -120,9 +119,8 @@ def says(comparison: StructureComparison) -> str:
         said.append(f"The reverse system says no force of {', '.join(forces.lacking)}, which no sensor shows.")
     if np.any(forces.rms > 0.0):
         i = int(np.argmax(forces.rms))
-        said.append(
-            f"The equation of {forces.coordinates[i]} is violated most: {forces.rms[i]:.3g} N rms are left of its forces."
-        )
+        left = f"{forces.rms[i]:.3g} N rms are left of its forces"
+        said.append(f"The equation of {forces.coordinates[i]} is violated most: {left}.")
     if len(prediction.prepared.sensors) > 1 and forces.aligned:
         place, share = forces.aligned[0]
         said.append(f"A single force {in_words(place)} could make {percent(share)} of what stands above the noise.")
@@ -217,7 +215,9 @@ def _interval(c: PlacedCoefficient) -> str:
     return "held" if c.interval is None else f"{c.interval[0]:.5g} to {c.interval[1]:.5g}"
 
 
-def history_step(comparison: StructureComparison, added: str | None = None, dropped: str | None = None) -> dict[str, Any]:
+def history_step(
+    comparison: StructureComparison, added: str | None = None, dropped: str | None = None
+) -> dict[str, Any]:
     """A comparison as a step of the history (``study.compare.history``)."""
     prediction = comparison.prediction
     return {

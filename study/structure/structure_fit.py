@@ -36,7 +36,10 @@ class SensorNoise:
 
     def weighted(self, values: Floats) -> Floats:
         """Values (samples, sensors, ...) made white with unit variance, the same shape."""
-        parts = [whitened(values[:, i], a) / d for i, (a, d) in enumerate(zip(self.coefficients, self.deviation, strict=True))]
+        parts = [
+            whitened(values[:, i], a) / d
+            for i, (a, d) in enumerate(zip(self.coefficients, self.deviation, strict=True))
+        ]
         return np.stack(parts, axis=1)
 
 
@@ -158,7 +161,7 @@ def needed_steps(model: Model, dt: float) -> int:
     """Steps in each sampling interval with which a search may begin, the linear terms all known."""
     stiffness, damping, mass = matrices(model, {key: value or 0.0 for key, value in model.values.items()})
     try:
-        inverse = np.linalg.inv(mass)
+        inverse = np.asarray(np.linalg.inv(mass), dtype=np.float64)
     except np.linalg.LinAlgError:
         return FEWEST_STEPS
     n = len(mass)

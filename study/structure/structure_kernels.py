@@ -263,8 +263,8 @@ def _next_event(
         s = r[sides[a]]
         if held[a] == 0:  # the mean velocity is the change of displacement: it shows a dip below zero between two steps
             mean = (_along(directions, a, w, 0, 0, 0) - _along(directions, a, w, 4, 0, 0)) / span
-            v0 = 0.0 if fresh[a] != 0 else max(s * _along(directions, a, w, 4, n, 0), 0.0)
-            x = _zero(v0, s * _along(directions, a, w, 0, n, 0), s * mean)
+            v0 = 0.0 if fresh[a] != 0 else max(float(s * _along(directions, a, w, 4, n, 0)), 0.0)
+            x = _zero(v0, float(s * _along(directions, a, w, 0, n, 0)), float(s * mean))
         elif abs(early[a]) > 1.0:  # what else switched has set it free
             x = 0.0
         elif abs(s) > 1.0:
@@ -347,7 +347,7 @@ def _release(
         if now == at_low or abs(now - 1.0) < CLOSE:
             break
         rise = (now - at_low) / (x - low) if x != low else 0.0
-        low, at_low = x, now
+        low, at_low = x, float(now)
         if rise <= 0.0:
             break
         x = min(max(x + (1.0 - now) / rise, 0.0), 1.0)

@@ -82,7 +82,10 @@ def _families(u: Floats, v: Floats) -> Iterator[tuple[str, list[Floats]]]:
     x, y = u / max(float(np.std(u)), 1e-300), v / max(float(np.std(v)), 1e-300)
     yield "displacement", _functions(x)
     yield "velocity", _functions(y)
-    yield "displacement and velocity", [x * y, x**2 * y, x * y**2, x**3 * y, x * y**3, x**2 * y**2, abs(x) * y, abs(y) * x]
+    yield (
+        "displacement and velocity",
+        [x * y, x**2 * y, x * y**2, x**3 * y, x * y**3, x**2 * y**2, abs(x) * y, abs(y) * x],
+    )
     steps = np.diff(x, prepend=x[0])
     rate = float(np.std(steps) / np.std(y))
     past = [relaxed(steps, float(np.exp(-rate / tau))) for tau in TAUS]

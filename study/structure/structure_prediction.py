@@ -1,6 +1,6 @@
 """The free run of a fitted structure along the part that was not fitted: its error by sensor, and the noise floors."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -8,8 +8,8 @@ import numpy as np
 from study.records import noise_floor
 from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_fit import StructureFit, fit_structure
-from study.structure.structure_run import prepare_run
 from study.structure.structure_record import Sensor
+from study.structure.structure_run import prepare_run
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError
 
@@ -93,7 +93,7 @@ def predict_structure(fit: StructureFit, prepared: PreparedStructure) -> Structu
     try:
         first, initial = fit.first, fit.initial
         if prepared.judge[0] != fit.span[1]:
-            swapped = PreparedStructure(prepared.record, prepared.sensors, prepared.judge, prepared.fit)
+            swapped = replace(prepared, fit=prepared.judge, judge=prepared.fit)
             first = prepared.judge[0]
             initial = fit_structure(fit.model, swapped, tuple(fit.model.values), steps=fit.steps).initial
         runs = [
@@ -105,6 +105,8 @@ def predict_structure(fit: StructureFit, prepared: PreparedStructure) -> Structu
         ]  # fmt: skip
     except DivergenceError:
         flat = np.broadcast_to(np.mean(judged, axis=0), judged.shape).copy()
-        return StructurePrediction(fit, prepared, fit.first, fit.initial, flat, np.zeros(judged.shape[1]), diverged=True)
-    moved = np.sqrt(np.mean((runs[1] - runs[0]) ** 2, axis=0))
+        return StructurePrediction(
+            fit, prepared, fit.first, fit.initial, flat, np.zeros(judged.shape[1]), diverged=True
+        )
+    moved: Floats = np.sqrt(np.mean(np.subtract(runs[1], runs[0]) ** 2, axis=0))
     return StructurePrediction(fit, prepared, first, initial, runs[0], moved)

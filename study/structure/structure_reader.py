@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from study.equations.model import Model
-from study.records.readers import ReadOptions, read_table
-from study.records.readers import checks
+from study.records.readers import ReadOptions, checks, read_table
 from study.records.readers.roles import NAMES
 from study.records.readers.sampling import even_interval
 from study.records.readers.table import Column, Table
@@ -74,7 +73,9 @@ def _assigned(table: Table, model: Model, options: ReadOptions) -> tuple[dict[st
     forces: dict[str, Column] = {}
     for name, _ in model.forces:
         keys = [name.lower(), *(["force", "f"] if len(model.forces) == 1 else [])]
-        found = next((wanted[k] for k in keys if k in wanted), None) or next((by_name[k] for k in keys if k in by_name), None)
+        found = next((wanted[k] for k in keys if k in wanted), None) or next(
+            (by_name[k] for k in keys if k in by_name), None
+        )
         if found is None:
             like = f"--column {name}=NAME"
             raise StudyError(f"there is no column of the force {name!r}; expected {like}, of {table.listing()}")
@@ -82,7 +83,9 @@ def _assigned(table: Table, model: Model, options: ReadOptions) -> tuple[dict[st
     sensors = _sensors(table, model, wanted)
     if not sensors:
         like = f"--column {model.coordinates[0]}.displacement=NAME"
-        raise StudyError(f"no column is a motion of {', '.join(model.coordinates)}; expected {like}, of {table.listing()}")
+        raise StudyError(
+            f"no column is a motion of {', '.join(model.coordinates)}; expected {like}, of {table.listing()}"
+        )
     return forces, sensors
 
 

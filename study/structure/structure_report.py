@@ -5,14 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from study.equations.place import Place, in_words as placed
+from study.equations.place import Place
+from study.equations.place import in_words as placed
 from study.figures.labels import term_names
-from study.structure.modes import modes_table
+from study.structure.modes import modes_of, modes_table
 from study.structure.placed_ranking import PlacedRanked
 from study.structure.structure_comparison import document, mode_rows
 from study.structure.structure_record import Sensor
 from study.structure.structure_verdict import MISSING, NOTHING, StructureDiagnosis
-from study.structure.modes import modes_of
 from study.support.numbers import percent
 
 SHOWN, TIES = 8, 2  # candidates in the table on the screen; ties named there
@@ -34,7 +34,9 @@ def table(diagnosis: StructureDiagnosis) -> str:
 
 def _shown(number: int, row: PlacedRanked) -> list[str]:
     unit = row.term.unit(row.term.symbols[0], "N", "m")
-    ties = ", ".join(row.tied_with[:TIES]) + (f" and {len(row.tied_with) - TIES} more" if len(row.tied_with) > TIES else "")
+    ties = ", ".join(row.tied_with[:TIES]) + (
+        f" and {len(row.tied_with) - TIES} more" if len(row.tied_with) > TIES else ""
+    )
     return [
         str(number), row.term.name, row.entry.place.label if row.entry.place else "",
         percent(row.gain.explained, "z.1f", row.gain.error, ".1f"), percent(row.prediction.error),
@@ -97,13 +99,18 @@ def separating_sensor(first: PlacedRanked, tied: list[PlacedRanked]) -> str:
     seen = {s.coordinate for s in prepared.sensors}
     wanted = tuple(Sensor(c, "displacement") for c in first.fit.model.coordinates if c not in seen)
     if not wanted:
-        return "Every coordinate is measured: a larger force, or one at another coordinate, may tell these places apart."
+        return (
+            "Every coordinate is measured: a larger force, or one at another coordinate, may tell these places apart."
+        )
     one, other = (r.prediction.motion(wanted) for r in (first, places[0]))
     apart = np.sqrt(np.mean((one - other) ** 2, axis=0)) / np.std(one, axis=0)
     best = int(np.argmax(apart))
     if apart[best] < APART * first.prediction.error:
-        return f"No further sensor would show them {percent(float(apart[best]))} apart: try a force at another coordinate."
-    return f"A sensor at {wanted[best].coordinate} would tell the places apart: there they differ by {percent(float(apart[best]))}."
+        return (
+            f"No further sensor would show them {percent(float(apart[best]))} apart: try a force at another coordinate."
+        )
+    differ = percent(float(apart[best]))
+    return f"A sensor at {wanted[best].coordinate} would tell the places apart: there they differ by {differ}."
 
 
 def _unknown(diagnosis: StructureDiagnosis) -> list[str]:
@@ -112,7 +119,8 @@ def _unknown(diagnosis: StructureDiagnosis) -> list[str]:
     if diagnosis.candidates and diagnosis.candidates[0].gain.explained > 0.0:
         best = diagnosis.candidates[0]
         said.append(
-            f"The nearest, {term_names(best.term.name)} {_place(best.entry.place)}, leaves {percent(best.prediction.error)}."
+            f"The nearest, {term_names(best.term.name)} {_place(best.entry.place)}, leaves "
+            f"{percent(best.prediction.error)}."
         )
     if diagnosis.families and diagnosis.families[0].gain.explained > DEPENDENCE:
         most = diagnosis.families[0]

@@ -1,6 +1,7 @@
 """The first fit of a structure: from its linear terms, whatever else it holds."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -48,10 +49,8 @@ def _fitted(model: Model, prepared: PreparedStructure, linear: Mapping[str, floa
     open_keys = [key for key, value in model.values.items() if value is None]
     start = dict.fromkeys(open_keys, 0.0) | {key: linear[key] for key in open_keys if key in linear}
     fits: list[StructureFit] = []
-    try:
+    with suppress(DivergenceError):
         fits.append(fit_structure(model, prepared, model.held_keys, start))
-    except DivergenceError:
-        pass
     if not fits or (not fits[0].converged and fits[0].cost > 0.5):
         calm = {key: 4.0 * abs(v) if key.startswith("c[") else v for key, v in start.items()}
         try:

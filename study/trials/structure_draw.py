@@ -9,6 +9,7 @@ from study.equations.model import Model, ModelTerm, free
 from study.equations.place import GROUND, Place
 from study.equations.term import Term
 from study.equations.terms import LIBRARY, get
+from study.identify.frequency_domain.inputs import history
 from study.records.excitation import Excitation, force
 from study.records.record import MOTIONS
 from study.structure.missing_forces import placed_inputs, relative_record
@@ -17,7 +18,6 @@ from study.structure.placed_candidates import external
 from study.structure.places import connections
 from study.structure.structure_record import Sensor, StructureRecord
 from study.structure.structure_simulation import simulate_structure
-from study.identify.frequency_domain.inputs import history
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError, StudyError, expect
 from study.support.least_squares import least_squares
@@ -70,7 +70,10 @@ def make_structure_trial(
     rng = np.random.default_rng([2027, seed])
     drawn = (str(rng.choice(HIDDEN)), float(rng.choice(NOISES)), str(rng.choice(["displacement", "acceleration"])))
     name = hidden or drawn[0]
-    expect(name in (*HIDDEN, "none"), f"{name!r} cannot be hidden in a structure; expected none or one of {', '.join(HIDDEN)}")
+    expect(
+        name in (*HIDDEN, "none"),
+        f"{name!r} cannot be hidden in a structure; expected none or one of {', '.join(HIDDEN)}",
+    )
     expect(response is None or response in MOTIONS, f"response is {response!r}; expected one of {', '.join(MOTIONS)}")
     noise, response = drawn[1] if noise is None else noise, response or drawn[2]
     for _ in range(ATTEMPTS):
@@ -92,7 +95,9 @@ def _attempt(
     if frequency[0] * SAMPLES * dt < SLOWEST:
         return None
     level = float(10.0 ** rng.uniform(-1.0, 4.0))
-    drive = {"shaker": force(Excitation(level=level, reading="filtered", cutoff=1.3 * frequency[-1]), SAMPLES, dt, seed)}
+    drive = {
+        "shaker": force(Excitation(level=level, reading="filtered", cutoff=1.3 * frequency[-1]), SAMPLES, dt, seed)
+    }
     truth, entry, share = base, None, 0.0
     if name != "none":
         grown = _hidden(rng, base, get(name), drive, dt)
@@ -103,9 +108,7 @@ def _attempt(
             return None
     wanted = tuple(Sensor(c, response) for c in base.coordinates)
     quiet = simulate_structure(truth, drive, dt, sensors=wanted, steps_per_sample=16)
-    noisy = {
-        s: x + np.sqrt(noise) * float(np.std(x)) * rng.standard_normal(len(x)) for s, x in quiet.motions.items()
-    }
+    noisy = {s: x + np.sqrt(noise) * float(np.std(x)) * rng.standard_normal(len(x)) for s, x in quiet.motions.items()}
     label = f"structure_{seed}"
     believed = replace(base, name=label).with_values(dict.fromkeys(base.values, None))
     record = replace(quiet.with_motions(noisy), name=label)
@@ -166,25 +169,28 @@ def _motion(record: StructureRecord, model: Model) -> Floats:
 
 
 def _strength(unit: ModelTerm, base: Model, record: StructureRecord, dt: float) -> tuple[float, float]:
-    """Rms of a unit effect that no linear force at its place could take over, and of the structure's own force there."""
+    """Rms of a unit effect beyond any linear force at its place, and of the structure's own force there."""
     motion = _motion(record, base)
     along = relative_record(unit.place, base, motion, dt)
     total = np.zeros(len(record))
     for item in placed_inputs(unit):
         values = along["displacement"] if item.shape == "u" else history(item, along)
         for part in item.parts:
-            coefficient = next(c or 0.0 for c, s in zip(unit.coefficients, unit.term.symbols, strict=True) if s == part.symbol)
+            coefficient = next(
+                c or 0.0 for c, s in zip(unit.coefficients, unit.term.symbols, strict=True) if s == part.symbol
+            )
             total = total + coefficient * part.factor * (values if part.order == 0 else np.gradient(values, dt))
     assert unit.place is not None, "every term of a structure has a place"
     e = np.array(unit.place.direction(base.coordinates))
     linear = np.column_stack([*(x @ e for x in motion)])
     rest = total - linear @ least_squares(linear, total)
     values = base.numbers()
+    orders = {"linear_stiffness": 0, "linear_damping": 1}
     springs = [
-        values[t.symbols[0]] * (motion[0 if t.term.name == "linear_stiffness" else 1] @ np.array(t.place.direction(base.coordinates)))
+        values[t.symbols[0]] * (motion[orders[t.term.name]] @ np.array(t.place.direction(base.coordinates)))
         for t in base.terms
-        if t.place is not None and t.place.path == unit.place.path and t.term.name != "inertia"
-    ]  # fmt: skip
+        if t.place is not None and t.place.path == unit.place.path and t.term.name in orders
+    ]
     masses = [values[f"m[{c}]"] for c in base.coordinates]
     inertia = max(float(np.std(motion[2][:, i])) * masses[i] for i in np.flatnonzero(e))
     return float(np.sqrt(np.mean(rest**2))), float(np.std(np.sum(springs, axis=0))) if springs else inertia
@@ -209,7 +215,9 @@ def _forgets(model: Model, drive: dict[str, Floats], dt: float) -> bool:
     pushed = {name: values + 0.1 * np.std(values) * (np.arange(len(values)) < 10) for name, values in drive.items()}
     wanted = tuple(Sensor(c, "displacement") for c in model.coordinates)
     try:
-        one, other = (simulate_structure(model, f, dt, sensors=wanted, steps_per_sample=2).measured for f in (drive, pushed))
+        one, other = (
+            simulate_structure(model, f, dt, sensors=wanted, steps_per_sample=2).measured for f in (drive, pushed)
+        )
     except StudyError:
         return False
     half = one.shape[1] // 2

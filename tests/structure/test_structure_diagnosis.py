@@ -62,7 +62,16 @@ def test_the_reverse_system_puts_the_effect_where_it_is(believed, record_of):
 
 def test_a_term_is_added_between_two_coordinates(folder, capsys):
     model = folder / "frame.yaml"
-    command = ["add", str(model), "cubic_stiffness", "--between", "floor2", "floor3", "--data", str(folder / "frame.csv")]
+    command = [
+        "add",
+        str(model),
+        "cubic_stiffness",
+        "--between",
+        "floor2",
+        "floor3",
+        "--data",
+        str(folder / "frame.csv"),
+    ]
     assert main([*command, "--out", str(folder / "added")]) == 0
     assert read_model(model).terms[-1].name == "cubic_stiffness[floor2-floor3]"
     shown = capsys.readouterr().out

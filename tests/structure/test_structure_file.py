@@ -59,7 +59,10 @@ def test_a_term_is_added_at_its_place(tmp_path):
         ("name: x\nterms: [{term: inertia, at: a}]\n", "no 'coordinates'"),
         ("name: x\nforces: {f: a}\nterms: [inertia]\n", "no 'coordinates'"),
         (HEAD + MASSES + SPRING + "  - {term: mine, between: [a, b], force: '2*u'}\n", None),
-        (HEAD + MASSES + "  - {term: linear_stiffness, at: b}\n  - {term: mine, at: b, force: '2*u'}\n", "no other than"),
+        (
+            HEAD + MASSES + SPRING + "  - {term: linear_damping, at: b}\n  - {term: mine, at: b, force: '2*v'}\n",
+            "no other than",
+        ),
     ],
 )  # fmt: skip
 def test_a_bad_structure_gets_its_sentence(text, said):
