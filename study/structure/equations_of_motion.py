@@ -5,7 +5,7 @@ acts with its force on one end and with the opposite on the other. The mass matr
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -82,7 +82,7 @@ def motion_program(model: Model, available: Sequence[str], keys: Sequence[str] =
     named_channels(model, available)
     made = _compiled(model.with_values(dict.fromkeys(model.values)), tuple(keys))
     values = {key: value for key, value in held.items() if value is not None}
-    return MotionProgram(**(vars(made) | {"program": with_registers(made.program, values)}))
+    return replace(made, program=with_registers(made.program, values))
 
 
 @lru_cache(maxsize=COMPILED)

@@ -137,7 +137,7 @@ class _Linear:
             design = _real(np.einsum("fij,kfjm->kfim", left, columns) * w).reshape(len(columns), -1).T
             x = least_squares(design, _real((left @ target) * w).ravel())
             found.append(np.where([i in self.heavy for i in range(len(x))], np.abs(x), x))
-            left = np.linalg.inv(self.stiffness(x))
+            left = np.asarray(np.linalg.inv(self.stiffness(x)), dtype=np.complex128)
         return found
 
 
@@ -159,7 +159,7 @@ def _problem(model: Model, prepared: PreparedStructure, held: Mapping[str, float
             known += held[key] * s[:, None, None] ** orders[key] * own[key]
     units = np.array([s[:, None, None] ** orders[key] * own[key] for key in free], dtype=np.complex128)
     force = np.array([[float(c == where) for _, where in model.forces] for c in model.coordinates])
-    order = np.stack([s ** MOTIONS.index(x.motion) for x in prepared.sensors], axis=1)
+    order = np.stack([s ** MOTIONS.index(x.motion) for x in prepared.sensors], axis=1).astype(np.complex128)
     rows = [model.coordinates.index(x.coordinate) for x in prepared.sensors]
     heavy = [i for i, key in enumerate(free) if orders[key] == 2 and "," not in key]
     return _Linear(
@@ -198,7 +198,7 @@ def linear_start(model: Model, prepared: PreparedStructure, held: Mapping[str, f
 def _comes_to_rest(model: Model, values: Mapping[str, float]) -> bool:
     """Whether the motion dies away when nothing drives it: that of others grows without end in a free run."""
     stiffness, damping, mass = matrices(model, values)
-    n, inverse = len(mass), np.linalg.inv(mass)
+    n, inverse = len(mass), np.asarray(np.linalg.inv(mass), dtype=np.float64)
     system = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ stiffness, -inverse @ damping]])
     roots = np.linalg.eigvals(system)
     return bool(np.all(roots.real <= 1e-6 * np.max(np.abs(roots))))

@@ -141,7 +141,8 @@ def _above_noise(values: Floats, dt: float, low: float) -> Floats:
     limit = white * (1.0 + CLEAR / np.sqrt(cut.effective_averages(len(values)) * SMOOTH / cut.line_inflation()))
     gate = (smooth > limit) & (frequency >= low)
     size = next_fast_len(2 * len(values), real=True)
-    weight = np.interp(rfftfreq(size, dt), frequency, gate.astype(np.float64))
+    at = np.asarray(rfftfreq(size, dt), dtype=np.float64)
+    weight = np.asarray(np.interp(at, frequency, gate.astype(np.float64)), dtype=np.float64)
     lines = np.asarray(rfft(values, size), dtype=np.complex128)
     return np.asarray(irfft(lines * weight, size), dtype=np.float64)[: len(values)]
 
@@ -184,8 +185,8 @@ def relative_record(place: Place | None, model: Model, motion: Floats, dt: float
     """Relative motion at a place as a record of a single coordinate; ``motion`` as :func:`corrected_motion` has it."""
     assert place is not None, "every term of a structure has a place"
     e = np.array(place.direction(model.coordinates))
-    along: Floats = np.asarray(motion[:2] @ e, dtype=np.float64)
-    return Record(dt, {"force": np.zeros(along.shape[1]), "displacement": along[0], "velocity": along[1]})
+    displacement, velocity = (np.asarray(x @ e, dtype=np.float64) for x in motion[:2])
+    return Record(dt, {"force": np.zeros(len(displacement)), "displacement": displacement, "velocity": velocity})
 
 
 def _shares(residual: Floats) -> Floats:

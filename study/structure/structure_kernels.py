@@ -343,11 +343,11 @@ def _release(
             code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, time, h, begin, end,
             drive, j, local, w,
         )  # fmt: skip
-        now = sign * r[sides[a]]
+        now = float(sign * r[sides[a]])
         if now == at_low or abs(now - 1.0) < CLOSE:
             break
         rise = (now - at_low) / (x - low) if x != low else 0.0
-        low, at_low = x, float(now)
+        low, at_low = x, now
         if rise <= 0.0:
             break
         x = min(max(x + (1.0 - now) / rise, 0.0), 1.0)

@@ -108,5 +108,6 @@ def predict_structure(fit: StructureFit, prepared: PreparedStructure) -> Structu
         return StructurePrediction(
             fit, prepared, fit.first, fit.initial, flat, np.zeros(judged.shape[1]), diverged=True
         )
-    moved: Floats = np.sqrt(np.mean(np.subtract(runs[1], runs[0]) ** 2, axis=0))
+    change = np.asarray(runs[1] - runs[0], dtype=np.float64)
+    moved = np.asarray(np.sqrt(np.mean(change**2, axis=0)), dtype=np.float64)
     return StructurePrediction(fit, prepared, first, initial, runs[0], moved)

@@ -24,6 +24,7 @@ from study.support.errors import StudyError, at, expect
 from study.support.units import VOLTAGE, parse_unit, role_unit
 
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180.0, "°": np.pi / 180.0}
+ANGLED = re.compile(r"(.*?)\s*[(\[]\s*((?:rad|mrad|deg|°)[^)\]]*)[)\]]")
 SEPARATOR = re.compile(r"[ ._:/-]+")
 
 
@@ -45,6 +46,7 @@ def read_structure(path: Path, model: Model, options: ReadOptions | None = None)
         If it cannot be read, lacks a force of the model or any sensor, or is no evenly sampled record.
     """
     table, given = read_table(path, options)
+    table = replace(table, columns=tuple(_angled(c) for c in table.columns))
     with at(path):
         forces, sensors = _assigned(table, model, given)
         columns = {**forces, **sensors}
@@ -112,6 +114,12 @@ def _named(table: Table, role: str, wanted: str | int) -> Column:
     matches = [c for k, c in enumerate(table.columns, 1) if wanted in (c.name, k) or str(wanted) == str(k)]
     expect(matches, f"there is no column {wanted!r} for {role}; expected one of {table.listing()}")
     return matches[0]
+
+
+def _angled(column: Column) -> Column:
+    """A column called ``pitch (rad)`` with its unit apart, which is no unit of a single mass."""
+    heading = ANGLED.fullmatch(column.name)
+    return replace(column, name=heading[1], unit=heading[2].strip()) if heading else column
 
 
 def _sensor_of(column: Column, coordinate: str) -> str:
