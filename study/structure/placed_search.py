@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+from scipy.fft import irfft, rfft, rfftfreq
 
 from study.equations.model import Model, ModelTerm
 from study.equations.place import Place
@@ -34,6 +34,8 @@ from study.support.least_squares import least_squares
 TRIED, KEPT = 15, 40  # free runs of a fit that tries a start, and of one that is kept
 NEAR = 0.01  # standard errors: as near a minimum as the fit of a search has to come
 CUTOFF = 1e-8  # of the largest singular value
+PEAKS = 8  # lines that are tried as the frequency of a periodic effect
+RARE = 1e-3  # of the largest: lines at which a modulation could hardly show
 STARTS = 3  # points of the search that start a fit
 
 
@@ -121,7 +123,7 @@ def placed_baseline(fit: StructureFit, prepared: PreparedStructure) -> PlacedBas
     run = prepare_run(model, prepared.record, sensors=wanted, steps_per_sample=fit.steps, span=fit.span)
     free = run.respond({}, fit.initial)[0].T
     motion = corrected_motion(free, fit.residual, prepared, model.coordinates)
-    size = next_fast_len(2 * len(fit.residual), real=True)
+    size = 2 * len(fit.residual)  # every other line is one of the record
     paths = transfer(matrices(model, model.numbers()), prepared.sensors, model.coordinates, prepared.dt, size)
     left = flat(fit, fit.residual)
     bare = PlacedBaseline(fit, prepared, motion, paths, size, free, free, left, left)
@@ -261,17 +263,17 @@ def _modulation_lines(u: Floats, place: Place, base: PlacedBaseline) -> Floats:
     """Lines at which a stiffness of this place that varies with time would explain most, by a matched filter."""
     n = len(u)
     e = np.array(place.direction(base.fit.model.coordinates))
-    path = (base.paths @ e) / base.fit.noise.deviation
-    residual = base.residual.reshape(n, -1)
-    lines = np.sum(np.conj(path) * base.lines(residual), axis=1)
-    matched = np.asarray(irfft(lines, base.size), dtype=np.float64)[:n]
+    path = (base.paths @ e)[::2] / base.fit.noise.deviation
+    residual = np.asarray(rfft(base.residual.reshape(n, -1), axis=0), dtype=np.complex128)
+    matched = np.asarray(irfft(np.sum(np.conj(path) * residual, axis=1), n), dtype=np.float64)
     numerator = np.abs(_windowed(matched * u)) ** 2
-    passband = np.asarray(irfft(np.sum(np.abs(path) ** 2, axis=1), base.size), dtype=np.float64)
-    spread = np.asarray(irfft(np.abs(base.lines(u)) ** 2, base.size), dtype=np.float64)
-    fine = np.abs(np.asarray(rfft(passband * spread), dtype=np.complex128))
-    at = np.linspace(0.0, len(fine) - 1.0, len(numerator))  # the record's own lines among those of the padded one
-    expected = np.interp(at, np.arange(len(fine)), fine)
-    return np.array(highest_lines(numerator / np.maximum(expected, 1e-6 * np.max(expected))))
+    passband = np.asarray(irfft(np.sum(np.abs(path) ** 2, axis=1), n), dtype=np.float64)
+    spread = np.asarray(irfft(np.abs(np.asarray(rfft(u), dtype=np.complex128)) ** 2, n), dtype=np.float64)
+    expected = np.abs(np.asarray(rfft(passband * spread), dtype=np.complex128))
+    explained = numerator / np.maximum(expected, RARE * np.max(expected))
+    inner = np.arange(3, len(explained) - 1)
+    peaks = inner[(explained[inner] >= explained[inner - 1]) & (explained[inner] > explained[inner + 1])]
+    return peaks[np.argsort(-explained[peaks])][:PEAKS].astype(np.float64)
 
 
 def with_placed_term(
