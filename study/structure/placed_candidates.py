@@ -21,10 +21,10 @@ from study.support.cores import cores
 from study.support.errors import StudyError
 
 NEVER_CANDIDATES = ("inertia",)
-FITTED = 16  # candidates that promise most, whatever they are: fitted in free run ...
-AT_EACH_PLACE = 2  # ... with so many at each place ...
-OF_EACH_EFFECT = 1  # ... and of each effect so many places ...
-PROMISING = 0.3  # ... that explain this share of what the best explains
+FITTED = 12  # candidates that promise most, whatever they are: fitted in free run ...
+AT_EACH_PLACE = 2  # ... with so many at each place that explain this share of what the best explains ...
+PROMISING = 0.3
+OF_EACH_EFFECT = 1  # ... and each effect where it explains most: the motion that it is judged by may lack its own part
 SETTLED = 4  # of the candidates, the best: fitted on the whole fitting part and with enough steps
 
 Progress = Callable[[str], None]
@@ -125,8 +125,8 @@ def promising(
     chosen: list[tuple[ModelTerm, list[PlacedStart]]] = []
     for rank, (entry, points) in enumerate(ordered):
         path = entry.place.path if entry.place else frozenset[str]()
-        few = places.get(path, 0) < AT_EACH_PLACE or effects.get(entry.term.name, 0) < OF_EACH_EFFECT
-        if rank < FITTED or (few and points[0].share >= PROMISING * best):
+        near = places.get(path, 0) < AT_EACH_PLACE and points[0].share >= PROMISING * best
+        if rank < FITTED or near or effects.get(entry.term.name, 0) < OF_EACH_EFFECT:
             chosen.append((entry, points))
             places[path] = places.get(path, 0) + 1
             effects[entry.term.name] = effects.get(entry.term.name, 0) + 1

@@ -107,14 +107,53 @@ def rank_placed(
     best = min(rows, key=lambda r: float(r.residual @ r.residual))
     noise = noise_left(best.fit.residual)
     white = {r.name: r.white(noise) for r in rows}
-    own = _white(held_out_parts(fit, before, linearise(fit, before.prepared)), noise)
-    rows = [replace(r, p_value=min(1.0, asked * _p_value(own, white[r.name]))) for r in rows]
+    test = _test(fit, before, noise)
+    rows = [replace(r, p_value=min(1.0, asked * test.p_value(r))) for r in rows]
     return [replace(r, distance=away, tied_with=tied) for r, away, tied in in_order(rows, white, asked)]
 
 
-def _p_value(before: Floats, after: Floats) -> float:
-    count = min(len(before), len(after))
-    return statistics.gain(before[:count], after[:count]).p_value
+@dataclass(frozen=True, eq=False)
+class _Test:
+    """Whether a candidate explains what the model leaves beyond what its own coefficients could, on held-out parts.
+
+    A structure has many coefficients, each with an error that shows in all of the judging part alike: a candidate that
+    happens to move them nearer to what that part wants gains there with every block. So what they could do is taken out
+    of residual and gain on each part (Frisch and Waugh, 1933).
+    """
+
+    noise: SensorNoise
+    own: tuple[Floats, Floats]  # what the model leaves of judging and fitting part, white
+    bases: tuple[Floats, Floats]  # orthonormal bases of what its own coefficients and initial state could change there
+
+    def p_value(self, row: PlacedRanked) -> float:
+        """Of one candidate alone; where its shape was searched for along the fitting part, on the other part only."""
+        used = 1 if row.term.parameters else 2
+        before, after = list[Floats](), list[Floats]()
+        for own, basis, part in zip(self.own[:used], self.bases, row.parts, strict=False):
+            if len(own) and len(part):
+                change = own - self.noise.weighted(part).ravel()
+                left, moved = (x - basis @ (basis.T @ x) for x in (own, change))
+                before.append(left)
+                after.append(left - moved)
+        return statistics.gain(np.concatenate(before), np.concatenate(after)).p_value
+
+
+def _test(fit: StructureFit, before: StructurePrediction, noise: SensorNoise) -> _Test:
+    jacobian = linearise(fit, before.prepared)
+    parts = held_out_parts(fit, before, jacobian)
+    try:
+        columns = [before.derivatives(fit), jacobian] if not before.diverged else []
+    except DivergenceError:
+        columns = []
+    bases = [_basis(noise.weighted(x)) for x in columns] or [np.zeros((part.size, 0)) for part in parts]
+    white = [noise.weighted(part).ravel() if len(part) else np.zeros(0) for part in parts]
+    return _Test(noise, (white[0], white[1]), (bases[0], bases[1]))
+
+
+def _basis(columns: Floats) -> Floats:
+    flat = columns.reshape(-1, columns.shape[2])
+    length = np.linalg.norm(flat, axis=0)
+    return np.linalg.qr(flat / np.where(length > 0.0, length, 1.0))[0]
 
 
 def held_out_parts(fit: StructureFit, prediction: StructurePrediction, jacobian: Floats) -> tuple[Floats, Floats]:

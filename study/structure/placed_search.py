@@ -89,6 +89,16 @@ class PlacedBaseline:
         """Transform of forces along the fitting part, samples along the first axis."""
         return np.asarray(rfft(values, self.size, axis=0), dtype=np.complex128)
 
+    @property
+    def by_sensor(self) -> Floats:
+        """What is left, shape (n, s)."""
+        return self.residual.reshape(len(self.fit.residual), -1)
+
+    def modulation(self, u: Floats, place: Place) -> Floats:
+        """:func:`modulation_lines` of a place with the relative displacement u."""
+        e = np.array(place.direction(self.fit.model.coordinates))
+        return modulation_lines(u, (self.paths @ e)[::2] / self.fit.noise.deviation, self.by_sensor)
+
     def dated(self, record: Record) -> Record:
         """A relative motion with the time at which it was."""
         return replace(record, start=self.prepared.record.start + self.fit.first * self.prepared.dt)
@@ -243,9 +253,9 @@ def _places(
         case "shares of the one before":
             tried = places * point[-1]
         case "lines of the modulation":
-            tried = np.add.outer(_modulation_lines(u, place, base), places).ravel() / (len(u) * dt)
+            tried = np.add.outer(base.modulation(u, place), places).ravel() / (len(u) * dt)
         case "lines of the residual":
-            tried = np.add.outer(_residual_lines(base), places).ravel() / (len(u) * dt)
+            tried = np.add.outer(residual_lines(base.by_sensor), places).ravel() / (len(u) * dt)
     return [float(x) for x in tried if np.isfinite(x)]
 
 
@@ -253,19 +263,20 @@ def _windowed(values: Floats) -> Complexes:
     return np.asarray(rfft(values * np.hanning(len(values))), dtype=np.complex128)
 
 
-def _residual_lines(base: PlacedBaseline) -> Floats:
-    """Lines that stand out of the residuals' own spectra."""
-    residual = base.residual.reshape(len(base.fit.residual), -1)
+def residual_lines(residual: Floats) -> Floats:
+    """Lines that stand out of the residuals' own spectra; ``residual`` has shape (samples, sensors)."""
     return np.array(highest_lines(np.sum([np.abs(_windowed(x)) ** 2 for x in residual.T], axis=0)))
 
 
-def _modulation_lines(u: Floats, place: Place, base: PlacedBaseline) -> Floats:
-    """Lines at which a stiffness of this place that varies with time would explain most, by a matched filter."""
+def modulation_lines(u: Floats, path: Complexes, residual: Floats) -> Floats:
+    """Lines at which a stiffness of a place that varies with time would explain most, by a matched filter.
+
+    ``path`` leads from a force at the place to the sensors, shape (lines, sensors), ``residual`` and the relative
+    displacement ``u`` have as many samples as these lines are of.
+    """
     n = len(u)
-    e = np.array(place.direction(base.fit.model.coordinates))
-    path = (base.paths @ e)[::2] / base.fit.noise.deviation
-    residual = np.asarray(rfft(base.residual.reshape(n, -1), axis=0), dtype=np.complex128)
-    matched = np.asarray(irfft(np.sum(np.conj(path) * residual, axis=1), n), dtype=np.float64)
+    spectra = np.asarray(rfft(residual, axis=0), dtype=np.complex128)
+    matched = np.asarray(irfft(np.sum(np.conj(path) * spectra, axis=1), n), dtype=np.float64)
     numerator = np.abs(_windowed(matched * u)) ** 2
     passband = np.asarray(irfft(np.sum(np.abs(path) ** 2, axis=1), n), dtype=np.float64)
     spread = np.asarray(irfft(np.abs(np.asarray(rfft(u), dtype=np.complex128)) ** 2, n), dtype=np.float64)

@@ -14,12 +14,13 @@ from study.diagnose.dependence import DEGREE, TAUS, hysteretic, relaxed
 from study.equations.place import Place
 from study.records.record import MOTIONS
 from study.structure.mass_matrix import matrices
+from study.structure.placed_search import modulation_lines, residual_lines
 from study.structure.places import connections, transfer
 from study.structure.structure_prediction import StructurePrediction
 from study.structure.structure_record import Sensor
 from study.structure.structure_run import prepare_run
 from study.support import statistics
-from study.support.arrays import Floats
+from study.support.arrays import Complexes, Floats
 from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares
 from study.support.statistics import Gain
@@ -32,7 +33,7 @@ class Leftover:
     """What one family of shapes at one place explains, held out."""
 
     place: Place
-    family: str  # ``displacement``, ``velocity``, ``displacement and velocity`` or ``past``
+    family: str  # ``displacement``, ``velocity``, ``displacement and velocity``, ``past`` or ``time``
     gain: Gain
 
 
@@ -56,10 +57,15 @@ def left_over(prediction: StructurePrediction) -> list[Leftover]:
     linear = matrices(model, model.numbers())
     paths = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, size) / prepared.scale[:, None]
     cut, n = split * len(prepared.sensors), len(model.coordinates)
+    early = residual[:cut].reshape(split, -1)
+    short = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, split) / prepared.scale[:, None]
+    steady = residual_lines(early)
     found: list[Leftover] = []
     for place in connections(model):
         e = np.array(place.direction(model.coordinates))
-        for family, shapes in _families(free[:, :n] @ e, free[:, n:] @ e):
+        u = free[:, :n] @ e
+        families = [*_families(u, free[:, n:] @ e), ("time", _times(u, short @ e, early, steady))]
+        for family, shapes in families:
             lines = np.stack([rfft(x, size) for x in shapes], axis=1)
             columns = irfft((paths @ e)[:, :, None] * lines[:, None, :], size, axis=0)[: len(free)]
             gain = statistics.gain(*_held_out(own, columns.reshape(len(residual), -1), residual, cut))
@@ -92,12 +98,28 @@ def _families(u: Floats, v: Floats) -> Iterator[tuple[str, list[Floats]]]:
     yield "past", past + [hysteretic(steps, beta) for beta in (0.5, 1.5, 4.0)]
 
 
+def _times(u: Floats, path: Complexes, early: Floats, steady: Floats) -> list[Floats]:
+    """What varies with time at the place: its stiffness, or a force, at the lines that stand out of the first part."""
+    turn = 2.0 * np.pi * np.arange(len(u)) / len(early)
+    x = u / max(float(np.std(u)), 1e-300)
+    shapes: list[Floats] = []
+    for line in modulation_lines(u[: len(early)], path, early)[:3]:
+        shapes += [x * np.cos(line * turn), x * np.sin(line * turn)]
+    for line in steady[:3]:
+        shapes += [np.cos(line * turn), np.sin(line * turn)]
+    return shapes
+
+
 def _functions(x: Floats) -> list[Floats]:
     powers = [x**n for n in range(2, DEGREE + 1)]
     return [*powers, np.abs(x), x * np.abs(x), np.sign(x), np.clip(x, -0.5, 0.5), np.clip(x, -1.0, 1.0)]
 
 
 def _held_out(own: Floats, columns: Floats, residual: Floats, cut: int) -> tuple[Floats, Floats]:
-    design = np.hstack([own, columns])
-    amounts = least_squares(design[:cut], residual[:cut], 1e-6)
-    return residual[cut:], residual[cut:] - design[cut:] @ amounts
+    """The residual of the second part before and after, less what the model's own coefficients could do there."""
+    amounts = least_squares(np.hstack([own, columns])[:cut], residual[:cut], 1e-6)[own.shape[1] :]
+    late = np.column_stack([residual[cut:], columns[cut:] @ amounts])
+    length = np.linalg.norm(own[cut:], axis=0)
+    basis = np.linalg.qr(own[cut:] / np.where(length > 0.0, length, 1.0))[0]
+    late = late - basis @ (basis.T @ late)
+    return late[:, 0], late[:, 0] - late[:, 1]
