@@ -140,7 +140,7 @@ class _Test:
 
 def _test(fit: StructureFit, before: StructurePrediction, noise: SensorNoise) -> _Test:
     jacobian = linearise(fit, before.prepared)
-    parts = held_out_parts(fit, before, jacobian)
+    parts = held_out_parts(fit, before, jacobian, before.prepared.fit)
     try:
         columns = [before.derivatives(fit), jacobian] if not before.diverged else []
     except DivergenceError:
@@ -156,14 +156,16 @@ def _basis(columns: Floats) -> Floats:
     return np.linalg.qr(flat / np.where(length > 0.0, length, 1.0))[0]
 
 
-def held_out_parts(fit: StructureFit, prediction: StructurePrediction, jacobian: Floats) -> tuple[Floats, Floats]:
+def held_out_parts(
+    fit: StructureFit, prediction: StructurePrediction, jacobian: Floats, fitted: tuple[int, int]
+) -> tuple[Floats, Floats]:
     """Residual of the judging part by the fitting part's coefficients, and the other way round (``diagnose.held_out``).
 
     The other way takes one step of Gauss and Newton by the judging part's derivatives; it is empty where that cannot
-    be.
+    be, or the fit is of another part than ``fitted``, as that of a search is.
     """
     nothing = np.empty((0, prediction.residual.shape[1]))
-    if prediction.diverged or not fit.keys or fit.span != prediction.prepared.fit:
+    if prediction.diverged or not fit.keys or fit.span != fitted:
         return prediction.residual, nothing
     scale, own = prediction.prepared.scale, len(fit.keys)
     try:
@@ -190,7 +192,7 @@ def _examined(candidate: PlacedCandidate, before: StructurePrediction) -> Placed
         candidate.entry, fit, candidate.prediction,
         statistics.gain((before.residual / size).ravel(), (candidate.prediction.residual / size).ravel()),
         coefficient, error, parameters, errors, flatness, steadiness,
-        held_out_parts(fit, candidate.prediction, jacobian),
+        held_out_parts(fit, candidate.prediction, jacobian, before.prepared.fit),
     )  # fmt: skip
 
 

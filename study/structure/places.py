@@ -15,21 +15,13 @@ from study.support.arrays import Complexes, Floats
 def connections(model: Model) -> tuple[Place, ...]:
     """Every pair where an effect may be missing: between the ground and each coordinate, and between neighbours.
 
-    Neighbours are what a term of the model ties together; where nothing does, those next to each other in its list.
+    Neighbours are what a term of the model ties together. Two coordinates that inertia couples are motions of one body,
+    as heave and pitch: nothing lies between them.
     """
     found: dict[frozenset[str], Place] = {}
     for entry in model.terms:
-        place = entry.place
-        if place is not None and place.kind == "between":
-            found.setdefault(place.path, place)
-        elif place is not None and place.kind == "couples":
-            found.setdefault(frozenset(place.ends), Place("between", place.ends))
-    for first, second in zip(model.coordinates, model.coordinates[1:], strict=False):
-        tied = any(first in path and GROUND not in path for path in found) and any(
-            second in path and GROUND not in path for path in found
-        )
-        if not tied:
-            found.setdefault(frozenset((first, second)), Place("between", (first, second)))
+        if entry.place is not None and entry.place.kind == "between":
+            found.setdefault(entry.place.path, entry.place)
     for name in model.coordinates:
         found.setdefault(frozenset((GROUND, name)), Place("between", (GROUND, name)))
     return tuple(found.values())

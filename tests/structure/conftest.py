@@ -22,7 +22,7 @@ def frame():
 @pytest.fixture(scope="session")
 def quiet_frame(frame):
     """All motions of the frame without noise."""
-    drive = force(Excitation(level=400.0, cutoff=12.5), 4000, 0.02, 1)
+    drive = force(Excitation(level=400.0, cutoff=12.5), 5000, 0.02, 1)
     return simulate_structure(frame, {"shaker": drive}, 0.02)
 
 

@@ -70,7 +70,7 @@ def test_linear_terms_come_from_frequency_responses(frame, record_of):
 def test_what_cannot_be_judged_gets_its_sentence(believed, record_of):
     record = record_of()
     with pytest.raises(StudyError, match=r"overlap.*expected"):
-        prepare_structure(record, believed, (0, 2000), (1000, 4000))
+        prepare_structure(record, believed, (0, 2000), (1000, 5000))
     loose = tuple(t for t in believed.terms if t.place and not {"floor2", "floor3"} <= set(t.place.ends))
     apart = Model("loose", loose, believed.coordinates, (("shaker", "floor1"),))
     with pytest.raises(StudyError, match="nothing measures the coordinate 'floor3' and nothing ties it"):
