@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from study.commands import structures
 from study.commands.command import Command, progress
 from study.commands.record_arguments import (
     accounted_together,
@@ -41,6 +42,9 @@ def _run(arguments: argparse.Namespace) -> None:
 
     folder = out_folder(arguments)
     model = read_model(arguments.model)
+    if model.coordinates:
+        structures.diagnose(arguments, model)
+        return
     own = own_candidates(arguments.candidate, model)
     for name in arguments.without:
         terms.get(name)

@@ -66,7 +66,7 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         "--accept-swapped", action="store_true", help="take force and response as named, though they seem exchanged"
     )
     reading.add_argument(
-        "--absolute", action="store_true", help="on a moving base (columns base_acceleration ...): the response is absolute"
+        "--absolute", action="store_true", help="on a moving base (column base_acceleration): the response is absolute"
     )  # fmt: skip
     reading.add_argument("--free", action="store_true", help="no force acts: a free decay (a column of it is left out)")
     reading.add_argument(
@@ -76,8 +76,8 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     judging.add_argument("--fit", type=span, metavar="A:B", help="samples to fit, A to B - 1 (default: the first half)")
     judging.add_argument(
         "--judge", type=judged, metavar="A:B",
-        help=f"samples to judge (default: the second half), or '{ALTERNATE}': each from a state of its own, the default "
-        "of free decays and of several stretches, and right for sweeps, whose halves have other frequencies",
+        help=f"samples to judge (default: the second half), or '{ALTERNATE}': each from a state of its own, the "
+        "default of free decays and of several stretches, and right for sweeps, whose halves have other frequencies",
     )  # fmt: skip
     judging.add_argument(
         "--use", action="append", type=times, default=[], metavar="S:T",

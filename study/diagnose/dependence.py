@@ -153,8 +153,8 @@ def _states(left: Leftover) -> list[Floats]:
     """Relaxations of several speeds, of the motion and of where it turned."""
     steps: Floats = np.diff(left.displacement, prepend=left.displacement[0])
     rate = float(np.std(steps) / np.std(left.velocity))  # time step in units of displacement over velocity
-    relaxed = [_relaxed(steps, float(np.exp(-rate / tau))) for tau in TAUS]
-    return relaxed + [_hysteresis(steps, beta) for beta in (0.5, 1.5, 4.0)]
+    slow = [relaxed(steps, float(np.exp(-rate / tau))) for tau in TAUS]
+    return slow + [hysteretic(steps, beta) for beta in (0.5, 1.5, 4.0)]
 
 
 def _hats(x: Floats) -> list[Floats]:
@@ -165,14 +165,15 @@ def _hats(x: Floats) -> list[Floats]:
     return [np.clip(1.0 - np.abs(inside - knot) / (knots[1] - knots[0]), 0.0, None) for knot in knots]
 
 
-def _relaxed(steps: Floats, kept: float) -> Floats:
+def relaxed(steps: Floats, kept: float) -> Floats:
     """The sum of all steps so far, of each of which a share is kept from sample to sample, shape (n,)."""
     size = next_fast_len(2 * len(steps), real=True)
     memory = kept ** np.arange(len(steps))
     return np.asarray(irfft(rfft(steps, size) * rfft(memory, size), size)[: len(steps)], dtype=np.float64)
 
 
-def _hysteresis(steps: Floats, beta: float) -> Floats:
+def hysteretic(steps: Floats, beta: float) -> Floats:
+    """A Bouc-Wen state along a motion's steps, no larger than one over ``beta``, shape (n,)."""
     state, z = np.zeros_like(steps), 0.0
     for i, step in enumerate(steps.tolist()):
         z = min(max(z + step - beta * abs(step) * z, -1.0 / beta), 1.0 / beta)

@@ -94,8 +94,8 @@ def laid_out(records: Sequence[Record], layout: Layout, *, prescribed: bool = Fa
     if drifts:
         fit, judge, horizon = _over_a_horizon(fit, judge, _seen(response))
         notes.append(
-            f"nothing in the model brings the mass back, so its motion drifts: it is fitted and judged over a horizon of "
-            f"{horizon:.3g} s, from {len(fit)} and {len(judge)} states of its own"
+            f"nothing in the model brings the mass back, so its motion drifts: it is fitted and judged over a horizon "
+            f"of {horizon:.3g} s, from {len(fit)} and {len(judge)} states of its own"
         )
     prepared = strung_together(fit, judge, response, completed, notes)
     measured = tuple(m for m in MOTIONS if m in records[0])

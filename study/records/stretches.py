@@ -61,13 +61,13 @@ def _refuse_different(first: Record, other: Record) -> None:
         one, two = first.units.get(channel, ""), other.units.get(channel, "")
         expect(
             one == two,
-            f"{channel} is in {one} in {first.name} and in {two} in {other.name}; expected the same unit in records that "
-            "are judged together",
+            f"{channel} is in {one} in {first.name} and in {two} in {other.name}; expected the same unit in records "
+            "that are judged together",
         )
 
 
 def sure(completed: CompletedRecord, first: int, last: int) -> Stretch:
-    """A stretch of a completed record without the samples at its ends that derivatives and integrals leave uncertain."""
+    """A stretch of a completed record without the samples at its ends that its derivatives leave uncertain."""
     edge = completed.edge
     low, high = max(first, edge), min(last, len(completed.record) - edge)
     expect(

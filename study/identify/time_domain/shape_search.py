@@ -209,15 +209,15 @@ def modulation_lines(base: Baseline) -> list[float]:
     passband = irfft(np.abs(receptance) ** 2, n)
     spread = irfft(np.abs(rfft(base.displacement)) ** 2, n)
     denominator = np.abs(rfft(passband * spread))
-    return _lines(numerator / np.maximum(denominator, 1e-6 * np.max(denominator)))
+    return highest_lines(numerator / np.maximum(denominator, 1e-6 * np.max(denominator)))
 
 
 def residual_lines(base: Baseline) -> list[float]:
     """Lines that stand out of the residual's own spectrum."""
-    return _lines(np.abs(_windowed(base.fit.residual)) ** 2)
+    return highest_lines(np.abs(_windowed(base.fit.residual)) ** 2)
 
 
-def _lines(spectrum: Floats) -> list[float]:
+def highest_lines(spectrum: Floats) -> list[float]:
     """The highest peaks over their surroundings, as line numbers refined by a parabola in the logarithm."""
     n = len(spectrum)
     width = max(8, n // 64)

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
-from study.records.base import BASE
+from study.records.moving_base import BASE
 from study.records.readers.options import BESIDE, ReadOptions
 from study.records.readers.table import Column, Table
 from study.records.record import MOTIONS
