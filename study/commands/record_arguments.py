@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from study.compare.history import Step
     from study.equations.model import Model
     from study.faults.accounting import Accounted
-    from study.records.layout import Layout
+    from study.records.record_layout import Layout
     from study.records.readers import ReadOptions
     from study.records.record import Record
 
@@ -143,7 +143,7 @@ def read_records(arguments: argparse.Namespace) -> list["Record"]:
 
 def layout_of(arguments: argparse.Namespace, record: "Record") -> "Layout":
     """What the user says of the parts to use, to fit and to judge."""
-    from study.records.layout import Layout
+    from study.records.record_layout import Layout
 
     alternate = arguments.judge == ALTERNATE
     fit, judge = _within(arguments.fit, record), None if alternate else _within(arguments.judge, record)

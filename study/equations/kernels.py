@@ -438,7 +438,7 @@ def integrate_known(
 
     ``drive`` has displacement, velocity and channels, 2 steps rows a sample. Row 0 of ``slots`` names the registers of
     the force and of its derivatives by states and keys, the others those of the states' slopes. ``states`` has, for
-    each segment between neighbouring ``bounds``, the states beside their sensitivities. Result as :func:`integrate_rk4`.
+    each segment between ``bounds``, the states beside their sensitivities. Result as in :func:`integrate_rk4`.
     """
     h = dt / steps
     for k in range(bounds.shape[0] - 1):
