@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from study.compare.history import Step
     from study.equations.model import Model
     from study.faults.accounting import Accounted
-    from study.records.record_layout import Layout
     from study.records.readers import ReadOptions
     from study.records.record import Record
+    from study.records.record_layout import Layout
 
 RANGE = re.compile(r"([0-9]{0,15}):([0-9]{0,15})")
 MOTIONS = ("displacement", "velocity", "acceleration")
