@@ -30,7 +30,7 @@ def _run(arguments: argparse.Namespace) -> None:
 
     folder = out_folder(arguments)
     model = read_model(arguments.model)
-    own = own_candidates(arguments.candidate)
+    own = own_candidates(arguments.candidate, model)
     for name in arguments.without:
         terms.get(name)
     files: dict[str, bytes] = {}
@@ -52,23 +52,28 @@ def _diagnosed(
     from study.diagnose.confirmed_faults import confirmed
     from study.diagnose.diagnosis_files import files, in_words, unneeded_in_words
     from study.diagnose.needless import needless
+    from study.diagnose.user_candidates import check_on, unfitted
     from study.diagnose.verdict import diagnose
     from study.faults.fault import paragraph
 
     with progress(" candidates", name=record.name) as step:
         accounted = accounted_for(arguments, model, record, path)
+        check_on(accounted.comparison.record, own)
         without = tuple(arguments.without)
         diagnosis = diagnose(accounted.comparison, extra=own, without=without, progress=lambda _: step(""))
         unneeded = needless(accounted.comparison)
+        untried = unfitted(diagnosis, own)
         words, faults = in_words(diagnosis), confirmed(accounted.faults, diagnosis)
     print(f"{record.name}: {diagnosis.verdict.replace('_', ' ')}")
     print(diagnosis_report.table(diagnosis))
+    for name, why in untried.items():
+        print(f"{name} could not be fitted: {why}")
     print("\n" + words)
     if faults:
         print("\n" + paragraph(faults))
     if unneeded:
         print(f"\n{unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
-    return files(diagnosis, words, unneeded, faults)
+    return files(diagnosis, words, unneeded, faults, untried)
 
 
 COMMAND = Command(

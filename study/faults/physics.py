@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from study.equations.model import Model, ModelTerm
+from study.equations.model import ModelTerm, free
 from study.equations.terms import LIBRARY, Term
 from study.faults.leftover import Leftover, better, leftover, share
 from study.identify.time_domain import shape_search
+from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part, run_of
 from study.records.prepared import Prepared
@@ -18,9 +19,8 @@ from study.support.cores import cores
 from study.support.errors import StudyError
 from study.support.statistics import worse
 
-LOOKED_AT = 2048  # samples of the fitting part, at most, in a search
+PERIODS, SHORT, LONG = 100.0, 2048, 8192  # of the motion in a search, and in samples no fewer and no more than these
 FITTED = 3  # effects of the largest linear share that are fitted
-POINTS = 2  # of the search over its shape, from which it is
 CHANCE = 2.0  # standard errors by which one effect may leave more than another and be as good
 RUNS = 20  # free runs of such a fit
 
@@ -43,7 +43,7 @@ def missing(left: Leftover) -> Leftover | None:
     One outside of what makes it physical, which is another effect or a fault in disguise, only where no other does.
     """
     prepared, fit = left.prepared, left.fit
-    look = prepared.shortened(LOOKED_AT)
+    look = prepared.shortened(int(np.clip(prepared.samples_in(PERIODS), SHORT, LONG)))
     terms = [t for t in LIBRARY.values() if t.name not in fit.model and t.name != "inertia"]
     try:
         near = fit if look is prepared else fit_part(fit.model, look, fit.held, steps=fit.steps_per_sample)
@@ -52,10 +52,10 @@ def missing(left: Leftover) -> Leftover | None:
         return None
 
     def begun(term: Term) -> list[shape_search.Start]:
-        return shape_search.starts(term, base, look)[:POINTS]
+        return shape_search.starts(term, base, look)
 
     def fitted(start: tuple[Term, list[shape_search.Start]]) -> Leftover | None:
-        return _fitted(*start, base, look, prepared)
+        return _fitted(start[0], base, look, prepared)
 
     with ThreadPoolExecutor(cores()) as pool:
         starts = [(term, found) for term, found in zip(terms, pool.map(begun, terms), strict=True) if found]
@@ -105,35 +105,17 @@ def without_effect(fit: FreeRunFit, name: str, prepared: Prepared) -> FreeRunFit
         return None
 
 
-def _fitted(
-    term: Term, points: Sequence[shape_search.Start], base: shape_search.Baseline, look: Prepared, prepared: Prepared
-) -> Leftover | None:  # fmt: skip
-    """What the model with an effect leaves, its shape held at first, with few runs; None where it does not run."""
-    held, shapes = base.fit.held, tuple(f"{term.name}.{p.name}" for p in term.parameters)
-    for part_of_it in (1.0, 0.0):  # linear amounts, the model's own held, may be too far: then from nothing
-        entries = [ModelTerm(term, tuple(part_of_it * c for c in p.coefficients), p.parameters) for p in points]
-        begun = [
-            _tried(base.fit.model.with_term(e), look, (*held, *shapes), base.fit.steps_per_sample) for e in entries
-        ]
-        for best in sorted((fit for fit in begun if fit is not None), key=lambda fit: fit.rms):
-            fit: FreeRunFit | None = best
-            for part in (look, prepared) if shapes else (prepared,):
-                fit = None if fit is None else _tried(fit.model, part, held, fit.steps_per_sample, fit)
-            found = None if fit is None else leftover(fit, prepared)
-            if found is not None:  # the run of a fit that follows one part may leave all bounds on the other
-                return found
-    return None
-
-
-def _tried(
-    model: Model, part: Prepared, held: Sequence[str], steps: int, near: FreeRunFit | None = None
-) -> FreeRunFit | None:  # fmt: skip
-    """A short fit, in the state as well from where ``near`` stands if that begins there; None if it does not run."""
-    initial = np.atleast_2d(near.initial) if near is not None and near.first == part.plan.fit[0] else None
+def _fitted(term: Term, base: shape_search.Baseline, look: Prepared, prepared: Prepared) -> Leftover | None:
+    """What the model with an effect leaves, fitted as any candidate is; None where it does not run."""
     try:
-        return fit_part(model, part, held, steps=steps, max_iterations=RUNS, initial=initial)
+        near = with_term(base.fit, free(term), base, look)
+        initial = np.atleast_2d(near.initial)[:1] if near.first == prepared.plan.fit[0] else None
+        fit = fit_part(
+            near.model, prepared, base.fit.held, steps=near.steps_per_sample, max_iterations=RUNS, initial=initial
+        )
     except StudyError:
         return None
+    return leftover(fit, prepared)
 
 
 def _sensitivities(left: Leftover) -> tuple[Floats, Floats] | None:

@@ -31,7 +31,7 @@ from study.support.thresholds import ALPHA
 
 ROUNDS = 12  # faults and effects looked for one after the other
 PLAIN = (DRIFT, SPIKES, DROP_OUTS)  # which no physics imitates
-LONG = 8192  # samples of either part in which faults compete with physics
+SHORT, LONG = 8192, 16384  # samples of either part in which faults compete with physics
 EFFECTS = 3  # of the library that are added before a fault is believed
 
 
@@ -52,7 +52,7 @@ def search(
     corrected. The fit that is given back begins there and searches no further. Of a long record, faults that compete
     with physics are looked for in a stretch of either part; the others everywhere.
     """
-    look = limited(given, LONG)
+    look = limited(given, int(np.clip(given.samples_in(physics.PERIODS), SHORT, LONG)))
     if look is given:
         stage = _searched(given, fit, fit, faults, asked)
         return (tuple(faults), fit) if stage is None else (stage.faults, stage.left.fit)

@@ -66,13 +66,19 @@ def at_the_limits(values: Floats, step: float | None) -> NDArray[np.bool_] | Non
 
 def _recurs(values: Floats, mask: NDArray[np.bool_], limit: float, step: float | None) -> bool:
     count, runs = int(np.count_nonzero(mask)), _runs(mask)
-    if _switches(values) or count < 4 or len(runs) < 2:
+    if _switches(values) or count < 4 or len(runs) < 2 or (count == len(runs) and _repeats(runs)):
         return False
     if step is None:
         return True
     inward = limit + step if limit < float(np.mean(values)) else limit - step
     beside = int(np.count_nonzero(np.abs(values - inward) < 0.25 * step))
     return count > beside + 5.0 * math.sqrt(beside + count)
+
+
+def _repeats(runs: Sequence[tuple[int, int]]) -> bool:
+    """Whether runs follow each other at multiples of one time, as the one largest value of a repeated motion does."""
+    apart = np.diff([first for first, _ in runs])
+    return int(np.gcd.reduce(apart)) == int(np.min(apart))
 
 
 def _switches(values: Floats) -> bool:

@@ -1,9 +1,11 @@
 """A record made ready once, for everything that fits, predicts, compares or diagnoses."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import rfft
 
 from study.records.completion import complete
 from study.records.plan import Plan, make_plan
@@ -71,6 +73,13 @@ class Prepared:
     def spread(self) -> float:
         """Standard deviation of the response within the fitting part."""
         return float(np.std(self.fitted))
+
+    def samples_in(self, periods: float) -> int:
+        """Samples that so many periods of the motion take: those of the frequency that halves the response's power."""
+        values = self.fitted - np.mean(self.fitted)
+        power = np.cumsum(np.abs(rfft(values)) ** 2)
+        middle = max(1, int(np.searchsorted(power, 0.5 * power[-1])))
+        return math.ceil(periods * len(values) / middle)
 
     def known(self, values: Floats, span: tuple[int, int]) -> Floats:
         """Values along a span, shape (samples, ...), zero where the sample of the response is lost."""

@@ -17,6 +17,7 @@ from study.records.record import Record
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
+LARGEST = 1e150  # of an input: the square of one beyond may be no number
 STATE_STEPS = 4  # Runge-Kutta steps a sample for a term's own state
 
 
@@ -124,7 +125,8 @@ def history(item: Input, record: Record) -> Floats:
 
 
 def _finite(values: Floats, item: Input, record: Record) -> Floats:
-    bad = np.flatnonzero(~np.isfinite(values))
+    with np.errstate(invalid="ignore"):
+        bad = np.flatnonzero(~(np.abs(values) < LARGEST))
     if bad.size:
         formula, time = item.shape if item.state is None else item.state, record.time[bad[0]]
         raise StudyError(f"the formula {formula!r} has no finite value at t = {time:.6g} s of {record.name}")

@@ -19,6 +19,7 @@ from study.identify.frequency_domain.inputs import history, reverse_inputs
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.no_response import LINEAR, unfit, why_no_response
 from study.identify.time_domain.part_fit import STEPS, fit_part
 from study.identify.time_domain.settling import KEPT, better, continued, from_segments, settled
 from study.identify.time_domain.shape_search import Baseline
@@ -68,7 +69,16 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
     for entry in unknown:
         fit = with_term(fit, entry, shape_search.baseline(fit, look), look)
     ordered = replace(model, terms=tuple(next(t for t in fit.model.terms if t.name == e.name) for e in model.terms))
-    return settled(continued(replace(fit, model=ordered), prepared), prepared)
+    return _followed(settled(continued(replace(fit, model=ordered), prepared), prepared), model, prepared)
+
+
+def _followed(fit: FreeRunFit, model: Model, prepared: Prepared) -> FreeRunFit:
+    """The fit; a linear system is never chaotic: one that needs segments is refused where there is a plain reason."""
+    if fit.restarts and all(term.name in LINEAR for term in model.terms):
+        sentence = unfit(model, prepared)
+        if sentence:
+            raise StudyError(sentence)
+    return fit
 
 
 def first_starts(model: Model, prepared: Prepared) -> list[dict[str, float]]:
@@ -135,7 +145,7 @@ def best_fit(
         bound = _at_minimum(inside, model, prepared, held)
         best = best if bound is None or _unphysical(bound) else bound
     if best is None:
-        raise StudyError(f"{model.name!r} has no finite response to the force of {prepared.record.name!r}")
+        raise StudyError(why_no_response(model, prepared))
     return replace(best, elsewhere=tuple(first[1:]))
 
 
