@@ -15,6 +15,7 @@ from study.faults.leftover import Leftover, amounts_on_both, leftover
 from study.faults.physics import refitted
 from study.records.prepared import Prepared
 from study.support import statistics
+from study.support.thresholds import TOLERANCE
 
 STEPS = 8  # of Gauss and Newton
 COARSE = (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)  # samples
@@ -60,7 +61,9 @@ def refined(
     if relative_power(left) >= relative_power(before):
         return None
     explained = statistics.gain(before.residual[1], left.residual[1]).explained
-    return Refined(replace(one.fault, explained=explained), left)  # pyright: ignore[reportPossiblyUnboundVariable]
+    found = one.fault  # pyright: ignore[reportPossiblyUnboundVariable]
+    error = math.hypot(found.error, TOLERANCE * found.value)  # the model and its integration are no nearer than that
+    return Refined(replace(found, explained=explained, error=error), left)
 
 
 def _coarse(given: Prepared, faults: Sequence[Fault], left: Leftover) -> tuple[float, Leftover]:
