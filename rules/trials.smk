@@ -37,3 +37,37 @@ rule trials:
         wanted=TRIALS.wanted.plain(),
     script:
         "../scripts/trial_summary.py"
+
+
+# Trials of structures: `snakemake -j2 trials_mdof`, not part of `all`.
+STRUCTURE_TRIALS, STRUCTURE_JOBS = 120, 12
+STRUCTURE_CODE = {
+    name: rests_on(Path(f"scripts/{name}.py")) for name in ("structure_trials", "structure_trial_summary")
+}
+
+
+rule structure_trial_runs:
+    input:
+        code=STRUCTURE_CODE["structure_trials"],
+    output:
+        table="results/trials_mdof/part_{part}.csv",
+    params:
+        count=STRUCTURE_TRIALS,
+        jobs=STRUCTURE_JOBS,
+    wildcard_constraints:
+        part="[0-9]+",
+    script:
+        "../scripts/structure_trials.py"
+
+
+rule trials_mdof:
+    input:
+        parts=[f"results/trials_mdof/part_{part}.csv" for part in range(STRUCTURE_JOBS)],
+        code=STRUCTURE_CODE["structure_trial_summary"],
+    output:
+        trials="results/trials_mdof/trials.csv",
+        rates="results/trials_mdof/rates.csv",
+        effects="results/trials_mdof/confusion_of_effects.csv",
+        places="results/trials_mdof/confusion_of_places.csv",
+    script:
+        "../scripts/structure_trial_summary.py"

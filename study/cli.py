@@ -1,15 +1,17 @@
 """The command line: run a command, and turn whatever goes wrong into one sentence."""
 
 import os
+import re
 import sys
 from collections.abc import Sequence
 from contextlib import nullcontext, suppress
 from pathlib import Path
 
 from study.commands.parser import parser
-from study.support.errors import StudyError
+from study.support.errors import StudyError, expect
 from study.support.terminal import harmless, shown_on
 
+LONG = re.compile(r"\S{400,}")  # a word that no path and no value needs: a message is to be read
 BAD_INPUT, FAULT, INTERRUPTED, PIPE_CLOSED = 2, 1, 130, 141  # the last two as shells report SIGINT and SIGPIPE
 
 
@@ -47,8 +49,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str] | None) -> None:
+    words = sys.argv[1:] if argv is None else argv
+    for word in words:  # a shell cannot pass one on, a caller in Python can
+        expect("\0" not in word, f"the word {word!r} holds a null byte; expected words without")
     try:
-        arguments = parser().parse_args(argv)
+        arguments = parser().parse_args(words)
     except SystemExit:  # --help and --version have printed what was asked
         return
     arguments.run(arguments)
@@ -75,7 +80,7 @@ def _flush() -> None:
 def _end(code: int, message: str = "") -> int:
     """Say the message in one line on stderr, and leave nothing for the interpreter's own flush to complain of."""
     if message:
-        line = " ".join(message.split())
+        line = LONG.sub(lambda word: f"{word[0][:150]}...{word[0][-20:]}", " ".join(message.split()))
         with suppress(OSError):
             print("study:", harmless(line), file=sys.stderr)
     try:

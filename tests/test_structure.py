@@ -8,7 +8,8 @@ import pytest
 
 STUDY = Path(__file__).parents[1] / "study"
 FLOORS = (
-    "cli", "commands", "interface", "explore", "trials", "diagnose", "faults", "reproduction", "compare", "figures",
+    "cli", "commands", "interface", "explore", "trials", "structure", "diagnose", "faults", "reproduction", "compare",
+    "figures",
     "identify", "equations", "records", "support",
 )  # fmt: skip
 FILES = sorted(STUDY.rglob("*.py"))

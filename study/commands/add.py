@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from study.commands import structures
 from study.commands.command import Command, progress
 from study.commands.record_arguments import (
     accounted_for,
@@ -25,6 +26,11 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", type=Path, help="model file (YAML); the term is added to it")
     parser.add_argument("term", help="an effect of the library, or a name for your own with --force")
     parser.add_argument("--force", metavar="FORMULA", help="formula of your own effect, such as 'u*abs(u)'")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--between", nargs=2, metavar="PLACE", help="of a structure: two coordinates, or 'ground' and one"
+    )
+    where.add_argument("--at", metavar="COORDINATE", help="of a structure: the coordinate that it acts on")
     parser.add_argument("--data", dest="records", type=Path, nargs="+", required=True, metavar="RECORD")
     add_reading_arguments(parser)
     add_out_argument(parser)
@@ -35,8 +41,12 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.support.transaction import locked
 
     folder = out_folder(arguments)
+    first = read_model(arguments.model)
+    if first.coordinates:
+        structures.add(arguments, first)
+        return
     term = _term(arguments)
-    _refuse_second(arguments.model, read_model(arguments.model), term)
+    _refuse_second(arguments.model, first, term)
     with locked(arguments.model):  # another run may have changed it meanwhile
         model = read_model(arguments.model)
         _refuse_second(arguments.model, model, term)
@@ -82,7 +92,10 @@ def _refuse_second(path: Path, model: "Model", term: "Term") -> None:
     from study.equations.redundancy import repeated_force
     from study.support.errors import expect
 
-    expect(term.name not in model, f"{path}: {term.name} is in the model already; an effect can be added once")
+    expect(
+        term.name not in model,
+        f"{path}: {term.name} is in the model already; expected another effect, each can be added once",
+    )
     fault = repeated_force(model.with_term(term))
     expect(fault is None, f"{path}: {fault}")
 
@@ -90,6 +103,7 @@ def _refuse_second(path: Path, model: "Model", term: "Term") -> None:
 COMMAND = Command(
     "add", "add an effect, fit again: error before and after",
     "study add rig.yaml quadratic_damping --data rig.csv\n"
-    "  study add rig.yaml bracket --force \"u*abs(u)\" --data rig.csv",
+    "  study add rig.yaml bracket --force \"u*abs(u)\" --data rig.csv\n"
+    "  study add frame.yaml one_sided_contact --between floor2 floor3 --data frame.csv",
     _arguments, _run,
 )  # fmt: skip

@@ -3,6 +3,7 @@
 import argparse
 from typing import TYPE_CHECKING
 
+from study.commands import structures
 from study.commands.command import Command, progress
 from study.commands.record_arguments import accounted_for, add_record_arguments, inputs_of, out_folder, read_records
 from study.identify.estimators import ESTIMATORS
@@ -34,6 +35,9 @@ def _run(arguments: argparse.Namespace) -> None:
 
     folder = out_folder(arguments)
     model = read_model(arguments.model)
+    if model.coordinates:
+        structures.compare(arguments, model)
+        return
     records = read_records(arguments)
     many, unpaged = len(records) > 1, lacking("bokeh", PAGE, "explore")
     files: dict[str, bytes] = {}

@@ -4,10 +4,19 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from study.commands import structures
 from study.commands.command import Command, progress
-from study.commands.record_arguments import accounted_for, add_record_arguments, inputs_of, out_folder, read_records
+from study.commands.record_arguments import (
+    accounted_together,
+    add_record_arguments,
+    inputs_of,
+    out_folder,
+    read_records,
+)
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from study.equations.model import Model
     from study.equations.terms import Term
     from study.records.record import Record
@@ -17,6 +26,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add_record_arguments(parser)
     parser.add_argument(
         "--candidate", action="append", default=[], metavar="NAME=FORMULA", help="a candidate of your own"
+    )
+    parser.add_argument(
+        "--each", action="store_true", help="of several records, a verdict each, not one on all of them"
     )
     parser.add_argument("--without", action="append", default=[], metavar="TERM", help="leave a term out")
 
@@ -30,6 +42,9 @@ def _run(arguments: argparse.Namespace) -> None:
 
     folder = out_folder(arguments)
     model = read_model(arguments.model)
+    if model.coordinates:
+        structures.diagnose(arguments, model)
+        return
     own = own_candidates(arguments.candidate, model)
     for name in arguments.without:
         terms.get(name)
@@ -37,17 +52,19 @@ def _run(arguments: argparse.Namespace) -> None:
     records = read_records(arguments)
     for path in arguments.records:
         settings_beside(path)  # what is wrong there is said before the work begins
-    for record, path in zip(records, arguments.records, strict=True):
+    if not arguments.each:  # one verdict on one structure
+        files = _diagnosed(model, records, arguments.records[0], arguments, own)
+    for record, path in zip(records, arguments.records, strict=True) if arguments.each else ():
         prefix = f"{record.name}_" if len(records) > 1 else ""
-        files |= {prefix + name: data for name, data in _diagnosed(model, record, path, arguments, own).items()}
+        files |= {prefix + name: data for name, data in _diagnosed(model, [record], path, arguments, own).items()}
     write_files(folder, files, inputs_of(arguments))
     print(f"\n{folder}: {', '.join(name for name in files if not name.endswith('.svg'))}")
 
 
 def _diagnosed(
-    model: "Model", record: "Record", path: Path, arguments: argparse.Namespace, own: "list[Term]"
+    model: "Model", records: "Sequence[Record]", path: Path, arguments: argparse.Namespace, own: "list[Term]"
 ) -> dict[str, bytes]:  # fmt: skip
-    """Diagnose one record, print the diagnosis, and give the files' contents."""
+    """Diagnose one record, or several together, print the diagnosis, and give the files' contents."""
     from study.diagnose import diagnosis_report
     from study.diagnose.confirmed_faults import confirmed
     from study.diagnose.diagnosis_files import files, in_words, unneeded_in_words
@@ -56,18 +73,19 @@ def _diagnosed(
     from study.diagnose.verdict import diagnose
     from study.faults.fault import paragraph
 
-    with progress(" candidates", name=record.name) as step:
-        accounted = accounted_for(arguments, model, record, path)
+    name = ", ".join(record.name for record in records)
+    with progress(" candidates", name=name) as step:
+        accounted = accounted_together(arguments, model, records, path)
         check_on(accounted.comparison.record, own)
         without = tuple(arguments.without)
         diagnosis = diagnose(accounted.comparison, extra=own, without=without, progress=lambda _: step(""))
         unneeded = needless(accounted.comparison)
         untried = unfitted(diagnosis, own)
         words, faults = in_words(diagnosis), confirmed(accounted.faults, diagnosis)
-    print(f"{record.name}: {diagnosis.verdict.replace('_', ' ')}")
+    print(f"{name}: {diagnosis.verdict.replace('_', ' ')}")
     print(diagnosis_report.table(diagnosis))
-    for name, why in untried.items():
-        print(f"{name} could not be fitted: {why}")
+    for candidate, why in untried.items():
+        print(f"{candidate} could not be fitted: {why}")
     print("\n" + words)
     if faults:
         print("\n" + paragraph(faults))
@@ -79,6 +97,11 @@ def _diagnosed(
 COMMAND = Command(
     "diagnose", "which effect is missing from a model",
     "study diagnose rig.csv --model rig.yaml\n"
+    "  study diagnose low.csv mid.csv high.csv --model rig.yaml         one verdict on all of them; --each for each\n"
+    "  study diagnose roll.csv --free --model rig.yaml                  a free decay: no force acts\n"
+    "  study diagnose blows.csv --use 2.0:9.5 --use 12.0:30.0 --model rig.yaml        the stretches between blows\n"
+    "  study diagnose damper.csv --model damper.yaml                    a component test: the model has no inertia\n"
+    "  study diagnose sweep.csv --judge every-other-block --model rig.yaml\n"
     "  study diagnose rig.csv --model rig.yaml --candidate \"bracket=u*abs(u) + 0.1*v**3\" --without hysteresis",
     _arguments, _run,
 )  # fmt: skip

@@ -1,6 +1,7 @@
 """Arguments that every command on measured records takes, and what becomes of them."""
 
 import argparse
+import math
 import re
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -8,22 +9,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from study.commands.command import number, whole
-from study.support.errors import StudyError, at, expect
+from study.support.errors import StudyError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from study.compare.comparison import Comparison
     from study.compare.history import Step
     from study.equations.model import Model
     from study.faults.accounting import Accounted
-    from study.records.prepared import Prepared
     from study.records.readers import ReadOptions
     from study.records.record import Record
+    from study.records.record_layout import Layout
 
 RANGE = re.compile(r"([0-9]{0,15}):([0-9]{0,15})")
 MOTIONS = ("displacement", "velocity", "acceleration")
 RESULTS = Path("results")
-GIVEN = ("dt", "fs", "group", "period", "accept_saturated", "accept_swapped")  # as ``ReadOptions`` calls them
+GIVEN = ("dt", "fs", "group", "period", "accept_saturated", "accept_swapped", "free")  # as ``ReadOptions`` calls them
 DIGITS = 10  # of the number of a column; more are a name
+ALTERNATE = "every-other-block"
 Span = tuple[int, int | None]
 
 
@@ -62,11 +66,23 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         "--accept-swapped", action="store_true", help="take force and response as named, though they seem exchanged"
     )
     reading.add_argument(
+        "--absolute", action="store_true", help="on a moving base (column base_acceleration): the response is absolute"
+    )  # fmt: skip
+    reading.add_argument("--free", action="store_true", help="no force acts: a free decay (a column of it is left out)")
+    reading.add_argument(
         "--no-measurement", action="store_true", help="look for no faults of the measurement: drift, delay, spikes ..."
     )
     judging = parser.add_argument_group("fitting and judging")
     judging.add_argument("--fit", type=span, metavar="A:B", help="samples to fit, A to B - 1 (default: the first half)")
-    judging.add_argument("--judge", type=span, metavar="A:B", help="samples to judge (default: the second half)")
+    judging.add_argument(
+        "--judge", type=judged, metavar="A:B",
+        help=f"samples to judge (default: the second half), or '{ALTERNATE}': each from a state of its own, the "
+        "default of free decays and of several stretches, and right for sweeps, whose halves have other frequencies",
+    )  # fmt: skip
+    judging.add_argument(
+        "--use", action="append", type=times, default=[], metavar="S:T",
+        help="use the record from S to T seconds alone; several such stretches are fitted and judged together",
+    )  # fmt: skip
     judging.add_argument("--response", choices=MOTIONS, help="the measured motion that free runs are held against")
     judging.add_argument(
         "--cutoff", type=number(above=0.0), metavar="HZ",
@@ -83,6 +99,25 @@ def span(text: str) -> Span:
     if last is not None and last <= (first or 0):
         raise argparse.ArgumentTypeError(f"{text!r} ends before it begins; expected a range such as 0:4096")
     return first or 0, last
+
+
+def judged(text: str) -> Span | str:
+    """Samples to judge, or the name of a way to choose them."""
+    return ALTERNATE if text.strip() == ALTERNATE else span(text)
+
+
+def times(text: str) -> tuple[float, float | None]:
+    """``2.0:9.5`` as two times in seconds; an end left out is that of the record."""
+    begin, separator, end = text.strip().partition(":")
+    try:
+        found = float(begin or "-inf"), float(end) if end else None
+    except ValueError:
+        separator, found = "", (0.0, None)
+    if not separator or not begin or not all(x is None or math.isfinite(x) for x in found):
+        raise argparse.ArgumentTypeError(f"{text!r} is no range of times in seconds such as 2.0:9.5")
+    if found[1] is not None and found[1] <= found[0]:
+        raise argparse.ArgumentTypeError(f"{text!r} ends before it begins; expected a range such as 2.0:9.5")
+    return found
 
 
 def read_options(arguments: argparse.Namespace) -> "ReadOptions":
@@ -106,25 +141,14 @@ def read_records(arguments: argparse.Namespace) -> list["Record"]:
     return list(distinct([read_record(path, options) for path in arguments.records]))
 
 
-def prepared_of(arguments: argparse.Namespace, record: "Record") -> "Prepared":
-    """A record made ready: its motions completed, and what to fit and to judge of it settled.
+def layout_of(arguments: argparse.Namespace, record: "Record") -> "Layout":
+    """What the user says of the parts to use, to fit and to judge."""
+    from study.records.record_layout import Layout
 
-    Raises
-    ------
-    StudyError
-        If the ranges overlap or leave the record, it lacks the response asked for, or cannot be completed.
-    """
-    from study.records.plan import make_plan
-    from study.records.prepared import prepare_record
-
-    fit, judge = _within(arguments.fit, record), _within(arguments.judge, record)
+    alternate = arguments.judge == ALTERNATE
+    fit, judge = _within(arguments.fit, record), None if alternate else _within(arguments.judge, record)
     fit, judge = fit or _other(judge, record), judge or _other(fit, record)
-    with at(record.name):
-        measured = ", ".join(m for m in MOTIONS if m in record)
-        usable = arguments.response is None or arguments.response in record
-        expect(usable, f"no {arguments.response} was measured; expected --response {measured}")
-        plan = make_plan(record, fit, judge, arguments.response)
-    return prepare_record(record, plan, arguments.cutoff)
+    return Layout(tuple(arguments.use), fit, judge, alternate, arguments.response, arguments.cutoff)
 
 
 def accounted_for(
@@ -134,15 +158,22 @@ def accounted_for(
 
     ``options`` are those of :func:`study.faults.accounting.accounted`: estimator and progress.
     """
-    from study.faults.accounting import accounted
-    from study.faults.instrument_settings import NOTHING_ASKED, settings_beside
+    return accounted_together(arguments, model, [record], path, **options)
 
-    needed = "a free run needs a mass; expected a term 'inertia'"
-    expect("inertia" in model, f"{arguments.model}: the model has no inertia, and {needed}")
+
+def accounted_together(
+    arguments: argparse.Namespace, model: "Model", records: "Sequence[Record]", path: Path, **options: Any
+) -> "Accounted":
+    """The same of several records of one structure, to all of which one model is fitted."""
+    from study.faults.instrument_settings import NOTHING_ASKED, settings_beside
+    from study.faults.kinds_of_tests import accounted_test
+
     with naming(path, arguments.model):
         settings = NOTHING_ASKED if arguments.no_measurement else settings_beside(path)
-        prepared = prepared_of(arguments, record)
-        return accounted(model, prepared, held=settings.held, switched_off=settings.switched_off, **options)
+        return accounted_test(
+            records, model, layout_of(arguments, records[0]), absolute=arguments.absolute, held=settings.held,
+            switched_off=settings.switched_off, **options,
+        )  # fmt: skip
 
 
 @contextmanager

@@ -2,8 +2,12 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from study.commands.command import Command, number, whole
+
+if TYPE_CHECKING:
+    from study.equations.model import Model
 
 MOST_SAMPLES = 10_000_000
 
@@ -32,11 +36,18 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.equations.simulate import Integrator, simulate
     from study.records.excitation import Excitation, force
     from study.records.record import write_csv
+    from study.support.errors import at, expect
     from study.support.file_sets import keep
     from study.support.files import replacing
 
     keep([arguments.model, path_of(arguments.model)], [arguments.out])
     model = read_model(arguments.model)
+    if model.coordinates:
+        _structure(model, arguments)
+        return
+    expect("inertia" in model, f"{arguments.model}: the model has no inertia; expected a term 'inertia'")
+    with at(arguments.model):
+        model.numbers()
     excitation = Excitation(level=arguments.level, cutoff=arguments.cutoff)
     history = force(excitation, arguments.samples, arguments.dt, arguments.seed)
     record = simulate(model, history, arguments.dt, Integrator(steps_per_sample=arguments.steps))
@@ -44,6 +55,30 @@ def _run(arguments: argparse.Namespace) -> None:
         write_csv(record, beside)
     seconds = arguments.samples * arguments.dt
     print(f"{arguments.out}: {len(record)} samples, {seconds:g} s of {model.name}, force of rms {history.std():.4g} N")
+
+
+def _structure(model: "Model", arguments: argparse.Namespace) -> None:
+    """The same of a structure: each of its forces is random on its own."""
+    from study.records.excitation import Excitation, force
+    from study.structure.modes import modes_of, modes_table
+    from study.structure.structure_record import write_structure_csv
+    from study.structure.structure_simulation import simulate_structure
+    from study.support.errors import expect
+    from study.support.files import replacing
+
+    lacking = f"model {model.name!r} has no 'forces'; expected where the force acts, such as"
+    expect(model.forces, f"{lacking} {{shaker: {model.coordinates[0]}}}")
+    excitation = Excitation(level=arguments.level, cutoff=arguments.cutoff)
+    forces = {
+        name: force(excitation, arguments.samples, arguments.dt, arguments.seed + i)
+        for i, (name, _) in enumerate(model.forces)
+    }
+    record = simulate_structure(model, forces, arguments.dt, steps_per_sample=arguments.steps)
+    with replacing(arguments.out) as beside:
+        write_structure_csv(record, beside)
+    driven = ", ".join(f"{name} at {where} of rms {forces[name].std():.4g} N" for name, where in model.forces)
+    print(f"{arguments.out}: {len(record)} samples, {arguments.samples * arguments.dt:g} s of {model.name}, {driven}")
+    print(modes_table(modes_of(model), model.coordinates))
 
 
 COMMAND = Command(

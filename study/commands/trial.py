@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from study.commands.command import Command, number, whole
+from study.support.errors import expect
 
 if TYPE_CHECKING:
     from study.trials import Trial
@@ -29,6 +30,13 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--fault", default="none", metavar="NAME",
         help="a fault of the measurement, such as delay; 'any' for one in half of the seeds (default: none)",
     )  # fmt: skip
+    parser.add_argument(
+        "--test", metavar="KIND",
+        help="another kind of test than a force on mass and spring: free_decay, blows, base, component or axis",
+    )  # fmt: skip
+    parser.add_argument(
+        "--coordinates", type=whole(2, 5), help="a structure of so many masses, its effect hidden at one of its places"
+    )
     parser.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="folder (default: this one)")
 
 
@@ -39,8 +47,38 @@ def _run(arguments: argparse.Namespace) -> None:
         print(sealed.sentences(sealed.unseal(arguments.open)))
         return
     hidden, noise, response = _names(arguments.hidden), arguments.noise, arguments.response
+    if arguments.coordinates is not None:
+        print(_structure(arguments, hidden))
+        return
+    if arguments.test is not None:
+        from study.trials.kinds import make_test
+
+        other = response is not None or arguments.fault != "none"
+        expect(not other, "--test draws no --response and no --fault; expected neither of them beside it")
+        trial = make_test(arguments.test, arguments.seed, hidden, noise)
+        print(_written(trial, *sealed.write(trial, arguments.out)))
+        return
     trial = make_trial(arguments.seed, hidden, noise, response, arguments.fault, WIDE)
     print(_written(trial, *sealed.write(trial, arguments.out)))
+
+
+def _structure(arguments: argparse.Namespace, hidden: tuple[str, ...] | None) -> str:
+    """A trial of a structure on disk, and what to try with it."""
+    from study.support.errors import expect
+    from study.trials.structure_draw import make_structure_trial
+    from study.trials.structure_sealed import write
+
+    one = hidden is None or len(hidden) < 2
+    expect(one, f"--hidden names {', '.join(hidden or ())}; expected one effect, or none, in a structure")
+    expect(arguments.fault == "none", "--fault is not drawn for structures; expected --coordinates without it")
+    name = None if hidden is None else "none" if not hidden else hidden[0]
+    trial = make_structure_trial(arguments.seed, name, arguments.noise, arguments.response, arguments.coordinates)
+    record, model, answer = write(trial, arguments.out)
+    return (
+        f"{record}: force and {trial.response} of {len(trial.record.sensors)} masses, {len(trial.record)} samples at "
+        f"{trial.record.dt:.4g} s\n{model}: the structure its owner believes in\n{answer}: the answer, sealed; "
+        f"'study trial --open {answer}' shows it\n\nTry: study diagnose {record} --model {model}"
+    )
 
 
 def _names(text: str | None) -> tuple[str, ...] | None:
@@ -51,7 +89,7 @@ def _names(text: str | None) -> tuple[str, ...] | None:
 
 def _written(trial: "Trial", record: Path, model: Path, answer: Path) -> str:
     return (
-        f"{record}: force and {trial.response}, {len(trial.record)} samples at {trial.record.dt:.4g} s\n"
+        f"{record}: {' and '.join(trial.record.channels)}, {len(trial.record)} samples at {trial.record.dt:.4g} s\n"
         f"{model}: the model its owner believes in ({', '.join(t.name for t in trial.believed.terms)})\n"
         f"{answer}: the answer, sealed; 'study trial --open {answer}' shows it\n\n"
         f"Try: study diagnose {record} --model {model}"
@@ -62,6 +100,8 @@ COMMAND = Command(
     "trial", "write a record with a hidden effect, and its answer sealed apart",
     "study trial --seed 7\n  study trial --seed 7 --hidden quadratic_damping --noise 0.05 --out trials\n"
     "  study trial --seed 8 --fault any\n"
+    "  study trial --seed 9 --test free_decay\n"
+    "  study trial --seed 9 --coordinates 3\n"
     "  study trial --open trial_7.answer.json",
     _arguments, _run,
 )  # fmt: skip

@@ -12,10 +12,13 @@ from numpy.typing import NDArray
 from study.compare import panels
 from study.compare.across_levels import Level
 from study.compare.comparison import Comparison
+from study.compare.decay import decays
 from study.compare.force_map import curve, surface
+from study.compare.loops import loops
 from study.figures import coherence, page
 from study.figures.curves import InputCoherence
 from study.figures.sheet import in_style
+from study.records.prepared import FORCE
 from study.support.numbers import percent
 
 Floats = NDArray[np.float64]
@@ -29,7 +32,18 @@ def pictures(comparison: Comparison) -> dict[str, bytes]:
         "error_in_time": error_in_time,
     }  # fmt: skip
     with in_style():
-        return page.files({name: draw(comparison) for name, draw in drawn.items()})
+        return page.files({name: draw(comparison) for name, draw in drawn.items()} | _of_its_kind(comparison))
+
+
+def _of_its_kind(comparison: Comparison) -> dict[str, Figure]:
+    """What those who run a test of this kind expect to see of it."""
+    from study.compare import kind_pictures
+
+    prepared, prediction = comparison.prepared, comparison.prediction
+    if prepared.response == FORCE:
+        return {"loops": kind_pictures.loops(comparison, loops(prediction))}
+    found = decays(comparison.fit, prepared, prediction.noise.rms) if prepared.free else None
+    return {} if found is None else {"decay": kind_pictures.decay(comparison, found)}
 
 
 def level_pictures(moving: Sequence[Level], force_unit: str) -> dict[str, bytes]:

@@ -8,6 +8,7 @@ Inputs are the shapes of the model's terms along the measured motion, the output
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +17,10 @@ from study.compare.noise import segments_of
 from study.compare.prediction import Prediction
 from study.equations.model import Model
 from study.identify.frequency_domain import conditioned
-from study.identify.frequency_domain.inputs import Input, histories, reverse_inputs
+from study.identify.frequency_domain.inputs import Input, histories, reverse_inputs, without_inertia
+from study.records.plan import FEWEST
 from study.records.record import MOTIONS
-from study.records.spectra import Segments, SpectralMatrix, cross_spectra
+from study.records.spectra import Segments, SpectralMatrix, cross_spectra, cross_spectra_within
 
 Floats = NDArray[np.float64]
 FEWEST_AVERAGES = 4  # for each input
@@ -73,11 +75,15 @@ def force_error(model: Model, prediction: Prediction) -> ForceError:
     prepared, noise = prediction.prepared, prediction.noise
     record, (first, last) = prepared.record, prepared.inner(prepared.plan.judge)
     inputs = reverse_inputs(model)
+    if prepared.free:  # its inertia force is what the others have to balance
+        inputs = without_inertia(inputs)
+        record = record.with_channels({"force": -model.numbers()["m"] * record["acceleration"]})
     channels = [h[first:last] for h in histories(inputs, record)]
-    cut = _segments(last - first, len(inputs))
-    matrix = cross_spectra(
-        [*channels, record[prepared.response][first:last], record["force"][first:last]], record.dt, cut
-    )
+    channels += [record[prepared.response][first:last], record["force"][first:last]]
+    begins = record.part(first, last).joints
+    cut = _segments([b - a for a, b in pairwise((0, *begins, last - first))], len(inputs))
+    within = cross_spectra_within(channels, begins, record.dt, cut) if begins else None
+    matrix = within or cross_spectra(channels, record.dt, cut)
     keep = [*range(len(inputs)), len(inputs) + 1]  # all but the response
     reverse = replace(matrix, density=matrix.density[:, keep][:, :, keep])
     response = matrix.density[:, -2, -2].real
@@ -97,12 +103,16 @@ def force_error(model: Model, prediction: Prediction) -> ForceError:
     )
 
 
-def _segments(samples: int, inputs: int) -> Segments:
-    """The usual segments, shortened until there are enough averages for so many inputs."""
-    cut = segments_of(samples)
-    while cut.length > 64 and cut.effective_averages(samples) < FEWEST_AVERAGES * inputs:
+def _segments(stretches: Sequence[int], inputs: int) -> Segments:
+    """The usual segments, shortened until there are enough averages for so many inputs; lengths of the stretches."""
+    cut = segments_of(sum(stretches))
+    while cut.length > FEWEST and _averages(cut, stretches) < FEWEST_AVERAGES * inputs:
         cut = replace(cut, length=cut.length // 2)
     return cut
+
+
+def _averages(cut: Segments, stretches: Sequence[int]) -> float:
+    return sum(cut.effective_averages(n) for n in stretches if n >= cut.length)
 
 
 def _left(matrix: SpectralMatrix, inputs: Sequence[Input], model: Model) -> Floats:
@@ -115,9 +125,12 @@ def _left(matrix: SpectralMatrix, inputs: Sequence[Input], model: Model) -> Floa
 
 def from_noise(frequency: Floats, inputs: Sequence[Input], model: Model, response: str, density: Floats) -> Floats:
     """Density of force that noise on the response makes through the linear terms."""
-    linear = next(i for i in inputs if i.shape == "u")
-    stiffness = np.abs(linear.response(frequency, model.numbers())) ** 2
+    if response == "force":
+        return density
+    linear = next((i.response(frequency, model.numbers()) for i in inputs if i.shape == "u"), np.zeros(len(frequency)))
     omega = 2.0 * np.pi * np.maximum(frequency, 0.5 * frequency[1])
+    with np.errstate(over="ignore"):  # a mass that nothing holds may run off
+        stiffness = np.abs(linear) ** 2
     return stiffness * density / omega ** (2 * MOTIONS.index(response))
 
 

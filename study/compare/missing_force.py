@@ -22,7 +22,7 @@ from study.equations.model import Model, forward_graph, named_channels, with_reg
 from study.identify.frequency_domain.inputs import history, reverse_inputs
 from study.identify.frequency_domain.starting_values import oscillator
 from study.records.completion import SETTLED, derivative
-from study.records.prepared import Prepared
+from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record
 
 Floats = NDArray[np.float64]
@@ -58,6 +58,8 @@ class MissingForce:
 
 def missing_force(model: Model, keys: Sequence[str], prediction: Prediction) -> MissingForce:
     """The missing force on the judging part. Every value of the model is known; ``keys`` are what was fitted of it."""
+    if prediction.prepared.response == FORCE:
+        return _along_a_known_motion(keys, prediction)
     noise, prepared = prediction.noise, prediction.prepared
     gate = above_noise(noise, prepared.band[0])
     motion = _motion(prediction, gate, noise.frequency)
@@ -69,6 +71,18 @@ def missing_force(model: Model, keys: Sequence[str], prediction: Prediction) -> 
         displacement=motion[0], velocity=motion[1], force=forces[:, 0], free=forces[:, 1:], gate=gate,
         weight=_weight(prepared, noise.frequency), frequency=noise.frequency,
         noise=float(np.sum(noise.density[gate]) * width), dt=prediction.dt, edge=_edge(prediction, width),
+    )  # fmt: skip
+
+
+def _along_a_known_motion(keys: Sequence[str], prediction: Prediction) -> MissingForce:
+    """The same where the motion is prescribed: what is left of the measured force, at all frequencies."""
+    noise, prepared, run = prediction.noise, prediction.prepared, prediction.run
+    part = prepared.record.part(*prepared.plan.judge)
+    free = np.zeros((len(part), len(keys))) if run is None else run.derivatives(run.fit)[:, : len(keys)]
+    lines = np.ones(len(noise.frequency), dtype=np.bool_)
+    return MissingForce(
+        displacement=part["displacement"], velocity=part["velocity"], force=prediction.difference, free=free,
+        gate=lines, weight=np.ones(len(lines)), frequency=noise.frequency, noise=noise.rms**2, dt=prediction.dt, edge=0,
     )  # fmt: skip
 
 

@@ -44,7 +44,7 @@ class Prediction:
 
     @property
     def row(self) -> int:
-        """Place of the measured response in ``MOTIONS``."""
+        """Place of the measured response in ``MOTIONS``, which a prescribed motion's force has none in."""
         return MOTIONS.index(self.prepared.response)
 
     @property

@@ -2,19 +2,19 @@
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.compare.prediction import Prediction, predict
-from study.equations.model import free
+from study.equations.model import ModelTerm, free
 from study.equations.terms import LIBRARY, Term
 from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.shape_search import Baseline
 from study.identify.time_domain.weighted_fit import finished
-from study.records.prepared import Prepared
+from study.records.prepared import FORCE, Prepared
 from study.support.cores import cores
 from study.support.errors import StudyError
 
@@ -62,10 +62,25 @@ def try_all(
 
 def attempt(term: Term, base: Baseline, prepared: Prepared) -> Candidate | None:
     """The model with a candidate as a search fits it; None where it has no finite response."""
+    found = _attempt(free(term), base, prepared)
+    plainer = _plainer(term) if prepared.response == FORCE and (found is None or found.unphysical) else None
+    return found if plainer is None else _attempt(plainer, base, prepared) or found
+
+
+def _attempt(entry: ModelTerm, base: Baseline, prepared: Prepared) -> Candidate | None:
     try:
-        return judged(term, with_term(base.fit, free(term), base, prepared), prepared)
+        return judged(entry.term, with_term(base.fit, entry, base, prepared), prepared)
     except StudyError:
         return None
+
+
+def _plainer(term: Term) -> ModelTerm | None:
+    """A term whose roundness along a loop is held at zero, as Dahl's friction is; None where it has no such parameter.
+
+    A prescribed stroke that slips nearly all the time tells little of it, and a fit may leave what is physical.
+    """
+    fixed = tuple(0.0 if p.relative and p.signed else None for p in term.parameters)
+    return replace(free(term), parameters=fixed) if any(value == 0.0 for value in fixed) else None
 
 
 def judged(term: Term, fit: FreeRunFit, prepared: Prepared) -> Candidate | None:

@@ -1,18 +1,27 @@
 """When an effect is believed: what it gains is no chance, its coefficient is not zero, and the gain can be seen."""
 
 import math
+from typing import Protocol
 
-from study.compare.prediction import Prediction
 from study.support.numbers import percent
 from study.support.thresholds import ALPHA, TOLERANCE
 
 
-def credible(before: Prediction, after: Prediction, interval: tuple[float, float], p_value: float) -> bool:
+class Judged(Protocol):
+    """A held-out prediction."""
+
+    @property
+    def error(self) -> float:
+        """Rms of the residual over that of the response."""
+        ...
+
+
+def credible(before: Judged, after: Judged, interval: tuple[float, float], p_value: float) -> bool:
     """Whether a model with an effect is better than one without.
 
     Parameters
     ----------
-    before, after : Prediction
+    before, after : Judged
         Held-out predictions of the model without the effect and with it.
     interval : pair of float
         95 % confidence interval of the effect's coefficient.
@@ -22,7 +31,7 @@ def credible(before: Prediction, after: Prediction, interval: tuple[float, float
     return certain(before, after, interval, p_value) and percent(before.error) != percent(after.error)
 
 
-def certain(before: Prediction, after: Prediction, interval: tuple[float, float], p_value: float) -> bool:
+def certain(before: Judged, after: Judged, interval: tuple[float, float], p_value: float) -> bool:
     """The same, whether or not the gain shows in the digits printed: much noise hides there what is no chance.
 
     An effect that is certain but not credible is neither called missing nor, where it is in the model, needless.

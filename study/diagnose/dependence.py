@@ -19,7 +19,7 @@ from study.equations.terms import custom
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import judging_run, linearise, run_of
 from study.identify.time_domain.shape_search import Baseline, modulation_lines, residual_lines
-from study.records.prepared import Prepared
+from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS
 from study.support import statistics
 from study.support.errors import DivergenceError
@@ -54,13 +54,15 @@ def leftover(base: Baseline, prepared: Prepared) -> Leftover:
     motions = [run_of(fit, prepared, motion=name).respond({}, fit.initial)[0] for name in MOTIONS[:2]]
     families = _formulas(*(float(np.std(x)) for x in motions))
     shaped = _with_shapes(fit, [text for texts in families.values() for text in texts])
-    states = 0 if fit.restarts else 2  # of segments, each initial state matters to its own samples alone
-    rows = [*motions, fit.residual, linearise(shaped, prepared)[:, : len(shaped.keys) + states]]
+    # Of segments, each initial state matters to its own samples alone; those of stretches are taken out of all columns.
+    joined = bool(prepared.record.stretches)
+    states = 0 if fit.restarts or joined or prepared.response == FORCE else 2
+    rows = [*motions, fit.residual, _columns(linearise(shaped, prepared), len(shaped.keys), states, joined)]
     try:
         run = judging_run(fit, prepared)
         later = [run.motion(name) for name in MOTIONS[:2]]
         later.append(prepared.known(prepared.judged - run.motion(prepared.response), prepared.plan.judge))
-        later.append(run.derivatives(shaped)[:, : len(shaped.keys) + states])
+        later.append(_columns(run.derivatives(shaped), len(shaped.keys), states, joined))
     except DivergenceError:
         split = len(fit.residual) // 2
     else:
@@ -74,6 +76,14 @@ def leftover(base: Baseline, prepared: Prepared) -> Leftover:
         shapes={name: slopes[:, a:b] for name, (a, b) in zip(families, pairwise(edges), strict=True)},
         split=split, base=base,
     )  # fmt: skip
+
+
+def _columns(derivatives: Floats, keys: int, states: int, joined: bool) -> Floats:
+    """Derivatives by the keys and so many initial states; of stretches, what each one's own state leaves of them."""
+    if not joined or derivatives.shape[1] == keys:
+        return derivatives[:, : keys + states]
+    own = derivatives[:, keys:]
+    return derivatives[:, :keys] - own @ np.linalg.lstsq(own, derivatives[:, :keys], rcond=1e-10)[0]
 
 
 def _with_shapes(fit: FreeRunFit, texts: Sequence[str]) -> FreeRunFit:
@@ -143,8 +153,8 @@ def _states(left: Leftover) -> list[Floats]:
     """Relaxations of several speeds, of the motion and of where it turned."""
     steps: Floats = np.diff(left.displacement, prepend=left.displacement[0])
     rate = float(np.std(steps) / np.std(left.velocity))  # time step in units of displacement over velocity
-    relaxed = [_relaxed(steps, float(np.exp(-rate / tau))) for tau in TAUS]
-    return relaxed + [_hysteresis(steps, beta) for beta in (0.5, 1.5, 4.0)]
+    slow = [relaxed(steps, float(np.exp(-rate / tau))) for tau in TAUS]
+    return slow + [hysteretic(steps, beta) for beta in (0.5, 1.5, 4.0)]
 
 
 def _hats(x: Floats) -> list[Floats]:
@@ -155,14 +165,15 @@ def _hats(x: Floats) -> list[Floats]:
     return [np.clip(1.0 - np.abs(inside - knot) / (knots[1] - knots[0]), 0.0, None) for knot in knots]
 
 
-def _relaxed(steps: Floats, kept: float) -> Floats:
+def relaxed(steps: Floats, kept: float) -> Floats:
     """The sum of all steps so far, of each of which a share is kept from sample to sample, shape (n,)."""
     size = next_fast_len(2 * len(steps), real=True)
     memory = kept ** np.arange(len(steps))
     return np.asarray(irfft(rfft(steps, size) * rfft(memory, size), size)[: len(steps)], dtype=np.float64)
 
 
-def _hysteresis(steps: Floats, beta: float) -> Floats:
+def hysteretic(steps: Floats, beta: float) -> Floats:
+    """A Bouc-Wen state along a motion's steps, no larger than one over ``beta``, shape (n,)."""
     state, z = np.zeros_like(steps), 0.0
     for i, step in enumerate(steps.tolist()):
         z = min(max(z + step - beta * abs(step) * z, -1.0 / beta), 1.0 / beta)

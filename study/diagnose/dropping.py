@@ -108,6 +108,8 @@ def _starts(
 
 
 def _states(fit: FreeRunFit, name: str) -> Floats:
-    """The initial state of a fit without the state of a term, shape (1, states)."""
-    names = ["", "", *(t.name for t in fit.model.states)]
-    return np.atleast_2d(fit.initial)[:1, [i for i, other in enumerate(names) if other != name]]
+    """The initial states of a fit without that of a term, shape (1, states), or a row for each stretch."""
+    initial = np.atleast_2d(fit.initial)[: 1 if fit.restarts else None]
+    own = [t.name for t in fit.model.states]
+    names = [*[""] * (initial.shape[1] - len(own)), *own]
+    return initial[:, [i for i, other in enumerate(names) if other != name]]

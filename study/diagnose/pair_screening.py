@@ -15,7 +15,7 @@ from scipy.fft import rfft, rfftfreq
 
 from study.diagnose.ranked import Ranked
 from study.equations.model import Model, ModelTerm
-from study.identify.frequency_domain.inputs import history, reverse_inputs
+from study.identify.frequency_domain.inputs import history, reverse_inputs, without_inertia
 from study.identify.frequency_domain.starting_values import FAINT
 from study.identify.time_domain.shape_search import Baseline, sensitivity
 from study.records.prepared import Prepared
@@ -98,7 +98,10 @@ def _spectra(model: Model, base: Baseline, prepared: Prepared) -> tuple[dict[str
     Real and imaginary parts of the lines that the force drives, one array a key. Weighted with the linear
     receptance, so that noise on the response weighs as it does in a free run.
     """
-    part = prepared.record.part(*prepared.inner(prepared.plan.fit))
+    part, inputs = prepared.record.part(*prepared.inner(prepared.plan.fit)), reverse_inputs(model)
+    if prepared.free:  # its inertia force is what the others have to balance
+        mass, inputs = float(model.values["m"] or 1.0), without_inertia(inputs)
+        part = part.with_channels({"force": -mass * part["acceleration"]})
     taper = np.hanning(len(part) + 1)[:-1]
     frequency = np.asarray(rfftfreq(len(part), part.dt))
     force = np.asarray(rfft(taper * part["force"]))
@@ -107,7 +110,7 @@ def _spectra(model: Model, base: Baseline, prepared: Prepared) -> tuple[dict[str
     omega = 2j * np.pi * frequency[keep]
     weight = base.transfer(np.where(omega == 0.0, omega[-1] / len(omega), omega))
     columns: dict[str, Floats] = {}
-    for item in reverse_inputs(model):
+    for item in inputs:
         spectrum = np.asarray(rfft(taper * history(item, part)))[keep] * weight
         for k, power in zip(item.parts, item.powers(frequency[keep]).T, strict=True):
             columns[k.symbol] = _parts(spectrum * power)

@@ -50,6 +50,11 @@ class Ranked:
         return self.prediction.residual
 
     @property
+    def numerical(self) -> float:
+        """Rms error of the integration itself."""
+        return self.prediction.numerical
+
+    @property
     def response_error(self) -> float:
         """Rms of the held-out residual over that of the response."""
         return self.prediction.error
@@ -65,12 +70,7 @@ class Ranked:
         Where little is left, the faults of the rest of the model move the coefficient of what is added to it: it may
         change by a share of itself then; by no more than itself, where it takes a tenth of what a good model leaves.
         """
-        good = self.response_error <= GOOD
-        if good and self.gain.explained > 1.0 - NEARLY:
-            return self.unsteadiness > 1.0
-        if good or self.gain.explained >= ENOUGH:
-            return self.unsteadiness > UNSTEADY
-        return wavers(self.steadiness, asked)
+        return wanders(self.response_error, self.gain, self.unsteadiness, self.steadiness, asked)
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -81,6 +81,16 @@ class Ranked:
     def unsteadiness(self) -> float:
         """By how much, relative to itself, the coefficient changes with frequency or amplitude."""
         return changes(self.flatness, self.steadiness)
+
+
+def wanders(error: float, gain: Gain, unsteadiness: float, steadiness: Curve | None, asked: int) -> bool:
+    """:meth:`Ranked.wanders` of a candidate that leaves this error of the response."""
+    good = error <= GOOD
+    if good and gain.explained > 1.0 - NEARLY:
+        return unsteadiness > 1.0
+    if good or gain.explained >= ENOUGH:
+        return unsteadiness > UNSTEADY
+    return wavers(steadiness, asked)
 
 
 def examined(candidate: Candidate, before: Prediction) -> Ranked:

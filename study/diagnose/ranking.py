@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,12 @@ from study.compare.comparison import Comparison
 from study.diagnose.candidates import Candidate
 from study.diagnose.held_out import held_out
 from study.diagnose.ranked import Ranked, examined
+from study.equations.term import Term
 from study.identify.time_domain.part_fit import linearise
 from study.support import statistics
 from study.support.autoregression import autoregression
 from study.support.cores import cores
+from study.support.statistics import Gain
 from study.support.thresholds import ALPHA, NEARLY, K
 
 Floats = NDArray[np.float64]
@@ -42,23 +45,80 @@ def rank(candidates: Sequence[Candidate], comparison: Comparison) -> list[Ranked
     prepared = comparison.prepared
     own = held_out(comparison.fit, before, linearise(comparison.fit, prepared), prepared).white(noise)
     rows = [replace(r, p_value=min(1.0, len(rows) * _p_value(own, white[r.name]))) for r in rows]
-    rows.sort(key=lambda r: float(np.mean(white[r.name] ** 2)))
-    first = _unimpeached(rows, min(_tie(rows, white), key=lambda r: _complexity(r, white[r.name], len(rows))))
+    return [replace(r, distance=away, tied_with=tied) for r, away, tied in in_order(rows, white, len(rows))]
+
+
+class Row(Protocol):
+    """What the order of candidates rests on."""
+
+    @property
+    def name(self) -> str:
+        """What it is called among the others."""
+        ...
+
+    @property
+    def term(self) -> Term:
+        """The effect."""
+        ...
+
+    @property
+    def gain(self) -> Gain:
+        """What it explains of the held-out residual."""
+        ...
+
+    @property
+    def p_value(self) -> float:
+        """Of this, all candidates accounted for."""
+        ...
+
+    @property
+    def residual(self) -> Floats:
+        """Held-out residual."""
+        ...
+
+    @property
+    def numerical(self) -> float:
+        """Rms error of the integration itself."""
+        ...
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % confidence interval of the coefficient."""
+        ...
+
+    @property
+    def unphysical(self) -> str:
+        """Why it is no physical effect as fitted; empty if it is one."""
+        ...
+
+    def wanders(self, asked: int) -> bool:
+        """Whether its coefficient moves as that of a true term would not."""
+        ...
+
+
+R = TypeVar("R", bound=Row)
+
+
+def in_order(rows: Sequence[R], white: Mapping[str, Floats], asked: int) -> list[tuple[R, float, tuple[str, ...]]]:
+    """Candidates best first, each with its distance to the first and the names of those that it is tied with.
+
+    ``white`` holds the whitened held-out residuals by name, ``asked`` is how many candidates there were.
+    """
+    rows = sorted(rows, key=lambda r: float(np.mean(white[r.name] ** 2)))
+    simplest = min(_tie(rows, white), key=lambda r: _complexity(r, white[r.name], asked))
+    first = _unimpeached(rows, simplest, asked)
     rows = [first] + [r for r in rows if r is not first]
-    return [
-        replace(r, distance=distance(r, first, white), tied_with=tuple(_tied(r, rows, white)))
-        for r in rows
-    ]  # fmt: skip
+    return [(r, distance(r, first, white), tuple(_tied(r, rows, white))) for r in rows]
 
 
-def distance(row: Ranked, other: Ranked, white: Mapping[str, Floats]) -> float:
+def distance(row: Row, other: Row, white: Mapping[str, Floats]) -> float:
     """By how many standard errors a candidate leaves more than another of samples that neither was fitted to.
 
     Zero for two forms of one equation, whose predictions differ by no more than the integration itself. ``white`` holds
     the whitened residuals by name.
     """
     apart = float(np.sqrt(np.mean((row.residual - other.residual) ** 2)))
-    if row is other or apart <= math.hypot(row.prediction.numerical, other.prediction.numerical):
+    if row is other or apart <= math.hypot(row.numerical, other.numerical):
         return 0.0
     return statistics.worse(*_common(white[row.name], white[other.name]))
 
@@ -73,39 +133,39 @@ def _common(one: Floats, other: Floats) -> tuple[Floats, Floats]:
     return one[:count], other[:count]
 
 
-def _level(one: Ranked, other: Ranked, white: Mapping[str, Floats]) -> bool:
+def _level(one: Row, other: Row, white: Mapping[str, Floats]) -> bool:
     """Whether the record cannot tell two candidates apart."""
     return max(distance(one, other, white), distance(other, one, white)) < K
 
 
-def _tied(row: Ranked, rows: Sequence[Ranked], white: Mapping[str, Floats]) -> Iterator[str]:
+def _tied(row: Row, rows: Sequence[Row], white: Mapping[str, Floats]) -> Iterator[str]:
     if _believable(row):
         yield from (o.name for o in rows if o is not row and _believable(o) and _level(o, row, white))
 
 
-def _believable(row: Ranked) -> bool:
+def _believable(row: Row) -> bool:
     """Whether a candidate explains anything at all with a coefficient that is not zero: others tie with nothing."""
     low, high = row.interval
     return row.gain.explained > 0.0 and row.p_value < ALPHA and not low <= 0.0 <= high
 
 
-def _tie(rows: Sequence[Ranked], white: Mapping[str, Floats]) -> list[Ranked]:
+def _tie(rows: Sequence[R], white: Mapping[str, Floats]) -> list[R]:
     """The best candidate and those that the record cannot tell from it."""
     return [r for r in rows if r is rows[0] or (_believable(r) and _level(r, rows[0], white))]
 
 
-def _complexity(row: Ranked, white: Floats, asked: int) -> tuple[bool, bool, int, float]:
+def _complexity(row: Row, white: Floats, asked: int) -> tuple[bool, bool, int, float]:
     """Order among candidates that are tied: one that nothing speaks against, and that with fewest unknowns."""
     unknowns = len(row.term.components) + len(row.term.parameters)
     return *_against(row, asked), unknowns, float(np.mean(white**2))
 
 
-def _against(row: Ranked, asked: int) -> tuple[bool, bool]:
+def _against(row: Row, asked: int) -> tuple[bool, bool]:
     """What speaks against a candidate: values outside of what makes it physical, and a coefficient that wanders."""
     return bool(row.unphysical), row.wanders(asked)
 
 
-def _unimpeached(rows: Sequence[Ranked], first: Ranked) -> Ranked:
+def _unimpeached(rows: Sequence[R], first: R, asked: int) -> R:
     """The first candidate, or one against which less speaks, if there is one that explains nearly as much.
 
     A Bouc-Wen element of negative stiffness, say, is a hardening spring in disguise; and what imitates another effect
@@ -113,4 +173,4 @@ def _unimpeached(rows: Sequence[Ranked], first: Ranked) -> Ranked:
     """
     enough = NEARLY * first.gain.explained
     better = [r for r in rows if r is first or (_believable(r) and r.gain.explained >= enough)]
-    return min(better, key=lambda r: (*_against(r, len(rows)), r is not first))
+    return min(better, key=lambda r: (*_against(r, asked), r is not first))

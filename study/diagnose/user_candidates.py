@@ -9,7 +9,7 @@ from study.equations.terms import LIBRARY, Term, custom
 from study.identify.frequency_domain.inputs import history, reverse_inputs
 from study.identify.time_domain.fit_model import with_term
 from study.records.record import Record
-from study.support.errors import StudyError, expect
+from study.support.errors import StudyError, at, expect
 
 
 def own_candidates(given: Sequence[str], model: Model) -> list[Term]:
@@ -24,7 +24,8 @@ def own_candidates(given: Sequence[str], model: Model) -> list[Term]:
     for text in given:
         name, sign, formula = text.partition("=")
         expect(sign, f"{text!r} is no candidate; expected NAME=FORMULA such as 'bracket=u*abs(u)'")
-        term = custom(name.strip(), formula.strip())
+        with at(f"--candidate {text}"):
+            term = custom(name.strip(), formula.strip())
         expect(term.name not in model, f"--candidate {text}: the model has a term {term.name!r}; expected another name")
         taken = any(term.name == other.name for other in terms)
         expect(not taken, f"--candidate {text}: two candidates are called {term.name!r}; expected a name for each")
@@ -46,7 +47,7 @@ def check_on(record: Record, terms: Sequence[Term]) -> None:
                 if term.name in item.terms:
                     history(item, record)
         except StudyError as error:
-            raise StudyError(f"--candidate {term.name}={formula}: {error}; expected one that can be tried") from None
+            raise StudyError(f"--candidate {term.name}={formula}: {error}") from None
 
 
 def unfitted(diagnosis: Diagnosis, terms: Sequence[Term]) -> dict[str, str]:

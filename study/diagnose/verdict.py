@@ -21,7 +21,7 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part, linearise
 from study.identify.time_domain.settling import continued
 from study.identify.time_domain.shape_search import Baseline
-from study.records.prepared import Prepared
+from study.records.prepared import FORCE, Prepared
 from study.support import statistics
 from study.support.errors import DivergenceError
 from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE, UNSTEADY
@@ -31,6 +31,7 @@ MISSING, NOTHING, UNKNOWN = "missing_effect", "nothing_missing", "unknown_effect
 PERIODS = 100.0  # of the motion that a search uses, at least
 SHORT, LONG = 2048, 16384  # samples: it uses half of the fitting part if that is more, within these limits
 SETTLED = 4  # of the candidates, the best: fitted on the whole fitting part and with enough steps
+MOST = 0.5  # of what is unexplained: what an effect of a component, or of a decay, explains that is named first
 PAIRED = 1  # the best so many candidates are tried together with every other
 
 
@@ -73,6 +74,8 @@ def search_part(prepared: Prepared) -> Prepared:
 
     More where that is a quiet stretch, such as the end of a sweep, which shows less than half of the motion's size.
     """
+    if prepared.record.stretches:  # what is loud and what is quiet lie in stretches of their own
+        return prepared.shortened(LONG)
     first, last = prepared.plan.fit
     wanted = max((last - first) // 2, prepared.samples_in(PERIODS))
     look = prepared.shortened(int(np.clip(wanted, SHORT, LONG)))
@@ -116,9 +119,18 @@ def _decide(
     slight = first.response_error <= GOOD  # two effects that explain little alone explain little together
     pair = None if slight else _explaining_pair(rows, base, comparison.prepared)
     if pair is None:
-        return UNKNOWN, rows, left, ()
+        return MISSING if _stands_out(first, comparison.prepared) else UNKNOWN, rows, left, ()
     first = next(r for r in rows if r.name == pair.names[0])
     return MISSING, [first] + [r for r in rows if r is not first], _left(pair.fit, pair.prediction), pair.names
+
+
+def _stands_out(first: Ranked, prepared: Prepared) -> bool:
+    """Whether an effect of a component or of a decaying motion explains most of what is missing.
+
+    Measured ones seldom lack one effect alone: what is left beside the first is asked for when it is added.
+    """
+    alone = prepared.response == FORCE or prepared.free
+    return alone and first.gain.explained > MOST and not first.unphysical
 
 
 def _explaining_pair(rows: list[Ranked], base: Baseline, prepared: Prepared) -> Pair | None:

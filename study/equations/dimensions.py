@@ -81,12 +81,24 @@ def compose(force: str, length: str, powers: Dimensions | None) -> str:
         return f"{force} per unit of the formula"
     if (force, length, powers) == ("N", "m", MASS):
         return "kg"
+    if force == f"{length}/s^2":  # a force per unit mass
+        return _of_an_acceleration(length, powers)
     over = [_power(unit, p) for unit, p in ((length, powers[0]), ("s", powers[1])) if p > 0]
     up = [_power(unit, -p) for unit, p in ((length, powers[0]), ("s", powers[1])) if p < 0]
     label = " ".join([force, *up])
     if not over:
         return label
     return f"{label}/{over[0]}" if len(over) == 1 else f"{label}/({' '.join(over)})"
+
+
+def _of_an_acceleration(length: str, powers: Dimensions) -> str:
+    """The unit of a coefficient per unit mass, as ``1/s^2`` of a stiffness; none of the mass itself."""
+    own = ((length, 1 - powers[0]), ("s", -2 - powers[1]))
+    up, over = ([_power(unit, abs(p)) for unit, p in own if p * sign > 0] for sign in (1, -1))
+    if not over:
+        return " ".join(up)
+    below = over[0] if len(over) == 1 else f"({' '.join(over)})"
+    return f"{' '.join(up) or '1'}/{below}"
 
 
 def _power(unit: str, power: Fraction) -> str:

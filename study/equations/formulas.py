@@ -21,6 +21,7 @@ FUNCTIONS = {
     "sign": (Op.SGN, 1),
     "sin": (Op.SIN, 1),
     "cos": (Op.COS, 1),
+    "tan": (Op.DIV, 1),  # of sine and cosine
     "exp": (Op.EXP, 1),
     "log": (Op.LOG, 1),
     "sqrt": (Op.SQRT, 1),
@@ -151,7 +152,7 @@ class _Builder:
     def divide(self, left: int, right: int) -> int:
         x, y = self.graph.constant_value(left), self.graph.constant_value(right)
         if y == 0.0:
-            raise self.refuse("divides by zero")
+            raise self.refuse("divides by zero; expected a divisor that moves, or another number")
         if x is not None and y is not None:
             return self.graph.const(x / y)
         return self.graph.div(left, right)
@@ -164,6 +165,8 @@ class _Builder:
         if len(tree.args) != arity or tree.keywords:
             raise self.refuse(f"calls {name!r} with {len(tree.args)} arguments; it takes {arity}")
         arguments = [self.node(argument) for argument in tree.args]
+        if name == "tan":
+            return self.graph.div(self.graph.unary(Op.SIN, arguments[0]), self.graph.unary(Op.COS, arguments[0]))
         if arity == 1:
             return self.graph.unary(op, arguments[0])
         return self.graph.binary(op, arguments[0], arguments[1])

@@ -5,6 +5,7 @@ to the variational equations gives exactly the derivative of the Runge-Kutta map
 of the numbers which the simulation yields, not of an idealisation of them.
 """
 
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -17,14 +18,15 @@ from study.equations import kernels
 from study.equations.graph import Op, Program
 from study.equations.machine_code import OFTEN, Variation, machine_code
 from study.equations.model import Model, forward_graph, named_channels, with_registers
-from study.records.interpolation import between_samples
+from study.records.interpolation import between_runs, between_samples, runs_of
 from study.records.record import MOTIONS, Record
-from study.support.arrays import Floats
+from study.support.arrays import Floats, Ints
 from study.support.errors import DivergenceError, StudyError
 
 SHARED = 4096  # steps from which on two threads share the segments; with fewer, a thread costs more than it saves
 REMEMBERED = 4  # channels whose values between the samples are cached
 COMPILED = 128  # programs that are cached
+FORCE = "force"  # the response of a model without inertia, whose motion is prescribed
 SIDE = "side of v"  # the input that stands for sgn v during a step
 
 
@@ -46,14 +48,21 @@ class FreeRun:
         Sampling interval in seconds.
     steps : int
         Steps in each sampling interval.
-    start : float
-        Time of the first sample in seconds.
+    starts : tuple of (int, float)
+        Samples at which motions begin anew, and their times in seconds.
     samples : int
         Samples in the stretch.
+    places : int array, shape (samples,), optional
+        Where the samples lie along the motions, which run on between stretches; all that they run along if left out.
     row : int
         Which motion is the response: its place in ``MOTIONS``.
     cuts : tuple of int
         Samples of the stretch at which the motion begins anew from a state of its own.
+    motion : array, shape (samples,), optional
+        The response where it is a motion that is prescribed (``known``).
+    known : bool
+        Whether the motion is prescribed and the force is what is predicted: the model has no inertia. ``drive`` then
+        begins with displacement and velocity, and only the terms' own states are integrated.
     """
 
     program: Program
@@ -62,15 +71,39 @@ class FreeRun:
     drive: Floats
     dt: float
     steps: int
-    start: float
+    starts: tuple[tuple[int, float], ...]
     samples: int
     row: int
     cuts: tuple[int, ...] = ()
+    motion: Floats | None = None
+    known: bool = False
+    places: Ints | None = None
+
+    @property
+    def moving(self) -> int:
+        """How many of them are displacement and velocity."""
+        return 0 if self.known else 2
+
+    def time(self, sample: int) -> float:
+        """Time of a sample along the motions in seconds."""
+        begin, start = self.starts[bisect_right(self.starts, sample, key=lambda s: s[0]) - 1]
+        return start + (sample - begin) * self.dt
+
+    @property
+    def length(self) -> int:
+        """Samples that the motions run along."""
+        return len(self.drive) // (2 * self.steps) if self.places is not None else self.samples
+
+    def along(self, bounds: Sequence[int]) -> list[int]:
+        """Where samples of the stretch, and its end, lie along the motions."""
+        if self.places is None:
+            return list(bounds)
+        return [int(self.places[b]) if b < self.samples else self.length for b in bounds]
 
     @property
     def states(self) -> int:
-        """Displacement, velocity and the terms' own."""
-        return self.variation.states
+        """How many states it has: displacement, velocity and the terms' own, or these alone."""
+        return len(self.variation.slots) - 1 if self.known else self.variation.states
 
     def respond(
         self, values: Mapping[str, float], initial: Sequence[float] | Floats, free_states: int = 0
@@ -123,7 +156,7 @@ class FreeRun:
             raise StudyError(f"{len(states)} initial states were given; {len(bounds) - 1} segments need one each")
         program = with_registers(self.program, {key: values[key] for key in self.keys})
         first_free = 1 + len(self.keys)
-        out = np.empty((self.samples, first_free + free_states))
+        out = np.empty((self.length, first_free + free_states))
         state = np.zeros((len(states), self.states, out.shape[1]))  # one array for all segments is faster
         state[:, : states.shape[1], 0] = states
         state[:, range(free_states), range(first_free, out.shape[1])] = 1.0
@@ -135,6 +168,10 @@ class FreeRun:
                 other = beside.submit(self._integrate, program, bounds[half:], state[half:], out)
                 self._integrate(program, bounds[: half + 1], state[:half], out)
                 other.result()
+        if self.places is not None:
+            out = out[self.places]
+        if self.motion is not None:
+            return self.motion, np.zeros_like(out[:, 1:]), state[:-1]
         return out[:, 0], out[:, 1:], state[:-1]
 
     def passing(self, initial: Mapping[int, Floats]) -> Floats:
@@ -143,11 +180,8 @@ class FreeRun:
         ``initial`` gives the state of those segments that begin anew, by their numbers; the first, 0, is one of them.
         """
         bounds = (0, *self.cuts, self.samples)
-        states, state = (
-            np.empty((len(bounds) - 1, self.states)),
-            np.empty((1, self.states, 1)),
-        )
-        room = np.empty((self.samples, 1))
+        states, state = np.empty((len(bounds) - 1, self.states)), np.empty((1, self.states, 1))
+        room = np.empty((self.length, 1))
         for i, segment in enumerate(pairwise(bounds)):
             if i in initial:
                 state[0, :, 0] = initial[i]
@@ -155,15 +189,23 @@ class FreeRun:
             self._integrate(self.program, segment, state, room)
         return states
 
-    def _integrate(self, program: Program, bounds: Sequence[int], states: Floats, out: Floats) -> None:
+    def _integrate(self, program: Program, cuts: Sequence[int], states: Floats, out: Floats) -> None:
         """Response and derivatives into ``out``; ``states`` become those at which the next segments begin."""
-        code = machine_code(self.variation, out.shape[1], self.samples * self.steps >= OFTEN)
-        failed = kernels.integrate_segments(
-            code.addresses, program.registers.copy(), self.variation.side, self.start, self.dt,
-            self.steps, self.drive, np.array(bounds), states, self.row, out,
-        )  # fmt: skip
+        bounds = self.along(cuts)
+        starts = np.array([self.time(begin) for begin in bounds[:-1]])
+        if self.known:
+            failed = kernels.integrate_known(
+                program.code, program.first, program.registers.copy(), self.variation.slots, starts, self.dt,
+                self.steps, self.drive, np.array(bounds), states, out,
+            )  # fmt: skip
+        else:
+            code = machine_code(self.variation, out.shape[1], self.length * self.steps >= OFTEN)
+            failed = kernels.integrate_segments(
+                code.addresses, program.registers.copy(), self.variation.side, starts, self.dt,
+                self.steps, self.drive, np.array(bounds), states, self.row, out,
+            )  # fmt: skip
         if failed >= 0:
-            time = self.start + failed * self.dt
+            time = self.time(failed)
             raise DivergenceError(f"the free run diverged at t = {time:.4g} s", time)
 
 
@@ -177,7 +219,9 @@ def prepare(
     span: tuple[int, int] | None = None,
     restarts: Sequence[int] = (),
 ) -> FreeRun:
-    """Make a model ready to run under the force of a record.
+    """Make a model ready to run under the force of a record; one without inertia, along its motion.
+
+    Where the record is strung together of stretches, the motion begins anew at each.
 
     Parameters
     ----------
@@ -188,7 +232,7 @@ def prepare(
     keys : sequence of str
         The coefficients and shape parameters to differentiate by.
     response : str
-        ``displacement``, ``velocity`` or ``acceleration``.
+        ``displacement``, ``velocity`` or ``acceleration``; ``force`` of a model without inertia.
     steps_per_sample : int
         Runge-Kutta steps in each sampling interval.
     span : pair of int, optional
@@ -202,10 +246,11 @@ def prepare(
         If a value, a channel, the span or a restart is invalid.
     """
     first, last = _checked_span(record, span)
-    bounds = (first, *restarts, last)
-    if any(b - a < 2 for a, b in pairwise(bounds)):
+    cuts = tuple(sorted({*restarts, *(b for b in record.begins if first < b < last)}))
+    if list(restarts) != sorted(set(restarts)) or any(b - a < 2 for a, b in pairwise((first, *cuts, last))):
         raise StudyError(f"the restarts {tuple(restarts)} must rise, and leave two samples between {first} and {last}")
-    if response not in MOTIONS:
+    known = "inertia" not in model
+    if response not in MOTIONS and not (known and response == FORCE):
         raise StudyError(f"there is no response {response!r}; a free run yields {', '.join(MOTIONS)}")
     if steps_per_sample < 1:
         raise StudyError(f"steps_per_sample is {steps_per_sample}; at least 1 is needed")
@@ -215,12 +260,38 @@ def prepare(
         variation.program, {k: v for k, v in model.values.items() if k not in keys and v is not None}
     )
     factor = 2 * steps_per_sample
-    part = slice(factor * first, factor * (last - 1) + 1)
-    drive = np.column_stack([_between(record[name].tobytes(), factor)[part] for name in ("force", *channels)])
+    driving = (*MOTIONS[:2], *channels) if known else (FORCE, *channels)
+    starts, places = ((0, record.start + first * record.dt),), None
+    if record.stretches:
+        drive, starts, places = _along_stretches(record, (first, last), driving, factor)
+    else:
+        part = slice(factor * first, factor * (last - 1) + 1)
+        drive = np.column_stack([_between(record[name].tobytes(), factor)[part] for name in driving])
+    row = MOTIONS.index(response) if response in MOTIONS else len(MOTIONS)
+    motion = record[response][first:last] if known and response in MOTIONS else None
     return FreeRun(
-        program, variation, tuple(keys), drive, record.dt, steps_per_sample,
-        record.start + first * record.dt, last - first, MOTIONS.index(response), tuple(r - first for r in restarts),
+        program, variation, tuple(keys), drive, record.dt, steps_per_sample, starts, last - first, row,
+        tuple(c - first for c in cuts), motion, known, places,
     )  # fmt: skip
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _along_stretches(
+    record: Record, span: tuple[int, int], driving: tuple[str, ...], factor: int
+) -> tuple[Floats, tuple[tuple[int, float], ...], Ints]:
+    """What drives the motions of a record that is strung together, where they begin and when, and its samples' places.
+
+    The motions of a span begin with its first sample.
+    """
+    part = record.part(*span)
+    runs, places = runs_of(part)
+    starts, begin = list[tuple[int, float]](), 0
+    for run in runs:
+        starts.append((begin, float(run.source.time[run.first])))
+        begin += len(run)
+    drive = np.column_stack([between_runs(part, name, factor) for name in driving])
+    drive.flags.writeable = False
+    return drive, tuple(starts), places
 
 
 @lru_cache(maxsize=REMEMBERED)
@@ -254,9 +325,12 @@ def _differentiated(model: Model, channels: tuple[str, ...], keys: tuple[str, ..
 def _compiled(model: Model, channels: tuple[str, ...], keys: tuple[str, ...]) -> Variation:
     """As :func:`_differentiated`, of a model without values: a diagnosis runs each of its models many times."""
     forward = forward_graph(model, channels)
-    graph = forward.graph
-    by = (*forward.states, *(graph.input(key) for key in keys))
+    graph, known = forward.graph, "inertia" not in model
+    by = (*(forward.states[2:] if known else forward.states), *(graph.input(key) for key in keys))
     rows = [[slope, *(graph.derivative(slope, node) for node in by)] for slope in forward.slopes]
+    if known:
+        program = graph.program([node for row in rows for node in row])
+        return Variation(program, program.outputs.reshape(len(rows), 1 + len(by)), -1, len(channels))
     graph.input(SIDE)
     program, side = _with_side(graph.program([node for row in rows for node in row]), graph.program(forward.slopes))
     return Variation(program, program.outputs.reshape(len(rows), 1 + len(by)), side, 1 + len(channels))

@@ -5,7 +5,7 @@ its derivative is computed once), derivatives are exact, and :meth:`Graph.progra
 the instructions that ``kernels.py`` runs at compiled speed. No text is ever evaluated.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 
@@ -227,9 +227,18 @@ class Graph:
             return yes
         return self.add(self.mul(gate, yes), self.mul(self.sub(self.const(1.0), gate), no))
 
+    def substituted(self, outputs: Sequence[int], table: Mapping[int, int]) -> list[int]:
+        """The same results with some nodes replaced by others wherever they occur."""
+        new = dict(table)
+        for n in self.needed(outputs):
+            op, a, b = self.nodes[n]
+            if n not in new:
+                new[n] = n if op in (Op.INPUT, Op.CONST) else self._node(op, new[a], new[b])
+        return [new[n] for n in outputs]
+
     def program(self, outputs: Sequence[int]) -> Program:
         """Instructions that compute ``outputs`` and nothing else, inputs first, then constants."""
-        needed, count = self._needed(outputs), len(self.names)
+        needed, count = self.needed(outputs), len(self.names)
         constants = [n for n in needed if self.nodes[n][0] is Op.CONST]
         first = count + len(constants)
         register = {n: count + i for i, n in enumerate(constants)}
@@ -249,7 +258,7 @@ class Graph:
             outputs=np.array([register[n] for n in outputs], dtype=np.int64),
         )  # fmt: skip
 
-    def _needed(self, outputs: Sequence[int]) -> list[int]:
+    def needed(self, outputs: Sequence[int]) -> list[int]:
         """Every node that the outputs depend on, in an order in which each comes after its operands."""
         wanted: set[int] = set()
         todo = list(outputs)

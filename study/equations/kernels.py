@@ -377,13 +377,13 @@ def integrate_variation(
 
 @compiled
 def integrate_segments(
-    native: Native, r: Floats, side: int, start: float, dt: float,
+    native: Native, r: Floats, side: int, starts: Floats, dt: float,
     steps: int, drive: Floats, bounds: Ints, states: Floats, row: int, out: Floats,
 ) -> int:  # fmt: skip
     """:func:`integrate_variation` of one segment after the other, between neighbouring ``bounds``, each from its state.
 
-    A segment runs on to the first sample of the next, which overwrites it; the last one does not write that sample,
-    which another thread may own.
+    ``starts`` are the times at which they begin. A segment runs on to the first sample of the next, which overwrites
+    it; the last one does not write that sample, which another thread may own.
     """
     for i in range(bounds.shape[0] - 1):
         begin, end = bounds[i], bounds[i + 1]
@@ -392,11 +392,77 @@ def integrate_segments(
             target = out[begin : end + 1]
         else:
             target = np.empty((min(end + 1, out.shape[0]) - begin, out.shape[1]))
-        failed = integrate_variation(native, r, side, start + begin * dt, dt, steps, ahead, states[i], row, target)
+        failed = integrate_variation(native, r, side, starts[i], dt, steps, ahead, states[i], row, target)
         if failed >= 0:
             return int(begin + failed)
         if i + 2 == bounds.shape[0]:
             out[begin:end] = target[: end - begin]
+    return -1
+
+
+@compiled
+def _known_slopes(
+    code: Ints, first: int, r: Floats, slots: Ints, time: float, drive: Floats, j: int, w: Floats
+) -> None:
+    """Registers along a known motion at the states ``w[1]``, and the derivatives of these into ``w[2]``."""
+    channels = drive.shape[1] - 2
+    r[0] = drive[j, 0]
+    r[1] = drive[j, 1]
+    r[2] = time
+    for c in range(channels):
+        r[4 + c] = drive[j, 2 + c]
+    for i in range(w.shape[1]):
+        r[4 + channels + i] = w[1, i, 0]
+    run(code, first, r)
+    for i in range(w.shape[1]):
+        _chain(r, slots, i + 1, w, w[2, i])
+
+
+@inlined
+def _chain(r: Floats, slots: Ints, row: int, w: Floats, out: Floats) -> None:
+    """What row ``row`` of ``slots`` computes into ``out``, beside its derivatives by keys and initial states."""
+    n = w.shape[1]
+    out[0] = r[slots[row, 0]]
+    for c in range(1, out.shape[0]):
+        out[c] = r[slots[row, n + c]] if n + c < slots.shape[1] else 0.0
+        for m in range(n):
+            out[c] += r[slots[row, 1 + m]] * w[1, m, c]
+
+
+@compiled
+def integrate_known(
+    code: Ints, first: int, r: Floats, slots: Ints, starts: Floats, dt: float,
+    steps: int, drive: Floats, bounds: Ints, states: Floats, out: Floats,
+) -> int:  # fmt: skip
+    """A force along a known motion, with its exact derivatives; the terms' own states alone are integrated.
+
+    ``drive`` has displacement, velocity and channels, 2 steps rows a sample. Row 0 of ``slots`` names the registers of
+    the force and of its derivatives by states and keys, the others those of the states' slopes. ``states`` has, for
+    each segment between ``bounds``, the states beside their sensitivities. Result as in :func:`integrate_rk4`.
+    """
+    h = dt / steps
+    for k in range(bounds.shape[0] - 1):
+        w = np.zeros((4, states.shape[1], states.shape[2]))
+        w[0] = states[k]
+        for sample in range(bounds[k], bounds[k + 1]):
+            time = starts[k] + (sample - bounds[k]) * dt
+            w[1] = w[0]
+            _known_slopes(code, first, r, slots, time, drive, 2 * steps * sample, w)
+            _chain(r, slots, 0, w, out[sample])
+            if not math.isfinite(out[sample, 0]):
+                return int(sample)
+            if w.shape[1] == 0 or sample + 1 == bounds[k + 1]:
+                continue
+            for s in range(steps):
+                w[1] = w[0]
+                w[3] = w[0]
+                for stage in range(4):
+                    late = (stage + 1) // 2
+                    j = 2 * (steps * sample + s) + late
+                    _known_slopes(code, first, r, slots, time + (s + 0.5 * late) * h, drive, j, w)
+                    w[3] += (h / 3.0 if late == 1 else h / 6.0) * w[2]
+                    w[1] = w[0] + (h if stage == 2 else 0.5 * h) * w[2]
+                w[0] = w[3]
     return -1
 
 

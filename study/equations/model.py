@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 from study.equations import formulas
 from study.equations.graph import Graph, Program
+from study.equations.place import Place
 from study.equations.term import Component, Term
 from study.support.arrays import Floats
 from study.support.errors import StudyError
@@ -28,21 +29,32 @@ class ModelTerm:
         One for each component, in the order of ``term.symbols``; None where it is to be fitted.
     parameters : tuple of float or None
         One for each shape parameter; None where it is to be estimated.
+    place : Place, optional
+        Where it acts, in a structure of several coordinates.
     """
 
     term: Term
     coefficients: tuple[float | None, ...]
     parameters: tuple[float | None, ...]
+    place: Place | None = None
 
     @property
     def name(self) -> str:
-        """Name of the term."""
-        return self.term.name
+        """Name of the term, with its place if it has one: ``cubic_stiffness[floor2-floor3]``."""
+        return self.term.name if self.place is None else f"{self.term.name}[{self.place.label}]"
+
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        """Names of its coefficients: ``k3``, or ``k3[floor2-floor3]``."""
+        return self.keys[: len(self.coefficients)]
 
     @property
     def keys(self) -> tuple[str, ...]:
         """Names of its coefficients, then of its shape parameters as ``term.parameter``."""
-        return self.term.keys
+        if self.place is None:
+            return self.term.keys
+        own = tuple(f"{symbol}[{self.place.label}]" for symbol in self.term.symbols)
+        return own + tuple(f"{self.name}.{p.name}" for p in self.term.parameters)
 
     @property
     def values(self) -> dict[str, float | None]:
@@ -56,9 +68,9 @@ class ModelTerm:
         return replace(self, coefficients=numbers[:split], parameters=numbers[split:])
 
 
-def free(term: Term) -> ModelTerm:
+def free(term: Term, place: Place | None = None) -> ModelTerm:
     """A term of which nothing is known yet."""
-    return ModelTerm(term, (None,) * len(term.components), (None,) * len(term.parameters))
+    return ModelTerm(term, (None,) * len(term.components), (None,) * len(term.parameters), place)
 
 
 @dataclass(frozen=True)
@@ -70,11 +82,17 @@ class Model:
     name : str
         What it is called in tables and messages.
     terms : tuple of ModelTerm
-        Its terms, each at most once.
+        Its terms, each at most once (at each place).
+    coordinates : tuple of str
+        Of a structure; empty for a single mass, whose terms have no place.
+    forces : tuple of pairs of str
+        Name of each measured force, and the coordinate of the structure on which it acts.
     """
 
     name: str
     terms: tuple[ModelTerm, ...]
+    coordinates: tuple[str, ...] = ()
+    forces: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse the same term twice."""
@@ -121,23 +139,23 @@ class Model:
 
     def equation(self) -> str:
         """The equation of motion in one line, with symbols."""
-        parts = [f"{' , '.join(t.term.symbols)} [{t.term.formula}]" for t in self.terms]
+        parts = [f"{' , '.join(t.symbols)} [{t.term.formula}]" for t in self.terms]
         return " + ".join(parts) + " = F(t)"
 
     def numbers(self) -> dict[str, float]:
-        """Every value; all must be known, and the mass positive."""
+        """Every value; all must be known, and the mass of a single coordinate positive."""
         known = {key: value for key, value in self.values.items() if value is not None}
         missing = [key for key in self.values if key not in known]
         if missing:
             raise StudyError(f"model {self.name!r} gives no value for {', '.join(missing)}; a simulation needs all")
-        if not known.get("m", 0.0) > 0.0:
+        if not self.coordinates and "m" in known and not known["m"] > 0.0:
             raise StudyError(f"model {self.name!r} has the mass {known.get('m', 0.0):g}; it must be above zero")
         return known
 
 
 @dataclass(frozen=True)
 class ForwardGraph:
-    """A model's equation of motion solved for its acceleration.
+    """A model's equation of motion solved for its acceleration; without inertia, for the force.
 
     Attributes
     ----------
@@ -145,7 +163,7 @@ class ForwardGraph:
         The nodes; inputs are ``u, v, t, force``, channels (``channel:temperature``), states
         ``z:term``, then every key.
     slopes : tuple of int
-        Nodes of the acceleration and of each state's derivative.
+        Nodes of the acceleration, or of the force of a model without inertia, and of each state's derivative.
     states : tuple of int
         Nodes of u, v and each state z: what ``slopes`` (after v) are the derivatives of.
     """
@@ -160,8 +178,6 @@ def forward_graph(model: Model, channels: tuple[str, ...] = ()) -> ForwardGraph:
 
     ``channels`` are those of the user's own terms (:func:`named_channels`), in the order of the drive.
     """
-    if "inertia" not in model:
-        raise StudyError(f"model {model.name!r} has no inertia; a free run needs it")
     graph = Graph()
     fixed = {name: graph.input(name) for name in FIXED_INPUTS}
     measured = {name: graph.input(f"channel:{name}") for name in channels}
@@ -179,10 +195,20 @@ def forward_graph(model: Model, channels: tuple[str, ...] = ()) -> ForwardGraph:
             rates.append(rate)
         for component in entry.term.components:
             if component.order < 2:
-                unit = _unit_force(graph, component, names, rate)
+                unit = unit_force(graph, component, names, rate)
                 force = graph.add(force, graph.mul(keys[component.symbol], unit))
-    acceleration = graph.div(graph.sub(fixed["force"], force), keys["m"])
-    return ForwardGraph(graph, (acceleration, *rates), (fixed["u"], fixed["v"], *states.values()))
+    slope = graph.div(graph.sub(fixed["force"], force), keys["m"]) if "inertia" in model else force
+    return ForwardGraph(graph, (slope, *rates), (fixed["u"], fixed["v"], *states.values()))
+
+
+def has_spring(model: Model) -> bool:
+    """Whether any force of a model depends on the displacement itself, and so brings its mass back or pushes it away.
+
+    What a term remembers of the motion is no spring: it gives way.
+    """
+    forward = forward_graph(model, model.channels)
+    place = forward.states[0]
+    return any(forward.graph.constant_value(forward.graph.derivative(s, place)) != 0.0 for s in forward.slopes)
 
 
 def named_channels(model: Model, available: Collection[str]) -> tuple[str, ...]:
@@ -207,11 +233,11 @@ def unit_forces(model: Model) -> tuple[tuple[str, ...], Program]:
     inputs = {n: graph.input(n) for n in (*formulas.VARIABLES, *model.channels)}
     terms = [t.term for t in model.terms if not t.term.parameters and t.term.state is None]
     pairs = [(term.name, c) for term in terms for c in term.components if c.order < 2]
-    outputs = [_unit_force(graph, c, inputs, None) for _, c in pairs]
+    outputs = [unit_force(graph, c, inputs, None) for _, c in pairs]
     return tuple(name for name, _ in pairs), graph.program(outputs)
 
 
-def _unit_force(graph: Graph, component: Component, names: Mapping[str, int], rate: int | None) -> int:
+def unit_force(graph: Graph, component: Component, names: Mapping[str, int], rate: int | None) -> int:
     """Force of a component with a unit coefficient: its shape, or the shape's derivative by the chain rule."""
     shape = formulas.build(graph, component.shape, names)
     if component.order == 1:
@@ -225,6 +251,8 @@ def _unit_force(graph: Graph, component: Component, names: Mapping[str, int], ra
 
 def forward_program(model: Model, channels: tuple[str, ...] = ()) -> Program:
     """The program of a model whose values are all known, with the values in their registers."""
+    if "inertia" not in model:
+        raise StudyError(f"model {model.name!r} has no inertia; a simulation needs it")
     values, forward = model.numbers(), forward_graph(model, channels)
     return with_registers(forward.graph.program(forward.slopes), values)
 

@@ -10,6 +10,8 @@ A file holds ``name`` and ``terms``; an entry of ``terms`` is a name, or a mappi
       - {term: periodic_stiffness, f_m: 1.0, amplitude: 177.7, phase: 0.0}
       - {term: bracket, force: "u*abs(u) + 0.1*v**3"}    # the user's own
 
+A structure has ``coordinates`` and ``forces`` as well, and each of its terms a place (``layout``).
+
 Nothing in a file is trusted: size, depth and number of entries are bounded before anything is built, aliases and
 tags are refused, and formulas are parsed, never evaluated.
 """
@@ -18,10 +20,11 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
-from study.equations import terms
+from study.equations import layout, terms
 from study.equations.model import Model, ModelTerm, free
 from study.equations.redundancy import repeated_force
 from study.equations.terms import Term
@@ -61,7 +64,8 @@ def parse_model(text: str, source: Path) -> Model:
 
 def format_model(model: Model) -> str:
     """The model as YAML text with every known value; :func:`parse_model` gives the same model back."""
-    return f"name: {scalar(model.name)}\nterms:\n" + "".join(f"  - {format_entry(t)}\n" for t in model.terms)
+    head = f"name: {scalar(model.name)}\n" + layout.written(model)
+    return f"{head}terms:\n" + "".join(f"  - {format_entry(t)}\n" for t in model.terms)
 
 
 def format_entry(entry: ModelTerm) -> str:
@@ -70,12 +74,13 @@ def format_entry(entry: ModelTerm) -> str:
     for key, value in known.items():
         if not math.isfinite(value):
             raise StudyError(f"{key} of {entry.name} is {value}; only finite numbers can be written")
-    fields = {"term": scalar(entry.name)}
-    if entry.name not in terms.LIBRARY:
+    fields = {"term": scalar(entry.term.name)} | layout.place_fields(entry.place)
+    if entry.term.name not in terms.LIBRARY:
         fields["force"] = json.dumps(entry.term.components[0].shape)
     parameters = {p.name: f"{entry.name}.{p.name}" for p in entry.term.parameters}
     fields |= {name: repr(float(known[key])) for name, key in parameters.items() if key in known}
-    coefficients = {s: repr(float(known[s])) for s in entry.term.symbols if s in known}
+    own = zip(entry.term.symbols, entry.symbols, strict=True)
+    coefficients = {symbol: repr(float(known[key])) for symbol, key in own if key in known}
     if coefficients and len(entry.term.symbols) == 1:
         fields["value"] = coefficients[entry.term.symbols[0]]
     elif coefficients:
@@ -174,7 +179,7 @@ def _model(document: object, stem: str) -> Model:
     if top is None:
         content = "is empty" if document is None else f"holds {shown(document)}"
         raise StudyError(f"{content}; expected a mapping of 'name' and 'terms'")
-    _refuse_unknown(top, ("name", "terms"), "the model")
+    _refuse_unknown(top, ("name", "terms", *layout.KEYS), "the model")
     name = top.get("name", stem)
     if not isinstance(name, str) or not name.strip() or not name.isprintable() or len(name) > LONGEST_NAME:
         raise StudyError(f"the name is {shown(name)}; expected a short text on one line")
@@ -184,21 +189,27 @@ def _model(document: object, stem: str) -> Model:
         raise StudyError(f"'terms' is {content}; expected a list such as [inertia, linear_damping, linear_stiffness]")
     if len(entries) > MOST_TERMS:
         raise StudyError(f"'terms' has {len(entries)} entries; at most {MOST_TERMS} are read")
-    model = Model(name, tuple(_entry(item, number) for number, item in enumerate(entries, 1)))
-    if fault := repeated_force(model):
+    coordinates, forces = layout.coordinates_and_forces(top)
+    listed = tuple(_entry(item, number, coordinates) for number, item in enumerate(entries, 1))
+    model = Model(name, listed, coordinates, forces)
+    if coordinates:
+        layout.check(model)
+    elif fault := repeated_force(model):
         raise StudyError(fault)
     return model
 
 
-def _entry(item: object, number: int) -> ModelTerm:
+def _entry(item: object, number: int, coordinates: Sequence[str]) -> ModelTerm:
     try:
         if isinstance(item, str):
             _refuse_long(item)
-            return free(terms.get(item))
+            return free(terms.get(item), layout.place_of({}, item, coordinates))
         mapping = as_mapping(item)
         if mapping is None:
             raise StudyError(f"is {shown(item)}; expected a name or a mapping such as {{term: inertia, value: 1.0}}")
-        return entry_from(mapping)
+        place = layout.place_of(mapping, mapping.get("term"), coordinates)
+        plain = {key: value for key, value in mapping.items() if place is None or key not in layout.PLACES}
+        return replace(entry_from(plain), place=place)
     except StudyError as error:
         raise StudyError(f"entry {number} of 'terms': {error}") from None
 

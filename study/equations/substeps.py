@@ -3,11 +3,11 @@
 import numpy as np
 
 from study.equations import kernels
-from study.equations.free_run import prepare
+from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model
 from study.records.record import Record
 from study.records.states import angular_rate, starting_states
-from study.support.arrays import Floats
+from study.support.arrays import Floats, Ints
 
 POINTS = 64  # points of the motion at which the equation of motion is linearised
 ROUGH = 0.5  # largest step times the fastest rate
@@ -34,10 +34,12 @@ def needed_steps(model: Model, record: Record, response: str = "displacement", m
 def _rates(model: Model, record: Record, response: str) -> Floats:
     """Magnitude of the largest eigenvalue at each point, in rad/s, shape (points,)."""
     run = prepare(model, record, steps_per_sample=1)
-    states = run.states
     samples = np.unique(np.linspace(0, len(record) - 1, POINTS).astype(np.int64))
+    if run.known:
+        return _rates_of_memories(run, record, samples)
+    states = run.states
     point = np.column_stack([starting_states(record, response, samples.tolist()), record.time[samples]])
-    data = np.column_stack([point, run.drive[2 * samples]])
+    data = np.column_stack([point, run.drive[2 * np.array(run.along(samples.tolist()))]])
     columns = np.arange(data.shape[1], dtype=np.int64)
     partial = np.empty((len(samples), (states - 1) * states))
     with np.errstate(all="ignore"):
@@ -51,3 +53,19 @@ def _rates(model: Model, record: Record, response: str) -> Floats:
     jacobian[:, 0, 1] = 1.0
     jacobian[:, 1:] = partial.reshape(len(samples), states - 1, states)
     return np.asarray(np.max(np.abs(np.linalg.eigvals(jacobian)), axis=1), dtype=np.float64)
+
+
+def _rates_of_memories(run: FreeRun, record: Record, samples: Ints) -> Floats:
+    """The same of a model without inertia: how fast the terms' own states change beside a prescribed motion."""
+    states = run.states
+    if states == 0:
+        return np.zeros(1)
+    drive = run.drive[2 * np.array(run.along(samples.tolist()))]
+    data = np.column_stack([drive[:, :2], record.time[samples], drive[:, 2:]])
+    columns = np.array([0, 1, 2, *range(4, data.shape[1] + 1)], dtype=np.int64)
+    partial = np.empty((len(samples), states * states))
+    kernels.evaluate(
+        run.program.code, run.program.first, run.program.registers.copy(), columns, data,
+        run.variation.slots[1:, 1 : 1 + states].ravel(), partial,
+    )  # fmt: skip
+    return np.max(np.abs(partial), axis=1)

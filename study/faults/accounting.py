@@ -15,9 +15,11 @@ from study.faults.search import first_faults, search
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.settling import settled
-from study.records.prepared import Prepared
+from study.records.prepared import FORCE, Prepared
 from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE
+
+NOT_ASKED = "faults of the measurement are looked for in a single stretch of a driven response alone"
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +62,8 @@ def accounted(
     """
     known = dict(held or {})
     asked = tuple(name for name in FAULTS if name not in switched_off and name not in known)
+    if asked and not _may_be_asked(prepared):
+        asked, prepared = (), replace(prepared, notes=(*prepared.notes, NOT_ASKED))
     faults = first_faults(prepared, known, asked)
     first = corrected(prepared, faults)
     if not asked:
@@ -69,6 +73,11 @@ def accounted(
     final = first if found == faults else corrected(prepared, found)
     best = fit if final is first else _fitted(model, final, near)
     return _compared(model, final, found, best, estimator, progress)
+
+
+def _may_be_asked(prepared: Prepared) -> bool:
+    """Whether a record shows faults by what it leaves of a driven response; they pass through no joint of stretches."""
+    return not (prepared.record.stretches or prepared.free or prepared.response == FORCE)
 
 
 def _fitted(model: Model, prepared: Prepared, near: FreeRunFit) -> FreeRunFit:

@@ -233,4 +233,6 @@ def consistent(record: Record) -> tuple[Record, tuple[str, ...]]:
 def _length(unit: Unit) -> str:
     """The unit of length in a unit of motion: ``mm`` in ``mm/s^2``, ``m`` in ``g``."""
     first = unit.text.replace("/", " ").split()[0]
+    if first == "deg" or first.endswith("rad"):  # a sine in a formula takes radians
+        return "rad"
     return first if parse_unit(first).powers in (ROLES["displacement"][0], VOLTAGE) else "m"

@@ -5,10 +5,13 @@ an integrator with several steps a sample would respond to. Band-limited interpo
 content above its Nyquist frequency.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.fft import irfft, rfft
 
-from study.support.arrays import Floats
+from study.records.record import Record
+from study.support.arrays import Floats, Ints
 
 EDGE = 512  # samples by which a record that does not close on itself is continued at each end
 CLOSES = 10.0  # a record that does not close has many times the energy there of one whose ends are continued
@@ -32,6 +35,51 @@ def between_samples(values: Floats, factor: int) -> Floats:
     if _top_energy(values) <= CLOSES * _top_energy(continued):
         return _periodic(values, factor)[: factor * (n - 1) + 1]
     return _periodic(continued, factor)[factor * edge : factor * (edge + n - 1) + 1]
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Samples of a record along which one motion runs: stretches that continue each other, and what lies between."""
+
+    source: Record
+    first: int
+    last: int
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return self.last - self.first
+
+
+def runs_of(record: Record) -> tuple[tuple[Run, ...], Ints]:
+    """The motions of a record that is strung together, and the place of each of its samples in them, shape (n,)."""
+    runs, places, begin = list[Run](), list[Ints](), 0
+    for stretch in record.stretches:
+        if stretch.continues and runs:
+            runs[-1] = Run(runs[-1].source, runs[-1].first, stretch.last)
+        else:
+            begin += len(runs[-1]) if runs else 0
+            runs.append(Run(stretch.source, stretch.first, stretch.last))
+        places.append(begin - runs[-1].first + np.arange(stretch.first, stretch.last))
+    return tuple(runs), np.concatenate(places)
+
+
+def between_runs(record: Record, name: str, factor: int) -> Floats:
+    """A channel along the motions of a record that is strung together, on a grid ``factor`` times as fine.
+
+    Each as its source has it, so that no joint is seen; between two motions the last value holds. A channel that the
+    record has of its own (``changed``) is taken as straight where a motion runs on between two stretches.
+    """
+    parts: list[Floats] = []
+    runs, places = runs_of(record)
+    own, begin = name in record.changed, 0
+    for run in runs:
+        inside = (places >= begin) & (places < begin + len(run))
+        along = np.interp(np.arange(begin, begin + len(run)), places[inside], record[name][inside]) if own else None
+        fine = between_samples(run.source[name] if along is None else along, factor)
+        fine = fine[0 if own else factor * run.first :][: factor * len(run)]
+        parts.append(np.pad(fine, (0, factor * len(run) - len(fine)), mode="edge"))
+        begin += len(run)
+    return np.concatenate(parts)
 
 
 def _top_energy(values: Floats) -> float:

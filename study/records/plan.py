@@ -46,6 +46,9 @@ def make_plan(
     response = measured or next((c for c in MOTIONS if c in record), None)
     if response is None:
         raise StudyError(f"record {record.name!r} has no displacement, velocity or acceleration")
+    if response not in record:
+        there = ", ".join(record.channels)
+        raise StudyError(f"record {record.name!r} has no channel {response!r}; expected one of {there}")
     given = fit is not None or judge is not None
     half = len(record) // 2
     usual = ((0, half), (half, len(record))) if given or len(record) < 2 * FEWEST else halves(record, response)

@@ -2,16 +2,18 @@
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import rfft
 
 from study.records.completion import complete
-from study.records.plan import Plan, make_plan
+from study.records.plan import FEWEST, Plan, make_plan
 from study.records.record import MOTIONS, Record
 from study.support.arrays import Floats
 
+FORCE = "force"  # what is predicted where the motion is prescribed
 QUIET = 0.5  # of the motion's size: a stretch that shows less is no picture of the record
 
 
@@ -96,12 +98,26 @@ class Prepared:
         """The same record with another part to fit."""
         return replace(self, plan=replace(self.plan, fit=(first, last)))
 
+    @cached_property
+    def free(self) -> bool:
+        """Whether no force acts at all: the record is of free decays."""
+        return self.response != FORCE and not np.any(self.record[FORCE])
+
     def shortened(self, samples: int) -> "Prepared":
         """The same with no more than so many samples to fit: those that the judging part follows, if it does."""
         first, last = self.plan.fit
         if last - first <= samples:
             return self
+        if self.record.joints:
+            return self._of_stretches(samples)
         return self.with_fit(*((last - samples, last) if self.plan.judge[0] == last else (first, first + samples)))
+
+    def _of_stretches(self, samples: int) -> "Prepared":
+        """The last so many samples to fit; of a stretch that would be cut to a rest of few samples, none."""
+        last = self.plan.fit[1]
+        first = last - samples
+        end = self.record.stretch_of(first)[1]
+        return self.with_fit(end if end - first < FEWEST and end < last else first, last)
 
 
 def limited(prepared: Prepared, samples: int) -> Prepared:

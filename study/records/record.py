@@ -1,7 +1,9 @@
 """A record: what was measured or simulated, with its units."""
 
+from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import accumulate
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,29 @@ from study.support.arrays import Floats
 
 MOTIONS = ("displacement", "velocity", "acceleration")
 SI_UNITS = {"time": "s", "force": "N", "displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Samples ``first`` to ``last`` (exclusive) of a record, along which the motion goes on without a break.
+
+    It ``continues`` where it comes after the stretch before it in the same record, and a motion runs through what lies
+    between them; else the motion begins anew.
+    """
+
+    source: "Record"
+    first: int
+    last: int
+    continues: bool = False
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return self.last - self.first
+
+    @property
+    def time(self) -> Floats:
+        """Time of each sample in seconds, shape (n,)."""
+        return self.source.time[self.first : self.last]
 
 
 @dataclass(frozen=True, eq=False)  # arrays have no single truth value: a record equals itself alone
@@ -30,6 +55,10 @@ class Record:
         Time of the first sample in seconds.
     period : int, optional
         Samples in one period, where the excitation is periodic.
+    stretches : tuple of Stretch
+        What it is strung together of; empty for a record of its own.
+    changed : set of str
+        Channels that are no longer those of its stretches.
     """
 
     dt: float
@@ -38,6 +67,8 @@ class Record:
     name: str = "record"
     start: float = 0.0
     period: int | None = None
+    stretches: tuple[Stretch, ...] = ()
+    changed: frozenset[str] = frozenset()
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -54,7 +85,26 @@ class Record:
     @property
     def time(self) -> Floats:
         """Time of each sample in seconds, shape (n,)."""
+        if self.stretches:
+            return np.concatenate([stretch.time for stretch in self.stretches])
         return self.start + self.dt * np.arange(len(self), dtype=np.float64)
+
+    @property
+    def begins(self) -> tuple[int, ...]:
+        """Samples at which the motion begins anew, the first aside."""
+        pairs = zip(self.joints, self.stretches[1:], strict=True)
+        return tuple(joint for joint, stretch in pairs if not stretch.continues)
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """Samples at which its stretches begin, the first aside."""
+        return tuple(accumulate(len(stretch) for stretch in self.stretches[:-1]))
+
+    def stretch_of(self, sample: int) -> tuple[int, int]:
+        """First sample of the stretch that holds this one, and the one after its last."""
+        bounds = (0, *self.joints, len(self))
+        place = bisect_right(bounds, sample, hi=len(bounds) - 1)
+        return bounds[place - 1], bounds[place]
 
     @property
     def extra(self) -> tuple[str, ...]:
@@ -64,11 +114,23 @@ class Record:
     def part(self, first: int, last: int) -> "Record":
         """Samples ``first`` to ``last`` (exclusive), with the time they were taken at."""
         channels = {name: values[first:last] for name, values in self.channels.items()}
-        return replace(self, channels=channels, start=self.start + first * self.dt)
+        start = self.start + first * self.dt
+        return replace(self, channels=channels, start=start, stretches=self._stretches(first, last))
+
+    def _stretches(self, first: int, last: int) -> tuple[Stretch, ...]:
+        """The stretches, or parts of them, that samples ``first`` to ``last`` come from."""
+        kept: list[Stretch] = []
+        for begin, stretch in zip((0, *self.joints), self.stretches, strict=False):
+            low, high = max(first - begin, 0), min(last - begin, len(stretch))
+            if high > low:
+                going_on = stretch.continues and bool(kept)
+                kept.append(Stretch(stretch.source, stretch.first + low, stretch.first + high, going_on))
+        return tuple(kept)
 
     def with_channels(self, channels: Mapping[str, Floats]) -> "Record":
         """The same record with channels replaced or added."""
-        return replace(self, channels={**self.channels, **channels})
+        changed = self.changed.union(channels) if self.stretches else self.changed
+        return replace(self, channels={**self.channels, **channels}, changed=changed)
 
 
 def write_csv(record: Record, path: Path) -> None:

@@ -6,7 +6,7 @@ for, zero and Nyquist frequency not doubled.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.fft import rfftfreq
@@ -134,6 +134,30 @@ def cross_spectra(channels: Sequence[Floats], dt: float, segments: Segments | No
         Default: the report's 512-point Hann segments with half overlap.
     """
     return cross_spectra_in_pieces([channels], dt, segments)
+
+
+def cross_spectra_within(
+    channels: Sequence[Floats], begins: Sequence[int], dt: float, segments: Segments
+) -> SpectralMatrix:  # fmt: skip
+    """:func:`cross_spectra` of a record that is strung together at ``begins``: no segment reaches across a joint.
+
+    Stretches shorter than a segment are left out; where all are, segments are as long as the longest holds.
+    """
+    bounds = [0, *begins, len(channels[0])]
+    lengths = np.diff(bounds)
+    if np.max(lengths) < segments.length:
+        segments = replace(segments, length=2 ** int(np.log2(np.max(lengths))))
+    total = np.zeros((segments.length // 2 + 1, len(channels), len(channels)), dtype=np.complex128)
+    scale, averages, count = np.ones(len(total)), 0.0, 0
+    for begin, length in zip(bounds, lengths.tolist(), strict=False):
+        if length >= segments.length:
+            own = segments.count(length)
+            _add_products(total, [c[begin : begin + length] for c in channels], own, segments)
+            averages, count = averages + segments.effective_averages(length), count + own
+    scale *= 2.0 * dt / (count * np.sum(segments.taper() ** 2))
+    scale[[0, -1]] /= 2.0
+    frequency = np.asarray(rfftfreq(segments.length, dt), dtype=np.float64)
+    return SpectralMatrix(frequency, total * scale[:, None, None], averages, segments)
 
 
 def cross_spectra_in_pieces(

@@ -23,20 +23,21 @@ def starting_states(record: Record, response: str, samples: Sequence[int], reach
     A displacement is smoothed by a cubic over a part of its period, which yields the velocity too; what neither it
     nor a channel of the record shows is zero.
     """
-    if response != "displacement":
+    if response != "displacement":  # of a prescribed motion too, where the force is what is predicted
         columns = [
             record[c][list(samples)] if c in record else np.zeros(len(samples)) for c in ("displacement", "velocity")
         ]
         return np.column_stack(columns)
     values = record[response]
-    half = round(reach * 2.0 * np.pi / (angular_rate(values, record.dt) * record.dt))
-    half = int(np.clip(half, 2, max((len(values) - 1) // 2, 1)))
+    wanted = round(reach * 2.0 * np.pi / (angular_rate(values, record.dt) * record.dt))
     states = np.empty((len(samples), 2))
     for i, sample in enumerate(samples):
-        first = max(0, min(sample - half, len(values) - 2 * half - 1))
+        begin, end = record.stretch_of(sample)
+        half = int(np.clip(wanted, 2, max((end - begin - 1) // 2, 1)))
+        first = max(begin, min(sample - half, end - 2 * half - 1))
         window = values[first : first + 2 * half + 1]
-        states[i] = _smoothing(first - sample, len(window), half) @ window
-    return states / np.array([1.0, half * record.dt])
+        states[i] = _smoothing(first - sample, len(window), half) @ window / np.array([1.0, half * record.dt])
+    return states
 
 
 @lru_cache(maxsize=256)

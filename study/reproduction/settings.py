@@ -1,5 +1,6 @@
 """The study's settings as typed, frozen values: the sections of ``config/config.yaml``, and what its jobs are given."""
 
+from difflib import get_close_matches
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
@@ -21,6 +22,8 @@ def _with(*needed: str) -> AfterValidator:
 
     def check(values: dict[str, float]) -> dict[str, float]:
         if lacking := [name for name in needed if name not in values]:
+            if near := get_close_matches(lacking[0], [name for name in values if name not in needed], n=1):
+                raise ValueError(f"names {near[0]!r}, which is no parameter; did you mean {lacking[0]!r}?")
             raise ValueError(f"lacks {lacking[0]!r}; expected at least {', '.join(needed)}")
         return values
 

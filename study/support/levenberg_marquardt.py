@@ -50,7 +50,8 @@ class Point:
         values, vectors = np.linalg.eigh(self.normal.reduced())
         inverse = (vectors / np.maximum(values, np.finfo(float).eps)) @ vectors.T
         scale = self.scale[: len(values)]
-        return np.asarray(variance * inverse / np.outer(scale, scale), dtype=np.float64)
+        with np.errstate(over="ignore"):  # where a value runs off, its error is beyond all measure
+            return np.asarray(variance * inverse / np.outer(scale, scale), dtype=np.float64)
 
     def undecided(self) -> NDArray[np.bool_]:
         """Which shared variables the data do not show, or cannot tell apart from others, shape (k,)."""

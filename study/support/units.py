@@ -27,10 +27,12 @@ BASES: dict[str, tuple[float, Powers]] = {
     "m": (1.0, LENGTH), "in": (0.0254, LENGTH), "inch": (0.0254, LENGTH), "mil": (0.0254e-3, LENGTH),
     "ft": (0.3048, LENGTH), "s": (1.0, TIME), "sec": (1.0, TIME), "min": (60.0, TIME), "h": (3600.0, TIME),
     "V": (1.0, VOLTAGE), "Gal": (0.01, ACCELERATION),
+    # Angles and strains take the place of a displacement, as moments take that of a force: a record holds no other.
+    "rad": (1.0, LENGTH), "deg": (math.pi / 180.0, LENGTH), "strain": (1.0, LENGTH), "microstrain": (1e-6, LENGTH),
     **dict.fromkeys(("g", "gn", "g_n"), (STANDARD_GRAVITY, ACCELERATION)),
 }  # fmt: skip
 PREFIXES = {"M": 1e6, "k": 1e3, "d": 1e-1, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
-PREFIXED = ("N", "m", "s", "V", "g", "gn")
+PREFIXED = ("N", "m", "s", "V", "g", "gn", "rad")
 PLAIN = str.maketrans({
     "²": "^2", "³": "^3", "⁻": "^-", "¹": "1", "·": " ", "⋅": " ", "*": " ", "µ": "u", "μ": "u", "−": "-",
 })  # fmt: skip
@@ -106,8 +108,9 @@ def role_unit(role: str, text: str) -> Unit:
     """
     unit = parse_unit(text)
     powers, expected = ROLES[role]
+    moment = role == "force" and unit.powers == (1, 1, 0, 0)
     uncalibrated = role != "time" and unit.powers[3] == 1
-    expect(unit.powers == powers or uncalibrated, f"{text!r} is no unit of {role}; expected {expected}")
+    expect(unit.powers == powers or moment or uncalibrated, f"{text!r} is no unit of {role}; expected {expected}")
     return unit
 
 

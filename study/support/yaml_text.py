@@ -39,6 +39,8 @@ def read_plain(text: str) -> object:
         raise StudyError(f"is not YAML ({_problem(error)}); {EXPECTED}") from None
     except Exception as error:  # whatever else a parser trips over in hostile text means the same to the user
         problem = (str(error) or type(error).__name__).splitlines()[0]
+        if problem.startswith("Exceeds the limit"):  # Python reads no number of thousands of digits
+            problem = "a number of too many digits"
         raise StudyError(f"is not YAML ({short(problem)}); {EXPECTED}") from None
 
 

@@ -38,13 +38,13 @@ class Trial:
     hidden: tuple[str, ...]  # names of the hidden effects
     noise: float  # mean square of the noise over that of the response
     shares: tuple[float, ...]  # of the restoring force in each hidden effect, beyond any linear model
-    experiment: Experiment  # the linear system, its excitation and how it was sampled
+    experiment: Experiment | None  # the linear system, its excitation and how it was sampled; None for other tests
     fault: Mapping[str, Any] = field(default_factory=dict[str, Any])  # of the measurement: its name, channel and value
 
     @property
     def response(self) -> str:
         """The measured motion."""
-        return next(c for c in self.record.channels if c != "force")
+        return next(c for c in self.record.channels if c in MOTIONS)
 
     @property
     def completed(self) -> Model:
@@ -246,7 +246,7 @@ def _drawn(rng: np.random.Generator, term: Term, quiet: Record) -> ModelTerm:
     values: list[float] = []
     for parameter in term.parameters:
         share = float(rng.uniform(*parameter.drawn))
-        values.append(share * values[-1] if parameter.relative else _scaled(share, parameter, scale, omega))
+        values.append(share * values[-1] if parameter.relative else scaled(share, parameter, scale, omega))
     entry = free(term)
     angle = float(rng.uniform(0.0, 2.0 * np.pi))
     sign = -1.0 if term.either_sign and angle > np.pi else 1.0
@@ -254,7 +254,7 @@ def _drawn(rng: np.random.Generator, term: Term, quiet: Record) -> ModelTerm:
     return replace(entry, coefficients=tuple(float(s) for s in shape), parameters=tuple(values))
 
 
-def _scaled(value: float, parameter: Parameter, scale: float, omega: float) -> float:
+def scaled(value: float, parameter: Parameter, scale: float, omega: float) -> float:
     """A value in the unit of its quantity, from one in units of rms displacement and angular rate (rad/s)."""
     match parameter.quantity:
         case "length":

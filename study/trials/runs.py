@@ -108,6 +108,7 @@ def run(order: Order) -> Row:
 
 def _answer(trial: Trial) -> Row:
     experiment = trial.experiment
+    assert experiment is not None, "these trials are of a force on a mass and spring"
     return {
         "samples_a_period": experiment.samples_a_period, "samples": experiment.samples,
         "damping": experiment.damping, "excitation": experiment.kind,

@@ -31,10 +31,15 @@ def write(trial: Trial, folder: Path) -> tuple[Path, Path, Path]:
     with replacing(record) as beside:
         write_csv(trial.record, beside)
     replace_file(model, format_model(trial.believed).encode())
-    sealed = base64.b64encode(json.dumps(contents(trial)).encode()).decode()
+    seal(contents(trial), answer, stem)
+    return record, model, answer
+
+
+def seal(content: Mapping[str, Any], answer: Path, stem: str) -> None:
+    """Write an answer that no glance gives away."""
+    sealed = base64.b64encode(json.dumps(content).encode()).decode()
     page = {"trial": stem, "open_with": f"study trial --open {answer.name}", "answer": sealed}
     replace_file(answer, (json.dumps(page, indent=1) + "\n").encode())
-    return record, model, answer
 
 
 def contents(trial: Trial) -> dict[str, Any]:

@@ -21,7 +21,7 @@ def base() -> SimpleNamespace:
     """A motion, and a residual of two sines."""
     residual = sum(np.sin(2 * np.pi * line * np.arange(N) / N) for line in LINES)
     residual = residual + 1e-3 * np.random.default_rng(4).standard_normal(N)
-    return SimpleNamespace(displacement=U, fit=SimpleNamespace(residual=residual), dt=DT)
+    return SimpleNamespace(displacement=U, fit=SimpleNamespace(residual=residual), dt=DT, row=0)
 
 
 POINTS = {

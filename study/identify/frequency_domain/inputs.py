@@ -6,6 +6,7 @@ cubic stiffness and Van der Pol's damping. The output is always the force.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from study.records.record import Record
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
+INERTIA = 2  # order of its time derivative
 LARGEST = 1e150  # of an input: the square of one beyond may be no number
 STATE_STEPS = 4  # Runge-Kutta steps a sample for a term's own state
 
@@ -79,6 +81,12 @@ def reverse_inputs(model: Model) -> tuple[Input, ...]:
     return tuple(inputs.values())
 
 
+def without_inertia(inputs: Sequence[Input]) -> tuple[Input, ...]:
+    """The inputs without the mass: where no force acts, its inertia force is what the others have to balance."""
+    rest = (replace(i, parts=tuple(p for p in i.parts if p.order < INERTIA)) for i in inputs)
+    return tuple(i for i in rest if i.parts)
+
+
 def _known_parameters(entry: ModelTerm) -> tuple[tuple[str, float], ...]:
     pairs: list[tuple[str, float]] = []
     for parameter, value in zip(entry.term.parameters, entry.parameters, strict=True):
@@ -110,13 +118,19 @@ def history(item: Input, record: Record) -> Floats:
     program = with_registers(graph.program([formulas.build(graph, formula, known)]), dict(item.parameters))
     positions = np.array([program.inputs[n] for n in wanted], dtype=np.int64)
     registers, output = program.registers.copy(), program.outputs
+    if item.state is not None and record.joints:  # each stretch begins at zero, as a record does
+        bounds = pairwise((0, *record.joints, len(record)))
+        return np.concatenate([history(item, _alone(record.part(a, b))) for a, b in bounds])
     if item.state is not None:
-        fine = np.column_stack([between_samples(x, 2 * STATE_STEPS) for x in data])
         states = np.empty(len(record))
-        kernels.integrate_state(
-            program.code, program.first, registers, positions, program.inputs["z"], int(output[0]),
-            record.dt / STATE_STEPS, STATE_STEPS, fine, states,
-        )  # fmt: skip
+        for steps in (STATE_STEPS, 4 * STATE_STEPS, 16 * STATE_STEPS):  # loops that close sharply ask for more
+            fine = np.column_stack([between_samples(x, 2 * steps) for x in data])
+            kernels.integrate_state(
+                program.code, program.first, registers, positions, program.inputs["z"], int(output[0]),
+                record.dt / steps, steps, fine, states,
+            )  # fmt: skip
+            if np.all(np.isfinite(states)):
+                break
         return _finite(states, item, record)
     table = np.column_stack(data) if data else np.zeros((len(record), 0))
     out = np.empty((len(record), 1))
@@ -124,12 +138,20 @@ def history(item: Input, record: Record) -> Floats:
     return _finite(out[:, 0], item, record)
 
 
+def _alone(part: Record) -> Record:
+    """One stretch as a record of its own."""
+    return replace(part, stretches=(), start=float(part.time[0]))
+
+
 def _finite(values: Floats, item: Input, record: Record) -> Floats:
     with np.errstate(invalid="ignore"):
         bad = np.flatnonzero(~(np.abs(values) < LARGEST))
     if bad.size:
         formula, time = item.shape if item.state is None else item.state, record.time[bad[0]]
-        raise StudyError(f"the formula {formula!r} has no finite value at t = {time:.6g} s of {record.name}")
+        raise StudyError(
+            f"the formula {formula!r} has no finite value at t = {time:.6g} s of {record.name}; "
+            "expected a formula that has one all along the motion"
+        )
     return values
 
 
@@ -142,7 +164,8 @@ def _columns(wanted: Sequence[str], formula: str, record: Record) -> list[Floats
         if name != "t" and channel not in (record if name in motion else record.extra):
             beside = "" if name in motion else " beside force and motion"
             raise StudyError(
-                f"the formula {formula!r} needs the channel {channel!r}, which {record.name} lacks{beside}"
+                f"the formula {formula!r} needs the channel {channel!r}, which {record.name} lacks{beside}; "
+                "expected one that it has"
             )
         columns.append(record.time if name == "t" else record[channel])
     return columns

@@ -6,7 +6,7 @@ no local minima, in which a fit from a linear model ends where the system is far
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from study.equations.model import Model, free
 from study.equations.terms import get
 from study.identify.frequency_domain import coefficients, conditioned
-from study.identify.frequency_domain.inputs import histories, reverse_inputs
-from study.records.prepared import Prepared
+from study.identify.frequency_domain.decay_start import along_the_motion, decay_start, drift_start, scaled
+from study.identify.frequency_domain.inputs import histories, reverse_inputs, without_inertia
+from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record
-from study.records.spectra import Segments, cross_spectra
+from study.records.spectra import Segments, cross_spectra, cross_spectra_within
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 
@@ -61,7 +62,7 @@ def coherent_lines(prepared: Prepared) -> Lines:
     found, _ = _lines(part, response, length)
     if len(found.omega) >= FEWEST_LINES:
         return found
-    while length < len(part) // 2:
+    while len(part) >= SHORT and length < len(part) // 2:
         length = min(2 * length, len(part) // 2)
         found, chance = _lines(part, response, length)
         if len(found.omega) > max(1.0, chance):  # two lines are four equations
@@ -80,7 +81,10 @@ def coherent_lines(prepared: Prepared) -> Lines:
 def _lines(part: Record, response: str, length: int) -> tuple[Lines, float]:
     """The lines by segments of a length, and how many of those driven may be coherent by chance."""
     force, motion = (part[name] - np.mean(part[name]) for name in ("force", response))
-    matrix = cross_spectra([force, motion], part.dt, Segments(length=length))
+    if part.joints:
+        matrix = cross_spectra_within([force, motion], part.joints, part.dt, Segments(length=length))
+    else:
+        matrix = cross_spectra([force, motion], part.dt, Segments(length=length))
     g, f = matrix.density[1:-1], matrix.frequency[1:-1]
     power = g[:, 0, 0].real * g[:, 1, 1].real
     coherence = np.abs(g[:, 0, 1]) ** 2 / np.where(power > 0.0, power, np.inf)
@@ -112,8 +116,17 @@ def solved(lines: Lines, wanted: Sequence[str]) -> tuple[Floats, Floats]:
 
 def linear_start(model: Model, prepared: Prepared) -> dict[str, float]:
     """Mass, damping and stiffness of the best linear approximation; zero for everything else."""
-    lines = coherent_lines(prepared)
     wanted = [key for key in LINEAR_ORDERS if key in model.values]
+    if prepared.response == FORCE:
+        return dict.fromkeys(model.values, 0.0) | along_the_motion(_with_shapes(model), prepared, wanted)
+    if prepared.free:
+        return decay_start(model, prepared)
+    try:
+        lines = coherent_lines(prepared)
+    except StudyError:
+        if "k" in model.values or not prepared.record.joints:
+            raise
+        return drift_start(model, prepared)
     solution, _ = solved(lines, wanted)
     start = dict.fromkeys(model.values, 0.0) | dict(zip(wanted, solution.tolist(), strict=True))
     if start["m"] <= 0.0:
@@ -124,8 +137,17 @@ def linear_start(model: Model, prepared: Prepared) -> dict[str, float]:
 
 def oscillator(prepared: Prepared) -> dict[str, float]:
     """m, c and k of the best linear oscillator, whatever the model's terms are."""
-    names = ("inertia", "linear_damping", "linear_stiffness")
-    return linear_start(Model("linear", tuple(free(get(name)) for name in names)), prepared)
+    names = ("linear_damping", "linear_stiffness")
+    names = names if prepared.response == FORCE else ("inertia", *names)
+    model = Model("linear", tuple(free(get(name)) for name in names))
+    try:
+        return linear_start(model, prepared)
+    except StudyError:
+        if not prepared.record.joints:
+            raise
+    drifting = drift_start(model.without_term("linear_stiffness"), prepared)
+    first, last = prepared.plan.fit
+    return drifting | {"k": drifting["m"] * (2.0 * np.pi / ((last - first) * prepared.dt)) ** 2}
 
 
 def reverse_start(model: Model, prepared: Prepared) -> dict[str, float]:
@@ -136,16 +158,33 @@ def reverse_start(model: Model, prepared: Prepared) -> dict[str, float]:
     StudyError
         If the part is too short, an input has no power, or the mass comes out negative.
     """
+    if prepared.response == FORCE:
+        _ = reverse_inputs(model)  # refuses shape parameters that are not known
+        return along_the_motion(model, prepared, [s for t in model.terms for s in t.term.symbols])
     part = prepared.record.part(*prepared.inner(prepared.plan.fit))
     inputs = reverse_inputs(model)
+    if prepared.free:  # the inertia force takes the place of the measured one
+        part = part.with_channels({FORCE: -part["acceleration"]})
+        inputs = without_inertia(inputs)
     cut = Segments(length=int(np.clip(2 ** int(np.log2(len(part) / PARTS)), SHORTEST, LONGEST)))
-    matrix = cross_spectra([*histories(inputs, part), part["force"]], part.dt, cut)
+    channels = [*histories(inputs, part), part["force"]]
+    if part.joints:
+        matrix = cross_spectra_within(channels, part.joints, part.dt, cut)
+        cut = matrix.segments
+    else:
+        matrix = cross_spectra(channels, part.dt, cut)
     force = matrix.density[:, -1, -1].real
     driven = matrix.frequency[(force > FAINT * np.max(force)) & (matrix.frequency > 1.5 / (cut.length * part.dt))]
     if driven.size < len(inputs):
         raise StudyError(f"the force of {part.name!r} drives too few frequencies for {len(inputs)} inputs")
     band = (max(float(driven[0]), prepared.band[0]), min(float(driven[-1]), prepared.band[1]))
     estimate = coefficients.fit(conditioned.analyse(matrix), inputs, band, cut.line_inflation())
-    if not np.all(np.isfinite(estimate.values)) or not estimate["m"] > 0.0:
+    if not np.all(np.isfinite(estimate.values)) or not (prepared.free or estimate["m"] > 0.0):
         raise StudyError(f"the reverse system of {model.name!r} and {part.name!r} has no solution")
-    return dict(zip(estimate.symbols, estimate.values.tolist(), strict=True))
+    found = dict(zip(estimate.symbols, estimate.values.tolist(), strict=True))
+    return scaled({"m": 1.0} | found, model) if prepared.free else found
+
+
+def _with_shapes(model: Model) -> Model:
+    """The model without terms whose shape parameters are not known: their forces count as zero."""
+    return replace(model, terms=tuple(t for t in model.terms if None not in t.parameters))

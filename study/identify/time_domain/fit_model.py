@@ -23,7 +23,7 @@ from study.identify.time_domain.no_response import LINEAR, unfit, why_no_respons
 from study.identify.time_domain.part_fit import STEPS, fit_part
 from study.identify.time_domain.settling import KEPT, better, continued, from_segments, settled
 from study.identify.time_domain.shape_search import Baseline
-from study.records.prepared import Prepared
+from study.records.prepared import FORCE, Prepared
 from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
@@ -55,7 +55,7 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
     StudyError
         If the model cannot be fitted.
     """
-    if "inertia" not in model:
+    if "inertia" not in model and prepared.response != FORCE:
         raise StudyError(f"model {model.name!r} has no inertia; a free run needs it")
     _check_own_formulas(model, prepared)
     if start is not None:

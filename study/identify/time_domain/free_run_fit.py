@@ -23,6 +23,7 @@ from study.support.block_normal import ContinuityGaps
 from study.support.errors import DivergenceError, StudyError
 from study.support.levenberg_marquardt import OFFSET, End, Point, minimise, point_at
 
+FAR = 1e9  # times its start: a mass that the motion does not show at all runs off without end
 WHITE = np.ones(1)  # autoregressive coefficients of white noise
 
 
@@ -169,9 +170,10 @@ def fit_free_run(
     if not isinstance(initial, str):
         states[:] = initial
     elif free:
-        states[:, :2] = starting_states(record, response, (first, *restarts))
+        begins = (first, *(first + cut for cut in run.cuts))
+        states[:, : run.moving] = starting_states(record, response, begins)[:, : run.moving]
     measured = record[response][first : first + run.samples]
-    positive = tuple(key for entry in model.terms for key in entry.term.positive if key in begin)
+    positive = {key: FAR * begin[key] for entry in model.terms for key in entry.term.positive if key in begin}
     kept = None if lost is None else (~lost[first : first + run.samples]).astype(np.float64)
     problem = _Problem(run, measured, free, _weights(continuity, measured, states), positive, noise, kept)
     end = problem.search(np.array([*begin.values(), *states.ravel()]), max_iterations, offset)
@@ -212,7 +214,7 @@ class _Problem:
     measured: Floats
     free_states: int
     weights: Floats | None
-    positive: tuple[str, ...]
+    positive: Mapping[str, float]  # keys above zero, and how far they may run off
     noise: Floats
     kept: Floats | None  # 0 for samples that are lost, 1 for others
 
@@ -225,7 +227,7 @@ class _Problem:
     def linearise(self, x: Floats) -> Point | None:
         """Residual and Jacobian at x; None where the model has no finite response there."""
         values = dict(zip(self.run.keys, (float(v) for v in x), strict=False))
-        if any(values[key] <= 0.0 for key in self.positive):
+        if any(not 0.0 < values[key] <= max(limit, 0.0) for key, limit in self.positive.items()):
             return None
         states = self.states(x)
         try:
@@ -255,7 +257,7 @@ class _Problem:
         point = self.linearise(x)
         if point is None:
             values = ", ".join(f"{key} = {v:g}" for key, v in zip(self.run.keys, x, strict=False))
-            raise DivergenceError(f"the free run diverges with the starting values {values}", self.run.start)
+            raise DivergenceError(f"the free run diverges with the starting values {values}", self.run.time(0))
         return minimise(self.linearise, point, float(np.linalg.norm(self.measured)), max_iterations, offset)
 
 

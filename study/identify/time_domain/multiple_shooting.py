@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from study.equations.model import Model
+from study.equations.model import Model, has_spring
 from study.equations.substeps import needed_steps
 from study.identify.time_domain.continuation import NEAR, NEGLIGIBLE, fit_segments, lengthen
 from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
@@ -13,6 +13,7 @@ from study.identify.time_domain.shooting import (
     ShootingSegments,
     even_restarts,
     needed_restarts,
+    own_begins,
 )
 from study.records.prepared import Prepared
 from study.records.record import Record
@@ -61,7 +62,8 @@ def fit_in_segments(
     if loose.rms < CLEAN * segments.spread:  # errors of long steps would matter
         loose = fit_segments(loose.model, segments, loose.initial, held, runs)
     states = np.atleast_2d(loose.initial)
-    if not needed_restarts(loose.model, record, states, whole, segments.restarts, steps_per_sample):
+    apart = own_begins(record, whole)  # stretches are short: a state for each is all that they need
+    if apart or not needed_restarts(loose.model, record, states, whole, segments.restarts, steps_per_sample):
         return fit_free_run(
             loose.model, record, held=held, response=response, steps_per_sample=steps_per_sample,
             span=whole, max_iterations=max_iterations,
@@ -88,10 +90,17 @@ def is_poor(fit: FreeRunFit, measured: Floats) -> bool:
 
 
 def is_chaotic(fit: FreeRunFit, prepared: Prepared) -> bool:
-    """Whether disturbances of a fitted free run grow along the part that it was fitted to."""
+    """Whether disturbances of a fitted free run grow along the part that it was fitted to.
+
+    They do not where no force depends on the displacement: such a motion drifts, in proportion to time, but two of
+    them approach each other or stay as they are.
+    """
+    if not has_spring(fit.model):
+        return False
     record, response, span = prepared.record, prepared.response, fit.span
     segments = ShootingSegments(record, response, span, even_restarts(record, response, span), fit.steps_per_sample)
-    states = segments.passing(fit.model, fit.restarts, fit.initial)
+    begins = sorted({*fit.restarts, *own_begins(record, span)})
+    states = segments.passing(fit.model, begins, fit.initial)
     return bool(needed_restarts(fit.model, record, states, span, segments.restarts, fit.steps_per_sample))
 
 

@@ -11,11 +11,13 @@ from study.equations.model import Model
 from study.identify.time_domain.free_run_fit import WHITE, FreeRunFit, fit_free_run
 from study.records.prepared import Prepared
 from study.support.autoregression import whitened
+from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares
 from study.support.levenberg_marquardt import OFFSET
 from study.support.statistics import clustered_covariance
 
 Floats = NDArray[np.float64]
+FAR = 1e150  # a shift beyond all measure
 STEPS = 2  # Runge-Kutta steps in a sampling interval while a search compares models
 
 
@@ -57,9 +59,12 @@ def run_of(
 
 
 def linearise(fit: FreeRunFit, prepared: Prepared) -> Floats:
-    """Derivatives of the response on the samples that were fitted, shape (n, keys + 2): keys, then initial states."""
-    values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
-    return prepared.known(run_of(fit, prepared, fit.keys).respond(values, fit.initial, 2)[1], fit.span)
+    """Derivatives of the response on the samples that were fitted, shape (n, keys + 2): keys, then initial states.
+
+    These are two for each stretch of the record, and none where the motion is prescribed.
+    """
+    values, run = dict(zip(fit.keys, fit.values.tolist(), strict=True)), run_of(fit, prepared, fit.keys)
+    return prepared.known(run.respond(values, fit.initial, run.moving)[1], fit.span)
 
 
 def covariance_of(fit: FreeRunFit, jacobian: Floats) -> Floats:
@@ -72,7 +77,10 @@ def covariance_of(fit: FreeRunFit, jacobian: Floats) -> Floats:
 
 def integration_shift(fit: FreeRunFit, prepared: Prepared, jacobian: Floats) -> Floats:
     """By how much halving the steps would move the estimates, shape (keys + 2,), by one step of Gauss and Newton."""
-    coarse, fine = (run_of(fit, prepared, finer=n).respond({}, fit.initial)[0] for n in (1, 2))
+    try:
+        coarse, fine = (run_of(fit, prepared, finer=n).respond({}, fit.initial)[0] for n in (1, 2))
+    except DivergenceError:  # a motion that stays finite by the error of its integration alone
+        return np.full(jacobian.shape[1], FAR)
     return least_squares(whitened(jacobian, fit.noise), whitened(np.subtract(coarse, fine), fit.noise))
 
 
@@ -122,7 +130,7 @@ class JudgingRun:
         """As :func:`linearise`, on the judging part, of a fit with the same motion."""
         values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
         run = self._run(fit.keys, self.prepared.response, 1, fit.model)
-        derivatives = run.respond(values, self.initial, 2)[1][self.prepared.plan.judge[0] - self.first :]
+        derivatives = run.respond(values, self.initial, run.moving)[1][self.prepared.plan.judge[0] - self.first :]
         return self.prepared.known(derivatives, self.prepared.plan.judge)
 
     def _run(self, keys: Sequence[str], motion: str, finer: int, model: Model | None = None) -> FreeRun:
@@ -141,7 +149,8 @@ def judging_run(fit: FreeRunFit, prepared: Prepared) -> JudgingRun:
         If it leaves the range of finite numbers.
     """
     plan = prepared.plan
-    if plan.judge[0] == fit.span[1] and not fit.restarts:
+    begun = plan.judge[0] in prepared.record.joints
+    if plan.judge[0] == fit.span[1] and not (fit.restarts or begun):
         return JudgingRun(fit, prepared, fit.first, fit.initial)
     again = fit_free_run(
         fit.model, prepared.record, held=tuple(fit.model.values), response=plan.response,

@@ -60,7 +60,9 @@ def _followed(other: FreeRunFit, fit: FreeRunFit, covariance: Floats, prepared: 
     begun = _begun(other, fit)
     try:
         run = run_of(begun, prepared, begun.keys)
-        response, jacobian = run.respond(dict(zip(begun.keys, begun.values.tolist(), strict=True)), begun.initial, 2)
+        response, jacobian = run.respond(
+            dict(zip(begun.keys, begun.values.tolist(), strict=True)), begun.initial, run.moving
+        )
         residual = prepared.record[prepared.response][slice(*begun.span)] - response
         step = least_squares(jacobian, residual, 1e-12)
         here = fit.residual[begun.first - fit.first :][: len(residual)]
@@ -77,8 +79,8 @@ def _begun(other: FreeRunFit, fit: FreeRunFit) -> FreeRunFit:
     """A start with what the fit found for the terms that joined the model after it."""
     model = fit.model.with_values(fit.model.numbers() | other.model.numbers())
     values = np.array([model.numbers()[key] for key in fit.keys])
-    initial = np.zeros_like(fit.initial)
-    initial[: len(other.initial)] = other.initial
+    initial = np.zeros((*other.initial.shape[:-1], fit.initial.shape[-1]))
+    initial[..., : other.initial.shape[-1]] = other.initial
     return replace(other, model=model, keys=fit.keys, values=values, initial=initial)
 
 
@@ -88,6 +90,7 @@ def larger(residual: Floats, than: Floats) -> bool:
     One-sided, by Student's t; of residuals that are alike to the last bit neither is.
     """
     rise = block_powers(residual) - block_powers(than)
+    rise = np.ldexp(rise, -int(np.frexp(np.max(np.abs(rise)))[1]))  # by a power of two: squares of 1e160 are no numbers
     count, mean = len(rise), float(np.mean(rise))
     error = float(np.std(rise, ddof=1)) / np.sqrt(count)
     chance = np.asarray(stdtr(count - 1, -mean / max(error, np.finfo(float).tiny)), dtype=np.float64)

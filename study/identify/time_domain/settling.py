@@ -12,7 +12,7 @@ from study.identify.frequency_domain.starting_values import linear_start
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.multiple_shooting import POOR, fit_in_segments, is_chaotic, is_poor
 from study.identify.time_domain.part_fit import STEPS, covariance_of, fit_part, integration_shift, linearise
-from study.records.prepared import Prepared
+from study.records.prepared import FORCE, Prepared
 from study.records.states import angular_rate
 from study.support.errors import DivergenceError, StudyError
 
@@ -40,7 +40,7 @@ def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
 
 
 def _settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
-    if _stands(fit, prepared):
+    if prepared.response == FORCE or _stands(fit, prepared):
         return fit
     if is_chaotic(fit, prepared):
         apart = _in_segments(fit, prepared)
@@ -108,7 +108,12 @@ def better(one: FreeRunFit | None, other: FreeRunFit | None) -> FreeRunFit | Non
 
 
 def from_segments(model: Model, prepared: Prepared, held: Sequence[str], steps: int = STEPS) -> FreeRunFit | None:
-    """A fit that begins where multiple shooting ends; None where the model cannot run even in segments."""
+    """A fit that begins where multiple shooting ends; None where the model cannot run even in segments.
+
+    A motion that is prescribed drifts from nothing: there is nothing to cut.
+    """
+    if prepared.response == FORCE:
+        return None
     length = round(PERIODS * 2.0 * np.pi / (angular_rate(prepared.fitted, prepared.dt) * prepared.dt))
     stretch = prepared.shortened(int(np.clip(length, SHORTEST, LONGEST)))
     try:

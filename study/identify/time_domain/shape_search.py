@@ -11,11 +11,12 @@ import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
 from study.equations.model import Model, ModelTerm
+from study.equations.substeps import needed_steps
 from study.equations.term import Parameter, Term
 from study.identify.frequency_domain.starting_values import linear_start, oscillator
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import linearise, run_of
-from study.records.prepared import Prepared
+from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
@@ -23,6 +24,7 @@ from study.support.least_squares import least_squares
 
 SEARCHED = 4096  # samples that a search for open shape parameters looks at, if they show anything
 PEAKS = 6  # lines of a spectrum that are tried as the frequency of a periodic effect
+SHARP = (15.0, 40.0, 100.0, 250.0)  # per amplitude: loops that close within a small part of a stroke
 STARTS = 4  # points of the search that start a fit
 SPREAD = 5  # points that start a fit where the search is blunt, from one end of the range to the other
 
@@ -58,8 +60,8 @@ class Baseline:
         m, c and k of the best linear oscillator, whatever the model's terms are.
     dt : float
         Sampling interval in seconds.
-    row : int
-        Place of the measured response in ``MOTIONS``.
+    row : int or None
+        Place of the measured response in ``MOTIONS``; None where it is the force of a prescribed motion.
     """
 
     fit: FreeRunFit
@@ -68,10 +70,12 @@ class Baseline:
     linear: dict[str, float]
     approximation: dict[str, float]
     dt: float
-    row: int
+    row: int | None
 
     def transfer(self, omega: Complexes) -> Complexes:
         """Frequency response function from a small force to the measured response at ``omega = j 2 pi f``."""
+        if self.row is None:
+            return np.ones_like(omega)
         own = self.approximation
         return np.asarray(omega**self.row / (own["m"] * omega**2 + own["c"] * omega + own["k"]), dtype=np.complex128)
 
@@ -92,7 +96,8 @@ def baseline(fit: FreeRunFit, prepared: Prepared) -> Baseline:
     basis = np.linalg.qr(jacobian / np.where(scale > 0.0, scale, 1.0))[0]
     displacement, _ = run_of(fit, prepared, motion="displacement").respond({}, fit.initial)
     linear, approximation = _linear(fit, prepared)
-    return Baseline(fit, basis, displacement, linear, approximation, prepared.dt, MOTIONS.index(prepared.response))
+    row = MOTIONS.index(prepared.response) if prepared.response in MOTIONS else None
+    return Baseline(fit, basis, displacement, linear, approximation, prepared.dt, row)
 
 
 def _linear(fit: FreeRunFit, prepared: Prepared) -> tuple[dict[str, float], dict[str, float]]:
@@ -101,6 +106,8 @@ def _linear(fit: FreeRunFit, prepared: Prepared) -> tuple[dict[str, float], dict
         return linear_start(fit.model, prepared), oscillator(prepared)
     except StudyError:
         own = fit.model.numbers()
+        if prepared.response == FORCE:  # nothing passes through a structure there
+            return own, {}
         slowest = (2.0 * np.pi / (len(fit.residual) * prepared.dt)) ** 2
         approximation = {"m": own["m"], "c": own.get("c", 0.0), "k": own.get("k") or own["m"] * slowest}
         return {key: own[key] if key in approximation else 0.0 for key in own}, approximation
@@ -126,8 +133,11 @@ def sensitivity(
     """
     entry = ModelTerm(term, (0.0,) * len(term.components), parameters)
     model = base.fit.model.with_term(entry)
+    steps = base.fit.steps_per_sample
+    if prepared.response == FORCE:  # a loop that closes sharply asks for more than any motion would
+        steps = max(steps, needed_steps(model, prepared.record, FORCE))
     try:
-        run = run_of(replace(base.fit, model=model), prepared, term.symbols)
+        run = run_of(replace(base.fit, model=model, steps_per_sample=steps), prepared, term.symbols)
         _, added = run.respond(dict.fromkeys(term.symbols, 0.0), base.fit.initial)
     except StudyError:
         return None
@@ -169,6 +179,8 @@ def _places(parameter: Parameter, point: tuple[float, ...], base: Baseline) -> l
         case "times of the motion":
             tried = places / float(np.std(np.gradient(u, base.dt)) / np.std(u))
         case "per amplitude":
+            if base.row is None:  # a prescribed stroke may be many times the slip that closes a loop
+                places = np.concatenate([places, SHARP])
             tried = places * (1.0 / float(np.std(u)))
         case "shares of the one before":
             tried = places * point[-1]
@@ -197,15 +209,15 @@ def modulation_lines(base: Baseline) -> list[float]:
     passband = irfft(np.abs(receptance) ** 2, n)
     spread = irfft(np.abs(rfft(base.displacement)) ** 2, n)
     denominator = np.abs(rfft(passband * spread))
-    return _lines(numerator / np.maximum(denominator, 1e-6 * np.max(denominator)))
+    return highest_lines(numerator / np.maximum(denominator, 1e-6 * np.max(denominator)))
 
 
 def residual_lines(base: Baseline) -> list[float]:
     """Lines that stand out of the residual's own spectrum."""
-    return _lines(np.abs(_windowed(base.fit.residual)) ** 2)
+    return highest_lines(np.abs(_windowed(base.fit.residual)) ** 2)
 
 
-def _lines(spectrum: Floats) -> list[float]:
+def highest_lines(spectrum: Floats) -> list[float]:
     """The highest peaks over their surroundings, as line numbers refined by a parabola in the logarithm."""
     n = len(spectrum)
     width = max(8, n // 64)

@@ -7,6 +7,7 @@ growth, each with an initial state of its own, keep the fit well posed (multiple
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -23,11 +24,20 @@ REACHES = (0.07, 0.15, REACH, 0.3)  # widths of smoothing, in periods, that are 
 
 
 def even_restarts(record: Record, response: str, span: tuple[int, int]) -> tuple[int, ...]:
-    """Restarts that cut a span into segments of ``PERIODS`` periods of the motion."""
+    """Restarts that cut a span into segments of ``PERIODS`` periods of the motion, and where a stretch begins in it."""
     first, last = span
     rate = angular_rate(record[response][first:last], record.dt)
-    count = max(1, round((last - first) * record.dt * rate / (2.0 * np.pi * PERIODS)))
-    return tuple(int(r) for r in np.linspace(first, last, count + 1).round()[1:-1])
+    begins = own_begins(record, span)
+    restarts = list[int]()
+    for begin, end in pairwise((first, *begins, last)):
+        count = max(1, round((end - begin) * record.dt * rate / (2.0 * np.pi * PERIODS)))
+        restarts += [int(r) for r in np.linspace(begin, end, count + 1).round()[1:]]
+    return tuple(restarts[:-1])
+
+
+def own_begins(record: Record, span: tuple[int, int]) -> tuple[int, ...]:
+    """Samples within a span at which a stretch of the record begins, its first aside."""
+    return tuple(b for b in record.begins if span[0] < b < span[1])
 
 
 def needed_restarts(
@@ -47,7 +57,10 @@ def needed_restarts(
     weighted = arrivals[:, :2, 1:] * np.array([[1.0, rate], [1.0 / rate, 1.0]])
     kept: list[int] = []
     grown: list[Floats] = []  # from each restart that matters to where the present segment ends
+    own = own_begins(record, span)
     for begin, through in zip((span[0], *restarts[:-1]), weighted, strict=True):
+        if begin in own:  # nothing from before reaches a motion that begins anew
+            grown = []
         grown = [through @ p for p in grown] + [through]
         sizes = [float(np.linalg.norm(p, 2)) for p in grown]
         if max(sizes) > GROWTH and len(grown) > 1:

@@ -6,6 +6,8 @@ What a file is is told by its content first and its name second. Packages for a 
 import warnings
 from pathlib import Path
 
+import numpy as np
+
 from study.records.readers import hdf5, matlab, parquet, uff
 from study.records.readers.assemble import record_from
 from study.records.readers.options import ReadOptions, assignments, beside, read_options
@@ -16,7 +18,7 @@ from study.records.record import Record
 from study.support.errors import StudyError, expect
 from study.support.files import reason
 
-__all__ = ["ReadOptions", "assignments", "read_options", "read_record", "suspect_swapped"]
+__all__ = ["ReadOptions", "assignments", "read_options", "read_record", "read_table", "suspect_swapped"]
 
 MAGIC = 1024  # bytes; MATLAB 7.3 begins its HDF5 part behind 512 of its own
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -54,17 +56,23 @@ def read_record(path: Path, mapping: ReadOptions | None = None) -> Record:
         If it cannot be read, or is no evenly sampled record.
     """
     path = Path(path)
+    table, options = read_table(path, mapping)
+    record = record_from(path, table, options)
+    unforced = not np.any(record["force"])
+    suspicion = None if options.accept_swapped or unforced else suspect_swapped(record)
+    if suspicion is not None:
+        raise StudyError(f"{path}: {suspicion}")
+    return record
+
+
+def read_table(path: Path, mapping: ReadOptions | None = None) -> tuple[Table, ReadOptions]:
+    """The columns of a file, and what the user says about it there and beside the file; raises as `read_record`."""
     options = mapping or ReadOptions()
     with readable(path) as source:
         head = _head(path, source)
         if beside(path).is_file():
             options = options.over(read_options(beside(path)))
-        table = _table(path, source, head, options)
-    record = record_from(path, table, options)
-    suspicion = None if options.accept_swapped else suspect_swapped(record)
-    if suspicion is not None:
-        raise StudyError(f"{path}: {suspicion}")
-    return record
+        return _table(path, source, head, options), options
 
 
 def _head(path: Path, source: Path) -> bytes:

@@ -33,12 +33,14 @@ def record_from(path: Path, table: Table, options: ReadOptions) -> Record:
     _check_lengths(path, roles, options)
     _check_apart(path, roles)
     units = _units(path, roles, options)
-    first, last = _range(path, len(roles["force"].values), options)
+    first, last = _range(path, len(next(iter(roles.values())).values), options)
     cut = table.from_sample(first)
     kept = _usable(path, {r: replace(c, values=c.values[first:last]) for r, c in roles.items()}, cut, options)
     dt, start = _sampling(path, kept, units, cut, options, first)
     channels = {role: c.values for role, c in kept.items() if role != "time"}
     named = {role: unit for role, unit in units.items() if role in channels}
+    if "force" not in channels:  # a free decay
+        channels["force"] = np.zeros(last - first)
     period = _period(path, roles, channels["force"], options)
     return Record(dt, channels, {**SI_UNITS, **named}, _name(path, options), start, period)
 
@@ -88,7 +90,10 @@ def _range(path: Path, length: int, options: ReadOptions) -> tuple[int, int]:
     end = length if last is None else last
     asked = f"from {first} on" if last is None else f"{first} to {last}"
     inside = first < length and end <= length
-    expect(inside, f"{path}: samples {asked} are asked for; the record has {length}, counted from 0")
+    expect(
+        inside,
+        f"{path}: samples {asked} are asked for; the record has {length}; expected a range within, counted from 0",
+    )
     few = f"{path}: {end - first} samples are too few; expected {checks.FEWEST_SAMPLES} or more"
     expect(end - first >= checks.FEWEST_SAMPLES, few)
     return first, end
@@ -101,7 +106,8 @@ def _usable(path: Path, roles: Mapping[str, Column], table: Table, options: Read
         fault = checks.not_finite(column.values, table.place) or checks.beyond(column.values, table.place)
         if fault is not None and role not in (*ROLES, *options.columns):
             continue
-        if fault is None and role in ("force", *MOTIONS):
+        resting = role == "force" and not np.any(column.values)  # no force acts: a free decay
+        if fault is None and role in ("force", *MOTIONS) and not resting:
             fault = checks.constant(column.values)
             if fault is None and not options.accept_saturated:
                 fault = checks.saturated(column.values)
@@ -142,11 +148,11 @@ def _sampling(
 
 
 def _period(path: Path, roles: Mapping[str, Column], force: Floats, options: ReadOptions) -> int | None:
-    length, period = len(roles["force"].values), options.period
+    length, period = len(next(iter(roles.values())).values), options.period
     if period is None:
-        return roles["force"].period
+        return roles["force"].period if "force" in roles else None
     given = f"{path}: a period of {period} samples is given"
-    expect(period <= length, f"{given}; the record has {length}")
+    expect(period <= length, f"{given}, and the record has {length}; expected one that it holds")
     change = checks.change_after(force, period)
     differs = f"the force {period} samples later differs by {100.0 * change:.0f} % of its rms"
     expect(change <= AGAIN, f"{given}, and {differs}; expected the number of samples after which it repeats")

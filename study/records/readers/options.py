@@ -33,6 +33,7 @@ class ReadOptions:
     accept_swapped: bool = False  # force and response are as named, though they seem exchanged
     # Faults of the measurement by name: a value that is known, None for one not to be looked for; empty for none.
     measurement: Mapping[str, float | None] | None = None
+    free: bool = False  # no force acts: a free decay
 
     def __post_init__(self) -> None:
         """Refuse what contradicts itself or no record can have."""
@@ -61,6 +62,7 @@ class ReadOptions:
             self.period if self.period is not None else other.period,
             self.accept_saturated or other.accept_saturated, self.accept_swapped or other.accept_swapped,
             self.measurement if self.measurement is not None else other.measurement,
+            self.free or other.free,
         )  # fmt: skip
 
 
@@ -113,6 +115,7 @@ def _options(content: object) -> ReadOptions:
         accept_saturated=_flag("accept_saturated", given),
         accept_swapped=_flag("accept_swapped", given),
         measurement=_measurement(given),
+        free=_flag("free", given),
     )
 
 

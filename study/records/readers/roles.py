@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
+from study.records.moving_base import BASE
 from study.records.readers.options import BESIDE, ReadOptions
 from study.records.readers.table import Column, Table
 from study.records.record import MOTIONS
@@ -40,11 +41,21 @@ def assign(path: Path, table: Table, options: ReadOptions) -> dict[str, Column]:
         guesses = _guessed(path, table, rest, named)
         named |= {role: column for role, column in guesses.items() if role == "time" or not complete}
     motion = any(m in named for m in MOTIONS)
-    if "force" not in named or not motion:
+    base = any(c.name in BASE for c in table.columns) or any(role in BASE for role in named)
+    unforced = options.free or not _unknown(table, named)
+    if motion and "force" not in options.columns and (unforced or (base and "force" not in named)):
+        named.pop("force", None)  # a free decay: the user says so, or there is no column that could be a force
+    elif "force" not in named or not motion:
         missing = "displacement, velocity or acceleration" if "force" in named else "force"
-        raise _ask(path, table, f"no column is known to be the {missing}")
+        free = " (or say --free where no force acts)" if motion else ""
+        raise _ask(path, table, f"no column is known to be the {missing}{free}")
     place = {id(c): k for k, c in enumerate(table.columns)}
     return dict(sorted((named | _extra(table, named)).items(), key=lambda item: place[id(item[1])]))
+
+
+def _unknown(table: Table, named: Mapping[str, Column]) -> bool:
+    """Whether a column that is no motion and no time may be a force."""
+    return any(all(c is not n for r, n in named.items() if r != "force") for c in table.columns)
 
 
 def _named(path: Path, table: Table, role: str, wanted: str | int) -> Column:
@@ -129,7 +140,7 @@ def _unit_role(unit: str) -> str:
 
 def _extra(table: Table, named: Mapping[str, Column]) -> dict[str, Column]:
     """Further channels of the same length, under their own names."""
-    length, taken = len(named["force"].values), [id(c) for c in named.values()]
+    length, taken = len(next(iter(named.values())).values), [id(c) for c in named.values()]
     counts = Counter(c.name for c in table.columns)
     usable = [c for c in table.columns if not c.fault and len(c.values) == length and id(c) not in taken]
     return {c.name: c for c in usable if c.name and counts[c.name] == 1 and c.name not in (*named, *NAMES)}

@@ -79,7 +79,9 @@ def in_group(path: Path, names: Iterable[str], group: str | None, kind: str) -> 
         return names
     chosen = [name for name in names if name.startswith(group.strip("/") + "/")]
     groups = sorted({name.rsplit("/", 1)[0] for name in names if "/" in name})
-    expect(chosen, f"{path}: there is no {kind} {group!r}; it holds {', '.join(groups) or 'none'}")
+    expect(
+        chosen, f"{path}: there is no {kind} {group!r}; it holds {', '.join(groups) or 'none'}; expected one of these"
+    )
     return chosen
 
 

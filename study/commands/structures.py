@@ -1,0 +1,109 @@
+"""What the commands do with a model of several coordinates."""
+
+import argparse
+from typing import TYPE_CHECKING
+
+from study.commands.command import progress
+from study.commands.record_arguments import out_folder, read_options
+
+if TYPE_CHECKING:
+    from study.equations.model import Model
+    from study.structure.prepared_structure import PreparedStructure
+    from study.structure.structure_comparison import StructureComparison
+
+
+def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[PreparedStructure]":
+    """The records that were named, made ready."""
+    from study.structure.prepared_structure import prepare_structure
+    from study.structure.structure_reader import read_structure
+    from study.support.errors import at
+
+    made: list[PreparedStructure] = []
+    for path in arguments.records:
+        record = read_structure(path, model, read_options(arguments))
+        parts = [_within(span, len(record)) for span in (arguments.fit, arguments.judge)]
+        with at(path):
+            made.append(prepare_structure(record, model, parts[0], parts[1], arguments.cutoff))
+    return made
+
+
+def _within(span: "tuple[int, int | None] | None", samples: int) -> tuple[int, int] | None:
+    return None if span is None else (span[0], samples if span[1] is None else span[1])
+
+
+def compare(arguments: argparse.Namespace, model: "Model") -> None:
+    """``study compare`` of a structure."""
+    from study.compare.comparison_report import as_json
+    from study.structure.structure_comparison import compare_structure, document, summary
+    from study.support.file_sets import write_files
+
+    folder = out_folder(arguments)
+    ready = prepared_structures(arguments, model)
+    with progress("step", 3 * len(ready)) as step:
+        comparisons = [compare_structure(model, prepared, progress=step) for prepared in ready]
+    prefix = [f"{c.prepared.record.name}_" if len(ready) > 1 else "" for c in comparisons]
+    files = {f"{p}comparison.json": as_json(document(c)) for p, c in zip(prefix, comparisons, strict=True)}
+    write_files(folder, files)
+    print("\n\n".join(summary(c) for c in comparisons))
+    print(f"\n{folder}: {', '.join(files)}")
+
+
+def diagnose(arguments: argparse.Namespace, model: "Model") -> None:
+    """``study diagnose`` of a structure."""
+    from study.compare.comparison_report import as_json
+    from study.diagnose.user_candidates import own_candidates
+    from study.equations import terms
+    from study.structure.structure_comparison import compare_structure
+    from study.structure.structure_report import fields, in_words, table
+    from study.structure.structure_verdict import diagnose_structure
+    from study.support.file_sets import write_files
+
+    folder = out_folder(arguments)
+    own = own_candidates(arguments.candidate)
+    for name in arguments.without:
+        terms.get(name)
+    files: dict[str, bytes] = {}
+    ready = prepared_structures(arguments, model)
+    for prepared in ready:
+        with progress(" candidates", name=prepared.record.name) as step:
+            comparison = compare_structure(model, prepared)
+            diagnosis = diagnose_structure(comparison, own, arguments.without, progress=step)
+        print(f"{prepared.record.name}: {diagnosis.verdict.replace('_', ' ')}")
+        print(table(diagnosis) + "\n\n" + in_words(diagnosis))
+        prefix = f"{prepared.record.name}_" if len(ready) > 1 else ""
+        files[f"{prefix}diagnosis.json"] = as_json(fields(diagnosis))
+    write_files(folder, files)
+    print(f"\n{folder}: {', '.join(files)}")
+
+
+def add(arguments: argparse.Namespace, model: "Model") -> None:
+    """``study add`` to a structure."""
+    from study.compare import history
+    from study.compare.comparison_report import as_json
+    from study.equations import layout, terms
+    from study.equations.model import free
+    from study.equations.model_file import add_term
+    from study.structure.structure_comparison import compare_structure, document, history_step, summary
+    from study.structure.structure_verdict import added_term
+    from study.support.errors import at
+    from study.support.file_sets import write_files
+
+    folder = out_folder(arguments)
+    term = terms.get(arguments.term) if arguments.force is None else terms.custom(arguments.term, arguments.force)
+    with at(arguments.model):
+        where = {"at": arguments.at} if arguments.at else {}
+        where |= {"between": arguments.between} if arguments.between else {}
+        place = layout.place_of(where, term.name, model.coordinates)
+        entry = free(term, place)
+        layout.check(model.with_term(entry))
+    steps = history.read(arguments.model)
+    comparisons: list[StructureComparison] = []
+    for prepared in prepared_structures(arguments, model):
+        before = compare_structure(model, prepared)
+        comparisons.append(added_term(before, entry))
+        steps = history.climbed(steps, history_step(before), history_step(comparisons[-1], entry.name))
+    history.write(arguments.model, steps)
+    add_term(arguments.model, entry)
+    write_files(folder, {"comparison.json": as_json(document(comparisons[-1]))})
+    print("\n\n".join(summary(c) for c in comparisons))
+    print("\n" + history.table(steps))

@@ -1,0 +1,143 @@
+"""Frequency and damping ratio against amplitude: what a free decay shows, and what the fitted model makes of it.
+
+The analytic signal of the response (D. Gabor, 1946; M. Feldman, Mechanical Systems and Signal Processing 25, 2011) has
+an amplitude and a phase at each instant. Over windows of some periods straight lines through its phase and through the
+logarithm of its amplitude give the frequency, and the rate at which the motion decays.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.fft import fft, fftfreq, ifft
+
+from study.equations.free_run import prepare
+from study.identify.frequency_domain.decay_start import frequency_and_rate
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.records.prepared import Prepared
+from study.records.record import Record, Stretch
+from study.records.states import starting_states
+from study.support.arrays import Floats
+from study.support.errors import DivergenceError
+
+WINDOW = 6.0  # periods over which a frequency is taken
+BAND = (0.5, 1.6)  # of the frequency: what lies outside is offset, drift and overtones
+ENDS = 2.0  # periods at each end where the analytic signal knows too little
+QUIET = 4.0  # amplitude over the noise floor's rms below which nothing is read
+
+
+@dataclass(frozen=True)
+class Decay:
+    """Frequency and damping against amplitude; arrays of shape (windows,)."""
+
+    amplitude: Floats  # in the unit of the response
+    frequency: Floats  # in hertz
+    damping: Floats  # share of the critical damping
+    frequency_error: Floats  # standard errors, from the scatter about the straight lines
+    damping_error: Floats
+
+
+@dataclass(frozen=True)
+class Decays:
+    """As measured, and as the fitted model has it; the model's is None where it does not stay finite."""
+
+    measured: Decay
+    predicted: Decay | None
+
+
+def decays(fit: FreeRunFit, prepared: Prepared, floor: float) -> Decays | None:
+    """Both along each free stretch of a record, from its loudest sample on; None where all are too short.
+
+    ``floor`` is the rms of the noise on the response.
+    """
+    response = prepared.response
+    omega, _ = frequency_and_rate(prepared.record.part(*prepared.plan.fit), response)
+    wholes = _whole_stretches(prepared.record)
+    least = QUIET * floor
+    measured = [_decay(s.source[response][s.first : s.last], prepared.dt, omega, least) for s in wholes]
+    predicted: list[Decay] | None = []
+    for stretch in wholes:
+        try:
+            motion = _free_motion(fit, stretch, response)
+        except DivergenceError:
+            predicted = None
+            break
+        predicted.append(_decay(motion, prepared.dt, omega, least))
+    joined = _joined(measured)
+    return None if not len(joined.amplitude) else Decays(joined, None if predicted is None else _joined(predicted))
+
+
+def _whole_stretches(record: Record) -> list[Stretch]:
+    """Each piece of a source that the stretches cover together, from the first to the last of them."""
+    wholes: list[Stretch] = []
+    for stretch in sorted(
+        record.stretches or (Stretch(record, 0, len(record)),), key=lambda s: (id(s.source), s.first)
+    ):
+        before = wholes[-1] if wholes else None
+        if before is not None and before.source is stretch.source and stretch.first <= before.last + 1:
+            wholes[-1] = replace(before, last=max(before.last, stretch.last))
+        else:
+            wholes.append(replace(stretch, continues=False))
+    return wholes
+
+
+def _free_motion(fit: FreeRunFit, stretch: Stretch, response: str) -> Floats:
+    """The fitted model let go where a stretch begins."""
+    span = (stretch.first, stretch.last)
+    run = prepare(
+        fit.model, stretch.source, response=response, steps_per_sample=max(fit.steps_per_sample, 2), span=span
+    )
+    state = np.zeros(run.states)
+    state[:2] = starting_states(stretch.source, response, (stretch.first,))[0]
+    return run.respond({}, state)[0]
+
+
+def _decay(values: Floats, dt: float, omega: float, least: float) -> Decay:
+    """Frequency and damping of one decay."""
+    signal = _analytic(values, dt, omega)
+    period = 2.0 * np.pi / (omega * dt)
+    first, last, width = round(ENDS * period), len(values) - round(ENDS * period), round(WINDOW * period)
+    rows: list[tuple[float, ...]] = []
+    for begin in range(first, last - width + 1, max(width // 2, 1)):
+        part = signal[begin : begin + width]
+        if float(np.median(np.abs(part))) > least:
+            rows.append(_window(part, dt))
+    return Decay(*np.array(rows).reshape(-1, 5).T)
+
+
+def _analytic(values: Floats, dt: float, omega: float) -> np.ndarray:
+    """Analytic signal of a band about the frequency; the ends are continued by point reflection."""
+    n = len(values)
+    edge = min(n - 1, round(8.0 * 2.0 * np.pi / (omega * dt)))
+    before, after = 2.0 * values[0] - values[edge:0:-1], 2.0 * values[-1] - values[-2 : -edge - 2 : -1]
+    longer = np.concatenate([before, values, after])
+    lines = fftfreq(len(longer), dt) * 2.0 * np.pi / omega
+    rise = np.clip((lines / BAND[0] - 0.5) / 0.5, 0.0, 1.0) * np.clip(
+        (1.25 * BAND[1] - lines) / (0.25 * BAND[1]), 0.0, 1.0
+    )
+    return np.asarray(ifft(2.0 * rise * fft(longer)))[edge : edge + n]
+
+
+def _window(part: np.ndarray, dt: float) -> tuple[float, ...]:
+    """Amplitude, frequency, damping ratio and the errors of these in one window."""
+    at = dt * (np.arange(len(part)) - 0.5 * (len(part) - 1))
+    size = float(at @ at)
+    phase, level = np.unwrap(np.angle(part)), np.log(np.abs(part))
+    slopes, errors = list[float](), list[float]()
+    for line in (phase, level):
+        centred = line - np.mean(line)
+        slope = float(at @ centred) / size
+        left = centred - slope * at
+        # What is left swings with the motion: a window of some periods holds about two independent values in each.
+        errors.append(float(np.sqrt(np.mean(left**2) * len(part) / (2.0 * WINDOW) / size)))
+        slopes.append(slope)
+    rate, fall = slopes
+    natural = float(np.hypot(rate, fall))
+    return (
+        float(np.exp(np.mean(level))), natural / (2.0 * np.pi), -fall / natural,
+        errors[0] / (2.0 * np.pi), errors[1] / natural,
+    )  # fmt: skip
+
+
+def _joined(parts: list[Decay]) -> Decay:
+    names = ("amplitude", "frequency", "damping", "frequency_error", "damping_error")
+    return Decay(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))

@@ -1,0 +1,67 @@
+"""Pictures of single kinds of tests: frequency and damping against amplitude, loops of a component's force."""
+
+# Matplotlib leaves the **kwargs of its methods untyped.
+# pyright: reportUnknownMemberType=false
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from study.compare import panels
+from study.compare.comparison import Comparison
+from study.compare.decay import Decay, Decays
+from study.compare.loops import Loops
+from study.equations import dimensions
+from study.figures import page
+
+WIDE = 7.2  # inches
+
+
+def decay(comparison: Comparison, found: Decays) -> Figure:
+    """Frequency and damping ratio against amplitude, measured and of the fitted model."""
+    unit = comparison.record.units.get(comparison.plan.response, "")
+    figure, axes = page.page(
+        f"{comparison.record.name}: free decay", f"model {comparison.model.name}; windows of the analytic signal",
+        rows=2, width=WIDE, panel=2.2,
+    )  # fmt: skip
+    for axis, what, name in zip(axes, ("frequency", "damping"), ("frequency (Hz)", "damping ratio"), strict=True):
+        _points(axis, found.measured, what)
+        if found.predicted is not None:
+            order = np.argsort(found.predicted.amplitude)
+            axis.plot(found.predicted.amplitude[order], getattr(found.predicted, what)[order], **panels.PREDICTED)
+        axis.set_xscale("log")
+        axis.set_ylabel(name)
+    axes[1].set_xlabel(f"amplitude of the {comparison.plan.response} ({dimensions.pretty(unit)})")
+    page.letter(axes, ("frequency", "damping ratio"))
+    page.legend(figure, axes)
+    return figure
+
+
+def _points(axis: panels.Axes, found: Decay, what: str) -> None:
+    errors = 2.0 * getattr(found, f"{what}_error")
+    axis.errorbar(
+        found.amplitude, getattr(found, what), errors, fmt="o", markersize=3.0, color="0.45", elinewidth=0.8,
+        label="measured",
+    )  # fmt: skip
+
+
+def loops(comparison: Comparison, found: Loops) -> Figure:
+    """Force over displacement and over velocity, measured and predicted, and the energy that each cycle takes."""
+    record, prediction = comparison.record, comparison.prediction
+    part = record.part(*comparison.plan.judge)
+    units = {name: dimensions.pretty(record.units.get(name, "")) for name in ("force", "displacement", "velocity")}
+    figure, axes = page.page(
+        f"{record.name}: loops", f"model {comparison.model.name}; the judging part",
+        rows=1, columns=3, width=1.45 * WIDE, panel=2.9, share=False,
+    )  # fmt: skip
+    for axis, against in zip(axes, ("displacement", "velocity"), strict=False):
+        axis.plot(part[against], prediction.measured, ".", markersize=1.6, color="0.62", label="measured")
+        axis.plot(part[against], prediction.predicted, ".", markersize=1.2, color="C0", label="model")
+        axis.set_xlabel(f"{against} ({units[against]})")
+    axes[0].set_ylabel(f"force ({units['force']})")
+    axes[2].plot(found.stroke, found.measured, "o", markersize=3.5, color="0.45", label="measured")
+    axes[2].plot(found.stroke, found.predicted, "x", markersize=4.5, color="C0", label="model")
+    axes[2].set_xlabel(f"stroke of a cycle ({units['displacement']})")
+    axes[2].set_ylabel(f"energy ({units['force']} {units['displacement']})")
+    page.letter(axes, ("force over displacement", "over velocity", "dissipated in a cycle"))
+    page.legend(figure, axes)
+    return figure

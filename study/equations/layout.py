@@ -1,0 +1,167 @@
+"""Structures of several coordinates in a model file: their coordinates, forces and the places of their terms.
+
+::
+
+    coordinates: [floor1, floor2]
+    forces: {shaker: floor1}                                  # measured forces, and where they act
+    terms:
+      - {term: inertia, at: floor1, value: 5.2}
+      - {term: linear_stiffness, between: [ground, floor1]}
+      - {term: cubic_stiffness, between: [floor1, floor2]}    # on the second's motion minus the first's
+      - {term: inertia, couples: [floor1, floor2]}            # off the diagonal of the mass matrix
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from typing import cast
+
+from study.equations.model import Model, ModelTerm
+from study.equations.place import GROUND, Kind, Place
+from study.equations.redundancy import repeated_force
+from study.support.errors import StudyError, expect
+from study.support.yaml_text import as_list, as_mapping, scalar, shown
+
+KEYS = ("coordinates", "forces")
+PLACES: tuple[Kind, ...] = ("at", "between", "couples")
+MOST = 40  # coordinates
+LONGEST = 40  # characters in a name
+Forces = tuple[tuple[str, str], ...]
+
+
+def coordinates_and_forces(top: Mapping[object, object]) -> tuple[tuple[str, ...], Forces]:
+    """Names of the coordinates, and each force with the coordinate on which it acts; both empty for a single mass."""
+    if "coordinates" not in top:
+        expect("forces" not in top, "the model has 'forces' and no 'coordinates'; expected both, or neither")
+        return (), ()
+    given = as_list(top["coordinates"])
+    if not given:
+        raise StudyError(f"'coordinates' is {shown(top['coordinates'])}; expected a list such as [floor1, floor2]")
+    expect(len(given) <= MOST, f"'coordinates' has {len(given)} entries; at most {MOST} are read")
+    names = tuple(_name(item, "a coordinate") for item in given)
+    for name in names:
+        expect(names.count(name) == 1, f"'coordinates' lists {name!r} twice; expected each once")
+        expect(name != GROUND, f"'coordinates' lists {GROUND!r}, which never moves; expected names of what moves")
+    return names, _forces(top.get("forces", {}), names)
+
+
+def _name(item: object, what: str) -> str:
+    usable = isinstance(item, str) and item.isidentifier() and item.isascii() and len(item) <= LONGEST
+    expect(usable, f"{what} is {shown(item)}; expected a name of letters, digits and underscores, such as floor1")
+    return cast(str, item)
+
+
+def _forces(given: object, coordinates: Sequence[str]) -> Forces:
+    forces = as_mapping(given)
+    if forces is None:
+        raise StudyError(f"'forces' is {shown(given)}; expected where each acts, such as {{shaker: {coordinates[0]}}}")
+    found: list[tuple[str, str]] = []
+    for key, value in forces.items():
+        name = _name(key, "the name of a force")
+        found.append((name, _known(value, f"the force {name!r} acts on", coordinates)))
+    return tuple(found)
+
+
+def _known(value: object, what: str, names: Sequence[str]) -> str:
+    """A name out of several; the sentence otherwise says which are there."""
+    if not isinstance(value, str) or value not in names:
+        near = get_close_matches(str(value), names, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(names)}"
+        raise StudyError(f"{what} {shown(value)}, which is no coordinate of the model; {hint}")
+    return value
+
+
+def place_of(item: Mapping[object, object], term: object, coordinates: Sequence[str]) -> Place | None:
+    """The place in an entry of ``terms``; None in a model of a single coordinate, whose entries have none."""
+    ways = [key for key in PLACES if key in item]
+    if not coordinates:
+        expect(not ways, f"{term} has {''.join(ways[:1])!r}, and the model no 'coordinates'; expected both, or neither")
+        return None
+    like = f"'at: {coordinates[0]}' or 'between: [{GROUND}, {coordinates[0]}]'"
+    expect(len(ways) == 1, f"{term} says {' and '.join(ways) or 'not'} where it acts; expected one of {like}")
+    kind = ways[0]
+    if kind == "at":
+        return Place("at", (_known(item["at"], f"{term} is at", coordinates),))
+    return pair(kind, as_list(item[kind]) or [item[kind]], str(term), coordinates)
+
+
+def pair(kind: Kind, given: Sequence[object], term: str, coordinates: Sequence[str]) -> Place:
+    """A place between two coordinates, or one of them and the ground.
+
+    Raises
+    ------
+    StudyError
+        If these are not two that the model has.
+    """
+    like = f"[{GROUND}, {coordinates[0]}]"
+    expect(len(given) == 2, f"{kind!r} of {term} is {shown(list(given))}; expected two, such as {like}")
+    choice = coordinates if kind == "couples" else (*coordinates, GROUND)
+    verb = "couples" if kind == "couples" else "is between"
+    first, second = (_known(end, f"{term} {verb}", choice) for end in given)
+    expect(first != second, f"{term} {verb} {first!r} and itself; expected two different ends")
+    expect(
+        kind != "couples" or term == "inertia",
+        f"{term} couples nothing; expected 'at' or 'between', as inertia alone can",
+    )
+    return Place(kind, (first, second))
+
+
+def place_fields(place: Place | None) -> dict[str, str]:
+    """A place as fields of an entry in YAML."""
+    if place is None:
+        return {}
+    given = place.plain()[place.kind]
+    return {place.kind: scalar(given) if isinstance(given, str) else f"[{', '.join(scalar(end) for end in given)}]"}
+
+
+def written(model: Model) -> str:
+    """Coordinates and forces as lines of a model file; empty for a single mass."""
+    if not model.coordinates:
+        return ""
+    forces = ", ".join(f"{scalar(name)}: {scalar(where)}" for name, where in model.forces)
+    return f"coordinates: [{', '.join(scalar(c) for c in model.coordinates)}]\n" + (
+        f"forces: {{{forces}}}\n" if forces else ""
+    )
+
+
+def check(model: Model) -> None:
+    """Refuse a structure that no equation of motion holds for, whatever its values.
+
+    Raises
+    ------
+    StudyError
+        If a coordinate has no inertia, or nothing acts on it; or two terms of one kind lie at the same place.
+    """
+    placed = [(entry, entry.place) for entry in model.terms if entry.place is not None]
+    masses = {place.ends[0] for entry, place in placed if _is_mass(entry)}
+    acted = {end for entry, place in placed if not _is_mass(entry) for end in place.moving}
+    acted |= {where for _, where in model.forces}
+    for name in model.coordinates:
+        expect(name in masses, f"the coordinate {name!r} has no inertia; expected {{term: inertia, at: {name}}}")
+        loose = f"nothing ties the coordinate {name!r} to another or drives it"
+        expect(name in acted, f"{loose}; expected a term between it and another, or a force")
+    for entries in _same_place(model):
+        _check_alike(model, entries)
+
+
+def _is_mass(entry: ModelTerm) -> bool:
+    """Whether it is on the diagonal of the mass matrix alone."""
+    return entry.term.name == "inertia" and entry.place is not None and entry.place.kind == "at"
+
+
+def _same_place(model: Model) -> list[list[ModelTerm]]:
+    """Terms by what they lie between; couplings of inertia are another thing than an inertia between two."""
+    groups: dict[tuple[frozenset[str], bool], list[ModelTerm]] = {}
+    for entry in model.terms:
+        if entry.place is not None:
+            groups.setdefault((entry.place.path, entry.place.kind == "couples"), []).append(entry)
+    return list(groups.values())
+
+
+def _check_alike(model: Model, entries: Sequence[ModelTerm]) -> None:
+    """Refuse two terms at one place that are the same, or that no record could tell apart."""
+    names, label = [entry.term.name for entry in entries], entries[0].place.label if entries[0].place else ""
+    for name in names:
+        expect(names.count(name) == 1, f"model {model.name!r} lists {name} twice at {label}; expected once")
+    fault = repeated_force(Model(model.name, tuple(replace(entry, place=None) for entry in entries)))
+    expect(fault is None, f"at {label}, {fault}")

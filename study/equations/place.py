@@ -1,0 +1,58 @@
+"""Where a term acts in a structure of several coordinates."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+GROUND = "ground"  # never moves
+Kind = Literal["at", "between", "couples"]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a term acts.
+
+    A term ``at`` a coordinate acts on its motion, one ``between`` two on the motion of the second minus that of the
+    first, with equal and opposite forces on both; an inertia that ``couples`` two is an off-diagonal element of the
+    symmetric mass matrix.
+
+    Attributes
+    ----------
+    kind : str
+        ``at``, ``between`` or ``couples``.
+    ends : tuple of str
+        The coordinate, or both; ``ground`` may be one of two.
+    """
+
+    kind: Kind
+    ends: tuple[str, ...]
+
+    @property
+    def label(self) -> str:
+        """What coefficients are called by: ``floor2``, ``floor2-floor3``, or ``heave,pitch`` for a coupling."""
+        return (",", "-")[self.kind != "couples"].join(self.ends)
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """Its coordinates, without the ground."""
+        return tuple(end for end in self.ends if end != GROUND)
+
+    @property
+    def path(self) -> frozenset[str]:
+        """What it lies between, whichever way it is written: ``at`` a coordinate is between the ground and it."""
+        return frozenset((GROUND, *self.ends) if self.kind == "at" else self.ends)
+
+    def direction(self, coordinates: Sequence[str]) -> tuple[float, ...]:
+        """Weights of the coordinates in its relative motion, and of its force in their equations."""
+        signs = {self.ends[-1]: 1.0} if self.kind == "at" else {self.ends[0]: -1.0, self.ends[1]: 1.0}
+        return tuple(signs.get(c, 0.0) for c in coordinates)
+
+    def plain(self) -> dict[str, str | list[str]]:
+        """As models and ``diagnosis.json`` hold it: ``{"between": ["floor2", "floor3"]}``."""
+        return {self.kind: self.ends[0] if self.kind == "at" else list(self.ends)}
+
+
+def in_words(place: Place) -> str:
+    """``between floor2 and floor3``, ``at floor1``."""
+    word = "coupling" if place.kind == "couples" else place.kind
+    return f"{word} {' and '.join('the ground' if end == GROUND else end for end in place.ends)}"

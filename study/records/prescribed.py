@@ -1,0 +1,77 @@
+"""A motion that is prescribed and measured: its velocity without the lag and the noise of a difference."""
+
+import numpy as np
+
+from study.records.completion import consistent
+from study.records.noise_floor import floor
+from study.records.record import Record
+from study.records.spectra import Segments, autospectrum
+from study.support.arrays import Floats
+
+LIKE = 0.02  # of its rms: a velocity that differs by less from a difference of the displacement is that difference
+ABOVE = 10.0  # the motion is followed up to the highest line at which it stands so many times above its noise
+LINES = 256
+ROUNDING = 1e-9  # of the range
+DIGITAL = 0.95  # of all changes that are whole steps: then a displacement is digitised
+
+
+def with_prescribed_motion(record: Record) -> tuple[Record, tuple[str, ...]]:
+    """A record whose velocity may be trusted beside its displacement, and sentences on what was changed.
+
+    A velocity that is the difference of the displacement over the sample before lags by half a sample, which opens
+    loops of force over velocity that are none: it gives way to the derivative of the displacement. That is taken, here
+    and where no velocity was measured, up to the frequency at which the motion drowns in its noise.
+    """
+    if "displacement" not in record:
+        return record, ()
+    record, notes = consistent(record)
+    u = record["displacement"]
+    if "velocity" in record:
+        difference = np.diff(u, prepend=u[0]) / record.dt
+        size = float(np.std(record["velocity"]))
+        if size == 0.0 or float(np.std(record["velocity"] - difference)) > LIKE * size:
+            return record, notes
+        notes = (*notes, "the velocity in the file is the difference to the sample before, which lags by half a sample")
+    u = _without_flicker(u)
+    highest = _highest(u, record.dt)
+    velocity = _smooth_slope(u, record.dt, highest)
+    channels = {"velocity": velocity, "acceleration": np.gradient(velocity, record.dt)}
+    said = f"velocity is the derivative of the displacement below {highest:.3g} Hz, above which that is noise"
+    return record.with_channels(channels), (*notes, said)
+
+
+def _without_flicker(u: Floats) -> Floats:
+    """A digitised displacement that rests where it flickers by a step of its converter, shape (n,).
+
+    At rest the flicker is no motion, and would wear off what a component remembers. The value follows as a pointer with
+    the play of one step does, half a step behind either way; a displacement that is not in steps stays as it is.
+    """
+    change = np.abs(np.diff(u))
+    steps = change[change > ROUNDING * float(np.ptp(u))]
+    step = float(np.min(steps)) if len(steps) else 0.0
+    if step == 0.0 or float(np.mean(np.abs(steps / step - np.rint(steps / step)) < 0.05)) < DIGITAL:
+        return u
+    held, follower = np.empty_like(u), float(u[0])
+    for i, value in enumerate(u.tolist()):
+        follower = min(max(follower, value - 0.5 * step), value + 0.5 * step)
+        held[i] = follower
+    return held
+
+
+def _highest(u: Floats, dt: float) -> float:
+    """The highest frequency in hertz at which a displacement stands above its noise."""
+    frequency, power = autospectrum(u - np.mean(u), dt, Segments(min(LINES, 2 ** int(np.log2(len(u) // 4)))))
+    noise = floor(u - np.mean(u), dt).noise ** 2 * 2.0 * dt
+    above = np.flatnonzero(power > ABOVE * noise)
+    return float(frequency[above[-1]]) if len(above) else 0.5 / dt
+
+
+def _smooth_slope(u: Floats, dt: float, highest: float) -> Floats:
+    """Derivative of a displacement behind a Gaussian low-pass, its ends continued by point reflection, shape (n,)."""
+    n, slope = len(u), float(u[-1] - u[0]) / max(len(u) - 1, 1)
+    u = u - (u[0] + slope * np.arange(n))  # the continued record then closes, and its ends do not ring
+    longer = np.concatenate([-u[:0:-1], u, -u[-2::-1]])
+    lines = np.fft.rfftfreq(len(longer), dt)
+    gain = np.exp(-0.5 * (lines / highest) ** 2) * 2j * np.pi * lines
+    moved = np.fft.irfft(np.fft.rfft(longer) * gain, len(longer))[n - 1 : 2 * n - 1]
+    return np.asarray(moved + slope / dt, dtype=np.float64)

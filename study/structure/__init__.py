@@ -1,0 +1,1 @@
+"""Structures of several coordinates: their motion under forces, and which effect is missing where."""

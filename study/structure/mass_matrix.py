@@ -1,0 +1,60 @@
+"""The linear part of a structure as matrices."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from study.equations.model import Model
+from study.structure.equations_of_motion import mass_entries
+from study.support.arrays import Floats
+from study.support.errors import StudyError
+
+LINEAR = {"linear_stiffness": 0, "linear_damping": 1, "inertia": 2}  # and the order of their derivative
+
+
+def linear_keys(model: Model) -> dict[str, int]:
+    """Keys of the linear terms of a structure, with the order of their derivative."""
+    return {entry.symbols[0]: LINEAR[entry.term.name] for entry in model.terms if entry.term.name in LINEAR}
+
+
+def patterns(model: Model) -> dict[str, Floats]:
+    """What a unit of each linear key adds to its matrix, shape (coordinates, coordinates)."""
+    n = len(model.coordinates)
+    found: dict[str, Floats] = {}
+    for i, j, weight, key in mass_entries(model):
+        found.setdefault(key, np.zeros((n, n)))[i, j] += weight
+    for entry in model.terms:
+        if entry.term.name in LINEAR and entry.term.name != "inertia" and entry.place is not None:
+            e = np.array(entry.place.direction(model.coordinates))
+            found[entry.symbols[0]] = np.outer(e, e)
+    return found
+
+
+def matrices(model: Model, values: Mapping[str, float]) -> Floats:
+    """Stiffness, damping and mass matrix for values by key, shape (3, coordinates, coordinates)."""
+    n = len(model.coordinates)
+    total = np.zeros((3, n, n))
+    orders, own = linear_keys(model), patterns(model)
+    for key, order in orders.items():
+        total[order] += values[key] * own[key]
+    return total
+
+
+def checked_mass_matrix(model: Model) -> Floats:
+    """The mass matrix of a model whose values are known, shape (coordinates, coordinates).
+
+    Raises
+    ------
+    StudyError
+        If it is not positive definite: some motion would have no kinetic energy, or a negative one.
+    """
+    mass = matrices(model, model.numbers())[2]
+    scale = np.sqrt(np.abs(np.diag(mass)))
+    lowest = float(np.min(np.linalg.eigvalsh(mass / np.maximum(np.outer(scale, scale), np.finfo(float).tiny))))
+    if lowest <= 1e-9 or np.any(np.diag(mass) <= 0.0):
+        rows = "; ".join(" ".join(f"{x:.4g}" for x in row) for row in mass)
+        raise StudyError(
+            f"the mass matrix of {model.name!r}, [{rows}], is not positive definite; expected masses above zero, and "
+            "couplings smaller than the root of the product of the two masses that they couple"
+        )
+    return mass

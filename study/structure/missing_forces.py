@@ -1,0 +1,222 @@
+"""Which coordinate's equation is violated, by how many newtons, and between which places the missing force acts.
+
+``r = M a - (forces - forces of all terms)`` needs the motion. As for a single coordinate (``compare.missing_force``) it
+is that of the free run plus the difference to the measured one in those bands where that stands above the noise: where
+the difference is noise, r is zero. A missing force between two coordinates is in both equations, with opposite signs.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+
+from study.compare.force_map import Curve, curve
+from study.compare.noise import SIGNIFICANT
+from study.equations import kernels
+from study.equations.model import Model, ModelTerm
+from study.equations.place import Place
+from study.identify.frequency_domain.inputs import Input, history, reverse_inputs
+from study.records import noise_floor
+from study.records.completion import derivative
+from study.records.record import MOTIONS, Record
+from study.records.spectra import Segments, autospectrum
+from study.structure.equations_of_motion import motion_program
+from study.structure.mass_matrix import checked_mass_matrix, matrices
+from study.structure.places import alignment, connections, transfer
+from study.structure.prepared_structure import PreparedStructure
+from study.structure.structure_prediction import StructurePrediction
+from study.structure.structure_record import Sensor
+from study.support.arrays import Floats
+
+CLEAR = 3.0  # standard errors by which the difference must stand above the noise, for a line to be used
+SMOOTH = 5  # lines that are averaged
+MARGIN = 16  # one part of so many at each end, which filters leave unsure
+
+
+@dataclass(frozen=True, eq=False)
+class MissingForces:
+    """What the equation of each measured coordinate leaves on the judging part.
+
+    Attributes
+    ----------
+    coordinates : tuple of str
+        Those that are measured.
+    lacking : tuple of str
+        Those that no sensor shows.
+    displacement, velocity : array, shape (samples, all coordinates)
+        The motion, free of noise.
+    residual : array, shape (samples, coordinates)
+        Force that is left, in newtons.
+    size : array, shape (coordinates,)
+        Rms force of inertia, to compare it with.
+    matrix : array, shape (coordinates, coordinates)
+        Shares of the power of what is left that two equations hold with opposite signs; on the diagonal, of what acts
+        from outside or the ground.
+    aligned : tuple of (Place, float)
+        Share of what is left of the motions that a single force at a place could make, the largest first: of all
+        connections, neighbours and the ground. Unlike the matrix it needs no derivatives of noisy motions.
+    curves : dict of str
+        Force over relative displacement of each of these places by label: a restoring-force map.
+    """
+
+    coordinates: tuple[str, ...]
+    lacking: tuple[str, ...]
+    displacement: Floats
+    velocity: Floats
+    residual: Floats
+    size: Floats
+    matrix: Floats
+    aligned: tuple[tuple[Place, float], ...]
+    curves: dict[str, Curve]
+
+    @property
+    def rms(self) -> Floats:
+        """Rms force that is left, shape (coordinates,)."""
+        return np.sqrt(np.mean(self.residual**2, axis=0))
+
+    @property
+    def share(self) -> float:
+        """Power of what is left over that of the forces of inertia."""
+        power = float(np.sum(self.size**2))
+        return float(np.sum(self.rms**2)) / power if power > 0.0 else 0.0
+
+
+def missing_forces(prediction: StructurePrediction) -> MissingForces:
+    """What each equation of a fitted structure leaves on the judging part."""
+    model = prediction.fit.model
+    measured = [s.coordinate for s in prediction.prepared.sensors]
+    motion = gated_motion(prediction)
+    residual, inertia = unbalanced_forces(model, motion, prediction)
+    rows = [model.coordinates.index(c) for c in measured]
+    inner = slice(len(residual) // MARGIN, len(residual) - len(residual) // MARGIN)
+    left, size = residual[inner][:, rows], np.std(inertia[inner][:, rows], axis=0)
+    matrix = _shares(left)
+    aligned = _aligned(model, prediction)
+    known = [p for p, _ in aligned if set(p.moving) <= set(measured)]
+    return MissingForces(
+        tuple(measured), tuple(c for c in model.coordinates if c not in measured), motion[0][inner], motion[1][inner],
+        left, size, matrix, aligned, _maps(known, measured, motion[0][inner][:, rows], left),
+    )  # fmt: skip
+
+
+def gated_motion(prediction: StructurePrediction) -> Floats:
+    """Displacement, velocity and acceleration of all coordinates on the judging part, shape (3, samples, coordinates).
+
+    The free run's, and of those that are measured, what stands above the noise of the difference besides.
+    """
+    coordinates = prediction.fit.model.coordinates
+    wanted = tuple(Sensor(c, m) for m in MOTIONS for c in coordinates)
+    samples = len(prediction.measured)
+    free = np.zeros((samples, len(wanted))) if prediction.diverged else prediction.motion(wanted)
+    return corrected_motion(free, prediction.residual, prediction.prepared, coordinates)
+
+
+def corrected_motion(
+    free: Floats, difference: Floats, prepared: PreparedStructure, coordinates: Sequence[str]
+) -> Floats:
+    """A free run's motions, shape (samples, 3 coordinates), with what of the difference stands above the noise.
+
+    Shape (3, samples, coordinates).
+    """
+    motion = free.reshape(len(free), len(MOTIONS), -1).transpose(1, 0, 2).copy()
+    for sensor, values in zip(prepared.sensors, difference.T, strict=True):
+        seen, level = _above_noise(values, prepared.dt, prepared.low), MOTIONS.index(sensor.motion)
+        for order in range(len(MOTIONS)):
+            steps = order - level
+            low = prepared.low if steps < 0 else 0.0
+            motion[order, :, coordinates.index(sensor.coordinate)] += derivative(seen, prepared.dt, steps, low)
+    return motion
+
+
+def _above_noise(values: Floats, dt: float, low: float) -> Floats:
+    """Values in those bands where their density stands above that of white noise; none if noise alone would do."""
+    floor = noise_floor.floor(values, dt, low)
+    if floor.significance <= SIGNIFICANT:
+        return np.zeros_like(values)
+    cut = Segments(length=max(32, min(1024, 2 ** int(np.log2(len(values) / 8)))))
+    frequency, density = autospectrum(values, dt, cut)
+    white = floor.noise**2 / (0.5 / dt - low)
+    smooth = np.convolve(np.pad(density, SMOOTH // 2, mode="edge"), np.ones(SMOOTH) / SMOOTH, "valid")
+    limit = white * (1.0 + CLEAR / np.sqrt(cut.effective_averages(len(values)) * SMOOTH / cut.line_inflation()))
+    gate = (smooth > limit) & (frequency >= low)
+    size = next_fast_len(2 * len(values), real=True)
+    at = np.asarray(rfftfreq(size, dt), dtype=np.float64)
+    weight = np.asarray(np.interp(at, frequency, gate.astype(np.float64)), dtype=np.float64)
+    lines = np.asarray(rfft(values, size), dtype=np.complex128)
+    return np.asarray(irfft(lines * weight, size), dtype=np.float64)[: len(values)]
+
+
+def unbalanced_forces(model: Model, motion: Floats, prediction: StructurePrediction) -> tuple[Floats, Floats]:
+    """What the equations leave along a motion, and the forces of inertia, each of shape (samples, coordinates)."""
+    prepared = prediction.prepared
+    part = slice(*prepared.judge)
+    record = prepared.record
+    program = motion_program(model, tuple(record.extra))
+    states = [_state(entry, model, motion, prepared.dt) for entry in model.states]
+    drive = [record.forces[name][part] for name, _ in model.forces] + [record.extra[n][part] for n in model.channels]
+    data = np.column_stack([motion[0], motion[1], record.time[part], *drive, *states])
+    columns = np.arange(data.shape[1], dtype=np.int64)
+    registers, code = program.program.registers.copy(), program.program
+    for side in program.sides:  # the sign of a relative velocity, which the free run keeps in a register
+        registers[side] = 0.0
+    out = np.empty((len(data), program.coordinates))
+    if len(program.sides):
+        signs = np.sign(motion[1] @ program.directions.T)
+        data, columns = np.column_stack([data, signs]), np.concatenate([columns, program.sides])
+    kernels.evaluate(code.code, code.first, registers, columns, data, program.slopes[: program.coordinates], out)
+    mass = checked_mass_matrix(model)
+    inertia = motion[2] @ mass.T
+    return inertia - out @ mass.T, inertia
+
+
+def _state(entry: ModelTerm, model: Model, motion: Floats, dt: float) -> Floats:
+    """A term's own state along a motion, from rest."""
+    item = next(i for i in placed_inputs(entry) if i.state is not None)
+    return history(item, relative_record(entry.place, model, motion, dt))
+
+
+def placed_inputs(entry: ModelTerm) -> tuple[Input, ...]:
+    """The shapes of a term, whatever its place; its shape parameters are known."""
+    return reverse_inputs(Model("alone", (replace(entry, place=None),)))
+
+
+def relative_record(place: Place | None, model: Model, motion: Floats, dt: float) -> Record:
+    """Relative motion at a place as a record of a single coordinate; ``motion`` as :func:`corrected_motion` has it."""
+    assert place is not None, "every term of a structure has a place"
+    e = np.array(place.direction(model.coordinates))
+    displacement, velocity = (np.asarray(x @ e, dtype=np.float64) for x in motion[:2])
+    return Record(dt, {"force": np.zeros(len(displacement)), "displacement": displacement, "velocity": velocity})
+
+
+def _shares(residual: Floats) -> Floats:
+    power = residual.T @ residual
+    total = float(np.trace(power))
+    if total == 0.0:
+        return np.zeros_like(power)
+    between = np.maximum(-power, 0.0)
+    np.fill_diagonal(between, 0.0)
+    alone = np.maximum(np.diag(power) - np.sum(between, axis=1), 0.0)
+    return (2.0 * between + np.diag(alone)) / total
+
+
+def _aligned(model: Model, prediction: StructurePrediction) -> tuple[tuple[Place, float], ...]:
+    prepared = prediction.prepared
+    seen = np.stack([_above_noise(x, prepared.dt, prepared.low) for x in prediction.residual.T], axis=1)
+    if not np.any(seen):
+        return ()
+    size = next_fast_len(2 * len(seen), real=True)
+    lines = np.asarray(rfft(seen / prediction.size, size, axis=0), dtype=np.complex128)
+    linear = matrices(model, model.numbers())
+    paths = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, size) / prediction.size[:, None]
+    found = [(p, alignment(paths @ np.array(p.direction(model.coordinates)), lines)) for p in connections(model)]
+    return tuple(sorted(found, key=lambda item: -item[1]))
+
+
+def _maps(places: Sequence[Place], names: list[str], displacement: Floats, residual: Floats) -> dict[str, Curve]:
+    """Missing restoring force over relative displacement of each place, as the two equations that it is in have it."""
+    found: dict[str, Curve] = {}
+    for place in places:
+        e = np.array(place.direction(names))
+        found[place.label] = curve(displacement @ e, -(residual @ e) / float(e @ e))
+    return found

@@ -1,0 +1,164 @@
+"""Natural frequencies, damping ratios and mode shapes of the underlying linear system, with standard errors.
+
+The eigenvalues are those of ``(lambda^2 M + lambda C + K) psi = 0``, the shapes those without damping. Errors follow
+from the covariance of the coefficients by the exact derivatives of eigenvalues and vectors (Fox and Kapoor, 1968).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from study.equations.model import Model
+from study.structure.mass_matrix import checked_mass_matrix, linear_keys, matrices, patterns
+from study.support.arrays import Complexes, Floats
+
+RIGID = 1e-6  # of the highest natural frequency: what is below is motion as a rigid body
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Modes of a structure, the slowest first; n coordinates.
+
+    Attributes
+    ----------
+    frequency, frequency_error : array, shape (n,)
+        Undamped natural frequencies in hertz, and their standard errors; zero for motion as a rigid body.
+    damping, damping_error : array, shape (n,)
+        Damping ratios; zero for motion as a rigid body.
+    shape, shape_error : array, shape (n, n)
+        Each row a mode shape, one at the coordinate that moves most.
+    """
+
+    frequency: Floats
+    frequency_error: Floats
+    damping: Floats
+    damping_error: Floats
+    shape: Floats
+    shape_error: Floats
+
+    @property
+    def rigid(self) -> int:
+        """How many modes are motion as a rigid body: nothing ties the structure down."""
+        return int(np.count_nonzero(self.frequency == 0.0))
+
+
+def modes_of(model: Model, keys: Sequence[str] = (), covariance: Floats | None = None) -> Modes:
+    """Modes of a structure whose values are all known.
+
+    Parameters
+    ----------
+    model : Model
+        Its linear terms count.
+    keys : sequence of str
+        What was estimated; everything else counts as exact.
+    covariance : array, shape (keys, keys)
+        Of these.
+
+    Raises
+    ------
+    StudyError
+        If the mass matrix is not positive definite.
+    """
+    checked_mass_matrix(model)
+    stiffness, damping, mass = matrices(model, model.numbers())
+    squares, shapes = _undamped(stiffness, mass)
+    omega = np.sqrt(np.maximum(squares, 0.0))
+    omega = np.where(omega > RIGID * np.max(omega), omega, 0.0)
+    roots = _roots(stiffness, damping, mass, omega)
+    orders, units = linear_keys(model), patterns(model)
+    covariance = np.zeros((len(keys), len(keys))) if covariance is None else covariance
+    n, p = len(omega), len(keys)
+    by_square, by_shape, by_ratio = np.zeros((p, n)), np.zeros((p, n, n)), np.zeros((p, n))
+    for i, key in enumerate(keys):
+        if key in orders:
+            by_square[i], by_shape[i] = _changes(units[key], orders[key], squares, shapes)
+            by_ratio[i] = _root_changes(units[key], orders[key], roots, damping, mass)
+    errors = [np.sqrt(np.maximum(np.einsum("p...,pq,q...->...", g, covariance, g), 0.0)) for g in (by_square, by_ratio)]
+    moving = omega > 0.0
+    shape, shape_error = _normalised(shapes, by_shape, covariance)
+    return Modes(
+        omega / (2.0 * np.pi), np.where(moving, errors[0] / (4.0 * np.pi * np.where(moving, omega, 1.0)), 0.0),
+        np.where(moving, -roots[0].real / np.abs(roots[0]), 0.0), np.where(moving, errors[1], 0.0), shape, shape_error,
+    )  # fmt: skip
+
+
+def _undamped(stiffness: Floats, mass: Floats) -> tuple[Floats, Floats]:
+    """Squares of the angular frequencies, and the shapes of unit modal mass in columns, the slowest first."""
+    half = np.linalg.inv(np.linalg.cholesky(mass))
+    squares, vectors = np.linalg.eigh(half @ stiffness @ half.T)
+    return squares, np.asarray(half.T @ vectors, dtype=np.float64)
+
+
+def _roots(stiffness: Floats, damping: Floats, mass: Floats, omega: Floats) -> tuple[Complexes, Complexes]:
+    """The eigenvalue of positive frequency nearest to each undamped mode, shape (n,), and its vectors in columns."""
+    n = len(mass)
+    inverse = np.linalg.inv(mass)
+    system = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ stiffness, -inverse @ damping]])
+    values, vectors = (np.asarray(x, dtype=np.complex128) for x in np.linalg.eig(system))
+    chosen: list[int] = []
+    for w in omega:
+        upper = np.where(values.imag >= 0.0, np.abs(values - 1j * w), np.inf)
+        upper[chosen] = np.inf
+        chosen.append(int(np.argmin(upper)))
+    picked = values[chosen]
+    return np.where(np.abs(picked) > 0.0, picked, 1.0), vectors[:n, chosen]
+
+
+def _changes(unit: Floats, order: int, squares: Floats, shapes: Floats) -> tuple[Floats, Floats]:
+    """Derivatives of squared frequencies and shapes by one key, shapes in columns: (n,) and (n, n)."""
+    if order == 1:
+        return np.zeros_like(squares), np.zeros_like(shapes)
+    weight = np.ones_like(squares) if order == 0 else -squares
+    product = shapes.T @ unit @ shapes  # j, i: of mode i, along mode j
+    gap = squares[None, :] - squares[:, None]
+    apart = np.abs(gap) > 1e-12 * np.max(np.abs(squares))
+    along = np.where(apart, product * weight[None, :] / np.where(apart, gap, 1.0), 0.0)
+    if order == 2:
+        along = along - 0.5 * np.diag(np.diag(product))
+    return np.diag(product) * weight, shapes @ along
+
+
+def _root_changes(
+    unit: Floats, order: int, roots: tuple[Complexes, Complexes], damping: Floats, mass: Floats
+) -> Floats:
+    """Derivatives of the damping ratios by one key, shape (n,)."""
+    values, vectors = roots
+    found = np.zeros(len(values))
+    for i, (root, psi) in enumerate(zip(values, vectors.T, strict=True)):
+        bottom = psi @ (2.0 * root * mass + damping) @ psi
+        moved = -(root**order) * (psi @ unit @ psi) / bottom if bottom != 0.0 else 0.0
+        size = abs(root)
+        found[i] = -moved.real / size + root.real * (root.conjugate() * moved).real / size**3
+    return found
+
+
+def _normalised(shapes: Floats, slopes: Floats, covariance: Floats) -> tuple[Floats, Floats]:
+    """Shapes in rows with one at the coordinate that moves most, and their standard errors."""
+    rows, errors = list[Floats](), list[Floats]()
+    for i, shape in enumerate(shapes.T):
+        top = int(np.argmax(np.abs(shape)))
+        row = shape / shape[top]
+        change = (slopes[:, :, i] - row * slopes[:, top, i][:, None]) / shape[top]
+        rows.append(row)
+        errors.append(np.sqrt(np.maximum(np.einsum("pn,pq,qn->n", change, covariance, change), 0.0)))
+    return np.stack(rows), np.stack(errors)
+
+
+def modes_table(modes: Modes, coordinates: Sequence[str]) -> str:
+    """The modes as a person reads them."""
+    from tabulate import tabulate
+
+    rows = [
+        [
+            str(i + 1), _with_error(modes.frequency[i], modes.frequency_error[i]),
+            _with_error(100.0 * modes.damping[i], 100.0 * modes.damping_error[i]),
+            *(_with_error(x, e) for x, e in zip(modes.shape[i], modes.shape_error[i], strict=True)),
+        ]
+        for i in range(len(modes.frequency))
+    ]  # fmt: skip
+    return tabulate(rows, ["mode", "Hz", "damping %", *coordinates], tablefmt="simple", disable_numparse=True)
+
+
+def _with_error(value: float, error: float) -> str:
+    return f"{value:.4g}" + (f" +- {error:.1g}" if error > 0.0 else "")

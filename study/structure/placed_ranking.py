@@ -1,0 +1,245 @@
+"""Candidates of a structure in order, by the same score as those of a single coordinate (``diagnose.ranking``)."""
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from study.diagnose import ranked
+from study.diagnose.constancy import Curve, along_amplitude, along_frequency, changes
+from study.diagnose.ranking import in_order
+from study.equations.model import ModelTerm
+from study.equations.term import Term
+from study.structure.placed_candidates import PlacedCandidate, physical
+from study.structure.structure_fit import SensorNoise, StructureFit, covariance_of, linearise, noise_left
+from study.structure.structure_prediction import StructurePrediction
+from study.support import statistics
+from study.support.arrays import Floats
+from study.support.cores import cores
+from study.support.errors import DivergenceError
+from study.support.least_squares import least_squares
+from study.support.statistics import Gain
+
+INDISTINCT = 1e-6  # of a coefficient's effect: what the others leave of it below says nothing
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedRanked:
+    """One candidate with what an engineer needs to believe or doubt it."""
+
+    entry: ModelTerm  # the effect and its place
+    fit: StructureFit
+    prediction: StructurePrediction
+    gain: Gain  # what it explains of the held-out residual
+    coefficient: float  # its size: the amplitude, for an effect of any phase
+    error: float  # standard error of that
+    parameters: dict[str, float]  # shape parameters, and the phase of an effect of any phase
+    parameter_errors: dict[str, float]
+    flatness: Curve | None  # the coefficient along frequency, at the sensor that sees most of it
+    steadiness: Curve | None  # along amplitude, at all sensors
+    parts: tuple[Floats, Floats]  # held-out residuals of judging and fitting part, each shape (samples, sensors)
+    p_value: float = 1.0  # of what it explains, with the number of candidates accounted for (Bonferroni)
+    tied_with: tuple[str, ...] = ()
+    distance: float = math.inf
+
+    @property
+    def name(self) -> str:
+        """Effect and place."""
+        return self.entry.name
+
+    @property
+    def term(self) -> Term:
+        """The effect."""
+        return self.entry.term
+
+    @property
+    def residual(self) -> Floats:
+        """Held-out residual in shares of the sensors' sizes, those of one time side by side."""
+        return (self.prediction.residual / self.prediction.size).ravel()
+
+    @property
+    def numerical(self) -> float:
+        """Rms error of the integration itself, in the same shares."""
+        return float(np.sqrt(np.mean((self.prediction.numerical / self.prediction.size) ** 2)))
+
+    @property
+    def unphysical(self) -> str:
+        """Why it is no physical effect as fitted; empty if it is one."""
+        return physical(self.entry, self.fit.model)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % confidence interval of the coefficient."""
+        return self.coefficient - 1.96 * self.error, self.coefficient + 1.96 * self.error
+
+    @property
+    def unsteadiness(self) -> float:
+        """By how much, relative to itself, the coefficient changes with frequency or amplitude."""
+        return changes(self.flatness, self.steadiness)
+
+    def wanders(self, asked: int) -> bool:
+        """Whether its coefficient, of so many that are asked for, moves as that of a true term would not."""
+        return ranked.wanders(self.prediction.error, self.gain, self.unsteadiness, self.steadiness, asked)
+
+    def white(self, noise: SensorNoise) -> Floats:
+        """Both held-out parts strung together, made white, sensors of one time side by side."""
+        return _white(self.parts, noise)
+
+
+def _white(parts: tuple[Floats, Floats], noise: SensorNoise) -> Floats:
+    return np.concatenate([noise.weighted(part).ravel() for part in parts if len(part)])
+
+
+def rank_placed(
+    candidates: Sequence[PlacedCandidate], fit: StructureFit, before: StructurePrediction, asked: int
+) -> list[PlacedRanked]:
+    """Candidates by what they leave of samples that they were not fitted to; ``fit`` is that without any of them."""
+    if not candidates:
+        return []
+
+    def row(candidate: PlacedCandidate) -> PlacedRanked:
+        return _examined(candidate, before)
+
+    with ThreadPoolExecutor(cores()) as pool:
+        rows = list(pool.map(row, candidates))
+    best = min(rows, key=lambda r: float(r.residual @ r.residual))
+    noise = noise_left(best.fit.residual)
+    white = {r.name: r.white(noise) for r in rows}
+    test = _test(fit, before, noise)
+    rows = [replace(r, p_value=min(1.0, asked * test.p_value(r))) for r in rows]
+    return [replace(r, distance=away, tied_with=tied) for r, away, tied in in_order(rows, white, asked)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Test:
+    """Whether a candidate explains what the model leaves beyond what its own coefficients could, on held-out parts.
+
+    A structure has many coefficients, each with an error that shows in all of the judging part alike: a candidate that
+    happens to move them nearer to what that part wants gains there with every block. So what they could do is taken out
+    of residual and gain on each part (Frisch and Waugh, 1933).
+    """
+
+    noise: SensorNoise
+    own: tuple[Floats, Floats]  # what the model leaves of judging and fitting part, white
+    bases: tuple[Floats, Floats]  # orthonormal bases of what its own coefficients and initial state could change there
+
+    def p_value(self, row: PlacedRanked) -> float:
+        """Of one candidate alone; where its shape was searched for along the fitting part, on the other part only."""
+        used = 1 if row.term.parameters else 2
+        before, after = list[Floats](), list[Floats]()
+        for own, basis, part in zip(self.own[:used], self.bases, row.parts, strict=False):
+            if len(own) and len(part):
+                change = own - self.noise.weighted(part).ravel()
+                left, moved = (x - basis @ (basis.T @ x) for x in (own, change))
+                before.append(left)
+                after.append(left - moved)
+        return statistics.gain(np.concatenate(before), np.concatenate(after)).p_value
+
+
+def _test(fit: StructureFit, before: StructurePrediction, noise: SensorNoise) -> _Test:
+    jacobian = linearise(fit, before.prepared)
+    parts = held_out_parts(fit, before, jacobian, before.prepared.fit)
+    try:
+        columns = [before.derivatives(fit), jacobian] if not before.diverged else []
+    except DivergenceError:
+        columns = []
+    bases = [_basis(noise.weighted(x)) for x in columns] or [np.zeros((part.size, 0)) for part in parts]
+    white = [noise.weighted(part).ravel() if len(part) else np.zeros(0) for part in parts]
+    return _Test(noise, (white[0], white[1]), (bases[0], bases[1]))
+
+
+def _basis(columns: Floats) -> Floats:
+    flat = columns.reshape(-1, columns.shape[2])
+    length = np.linalg.norm(flat, axis=0)
+    return np.linalg.qr(flat / np.where(length > 0.0, length, 1.0))[0]
+
+
+def held_out_parts(
+    fit: StructureFit, prediction: StructurePrediction, jacobian: Floats, fitted: tuple[int, int]
+) -> tuple[Floats, Floats]:
+    """Residual of the judging part by the fitting part's coefficients, and the other way round (``diagnose.held_out``).
+
+    The other way takes one step of Gauss and Newton by the judging part's derivatives; it is empty where that cannot
+    be, or the fit is of another part than ``fitted``, as that of a search is.
+    """
+    nothing = np.empty((0, prediction.residual.shape[1]))
+    if prediction.diverged or not fit.keys or fit.span != fitted:
+        return prediction.residual, nothing
+    scale, own = prediction.prepared.scale, len(fit.keys)
+    try:
+        there = prediction.derivatives(fit) / scale[:, None]
+    except DivergenceError:
+        return prediction.residual, nothing
+    step = least_squares(there.reshape(-1, there.shape[2]), (prediction.residual / scale).ravel())[:own]
+    other = (fit.residual - jacobian[:, :, :own] @ step) / scale
+    begin = (jacobian[:, :, own:] / scale[:, None]).reshape(other.size, -1)
+    left = other.ravel() - begin @ least_squares(begin, other.ravel())
+    return prediction.residual, left.reshape(other.shape) * scale
+
+
+def _examined(candidate: PlacedCandidate, before: StructurePrediction) -> PlacedRanked:
+    fit, prepared = candidate.fit, candidate.prediction.prepared
+    jacobian = linearise(fit, prepared)
+    covariance = covariance_of(fit, prepared, jacobian)
+    coefficient, error, parameters, errors = _amount(candidate.entry, fit, covariance)
+    flatness, steadiness = _curves(
+        fit, candidate.entry, prepared.dt, jacobian / prepared.scale[:, None], prepared.scale
+    )
+    size = before.size
+    return PlacedRanked(
+        candidate.entry, fit, candidate.prediction,
+        statistics.gain((before.residual / size).ravel(), (candidate.prediction.residual / size).ravel()),
+        coefficient, error, parameters, errors, flatness, steadiness,
+        held_out_parts(fit, candidate.prediction, jacobian, before.prepared.fit),
+    )  # fmt: skip
+
+
+def _amount(
+    entry: ModelTerm, fit: StructureFit, covariance: Floats
+) -> tuple[float, float, dict[str, float], dict[str, float]]:
+    """Coefficient and shape parameters of a candidate with standard errors."""
+    place = {key: i for i, key in enumerate(fit.keys)}
+    values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
+    errors = {key: math.sqrt(max(float(covariance[i, i]), 0.0)) for key, i in place.items()}
+    names = {p.name: f"{entry.name}.{p.name}" for p in entry.term.parameters}
+    parameters = {name: values[key] for name, key in names.items() if key in values}
+    parameter_errors = {name: errors[key] for name, key in names.items() if key in values}
+    if len(entry.symbols) == 1:
+        return values[entry.symbols[0]], errors[entry.symbols[0]], parameters, parameter_errors
+    a, b = (values[s] for s in entry.symbols)
+    size = math.hypot(a, b)
+    direction = np.array([a, b]) / size if size > 0.0 else np.array([1.0, 0.0])
+    rows = [place[s] for s in entry.symbols]
+    block = covariance[np.ix_(rows, rows)]
+    across = np.array([direction[1], -direction[0]])
+    parameters["phase"] = math.atan2(-b, a)
+    parameter_errors["phase"] = math.sqrt(max(float(across @ block @ across), 0.0)) / size if size > 0.0 else math.inf
+    return size, math.sqrt(max(float(direction @ block @ direction), 0.0)), parameters, parameter_errors
+
+
+def _curves(
+    fit: StructureFit, entry: ModelTerm, dt: float, jacobian: Floats, scale: Floats
+) -> tuple[Curve | None, Curve | None]:
+    """The coefficient along frequency and along amplitude (``diagnose.constancy``); sensors one after the other."""
+    columns = [fit.keys.index(s) for s in entry.symbols]
+    direction = fit.values[columns]
+    size = float(np.linalg.norm(direction))
+    if size == 0.0:
+        return None, None
+    samples, sensors, _ = jacobian.shape
+    rows = jacobian.transpose(1, 0, 2).reshape(samples * sensors, -1)
+    residual = (fit.residual / scale).T.ravel()
+    own = rows[:, columns] @ (direction / size)
+    length = np.linalg.norm(rows, axis=0)
+    others = np.delete(rows / np.where(length > 0.0, length, 1.0), columns, axis=1)
+    basis = np.linalg.qr(others)[0]
+    alone = own - basis @ (basis.T @ own)
+    if np.linalg.norm(alone) <= INDISTINCT * np.linalg.norm(own):
+        return None, None
+    each = alone.reshape(sensors, samples)
+    most = int(np.argmax(np.sum(each**2, axis=1)))
+    bands = along_frequency(each[most], residual.reshape(sensors, samples)[most], size, dt)
+    classes = along_amplitude(alone, residual, size)
+    return bands if len(bands.at) else None, classes if len(classes.at) else None

@@ -1,0 +1,344 @@
+"""What a term at a place would explain, by the reverse system of all coordinates.
+
+With the linear part Z of the fitted structure, its nonlinear forces N and the measured motion x, what the equations
+leave is ``B F - Z x - N(x)``. Any force that is missing, and any change of a coefficient, is a known history times an
+unknown amount, and linear least squares find the amounts, however much the model lacks. Everything is passed through
+Z^-1 to the sensors first, where noise is what it was on the motion (the equations of a place and of its other end are
+one regression: action equals reaction). The motion is that of the free run with what the sensors show above their
+noise; where a sensor is missing it is the free run's. The best points start fits in free run.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.fft import irfft, rfft, rfftfreq
+
+from study.equations.model import Model, ModelTerm
+from study.equations.place import Place
+from study.equations.term import Parameter, Term
+from study.identify.frequency_domain.inputs import history
+from study.identify.time_domain.shape_search import highest_lines
+from study.records.record import MOTIONS, Record
+from study.structure.mass_matrix import LINEAR, linear_keys, matrices, patterns
+from study.structure.missing_forces import corrected_motion, placed_inputs, relative_record
+from study.structure.places import transfer
+from study.structure.prepared_structure import PreparedStructure
+from study.structure.structure_fit import StructureFit, fit_structure, flat, linearise
+from study.structure.structure_record import Sensor
+from study.structure.structure_run import prepare_run
+from study.support.arrays import Complexes, Floats
+from study.support.errors import StudyError
+from study.support.least_squares import least_squares
+
+TRIED, KEPT = 15, 40  # free runs of a fit that tries a start, and of one that is kept
+NEAR = 0.01  # standard errors: as near a minimum as the fit of a search has to come
+CUTOFF = 1e-8  # of the largest singular value
+PEAKS = 8  # lines that are tried as the frequency of a periodic effect
+RARE = 1e-3  # of the largest: lines at which a modulation could hardly show
+STARTS = 3  # points of the search that start a fit
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedBaseline:
+    """A fitted structure and what it leaves on the fitting part; n samples, s sensors, c coordinates.
+
+    Attributes
+    ----------
+    fit : StructureFit
+        The fit.
+    prepared : PreparedStructure
+        The record, with as much to fit as a search uses.
+    motion : array, shape (3, n, c)
+        Displacement, velocity and acceleration of all coordinates.
+    paths : complex array, shape (lines, s, c)
+        From a force on each coordinate to each sensor, on the lines of a transform of ``size`` samples.
+    size : int
+        With room for the response to die away.
+    columns : array, shape (n s, keys + states)
+        What a unit of each key, and of the initial state, adds to the sensors, weighted as the residual, sensors of one
+        time side by side.
+    basis : array, shape (n s, p)
+        Orthonormal basis of these.
+    violated : array, shape (n s,)
+        What the equations leave, passed to the sensors.
+    residual : array, shape (n s,)
+        The same less what the model's own coefficients could do.
+    """
+
+    fit: StructureFit
+    prepared: PreparedStructure
+    motion: Floats
+    paths: Complexes
+    size: int
+    columns: Floats
+    basis: Floats
+    violated: Floats
+    residual: Floats
+
+    def passed(self, place: Place, forces: Sequence[Complexes]) -> Floats:
+        """What forces at a place, given by their lines, add to the sensors, shape (n s, forces)."""
+        return _passed(self.fit, self.paths, self.size, place, forces)
+
+    def added(self, place: Place, forces: Sequence[Complexes]) -> Floats:
+        """The same less what the model's own coefficients could do."""
+        columns = self.passed(place, forces)
+        return columns - self.basis @ (self.basis.T @ columns)
+
+    def lines(self, values: Floats) -> Complexes:
+        """Transform of forces along the fitting part, samples along the first axis."""
+        return np.asarray(rfft(values, self.size, axis=0), dtype=np.complex128)
+
+    @property
+    def by_sensor(self) -> Floats:
+        """What is left, shape (n, s)."""
+        return self.residual.reshape(len(self.fit.residual), -1)
+
+    def modulation(self, u: Floats, place: Place) -> Floats:
+        """:func:`modulation_lines` of a place with the relative displacement u."""
+        e = np.array(place.direction(self.fit.model.coordinates))
+        return modulation_lines(u, (self.paths @ e)[::2] / self.fit.noise.deviation, self.by_sensor)
+
+    def dated(self, record: Record) -> Record:
+        """A relative motion with the time at which it was."""
+        return replace(record, start=self.prepared.record.start + self.fit.first * self.prepared.dt)
+
+    @property
+    def omega(self) -> Complexes:
+        """``j 2 pi f`` of the lines."""
+        return np.asarray(2j * np.pi * rfftfreq(self.size, self.prepared.dt), dtype=np.complex128)
+
+
+def _passed(fit: StructureFit, paths: Complexes, size: int, place: Place, forces: Sequence[Complexes]) -> Floats:
+    e = np.array(place.direction(fit.model.coordinates))
+    path, n = -(paths @ e), len(fit.residual)
+    return flat(fit, np.stack([irfft(path * f[:, None], size, axis=0)[:n] for f in forces], axis=2))
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedStart:
+    """A point of the search: shape parameters, coefficients there, and the share of the residual explained."""
+
+    term: Term
+    place: Place
+    parameters: tuple[float, ...]
+    coefficients: tuple[float, ...]
+    share: float
+
+
+def placed_baseline(fit: StructureFit, prepared: PreparedStructure) -> PlacedBaseline:
+    """Prepare a fitted structure for the search."""
+    model = fit.model
+    wanted = tuple(Sensor(c, m) for m in MOTIONS for c in model.coordinates)
+    run = prepare_run(model, prepared.record, sensors=wanted, steps_per_sample=fit.steps, span=fit.span)
+    free = run.respond({}, fit.initial)[0].T
+    motion = corrected_motion(free, fit.residual, prepared, model.coordinates)
+    size = 2 * len(fit.residual)  # every other line is one of the record
+    paths = transfer(matrices(model, model.numbers()), prepared.sensors, model.coordinates, prepared.dt, size)
+    left = flat(fit, fit.residual)
+    bare = PlacedBaseline(fit, prepared, motion, paths, size, free, free, left, left)
+    columns = flat(fit, linearise(fit, prepared))  # right for the initial state and for shape parameters
+    for i, column in _own_columns(bare).items():
+        columns[:, i] = column
+    scale = np.linalg.norm(columns, axis=0)
+    basis = np.linalg.qr(columns / np.where(scale > 0.0, scale, 1.0))[0]
+    violated = left - _drifted(bare, free)
+    residual = violated - basis @ (basis.T @ violated)
+    return replace(bare, columns=columns, basis=basis, violated=violated, residual=residual)
+
+
+def _own_columns(base: PlacedBaseline) -> dict[int, Floats]:
+    """What a unit of each estimated coefficient of the model adds along the motion, by the number of its key."""
+    fit, model = base.fit, base.fit.model
+    found: dict[int, Floats] = {}
+    own, orders, n = patterns(model), linear_keys(model), len(fit.residual)
+    for key in orders:
+        if key in fit.keys:
+            force = base.lines(base.motion[orders[key]] @ own[key])
+            column = np.asarray(irfft(-np.einsum("fsc,fc->fs", base.paths, force), base.size, axis=0), dtype=np.float64)
+            found[fit.keys.index(key)] = flat(fit, column[:n])
+    for entry in model.terms:
+        if entry.place is None or not set(entry.symbols) & set(fit.keys) or entry.symbols[0] in orders:
+            continue
+        record = base.dated(relative_record(entry.place, model, base.motion, base.prepared.dt))
+        columns = base.passed(entry.place, unit_lines(entry, record, base))
+        found |= {fit.keys.index(k): columns[:, i] for i, k in enumerate(entry.symbols) if k in fit.keys}
+    return found
+
+
+def _drifted(base: PlacedBaseline, free: Floats) -> Floats:
+    """By how much the model's nonlinear forces along the measured motion differ from those along its free run."""
+    model = base.fit.model
+    total = np.zeros_like(base.residual)
+    run = free.reshape(len(free), len(MOTIONS), -1).transpose(1, 0, 2)
+    for entry in model.terms:
+        if entry.term.name in LINEAR or entry.place is None:
+            continue
+        there, here = (
+            base.passed(
+                entry.place,
+                unit_lines(entry, base.dated(relative_record(entry.place, model, m, base.prepared.dt)), base),
+            )
+            for m in (base.motion, run)
+        )
+        total += (there - here) @ np.array([c or 0.0 for c in entry.coefficients])
+    return total
+
+
+def starts(term: Term, place: Place, base: PlacedBaseline, given: ModelTerm | None = None) -> list[PlacedStart]:
+    """Points of the search over a term's shape parameters, best first; ``given`` are those that are known."""
+    model = base.fit.model
+    record = base.dated(relative_record(place, model, base.motion, base.prepared.dt))
+    known = given.parameters if given is not None else (None,) * len(term.parameters)
+    found = [
+        _try(term, place, point, record, base) for point in _grid(term, place, record["displacement"], base, known)
+    ]
+    return sorted((p for p in found if p is not None), key=lambda p: -p.share)
+
+
+def _try(
+    term: Term, place: Place, point: tuple[float, ...], record: Record, base: PlacedBaseline
+) -> PlacedStart | None:
+    entry = ModelTerm(term, (0.0,) * len(term.components), point)
+    try:
+        forces = unit_lines(entry, record, base)
+    except StudyError:
+        return None
+    added = base.added(place, forces)
+    if not np.all(np.isfinite(added)) or not np.any(added):
+        return None
+    amounts = least_squares(added, base.residual, CUTOFF)
+    power = float(base.residual @ base.residual)
+    share = 1.0 - float(np.sum((base.residual - added @ amounts) ** 2)) / power if power > 0.0 else 0.0
+    return PlacedStart(term, place, point, tuple(amounts.tolist()), share)
+
+
+def unit_lines(entry: ModelTerm, record: Record, base: PlacedBaseline) -> list[Complexes]:
+    """Lines of the force of each component with a unit coefficient along a motion."""
+    by_symbol: dict[str, Complexes] = {}
+    for item in placed_inputs(entry):
+        values = base.lines(record["displacement"] if item.shape == "u" else history(item, record))
+        for part in item.parts:
+            by_symbol[part.symbol] = values * part.factor * base.omega**part.order
+    return [by_symbol[symbol] for symbol in entry.term.symbols]
+
+
+def _grid(
+    term: Term, place: Place, u: Floats, base: PlacedBaseline, known: Sequence[float | None]
+) -> list[tuple[float, ...]]:
+    points: list[tuple[float, ...]] = [()]
+    for parameter, value in zip(term.parameters, known, strict=True):
+        points = [
+            (*point, x)
+            for point in points
+            for x in ([value] if value is not None else _places(parameter, point, u, place, base))
+        ]
+    return points
+
+
+def _places(
+    parameter: Parameter, point: tuple[float, ...], u: Floats, place: Place, base: PlacedBaseline
+) -> list[float]:
+    """Values of one shape parameter to try, as ``shape_search`` has them for a single coordinate."""
+    places, dt = np.array(parameter.search.places), base.prepared.dt
+    match parameter.search.kind:
+        case "quantiles of |u|":
+            tried = np.quantile(np.abs(u), places)
+        case "quantiles of u":
+            tried = np.quantile(u, places)
+        case "times of the motion":
+            tried = places / float(np.std(np.gradient(u, dt)) / np.std(u))
+        case "per amplitude":
+            tried = places / float(np.std(u))
+        case "shares of the one before":
+            tried = places * point[-1]
+        case "lines of the modulation":
+            tried = np.add.outer(base.modulation(u, place), places).ravel() / (len(u) * dt)
+        case "lines of the residual":
+            tried = np.add.outer(residual_lines(base.by_sensor), places).ravel() / (len(u) * dt)
+    return [float(x) for x in tried if np.isfinite(x)]
+
+
+def _windowed(values: Floats) -> Complexes:
+    return np.asarray(rfft(values * np.hanning(len(values))), dtype=np.complex128)
+
+
+def residual_lines(residual: Floats) -> Floats:
+    """Lines that stand out of the residuals' own spectra; ``residual`` has shape (samples, sensors)."""
+    return np.array(highest_lines(np.sum([np.abs(_windowed(x)) ** 2 for x in residual.T], axis=0)))
+
+
+def modulation_lines(u: Floats, path: Complexes, residual: Floats) -> Floats:
+    """Lines at which a stiffness of a place that varies with time would explain most, by a matched filter.
+
+    ``path`` leads from a force at the place to the sensors, shape (lines, sensors), ``residual`` and the relative
+    displacement ``u`` have as many samples as these lines are of.
+    """
+    n = len(u)
+    spectra = np.asarray(rfft(residual, axis=0), dtype=np.complex128)
+    matched = np.asarray(irfft(np.sum(np.conj(path) * spectra, axis=1), n), dtype=np.float64)
+    numerator = np.abs(_windowed(matched * u)) ** 2
+    passband = np.asarray(irfft(np.sum(np.abs(path) ** 2, axis=1), n), dtype=np.float64)
+    spread = np.asarray(irfft(np.abs(np.asarray(rfft(u), dtype=np.complex128)) ** 2, n), dtype=np.float64)
+    expected = np.abs(np.asarray(rfft(passband * spread), dtype=np.complex128))
+    explained = numerator / np.maximum(expected, RARE * np.max(expected))
+    inner = np.arange(3, len(explained) - 1)
+    peaks = inner[(explained[inner] >= explained[inner - 1]) & (explained[inner] > explained[inner + 1])]
+    return peaks[np.argsort(-explained[peaks])][:PEAKS].astype(np.float64)
+
+
+def with_placed_term(
+    fit: StructureFit, entry: ModelTerm, prepared: PreparedStructure, base: PlacedBaseline | None = None,
+    points: Sequence[PlacedStart] | None = None,
+) -> StructureFit:  # fmt: skip
+    """The fitted structure with one term more at its place, the best of fits from several starts.
+
+    Raises
+    ------
+    StudyError
+        If none of them has a finite motion.
+    """
+    assert entry.place is not None, "every term of a structure has a place"
+    base = base or placed_baseline(fit, prepared)
+    tried = list(points or starts(entry.term, entry.place, base, entry))[:STARTS]
+    given = {key: value for key, value in entry.values.items() if value is not None}
+    grown = fit.model.with_term(entry)
+    shapes = tuple(key for key in entry.keys[len(entry.symbols) :] if key not in given)
+    held = (*fit.held, *given)
+    fits: list[StructureFit] = []
+    for point in tried:
+        own = dict(zip(entry.keys, (*point.coefficients, *point.parameters), strict=True)) | given
+        begun = [own | _moved(base, entry, point) | given]
+        if point is tried[0] or not fits:  # and from where the model stands, which a false step cannot lead astray
+            begun.append(own | dict.fromkeys(entry.symbols, 0.0) | given)
+        found = [_tried(grown.with_values(start), prepared, (*held, *shapes), fit, TRIED) for start in begun]
+        fits += [f for f in found if f is not None]
+    if not fits:
+        raise StudyError(f"no values of {', '.join(entry.keys)} let {entry.name} follow {prepared.record.name}")
+    best = min(fits, key=lambda f: f.cost)
+    if shapes or not best.converged:
+        best = _tried(best.model, prepared, held, best, KEPT) or best
+    return best
+
+
+def _moved(base: PlacedBaseline, entry: ModelTerm, point: PlacedStart) -> dict[str, float]:
+    """Coefficients of the model beside so much of a term, from the reverse system."""
+    known = replace(entry, coefficients=point.coefficients, parameters=point.parameters, place=point.place)
+    record = relative_record(point.place, base.fit.model, base.motion, base.prepared.dt)
+    force = np.sum(
+        [c * f for c, f in zip(point.coefficients, unit_lines(known, base.dated(record), base), strict=True)], axis=0
+    )
+    step = least_squares(base.columns, base.violated - base.passed(point.place, [force])[:, 0], CUTOFF)
+    return dict(zip(base.fit.keys, (base.fit.values + step[: len(base.fit.keys)]).tolist(), strict=True))
+
+
+def _tried(
+    model: Model, prepared: PreparedStructure, held: Sequence[str], near: StructureFit, runs: int
+) -> StructureFit | None:
+    try:
+        return fit_structure(
+            model, prepared, held, steps=near.steps, initial=near.initial, max_iterations=runs, offset=NEAR,
+            noise=near.noise,
+        )  # fmt: skip
+    except StudyError:
+        return None

@@ -1,0 +1,126 @@
+"""A record of a structure made ready once: which sensors are fitted, which part is fitted and which is judged."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from study.equations.model import Model
+from study.records.completion import CompletedRecord, complete
+from study.records.plan import FEWEST
+from study.records.record import MOTIONS, Record
+from study.structure.structure_record import Sensor, StructureRecord
+from study.support.arrays import Floats
+from study.support.errors import StudyError, expect
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedStructure:
+    """A record of a structure with what is fitted and judged of it.
+
+    Attributes
+    ----------
+    record : StructureRecord
+        In N, m and s.
+    sensors : tuple of Sensor
+        One motion of each measured coordinate: what free runs are compared with.
+    fit, judge : pair of int
+        First sample and the one after the last of each part.
+    notes : tuple of str
+        What was left out, a sentence each.
+    """
+
+    record: StructureRecord
+    sensors: tuple[Sensor, ...]
+    fit: tuple[int, int]
+    judge: tuple[int, int]
+    notes: tuple[str, ...] = ()
+    cutoff: float | None = None  # hertz: accelerations are integrated above it
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval in seconds."""
+        return self.record.dt
+
+    @cached_property
+    def measured(self) -> Floats:
+        """The sensors that are compared, shape (samples, sensors)."""
+        return np.stack([self.record.motions[s] for s in self.sensors], axis=1)
+
+    @cached_property
+    def scale(self) -> Floats:
+        """Size of each sensor: the standard deviation of its motion in the fitting part, shape (sensors,)."""
+        return np.std(self.measured[slice(*self.fit)], axis=0)
+
+    @cached_property
+    def complete(self) -> dict[str, Floats]:
+        """Displacement, velocity and acceleration of each measured coordinate, shape (3, samples)."""
+        return {s.coordinate: self._motion(s.coordinate) for s in self.sensors}
+
+    @cached_property
+    def low(self) -> float:
+        """Lowest frequency in hertz at which all completed motions are valid."""
+        return max(self._completed(s.coordinate).band[0] for s in self.sensors)
+
+    @cached_property
+    def edge(self) -> int:
+        """Samples at each end that derivatives and integrals leave uncertain."""
+        return max(self._completed(s.coordinate).edge for s in self.sensors)
+
+    def _completed(self, coordinate: str) -> CompletedRecord:
+        channels = {s.motion: x for s, x in self.record.motions.items() if s.coordinate == coordinate}
+        still = np.zeros(len(self.record))
+        return complete(Record(self.dt, {"force": still, **channels}, name=self.record.name), self.cutoff)
+
+    def _motion(self, coordinate: str) -> Floats:
+        record = self._completed(coordinate).record
+        return np.stack([record[motion] for motion in MOTIONS])
+
+    def shortened(self, samples: int) -> "PreparedStructure":
+        """The same with no more than so many samples to fit: those that the judging part follows, if it does."""
+        first, last = self.fit
+        if last - first <= samples:
+            return self
+        return replace(self, fit=(last - samples, last) if self.judge[0] == last else (first, first + samples))
+
+
+def prepare_structure(
+    record: StructureRecord,
+    model: Model,
+    fit: tuple[int, int] | None = None,
+    judge: tuple[int, int] | None = None,
+    cutoff: float | None = None,
+) -> PreparedStructure:
+    """Choose sensors and parts: the first half is fitted and the second judged by default.
+
+    Raises
+    ------
+    StudyError
+        If the parts overlap or are too short, or nothing measures a coordinate and nothing ties it to another.
+    """
+    half = len(record) // 2
+    fit, judge = fit or (0, half), judge or (half, len(record))
+    for name, (first, last) in (("fit", fit), ("judge", judge)):
+        good = 0 <= first < last <= len(record) and last - first >= FEWEST
+        expect(good, f"the part to {name}, {first}:{last}, must hold {FEWEST} samples or more of {len(record)}")
+    apart = fit[1] <= judge[0] or judge[1] <= fit[0]
+    expect(apart, f"the parts to fit {fit[0]}:{fit[1]} and to judge {judge[0]}:{judge[1]} overlap; expected two parts")
+    ordered = sorted(record.sensors, key=lambda s: MOTIONS.index(s.motion), reverse=True)
+    first_of = {s.coordinate: s for s in ordered}
+    sensors = tuple(first_of[c] for c in model.coordinates if c in first_of)
+    blind = [c for c in model.coordinates if c not in first_of]
+    _check_tied(model, blind)
+    lacks = f"no sensor is at {' and '.join(blind)}: the free run has its motion, the reverse system lacks it"
+    return PreparedStructure(record, sensors, fit, judge, (lacks,) if blind else (), cutoff)
+
+
+def _check_tied(model: Model, blind: Sequence[str]) -> None:
+    """Refuse a coordinate that nothing measures and nothing ties to what is measured."""
+    for name in blind:
+        ties = [t for t in model.terms if t.place is not None and name in t.place.moving and len(t.place.moving) > 1]
+        if not ties:
+            raise StudyError(
+                f"nothing measures the coordinate {name!r} and nothing ties it to another; expected a column "
+                f"{name!r}, or a term between it and a coordinate that is measured"
+            )

@@ -1,0 +1,230 @@
+"""A structure held against a record: how good it is, and where it fails."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from study.equations import dimensions, model_file
+from study.equations.model import Model
+from study.equations.place import Place, in_words
+from study.equations.term import QUANTITIES
+from study.structure.missing_forces import MissingForces, missing_forces
+from study.structure.modes import Modes, modes_of, modes_table
+from study.structure.prepared_structure import PreparedStructure
+from study.structure.structure_fit import StructureFit, covariance_of, linearise, settled
+from study.structure.structure_prediction import StructurePrediction, predict_structure
+from study.structure.structure_start import first_fit
+from study.support.arrays import Floats
+from study.support.numbers import percent
+
+
+@dataclass(frozen=True)
+class PlacedCoefficient:
+    """A coefficient or shape parameter of a fitted structure."""
+
+    key: str
+    term: str
+    place: Place | None
+    value: float
+    error: float | None  # standard error; None where the value was held
+    unit: str
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """95 % confidence interval; None if the value was held."""
+        return None if self.error is None else (self.value - 1.96 * self.error, self.value + 1.96 * self.error)
+
+
+@dataclass(frozen=True, eq=False)
+class StructureComparison:
+    """A structure held against one record."""
+
+    model: Model  # as it was given
+    prepared: PreparedStructure
+    fit: StructureFit
+    covariance: Floats  # of the estimates; shape (keys, keys)
+    coefficients: tuple[PlacedCoefficient, ...]
+    prediction: StructurePrediction
+    modes: Modes
+    forces: MissingForces  # what each coordinate's equation leaves, and between which places
+    notes: tuple[str, ...]
+
+
+def compare_structure(
+    model: Model,
+    prepared: PreparedStructure,
+    fit: StructureFit | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> StructureComparison:
+    """Fit what a structure leaves open to one part of a record and judge it on the other.
+
+    ``fit`` is the finished fit of a candidate.
+
+    Raises
+    ------
+    StudyError
+        If the model cannot be fitted.
+    """
+    report: Callable[[str], None] = progress or (lambda _: None)
+    report("fit")
+    if fit is None:
+        fit = settled(first_fit(model, prepared), prepared)
+    jacobian = linearise(fit, prepared)
+    covariance = covariance_of(fit, prepared, jacobian)[: len(fit.keys), : len(fit.keys)]
+    report("free run")
+    prediction = predict_structure(fit, prepared)
+    report("where it fails")
+    modes = modes_of(fit.model, fit.keys, covariance)
+    notes = [*prepared.notes]
+    if modes.rigid:
+        notes.append(f"nothing ties the structure down in {modes.rigid} of its motions: it may drift away as a whole")
+    if fit.undecided:
+        notes.append(f"this record cannot tell apart, or does not show, {', '.join(fit.undecided)}")
+    return StructureComparison(
+        model, prepared, fit, covariance, _coefficients(fit, covariance), prediction, modes,
+        missing_forces(prediction), tuple(notes),
+    )  # fmt: skip
+
+
+def _coefficients(fit: StructureFit, covariance: Floats) -> tuple[PlacedCoefficient, ...]:
+    errors = dict(zip(fit.keys, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+    return tuple(
+        PlacedCoefficient(key, entry.term.name, entry.place, float(value), errors.get(key), unit)
+        for entry in fit.model.terms
+        for (key, value), unit in zip(entry.values.items(), _units(entry), strict=True)
+        if value is not None
+    )
+
+
+def _units(entry: Any) -> list[str]:
+    own = [entry.term.unit(symbol, "N", "m") for symbol in entry.term.symbols]
+    for parameter in entry.term.parameters:
+        powers = QUANTITIES[parameter.quantity]
+        unit = dimensions.compose("", "m", (-powers[0], -powers[1])).strip().replace("/", "1/")
+        own.append("Hz" if parameter.quantity == "frequency" else unit)
+    return own
+
+
+def says(comparison: StructureComparison) -> str:
+    """What a person wants to know, in sentences."""
+    prediction, forces = comparison.prediction, comparison.forces
+    worst = int(np.argmax(prediction.errors))
+    said = [
+        f"The free run leaves {percent(prediction.error)} of the motion, {percent(prediction.errors[worst])} at "
+        f"{prediction.prepared.sensors[worst].coordinate}; noise alone would leave {percent(prediction.floor)}."
+    ]
+    if forces.lacking:
+        said.append(f"The reverse system says no force of {', '.join(forces.lacking)}, which no sensor shows.")
+    if np.any(forces.rms > 0.0):
+        i = int(np.argmax(forces.rms))
+        left = f"{forces.rms[i]:.3g} N rms are left of its forces"
+        said.append(f"The equation of {forces.coordinates[i]} is violated most: {left}.")
+    if len(prediction.prepared.sensors) > 1 and forces.aligned:
+        place, share = forces.aligned[0]
+        said.append(f"A single force {in_words(place)} could make {percent(share)} of what stands above the noise.")
+    return " ".join(said)
+
+
+def document(comparison: StructureComparison) -> dict[str, Any]:
+    """What ``comparison.json`` holds."""
+    prediction, fit, forces = comparison.prediction, comparison.fit, comparison.forces
+    return {
+        "record": prediction.prepared.record.name,
+        "model": {
+            "name": comparison.model.name, "coordinates": list(comparison.model.coordinates),
+            "terms": [model_file.format_entry(t) for t in comparison.model.terms],
+        },
+        "error": {
+            "response": prediction.error, "force": forces.share,
+            "sensors": {str(s): float(e) for s, e in zip(prediction.prepared.sensors, prediction.errors, strict=True)},
+        },
+        "noise_floor": {
+            "response": prediction.floor,
+            "sensors": {str(s): float(e) for s, e in zip(prediction.prepared.sensors, prediction.floors, strict=True)},
+        },
+        "coefficients": [coefficient_row(c) for c in comparison.coefficients],
+        "modes": mode_rows(comparison.modes),
+        "fit": {
+            "samples": list(prediction.prepared.fit), "judged": list(prediction.prepared.judge),
+            "converged": fit.converged, "message": fit.message,
+        },
+        "where": {
+            "coordinates": [
+                {"coordinate": c, "residual_force": float(r), "force": float(f)}
+                for c, r, f in zip(forces.coordinates, forces.rms, forces.size, strict=True)
+            ],
+            "places": [{**place.plain(), "share": share} for place, share in forces.aligned],
+            "shared_force": forces.matrix.tolist(),
+            "maps": {
+                label: {"at": c.at.tolist(), "force": c.mean.tolist(), "error": c.error.tolist()}
+                for label, c in forces.curves.items()
+            },
+        },
+        "notes": list(comparison.notes),
+        "says": says(comparison),
+    }  # fmt: skip
+
+
+def coefficient_row(c: PlacedCoefficient) -> dict[str, Any]:
+    """A coefficient as a plain row."""
+    return {
+        "key": c.key, "term": c.term, **(c.place.plain() if c.place else {}), "value": c.value,
+        "interval": None if c.interval is None else list(c.interval), "standard_error": c.error, "unit": c.unit,
+        "held": c.error is None,
+    }  # fmt: skip
+
+
+def mode_rows(modes: Modes) -> list[dict[str, Any]]:
+    """Modes as plain rows."""
+    return [
+        {
+            "frequency": float(modes.frequency[i]), "frequency_error": float(modes.frequency_error[i]),
+            "damping": float(modes.damping[i]), "damping_error": float(modes.damping_error[i]),
+            "shape": modes.shape[i].tolist(), "shape_error": modes.shape_error[i].tolist(),
+        }
+        for i in range(len(modes.frequency))
+    ]  # fmt: skip
+
+
+def summary(comparison: StructureComparison) -> str:
+    """The tables that a person reads first, and the sentences below them."""
+    from tabulate import tabulate
+
+    prediction, forces = comparison.prediction, comparison.forces
+    left = dict(zip(forces.coordinates, forces.rms, strict=True))
+    rows = [
+        [str(s), percent(e), percent(f), f"{left[s.coordinate]:.3g} N" if s.coordinate in left else "-"]
+        for s, e, f in zip(prediction.prepared.sensors, prediction.errors, prediction.floors, strict=True)
+    ]
+    first, last = prediction.prepared.fit, prediction.prepared.judge
+    heads = ["sensor", "error", "noise floor", "force left there"]
+    values = [[c.key, f"{c.value:.5g}", _interval(c), c.unit] for c in comparison.coefficients]
+    parts = [
+        f"model {comparison.model.name}: fitted to samples {first[0]} to {first[1]}, judged on {last[0]} to {last[1]}",
+        tabulate(rows, heads, tablefmt="simple", disable_numparse=True),
+        tabulate(values, ["", "value", "95 % interval", "unit"], tablefmt="simple", disable_numparse=True),
+        modes_table(comparison.modes, comparison.model.coordinates),
+        says(comparison),
+    ]
+    return "\n\n".join(parts) + (f"\n({'; '.join(comparison.notes)})" if comparison.notes else "")
+
+
+def _interval(c: PlacedCoefficient) -> str:
+    return "held" if c.interval is None else f"{c.interval[0]:.5g} to {c.interval[1]:.5g}"
+
+
+def history_step(
+    comparison: StructureComparison, added: str | None = None, dropped: str | None = None
+) -> dict[str, Any]:
+    """A comparison as a step of the history (``study.compare.history``)."""
+    prediction = comparison.prediction
+    return {
+        "terms": [t.name for t in comparison.model.terms], "added": added, "dropped": dropped,
+        "record": prediction.prepared.record.name,
+        "error": {"force": comparison.forces.share, "response": prediction.error},
+        "rms": float(np.sqrt(np.mean(prediction.residual**2))), "unit": "",
+        "noise_floor": {"response": prediction.floor}, "converged": comparison.fit.converged,
+        "coefficients": [coefficient_row(c) for c in comparison.coefficients],
+    }  # fmt: skip

@@ -1,0 +1,125 @@
+"""What a structure's unexplained force depends on, and at which place: general shapes of the motion, its past, time.
+
+As for a single coordinate (``diagnose.dependence``): amounts from the first part of the record, what they explain from
+the second. A force of each shape at each place passes through the linear approximation of the structure.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
+
+from study.diagnose.dependence import DEGREE, TAUS, hysteretic, relaxed
+from study.equations.place import Place
+from study.records.record import MOTIONS
+from study.structure.mass_matrix import matrices
+from study.structure.placed_search import modulation_lines, residual_lines
+from study.structure.places import connections, transfer
+from study.structure.structure_prediction import StructurePrediction
+from study.structure.structure_record import Sensor
+from study.structure.structure_run import prepare_run
+from study.support import statistics
+from study.support.arrays import Complexes, Floats
+from study.support.errors import DivergenceError
+from study.support.least_squares import least_squares
+from study.support.statistics import Gain
+
+LONGEST = 8192  # samples of either part that are looked at
+
+
+@dataclass(frozen=True)
+class Leftover:
+    """What one family of shapes at one place explains, held out."""
+
+    place: Place
+    family: str  # ``displacement``, ``velocity``, ``displacement and velocity``, ``past`` or ``time``
+    gain: Gain
+
+
+def left_over(prediction: StructurePrediction) -> list[Leftover]:
+    """What each family of shapes at each place explains of what a fitted structure leaves; none if it diverges."""
+    fit, prepared = prediction.fit, prediction.prepared
+    model = fit.model
+    begin = max(prediction.first, prepared.judge[0] - LONGEST)
+    end = min(prepared.judge[1], prepared.judge[0] + LONGEST)
+    split = prepared.judge[0] - begin if begin < prepared.judge[0] else (end - begin) // 2
+    wanted = tuple(Sensor(c, m) for m in MOTIONS[:2] for c in model.coordinates)
+    try:
+        free = prediction.motion(wanted, (begin, end))
+        own = _derivatives(prediction, begin, end) / prepared.scale[:, None]
+        predicted = prediction.motion(prepared.sensors, (begin, end))
+    except DivergenceError:
+        return []
+    residual = ((prepared.measured[begin:end] - predicted) / prepared.scale).ravel()
+    own = own.reshape(len(residual), -1)
+    size = next_fast_len(2 * len(free), real=True)
+    linear = matrices(model, model.numbers())
+    paths = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, size) / prepared.scale[:, None]
+    cut, n = split * len(prepared.sensors), len(model.coordinates)
+    early = residual[:cut].reshape(split, -1)
+    short = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, split) / prepared.scale[:, None]
+    steady = residual_lines(early)
+    found: list[Leftover] = []
+    for place in connections(model):
+        e = np.array(place.direction(model.coordinates))
+        u = free[:, :n] @ e
+        families = [*_families(u, free[:, n:] @ e), ("time", _times(u, short @ e, early, steady))]
+        for family, shapes in families:
+            lines = np.stack([rfft(x, size) for x in shapes], axis=1)
+            columns = irfft((paths @ e)[:, :, None] * lines[:, None, :], size, axis=0)[: len(free)]
+            gain = statistics.gain(*_held_out(own, columns.reshape(len(residual), -1), residual, cut))
+            found.append(Leftover(place, family, gain))
+    return found
+
+
+def _derivatives(prediction: StructurePrediction, begin: int, end: int) -> Floats:
+    fit = prediction.fit
+    run = prepare_run(
+        fit.model, prediction.prepared.record, fit.keys, sensors=prediction.prepared.sensors,
+        steps_per_sample=fit.steps, span=(prediction.first, end),
+    )  # fmt: skip
+    values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
+    states = range(len(prediction.initial))
+    return run.respond(values, prediction.initial, states)[1].transpose(1, 0, 2)[begin - prediction.first :]
+
+
+def _families(u: Floats, v: Floats) -> Iterator[tuple[str, list[Floats]]]:
+    x, y = u / max(float(np.std(u)), 1e-300), v / max(float(np.std(v)), 1e-300)
+    yield "displacement", _functions(x)
+    yield "velocity", _functions(y)
+    yield (
+        "displacement and velocity",
+        [x * y, x**2 * y, x * y**2, x**3 * y, x * y**3, x**2 * y**2, abs(x) * y, abs(y) * x],
+    )
+    steps = np.diff(x, prepend=x[0])
+    rate = float(np.std(steps) / np.std(y))
+    past = [relaxed(steps, float(np.exp(-rate / tau))) for tau in TAUS]
+    yield "past", past + [hysteretic(steps, beta) for beta in (0.5, 1.5, 4.0)]
+
+
+def _times(u: Floats, path: Complexes, early: Floats, steady: Floats) -> list[Floats]:
+    """What varies with time at the place: its stiffness, or a force, at the lines that stand out of the first part."""
+    turn = 2.0 * np.pi * np.arange(len(u)) / len(early)
+    x = u / max(float(np.std(u)), 1e-300)
+    shapes: list[Floats] = []
+    for line in modulation_lines(u[: len(early)], path, early)[:3]:
+        shapes += [x * np.cos(line * turn), x * np.sin(line * turn)]
+    for line in steady[:3]:
+        shapes += [np.cos(line * turn), np.sin(line * turn)]
+    return shapes
+
+
+def _functions(x: Floats) -> list[Floats]:
+    powers = [x**n for n in range(2, DEGREE + 1)]
+    return [*powers, np.abs(x), x * np.abs(x), np.sign(x), np.clip(x, -0.5, 0.5), np.clip(x, -1.0, 1.0)]
+
+
+def _held_out(own: Floats, columns: Floats, residual: Floats, cut: int) -> tuple[Floats, Floats]:
+    """The residual of the second part before and after, less what the model's own coefficients could do there."""
+    amounts = least_squares(np.hstack([own, columns])[:cut], residual[:cut], 1e-6)[own.shape[1] :]
+    late = np.column_stack([residual[cut:], columns[cut:] @ amounts])
+    length = np.linalg.norm(own[cut:], axis=0)
+    basis = np.linalg.qr(own[cut:] / np.where(length > 0.0, length, 1.0))[0]
+    late = late - basis @ (basis.T @ late)
+    return late[:, 0], late[:, 0] - late[:, 1]

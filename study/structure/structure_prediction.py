@@ -1,0 +1,113 @@
+"""The free run of a fitted structure along the part that was not fitted: its error by sensor, and the noise floors."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from study.records import noise_floor
+from study.structure.prepared_structure import PreparedStructure
+from study.structure.structure_fit import StructureFit, fit_structure
+from study.structure.structure_record import Sensor
+from study.structure.structure_run import prepare_run
+from study.support.arrays import Floats
+from study.support.errors import DivergenceError
+
+
+@dataclass(frozen=True, eq=False)
+class StructurePrediction:
+    """Measured and predicted motions on the judging part; n samples, s sensors."""
+
+    fit: StructureFit
+    prepared: PreparedStructure
+    first: int  # sample of the record at which the run begins
+    initial: Floats  # state there
+    predicted: Floats  # shape (n, s)
+    numerical: Floats  # rms error of the integration itself, the difference to a run with twice the steps; shape (s,)
+    diverged: bool = False  # the free run does not stay finite: the error counts as 100 %
+
+    @property
+    def measured(self) -> Floats:
+        """Shape (n, s)."""
+        return self.prepared.measured[slice(*self.prepared.judge)]
+
+    @cached_property
+    def residual(self) -> Floats:
+        """Measured minus predicted, shape (n, s)."""
+        return self.measured - self.predicted
+
+    @cached_property
+    def size(self) -> Floats:
+        """Rms of each measured motion about its mean, shape (s,)."""
+        return np.std(self.measured, axis=0)
+
+    @cached_property
+    def errors(self) -> Floats:
+        """Rms of the residual over that of the motion, of each sensor, shape (s,)."""
+        return np.sqrt(np.mean(self.residual**2, axis=0)) / self.size
+
+    @property
+    def error(self) -> float:
+        """Root mean square of the sensors' errors."""
+        return float(np.sqrt(np.mean(self.errors**2)))
+
+    @cached_property
+    def floors(self) -> Floats:
+        """Noise of each sensor, what no model could explain, over the rms of its motion, shape (s,)."""
+        noise = [noise_floor.floor(x, self.prepared.dt).noise for x in self.residual.T]
+        rms = np.sqrt(np.mean(self.residual**2, axis=0))
+        return np.minimum(np.maximum(noise, self.numerical), rms) / self.size
+
+    @property
+    def floor(self) -> float:
+        """Root mean square of the sensors' floors."""
+        return float(np.sqrt(np.mean(self.floors**2)))
+
+    def motion(self, sensors: tuple[Sensor, ...], span: tuple[int, int] | None = None) -> Floats:
+        """Motions of the free run on the judging part, or another that it covers, shape (samples, sensors)."""
+        begin, end = span or self.prepared.judge
+        run = prepare_run(
+            self.fit.model, self.prepared.record, sensors=sensors, steps_per_sample=self.fit.steps,
+            span=(self.first, end),
+        )  # fmt: skip
+        return run.respond({}, self.initial)[0].T[begin - self.first :]
+
+    def derivatives(self, fit: StructureFit) -> Floats:
+        """Of the motions on the judging part by the keys of a fit with the same motion and the initial state."""
+        run = prepare_run(
+            fit.model, self.prepared.record, fit.keys, sensors=self.prepared.sensors, steps_per_sample=fit.steps,
+            span=(self.first, self.prepared.judge[1]),
+        )  # fmt: skip
+        values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
+        jacobian = run.respond(values, self.initial, range(len(self.initial)))[1]
+        return jacobian.transpose(1, 0, 2)[self.prepared.judge[0] - self.first :]
+
+
+def predict_structure(fit: StructureFit, prepared: PreparedStructure) -> StructurePrediction:
+    """Run a fitted structure along the judging part.
+
+    Where that follows the fitting part the run goes on through both; elsewhere its initial state, and nothing else, is
+    estimated from the judging part.
+    """
+    judged = prepared.measured[slice(*prepared.judge)]
+    try:
+        first, initial = fit.first, fit.initial
+        if prepared.judge[0] != fit.span[1]:
+            swapped = replace(prepared, fit=prepared.judge, judge=prepared.fit)
+            first = prepared.judge[0]
+            initial = fit_structure(fit.model, swapped, tuple(fit.model.values), steps=fit.steps).initial
+        runs = [
+            prepare_run(
+                fit.model, prepared.record, sensors=prepared.sensors, steps_per_sample=n * fit.steps,
+                span=(first, prepared.judge[1]),
+            ).respond({}, initial)[0].T[prepared.judge[0] - first :]
+            for n in (1, 2)
+        ]  # fmt: skip
+    except DivergenceError:
+        flat = np.broadcast_to(np.mean(judged, axis=0), judged.shape).copy()
+        return StructurePrediction(
+            fit, prepared, fit.first, fit.initial, flat, np.zeros(judged.shape[1]), diverged=True
+        )
+    change = np.asarray(runs[1] - runs[0], dtype=np.float64)
+    moved = np.asarray(np.sqrt(np.mean(change**2, axis=0)), dtype=np.float64)
+    return StructurePrediction(fit, prepared, first, initial, runs[0], moved)

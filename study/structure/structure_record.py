@@ -1,0 +1,92 @@
+"""What was measured on a structure: forces, and motions at some of its coordinates."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from study.records.record import SI_UNITS
+from study.support.arrays import Floats
+
+
+@dataclass(frozen=True, order=True)
+class Sensor:
+    """A measured motion.
+
+    Attributes
+    ----------
+    coordinate : str
+        Which coordinate of the structure moves.
+    motion : str
+        ``displacement``, ``velocity`` or ``acceleration``.
+    """
+
+    coordinate: str
+    motion: str
+
+    def __str__(self) -> str:
+        """As columns are called: ``floor1 acceleration``."""
+        return f"{self.coordinate} {self.motion}"
+
+
+@dataclass(frozen=True, eq=False)
+class StructureRecord:
+    """Evenly sampled forces and motions of a structure; n samples.
+
+    Attributes
+    ----------
+    dt : float
+        Sampling interval in seconds.
+    forces : mapping of arrays, shape (n,)
+        By the names that the model gives them.
+    motions : mapping of arrays, shape (n,)
+        By sensor.
+    extra : mapping of arrays, shape (n,)
+        Further channels, for formulas to name.
+    units : mapping of str
+        Of ``force``, and of ``displacement, velocity, acceleration``.
+    name : str
+        What it is called in tables and file names.
+    start : float
+        Time of the first sample in seconds.
+    """
+
+    dt: float
+    forces: Mapping[str, Floats]
+    motions: Mapping[Sensor, Floats]
+    extra: Mapping[str, Floats] = field(default_factory=dict[str, Floats])
+    units: Mapping[str, str] = field(default_factory=lambda: dict(SI_UNITS))
+    name: str = "record"
+    start: float = 0.0
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(next(iter((*self.motions.values(), *self.forces.values()))))
+
+    @property
+    def sensors(self) -> tuple[Sensor, ...]:
+        """The measured motions."""
+        return tuple(self.motions)
+
+    @property
+    def time(self) -> Floats:
+        """Time of each sample in seconds, shape (n,)."""
+        return self.start + self.dt * np.arange(len(self), dtype=np.float64)
+
+    @property
+    def measured(self) -> Floats:
+        """All sensors, shape (sensors, n)."""
+        return np.stack([self.motions[s] for s in self.sensors])
+
+    def with_motions(self, motions: Mapping[Sensor, Floats]) -> "StructureRecord":
+        """The same forces with other motions."""
+        return replace(self, motions=motions)
+
+
+def write_structure_csv(record: StructureRecord, path: Path) -> None:
+    """Write time, forces and motions with all digits of a double, in columns such as ``floor1 acceleration``."""
+    import pandas as pd  # half a second, which records in memory are spared
+
+    columns = {"time": record.time, **record.forces, **{str(s): x for s, x in record.motions.items()}, **record.extra}
+    pd.DataFrame(columns).to_csv(path, index=False, float_format="%.17g", lineterminator="\n")

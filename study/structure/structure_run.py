@@ -1,0 +1,150 @@
+"""A structure running free under measured forces, with the exact derivatives of the motions at its sensors.
+
+State and sensitivities are integrated together by the classical Runge-Kutta method, as for a single coordinate
+(``equations.free_run``): the Jacobian is that of the numbers which the simulation yields.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from study.equations.model import Model, with_registers
+from study.records.interpolation import between_samples
+from study.records.record import MOTIONS
+from study.structure import structure_kernels as kernels
+from study.structure.equations_of_motion import MotionProgram, motion_program
+from study.structure.structure_record import Sensor, StructureRecord
+from study.support.arrays import Floats, Ints
+from study.support.errors import DivergenceError, expect
+
+
+@dataclass(frozen=True)
+class StructureRun:
+    """A structure and a stretch of a record, made ready to run as often as a fit needs.
+
+    Attributes
+    ----------
+    program : MotionProgram
+        Its equations of motion.
+    keys : tuple of str
+        The coefficients and shape parameters to differentiate by.
+    drive : array, shape (2 steps (samples - 1) + 1, forces + channels)
+        Forces and channels at every half step.
+    dt : float
+        Sampling interval in seconds.
+    steps : int
+        Steps in each sampling interval.
+    start : float
+        Time of the first sample in seconds.
+    samples : int
+        Samples in the stretch.
+    rows : int array, shape (sensors,)
+        The motions that are wanted: displacements, velocities and accelerations counted through.
+    """
+
+    program: MotionProgram
+    keys: tuple[str, ...]
+    drive: Floats
+    dt: float
+    steps: int
+    start: float
+    samples: int
+    rows: Ints
+
+    def respond(self, values: Mapping[str, float], initial: Floats, free: Sequence[int] = ()) -> tuple[Floats, Floats]:
+        """Motions at the sensors and their derivatives.
+
+        Parameters
+        ----------
+        values : mapping of float
+            Value of each key.
+        initial : array, shape (states,)
+            Displacements, velocities and the terms' own states at the first sample; what is left out is zero.
+        free : sequence of int
+            States to differentiate by, after the keys.
+
+        Returns
+        -------
+        response : array, shape (sensors, samples)
+        jacobian : array, shape (sensors, samples, keys + free states)
+
+        Raises
+        ------
+        DivergenceError
+            If a motion leaves the range of finite numbers.
+        """
+        own = self.program
+        program = with_registers(own.program, {key: values[key] for key in self.keys})
+        first = 1 + len(self.keys)
+        out = np.empty((len(self.rows), self.samples, first + len(free)))
+        state = np.zeros((own.states, out.shape[2]))
+        state[: len(initial), 0] = initial
+        state[list(free), range(first, out.shape[2])] = 1.0
+        failed = kernels.integrate_structure(
+            program.code, program.first, program.registers.copy(), own.slopes, own.by_state, own.by_key, own.sides,
+            own.by_side, own.directions, self.start, self.dt, self.steps, self.drive, state, self.rows, out,
+        )  # fmt: skip
+        if failed >= 0:
+            time = self.start + failed * self.dt
+            raise DivergenceError(f"the free run diverged at t = {time:.4g} s", time)
+        return out[:, :, 0], out[:, :, 1:]
+
+
+def prepare_run(
+    model: Model,
+    record: StructureRecord,
+    keys: Sequence[str] = (),
+    *,
+    sensors: Sequence[Sensor] | None = None,
+    steps_per_sample: int = 2,
+    span: tuple[int, int] | None = None,
+) -> StructureRun:
+    """Make a structure ready to run under the forces of a record.
+
+    Parameters
+    ----------
+    model : Model
+        A structure, every value known but those of ``keys``.
+    record : StructureRecord
+        Gives the forces, and the channels which the user's own terms name.
+    keys : sequence of str
+        The coefficients and shape parameters to differentiate by.
+    sensors : sequence of Sensor, optional
+        The motions that are wanted; those of the record if left out.
+    steps_per_sample : int
+        Runge-Kutta steps in each sampling interval.
+    span : pair of int, optional
+        First sample, and the one after the last; the whole record if left out.
+
+    Raises
+    ------
+    StudyError
+        If a value, force, channel or sensor is missing, or the span invalid.
+    """
+    first, last = span or (0, len(record))
+    inside = 0 <= first < last - 1 < len(record)
+    expect(inside, f"the span {first} to {last} does not lie in the {len(record)} samples of {record.name!r}")
+    names = [name for name, _ in model.forces]
+    lacking = ", ".join(name for name in names if name not in record.forces)
+    expect(not lacking, f"record {record.name!r} has no force {lacking}; expected {', '.join(names)}")
+    program = motion_program(model, tuple(record.extra), keys)
+    factor = 2 * steps_per_sample
+    columns = [record.forces[name] for name in names] + [record.extra[name] for name in model.channels]
+    part = slice(factor * first, factor * (last - 1) + 1)
+    drive = np.zeros((factor * (last - first - 1) + 1, len(columns)))
+    for i, values in enumerate(columns):
+        drive[:, i] = between_samples(values, factor)[part]
+    return StructureRun(
+        program, tuple(keys), drive, record.dt, steps_per_sample, record.start + first * record.dt, last - first,
+        np.array([_row(model, s) for s in (record.sensors if sensors is None else sensors)], dtype=np.int64),
+    )  # fmt: skip
+
+
+def _row(model: Model, sensor: Sensor) -> int:
+    """Number of a motion when displacements, velocities and accelerations are counted through."""
+    known = sensor.coordinate in model.coordinates
+    expect(
+        known, f"{sensor.coordinate!r} is no coordinate of the model; expected one of {', '.join(model.coordinates)}"
+    )
+    return MOTIONS.index(sensor.motion) * len(model.coordinates) + model.coordinates.index(sensor.coordinate)

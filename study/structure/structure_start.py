@@ -1,0 +1,60 @@
+"""The first fit of a structure: from its linear terms, whatever else it holds."""
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from study.equations.model import Model
+from study.structure.free_decay import decay_start
+from study.structure.linear_start import linear_start
+from study.structure.mass_matrix import linear_keys
+from study.structure.prepared_structure import PreparedStructure
+from study.structure.structure_fit import StructureFit, fit_structure
+from study.support.errors import DivergenceError, expect
+
+
+def known_linear(model: Model, prepared: PreparedStructure) -> dict[str, float]:
+    """The linear terms of a structure: what it holds of them, and the best linear approximation of the rest."""
+    held = {key: value for key, value in model.values.items() if value is not None}
+    start = linear_start if model.forces else decay_start
+    return {key: held[key] for key in linear_keys(model) if key in held} | start(model, prepared, held)
+
+
+def first_fit(model: Model, prepared: PreparedStructure) -> StructureFit:
+    """Fit all that a structure leaves open; what it gives is held.
+
+    Terms with an open shape parameter are searched for one after the other beside the others.
+
+    Raises
+    ------
+    StudyError
+        If no fit begins.
+    """
+    from study.structure.placed_search import with_placed_term
+
+    unknown = [t for t in model.terms if None in t.parameters]
+    known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
+    fit = _fitted(known, prepared, known_linear(known, prepared))
+    for entry in unknown:
+        fit = with_placed_term(fit, entry, prepared)
+    order = [t.name for t in model.terms]
+    terms = tuple(sorted(fit.model.terms, key=lambda t: order.index(t.name)))
+    return fit if not unknown else fit_structure(replace(fit.model, terms=terms), prepared, fit.held, steps=fit.steps)
+
+
+def _fitted(model: Model, prepared: PreparedStructure, linear: Mapping[str, float]) -> StructureFit:
+    """From the linear terms alone, and where that diverges or stays far from the motion, with half of them."""
+    open_keys = [key for key, value in model.values.items() if value is None]
+    start = dict.fromkeys(open_keys, 0.0) | {key: linear[key] for key in open_keys if key in linear}
+    fits: list[StructureFit] = []
+    with suppress(DivergenceError):
+        fits.append(fit_structure(model, prepared, model.held_keys, start))
+    if not fits or (not fits[0].converged and fits[0].cost > 0.5):
+        calm = {key: 4.0 * abs(v) if key.startswith("c[") else v for key, v in start.items()}
+        try:
+            fits.append(fit_structure(model, prepared, model.held_keys, calm))
+        except DivergenceError:
+            expect(fits, f"{model.name!r} has no finite motion under the forces of {prepared.record.name!r}")
+    return min(fits, key=lambda fit: float(np.mean((fit.residual / prepared.scale) ** 2)))

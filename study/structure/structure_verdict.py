@@ -1,0 +1,107 @@
+"""The whole diagnosis of a structure: which effect is missing, and where it sits."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from study.diagnose.credibility import credible
+from study.equations.model import ModelTerm
+from study.equations.term import Term
+from study.structure.placed_candidates import candidate_entries, promising, screened, try_all, with_best_settled
+from study.structure.placed_ranking import PlacedRanked, rank_placed
+from study.structure.placed_search import PlacedBaseline, placed_baseline, with_placed_term
+from study.structure.structure_comparison import StructureComparison, compare_structure
+from study.structure.structure_fit import fit_structure, settled, sized
+from study.structure.structure_leftover import Leftover, left_over
+from study.structure.structure_prediction import StructurePrediction
+from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE
+
+MISSING, NOTHING, UNKNOWN = "missing_effect", "nothing_missing", "unknown_effect"
+SHORT, LONG = 2048, 8192  # samples: a search uses half of the fitting part, within these limits
+NAMELESS = 0.1 * ALPHA  # what no candidate explains is believed less easily than what one does
+
+
+@dataclass(frozen=True, eq=False)
+class StructureDiagnosis:
+    """What is missing from a structure."""
+
+    verdict: str  # ``missing_effect``, ``nothing_missing`` or ``unknown_effect``
+    comparison: StructureComparison  # the structure as it was given
+    candidates: tuple[PlacedRanked, ...]  # best first
+    asked: int  # effects times places
+    left: float  # rms of the structure that remains beside the best explanation, over the rms response
+    families: tuple[Leftover, ...]  # for an unknown effect: what general shapes at each place explain, best first
+
+
+def diagnose_structure(
+    comparison: StructureComparison,
+    extra: Sequence[Term] = (),
+    without: Sequence[str] = (),
+    progress: Callable[[str], None] | None = None,
+) -> StructureDiagnosis:
+    """Find the effect that a structure lacks, and its place.
+
+    ``extra`` are the user's own candidates, ``without`` terms of the library to leave out; ``progress`` is called with
+    each candidate that was fitted.
+    """
+    base = search_base(comparison)
+    entries = candidate_entries(comparison.fit.model, extra, without)
+    chosen = promising(screened(entries, base))
+    tried = try_all(chosen, base, progress or (lambda _: None))
+    settled_ones = with_best_settled(tried, comparison.prepared)
+    rows = rank_placed(settled_ones, comparison.fit, comparison.prediction, len(entries))
+    return _decide(rows, comparison, len(entries))
+
+
+def search_base(comparison: StructureComparison) -> PlacedBaseline:
+    """The fitted structure as candidates are tried beside it, on no more samples than a search takes."""
+    prepared, fit = comparison.prepared, comparison.fit
+    first, last = prepared.fit
+    look = prepared.shortened(int(np.clip((last - first) // 2, SHORT, LONG)))
+    begin = fit.initial if look.fit[0] == fit.first else None
+    again = fit_structure(fit.model, look, fit.held, initial=begin, noise=sized(prepared.scale))
+    return placed_baseline(again, look)
+
+
+def added_term(comparison: StructureComparison, entry: ModelTerm) -> StructureComparison:
+    """The comparison of the structure with a term more, fitted as a diagnosis fits that candidate.
+
+    Raises
+    ------
+    StudyError
+        If the structure with it has no finite motion.
+    """
+    base = search_base(comparison)
+    fit = with_placed_term(base.fit, entry, base.prepared, base)
+    model = comparison.model.with_term(entry)
+    return compare_structure(model, comparison.prepared, settled(fit, comparison.prepared))
+
+
+def _decide(rows: list[PlacedRanked], comparison: StructureComparison, asked: int) -> StructureDiagnosis:
+    prediction = comparison.prediction
+    believed = [r for r in rows if credible(prediction, r.prediction, r.interval, r.p_value)]
+    if not believed:
+        families = left_over(prediction)
+        left = _left(prediction, families)
+        verdict = UNKNOWN if left > TOLERANCE else NOTHING
+        return StructureDiagnosis(verdict, comparison, tuple(rows), asked, left, _ordered(families))
+    first = believed[0]
+    families = left_over(first.prediction)
+    left = _left(first.prediction, families)
+    rows = [first] + [r for r in rows if r is not first]
+    enough = first.gain.explained >= ENOUGH or left <= GOOD
+    verdict = MISSING if enough and not first.wanders(asked) else UNKNOWN
+    if verdict == UNKNOWN:
+        families = left_over(prediction)
+    return StructureDiagnosis(verdict, comparison, tuple(rows), asked, left, _ordered(families))
+
+
+def _left(prediction: StructurePrediction, families: Sequence[Leftover]) -> float:
+    """Rms over that of the response which general shapes explain of a residual, and not by chance."""
+    found = [f.gain.explained for f in families if f.gain.p_value * len(families) < NAMELESS]
+    return prediction.error * float(np.sqrt(max((0.0, *found))))
+
+
+def _ordered(families: Sequence[Leftover]) -> tuple[Leftover, ...]:
+    return tuple(sorted(families, key=lambda f: -f.gain.explained))

@@ -1,0 +1,116 @@
+"""Which effect is missing from a structure, and where; at the command line."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from study.cli import main
+from study.equations.model_file import format_model, read_model
+from study.equations.terms import get
+from study.structure.placed_candidates import candidate_entries, external, one_sided, screened
+from study.structure.prepared_structure import prepare_structure
+from study.structure.structure_comparison import compare_structure
+from study.structure.structure_record import write_structure_csv
+from study.structure.structure_verdict import search_base
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, record_of, believed):
+    place = tmp_path_factory.mktemp("frame")
+    write_structure_csv(record_of(), place / "frame.csv")
+    (place / "frame.yaml").write_text(format_model(believed))
+    return place
+
+
+@pytest.fixture(scope="module")
+def diagnosed(folder):
+    code = main(
+        ["diagnose", str(folder / "frame.csv"), "--model", str(folder / "frame.yaml"), "--out", str(folder / "out")]
+    )
+    assert code == 0
+    return json.loads((folder / "out" / "diagnosis.json").read_text())
+
+
+def test_effect_and_place_come_first(diagnosed):
+    first = diagnosed["candidates"][0]
+    assert diagnosed["verdict"] == "missing_effect"
+    assert (first["term"], first["between"]) == ("cubic_stiffness", ["floor2", "floor3"])
+    low, high = first["interval"]
+    assert low < 1e6 < high
+    assert first["response_error"] == pytest.approx(first["noise_floor"], rel=0.05)
+    assert first["response_error"] < 0.8 * diagnosed["error"]["response"]
+    assert "between floor2 and floor3" in diagnosed["says"]
+    assert all({"term", "between"} == set(tie) for c in diagnosed["candidates"] for tie in c["tied_with"])
+    after = [m["frequency"] for m in diagnosed["modes"]["after"]]
+    np.testing.assert_allclose(after, [2.16976, 5.07901, 7.31513], rtol=5e-3)
+
+
+def test_the_reverse_system_puts_the_effect_where_it_is(believed, record_of):
+    comparison = compare_structure(believed, prepare_structure(record_of(), believed))
+    ordered = screened(candidate_entries(believed), search_base(comparison))
+    entry, points = ordered[0]
+    assert entry.place is not None
+    assert entry.place.path == {"floor2", "floor3"}
+    cubic = next(p[0] for e, p in ordered if e.name == "cubic_stiffness[floor2-floor3]")
+    assert cubic.share > 0.95 * points[0].share
+    assert cubic.coefficients[0] == pytest.approx(1e6, rel=0.2)
+    elsewhere = max(p[0].share for e, p in ordered if e.place is not None and e.place.path != {"floor2", "floor3"})
+    assert elsewhere < 0.8 * cubic.share
+
+
+def test_a_term_is_added_between_two_coordinates(folder, capsys):
+    model = folder / "frame.yaml"
+    command = [
+        "add",
+        str(model),
+        "cubic_stiffness",
+        "--between",
+        "floor2",
+        "floor3",
+        "--data",
+        str(folder / "frame.csv"),
+    ]
+    assert main([*command, "--out", str(folder / "added")]) == 0
+    assert read_model(model).terms[-1].name == "cubic_stiffness[floor2-floor3]"
+    shown = capsys.readouterr().out
+    assert "k3[floor2-floor3]" in shown
+    assert re.search(r"\+ cubic_stiffness\[floor2-floor3\]", shown)
+    assert json.loads((folder / "frame.history.json").read_text())["steps"][1]["error"]["response"] < 0.105
+    assert main(command) == 2
+    assert "twice" in capsys.readouterr().err
+    assert main(["diagnose", str(folder / "frame.csv"), "--model", str(model), "--out", str(folder / "again")]) == 0
+    assert json.loads((folder / "again" / "diagnosis.json").read_text())["verdict"] == "nothing_missing"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--between", "floor2", "floor9"], "no coordinate of the model"),
+        (["--between", "floor2", "floor2"], "two different ends"),
+        ([], "says not where it acts"),
+    ],
+)
+def test_a_place_that_is_not_there_gets_its_sentence(folder, capsys, words, said):
+    before = (folder / "frame.yaml").read_bytes()
+    command = ["add", str(folder / "frame.yaml"), "quadratic_damping", *words, "--data", str(folder / "frame.csv")]
+    assert main(command) == 2
+    assert said in capsys.readouterr().err
+    assert (folder / "frame.yaml").read_bytes() == before
+
+
+def test_candidates_are_effects_times_places(believed):
+    entries = candidate_entries(believed)
+    names = [e.name for e in entries]
+    assert len(names) == len(set(names))
+    assert "cubic_stiffness[floor1-floor2]" in names
+    assert "cubic_stiffness[ground-floor3]" in names
+    assert "constant_force[floor2]" in names
+    assert "linear_stiffness[ground-floor2]" in names
+    assert "linear_stiffness[floor1-floor2]" not in names
+    assert {"one_sided_contact[floor2-floor3]", "one_sided_contact[floor3-floor2]"} <= set(names)
+    assert [external(get(n)) for n in ("constant_force", "harmonic_force", "hysteresis")] == [True, True, False]
+    assert [one_sided(get(n)) for n in ("cubic_stiffness", "quadratic_stiffness", "bilinear_stiffness")] == [
+        False, False, True,
+    ]  # fmt: skip

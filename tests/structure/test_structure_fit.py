@@ -1,0 +1,77 @@
+"""Fits of structures in free run: coefficients, their errors, missing sensors; where the equations are violated."""
+
+import numpy as np
+import pytest
+
+from study.equations.model import Model
+from study.structure.linear_start import linear_start
+from study.structure.prepared_structure import prepare_structure
+from study.structure.structure_comparison import compare_structure, document
+from study.support.errors import StudyError
+
+
+def noise_over_motion(comparison):
+    """What noise alone leaves: it is a tenth of the rms of the whole record, which the judged half exceeds."""
+    prediction = comparison.prediction
+    whole = np.std(prediction.prepared.measured, axis=0)
+    return float(np.sqrt(np.mean((0.1 * whole / prediction.size) ** 2)))
+
+
+@pytest.mark.parametrize(
+    ("motion", "without"), [("displacement", ()), ("acceleration", ()), ("displacement", ("floor2",))]
+)
+def test_the_true_model_is_found_within_its_errors(frame, record_of, motion, without):
+    free = frame.with_values(dict.fromkeys(frame.values, None))
+    comparison = compare_structure(free, prepare_structure(record_of(motion, without=without), free))
+    off = [(c.value - frame.values[c.key]) / c.error for c in comparison.coefficients]
+    assert np.max(np.abs(off)) < 3.5
+    assert np.sqrt(np.mean(np.square(off))) < 1.6
+    assert comparison.prediction.error == pytest.approx(noise_over_motion(comparison), rel=0.05)
+    assert comparison.prediction.floor == pytest.approx(comparison.prediction.error, rel=0.05)
+    true = 2.16976, 5.07901, 7.31513
+    apart = np.abs(comparison.modes.frequency - true) / comparison.modes.frequency_error
+    assert np.max(apart) < 4.0
+    assert bool(comparison.forces.lacking) == bool(without)
+
+
+def test_held_values_are_held(frame, record_of):
+    """With nothing open nothing is fitted: the error is that of the model as it is."""
+    comparison = compare_structure(frame, prepare_structure(record_of(), frame))
+    assert comparison.fit.keys == ()
+    assert all(c.error is None for c in comparison.coefficients)
+    assert comparison.prediction.error == pytest.approx(noise_over_motion(comparison), rel=0.05)
+    wrong = frame.with_values({"m[floor2]": 5.0})
+    assert compare_structure(wrong, prepare_structure(record_of(), wrong)).prediction.error > 0.2
+
+
+def test_the_residual_force_acts_between_the_two_floors(believed, record_of):
+    quiet = compare_structure(believed, prepare_structure(record_of(noise=0.0), believed))
+    rows = document(quiet)["where"]
+    assert rows["places"][0]["between"] == ["floor2", "floor3"]
+    shared = np.array(rows["shared_force"])
+    assert np.argmax(shared) in (5, 7)  # row floor2, column floor3, or the other way round
+    assert shared[1, 2] > 0.5
+    noisy = compare_structure(believed, prepare_structure(record_of(), believed))
+    assert document(noisy)["where"]["places"][0]["between"] == ["floor2", "floor3"]
+    errors = list(document(noisy)["error"]["sensors"].values())
+    floors = list(document(noisy)["noise_floor"]["sensors"].values())
+    assert all(e > 1.1 * f for e, f in zip(errors, floors, strict=True))
+
+
+def test_linear_terms_come_from_frequency_responses(frame, record_of):
+    linear = frame.without_term("cubic_stiffness[floor2-floor3]")
+    free = linear.with_values(dict.fromkeys(linear.values, None))
+    for without in ((), ("floor2",)):
+        start = linear_start(free, prepare_structure(record_of(without=without), free), {})
+        masses = [start[f"m[floor{i}]"] / frame.values[f"m[floor{i}]"] for i in (1, 2, 3)]
+        assert np.max(np.abs(np.array(masses) - 1.0)) < 0.1
+
+
+def test_what_cannot_be_judged_gets_its_sentence(believed, record_of):
+    record = record_of()
+    with pytest.raises(StudyError, match=r"overlap.*expected"):
+        prepare_structure(record, believed, (0, 2000), (1000, 5000))
+    loose = tuple(t for t in believed.terms if t.place and not {"floor2", "floor3"} <= set(t.place.ends))
+    apart = Model("loose", loose, believed.coordinates, (("shaker", "floor1"),))
+    with pytest.raises(StudyError, match="nothing measures the coordinate 'floor3' and nothing ties it"):
+        prepare_structure(record_of(without=("floor3",)), apart)

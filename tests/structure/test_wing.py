@@ -1,0 +1,68 @@
+"""A measured structure: the free decay of a wing that heaves and pitches (K. H. Lee, D. Barton and others, Bristol)."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study.equations.model_file import parse_model
+from study.structure.placed_candidates import candidate_entries, screened
+from study.structure.prepared_structure import prepare_structure
+from study.structure.structure_comparison import compare_structure
+from study.structure.structure_reader import read_structure
+from study.structure.structure_verdict import search_base
+from study.support.errors import StudyError
+
+DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parents[3] / "shared" / "data"))
+pytestmark = pytest.mark.skipif(not (DATA / "wing").is_dir(), reason="the record is not there")
+M_T, M_W, B, A, RHO = 16.9, 5.3, 0.15, -0.5, 1.204
+AUTHORS = {"model_1": (0.1724, 0.24, 3529.0, 54.1), "model_2": (0.1726, 0.234, 3318.0, 60.3)}
+TERMS = """
+name: wing
+coordinates: [heave, pitch]
+terms:
+  - {{term: inertia, at: heave, value: {heave}}}
+  - {{term: inertia, at: pitch, value: {pitch}}}
+  - {{term: inertia, couples: [heave, pitch], value: {coupling}}}
+  - {{term: linear_stiffness, between: [ground, heave]}}
+  - {{term: linear_stiffness, between: [ground, pitch]}}
+  - {{term: linear_damping, between: [ground, heave]}}
+  - {{term: linear_damping, between: [ground, pitch]}}
+"""
+
+
+def wing(name):
+    inertia, x, _, _ = AUTHORS[name]
+    values = {
+        "heave": M_T + np.pi * RHO * B**2, "coupling": M_W * x * B - A * np.pi * RHO * B**3,
+        "pitch": inertia + np.pi * (1 / 8 + A**2) * RHO * B**4,
+    }  # fmt: skip
+    return parse_model(TERMS.format(**values), Path("wing.yaml"))
+
+
+@pytest.mark.parametrize("name", list(AUTHORS))
+def test_stiffness_is_found_and_what_is_missing_is_in_pitch(name):
+    model = wing(name)
+    record = read_structure(DATA / "wing" / f"{name}.csv", model)
+    prepared = prepare_structure(record, model, (0, 2500), (2500, 4000))
+    comparison = compare_structure(model, prepared)
+    _, _, heave, pitch = AUTHORS[name]
+    values = comparison.fit.model.values
+    assert values["k[ground-heave]"] == pytest.approx(heave, rel=0.15)
+    assert values["k[ground-pitch]"] == pytest.approx(pitch, rel=0.15)
+    ordered = screened(candidate_entries(model), search_base(comparison))
+    best = {c: max(p[0].share for e, p in ordered if e.place and e.place.moving == (c,)) for c in model.coordinates}
+    assert best["pitch"] > 0.5
+    assert best["heave"] < 0.5 * best["pitch"]
+    assert not any(
+        e.place and len(e.place.moving) > 1 for e, _ in ordered
+    )  # one body: nothing lies between its motions
+
+
+def test_without_a_force_masses_must_be_given():
+    model = wing("model_1")
+    free = model.with_values({"m[heave]": None})
+    record = read_structure(DATA / "wing" / "model_1.csv", free)
+    with pytest.raises(StudyError, match=r"says nothing of m\[heave\]; expected a value"):
+        compare_structure(free, prepare_structure(record, free, (0, 2500), (2500, 4000)))
