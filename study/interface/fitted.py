@@ -22,6 +22,7 @@ from study.interface.pictures import FitPictures
 from study.interface.showing import Words, html_table
 from study.records.plan import make_plan
 from study.records.prepared import Prepared, prepare_record
+from study.records.record import MOTIONS
 from study.support.errors import StudyError, at, expect
 from study.support.numbers import percent
 
@@ -292,10 +293,9 @@ def prepared_part(
         if parts[place] is None and other is not None:
             parts[place] = max(((other[1], len(record)), (0, other[0])), key=lambda part: part[1] - part[0])
     with at(record.name):
+        measured = ", ".join(motion for motion in MOTIONS if motion in record)
+        expect(response is None or response in record, f"no {response} was measured; expected one of {measured}")
         plan = make_plan(record, parts[0], parts[1], response)
-        expect(
-            plan.response in record, f"no {plan.response} was measured; expected one of {', '.join(record.channels)}"
-        )
     return prepare_record(record, plan, cutoff)
 
 
