@@ -5,7 +5,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from study.commands.command import Command, progress
-from study.commands.record_arguments import accounted_together, add_record_arguments, inputs_of, out_folder, read_records
+from study.commands.record_arguments import (
+    accounted_together,
+    add_record_arguments,
+    inputs_of,
+    out_folder,
+    read_records,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,7 +26,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--candidate", action="append", default=[], metavar="NAME=FORMULA", help="a candidate of your own"
     )
-    parser.add_argument("--each", action="store_true", help="of several records, a verdict each, not one on all of them")
+    parser.add_argument(
+        "--each", action="store_true", help="of several records, a verdict each, not one on all of them"
+    )
     parser.add_argument("--without", action="append", default=[], metavar="TERM", help="leave a term out")
 
 

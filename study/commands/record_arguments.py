@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from study.commands.command import number, whole
-from study.support.errors import at, expect
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -63,9 +62,9 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         "--accept-swapped", action="store_true", help="take force and response as named, though they seem exchanged"
     )
     reading.add_argument(
-        "--absolute", action="store_true", help="on a moving base (columns base_acceleration ...): the response is absolute"
+        "--absolute", action="store_true", help="on a moving base (column base_acceleration): the response is absolute"
     )  # fmt: skip
-    reading.add_argument("--free", action="store_true", help="no force acts: a free decay (a column of it is left out)")
+    reading.add_argument("--free", action="store_true", help="a free decay: no force acts, a column of it is left out")
     reading.add_argument(
         "--no-measurement", action="store_true", help="look for no faults of the measurement: drift, delay, spikes ..."
     )
@@ -73,8 +72,8 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     judging.add_argument("--fit", type=span, metavar="A:B", help="samples to fit, A to B - 1 (default: the first half)")
     judging.add_argument(
         "--judge", type=judged, metavar="A:B",
-        help=f"samples to judge (default: the second half), or '{ALTERNATE}': each from a state of its own, the default "
-        "of free decays and of several stretches, and right for sweeps, whose halves have other frequencies",
+        help=f"samples to judge (default: the second half), or '{ALTERNATE}': the default of free decays, "
+        "components and several stretches, and right for sweeps, whose halves have other frequencies",
     )  # fmt: skip
     judging.add_argument(
         "--use", action="append", type=times, default=[], metavar="S:T",

@@ -69,7 +69,9 @@ def decays(fit: FreeRunFit, prepared: Prepared, floor: float) -> Decays | None:
 def _whole_stretches(record: Record) -> list[Stretch]:
     """Each piece of a source that the stretches cover together, from the first to the last of them."""
     wholes: list[Stretch] = []
-    for stretch in sorted(record.stretches or (Stretch(record, 0, len(record)),), key=lambda s: (id(s.source), s.first)):
+    for stretch in sorted(
+        record.stretches or (Stretch(record, 0, len(record)),), key=lambda s: (id(s.source), s.first)
+    ):
         before = wholes[-1] if wholes else None
         if before is not None and before.source is stretch.source and stretch.first <= before.last + 1:
             wholes[-1] = replace(before, last=max(before.last, stretch.last))
@@ -109,7 +111,9 @@ def _analytic(values: Floats, dt: float, omega: float) -> np.ndarray:
     before, after = 2.0 * values[0] - values[edge:0:-1], 2.0 * values[-1] - values[-2 : -edge - 2 : -1]
     longer = np.concatenate([before, values, after])
     lines = fftfreq(len(longer), dt) * 2.0 * np.pi / omega
-    rise = np.clip((lines / BAND[0] - 0.5) / 0.5, 0.0, 1.0) * np.clip((1.25 * BAND[1] - lines) / (0.25 * BAND[1]), 0.0, 1.0)
+    rise = np.clip((lines / BAND[0] - 0.5) / 0.5, 0.0, 1.0) * np.clip(
+        (1.25 * BAND[1] - lines) / (0.25 * BAND[1]), 0.0, 1.0
+    )
     return np.asarray(ifft(2.0 * rise * fft(longer)))[edge : edge + n]
 
 

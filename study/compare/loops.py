@@ -1,5 +1,6 @@
 """The energy that a component takes out of each cycle of a prescribed motion: the area of its loops."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +28,7 @@ def loops(prediction: Prediction) -> Loops:
     above = u - np.mean(u) > 0.0
     crossings = np.flatnonzero(~above[:-1] & above[1:]) + 1
     largest, rows = float(np.ptp(u)), list[tuple[float, float, float]]()
-    for first, last in zip(crossings, crossings[1:], strict=False):
+    for first, last in itertools.pairwise(crossings):
         stroke = float(np.ptp(u[first : last + 1]))
         if stroke < SMALL * largest or any(first < joint <= last for joint in joints):
             continue

@@ -36,7 +36,7 @@ def with_known_mass(model: Model) -> Model:
     given = [s for s in symbols if model.values[s] is not None]
     expect(
         not given,
-        f"model {model.name!r} gives {', '.join(given)} and no mass, through which the base acts; expected the inertia as "
-        "well, such as {term: inertia, value: 5.3}, or none of them",
+        f"model {model.name!r} gives {', '.join(given)} and no mass, through which the base acts; expected the inertia "
+        "as well, such as {term: inertia, value: 5.3}, or none of them",
     )
     return model.with_values({"m": 1.0})

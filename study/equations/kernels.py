@@ -401,7 +401,9 @@ def integrate_segments(
 
 
 @compiled
-def _known_slopes(code: Ints, first: int, r: Floats, slots: Ints, time: float, drive: Floats, j: int, w: Floats) -> None:
+def _known_slopes(
+    code: Ints, first: int, r: Floats, slots: Ints, time: float, drive: Floats, j: int, w: Floats
+) -> None:
     """Registers along a known motion at the states ``w[1]``, and the derivatives of these into ``w[2]``."""
     channels = drive.shape[1] - 2
     r[0] = drive[j, 0]
@@ -435,7 +437,7 @@ def integrate_known(
     """A force along a known motion, with its exact derivatives; the terms' own states alone are integrated.
 
     ``drive`` has displacement, velocity and channels, 2 steps rows a sample. Row 0 of ``slots`` names the registers of
-    the force and of its derivatives by states and keys, the others those of the states' slopes. ``states`` has, for each
+    the force and of its derivatives by states and keys, the others those of the states' slopes. ``states`` has, of each
     segment between neighbouring ``bounds``, the states beside their sensitivities. Result as :func:`integrate_rk4`.
     """
     h = dt / steps

@@ -19,7 +19,6 @@ from study.records.prepared import FORCE, Prepared
 from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE
 
-
 NOT_ASKED = "faults of the measurement are looked for in a single stretch of a driven response alone"
 
 

@@ -72,5 +72,7 @@ def _converted(record: Record, motion: str, length: str) -> Floats:
     wanted = (length, f"{length}/s", f"{length}/s^2")[MOTIONS.index(motion)]
     with at(f"{record.name}: {channel}"):
         unit, target = parse_unit(text), parse_unit(wanted)
-        expect(unit.powers == target.powers, f"{text!r} is no unit of {motion}; expected {SI_UNITS[motion]} or the like")
+        expect(
+            unit.powers == target.powers, f"{text!r} is no unit of {motion}; expected {SI_UNITS[motion]} or the like"
+        )
     return record[channel] * (unit.factor / target.factor)

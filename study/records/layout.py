@@ -1,5 +1,6 @@
 """What kind of test a record is, and which parts of it are fitted and judged: the one place where that is decided."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -67,7 +68,9 @@ def laid_out(records: Sequence[Record], layout: Layout, *, prescribed: bool = Fa
     """
     response = _response(records[0], layout.response, prescribed)
     explicit = layout.fit is not None or layout.judge is not None
-    contradiction = "--use and --fit or --judge A:B exclude each other; expected '--judge every-other-block' beside --use"
+    contradiction = (
+        "--use and --fit or --judge A:B exclude each other; expected '--judge every-other-block' beside --use"
+    )
     expect(not (explicit and (layout.use or layout.alternate)), contradiction)
     readied = [with_prescribed_motion(r) if prescribed else (r, ()) for r in records]
     records = [r for r, _ in readied]
@@ -91,8 +94,8 @@ def laid_out(records: Sequence[Record], layout: Layout, *, prescribed: bool = Fa
     if drifts:
         fit, judge, horizon = _over_a_horizon(fit, judge, _seen(response))
         notes.append(
-            f"nothing in the model brings the mass back, so its motion drifts: it is fitted and judged over a horizon of "
-            f"{horizon:.3g} s, from {len(fit)} and {len(judge)} states of its own"
+            f"nothing in the model brings the mass back, so its motion drifts: it is fitted and judged over a horizon "
+            f"of {horizon:.3g} s, from {len(fit)} and {len(judge)} states of its own"
         )
     prepared = strung_together(fit, judge, response, completed, notes)
     measured = tuple(m for m in MOTIONS if m in records[0])
@@ -142,7 +145,7 @@ def _samples(record: Record, layout: Layout) -> list[Span]:
             )
         spans.append((first, last))
     ordered = sorted(spans)
-    for (_, end), (begin, _) in zip(ordered, ordered[1:], strict=False):
+    for (_, end), (begin, _) in itertools.pairwise(ordered):
         expect(end <= begin, f"{record.name}: two of the stretches to use overlap; expected each sample once")
     return ordered or [(0, len(record))]
 

@@ -5,6 +5,7 @@ the motion of a mass without a spring, several records of one structure: all are
 prepared record whose first part is fitted and whose second is judged. A free run begins anew at each of them.
 """
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -60,13 +61,13 @@ def _refuse_different(first: Record, other: Record) -> None:
         one, two = first.units.get(channel, ""), other.units.get(channel, "")
         expect(
             one == two,
-            f"{channel} is in {one} in {first.name} and in {two} in {other.name}; expected the same unit in records that "
-            "are judged together",
+            f"{channel} is in {one} in {first.name} and in {two} in {other.name}; expected the same unit in records "
+            "that are judged together",
         )
 
 
 def sure(completed: CompletedRecord, first: int, last: int) -> Stretch:
-    """A stretch of a completed record without the samples at its ends that derivatives and integrals leave uncertain."""
+    """A stretch of a completed record without the samples at its ends that derivatives leave uncertain."""
     edge = completed.edge
     low, high = max(first, edge), min(last, len(completed.record) - edge)
     expect(
@@ -144,7 +145,7 @@ def _period(values: Floats) -> float:
 def cut(stretch: Stretch, count: int) -> list[Stretch]:
     """A stretch in so many parts of about equal length."""
     bounds = np.linspace(stretch.first, stretch.last, count + 1).round().astype(int).tolist()
-    return [replace(stretch, first=a, last=b) for a, b in zip(bounds, bounds[1:], strict=False)]
+    return [replace(stretch, first=a, last=b) for a, b in itertools.pairwise(bounds)]
 
 
 def within_the_horizon(stretches: Sequence[Stretch], response: str) -> tuple[list[Stretch], float]:

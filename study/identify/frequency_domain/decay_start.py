@@ -1,4 +1,4 @@
-"""Starting values where no force acts: from the frequency and the decay of the motion; and where the motion is given."""
+"""Starting values where no force acts: from the frequency and the decay of the motion; and where it is given."""
 
 import numpy as np
 from scipy.fft import rfft, rfftfreq
@@ -92,7 +92,6 @@ def along_the_motion(model: Model, prepared: Prepared, wanted: list[str]) -> dic
     return dict.fromkeys(symbols, 0.0) | dict(
         zip(wanted, least_squares(shapes[:, columns], target, 1e-9).tolist(), strict=True)
     )
-
 
 
 def drift_start(model: Model, prepared: Prepared) -> dict[str, float]:

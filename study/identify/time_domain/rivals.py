@@ -60,7 +60,9 @@ def _followed(other: FreeRunFit, fit: FreeRunFit, covariance: Floats, prepared: 
     begun = _begun(other, fit)
     try:
         run = run_of(begun, prepared, begun.keys)
-        response, jacobian = run.respond(dict(zip(begun.keys, begun.values.tolist(), strict=True)), begun.initial, run.moving)
+        response, jacobian = run.respond(
+            dict(zip(begun.keys, begun.values.tolist(), strict=True)), begun.initial, run.moving
+        )
         residual = prepared.record[prepared.response][slice(*begun.span)] - response
         step = least_squares(jacobian, residual, 1e-12)
         here = fit.residual[begun.first - fit.first :][: len(residual)]
