@@ -41,7 +41,7 @@ def _run(arguments: argparse.Namespace) -> None:
 
     folder = out_folder(arguments)
     model = read_model(arguments.model)
-    own = own_candidates(arguments.candidate)
+    own = own_candidates(arguments.candidate, model)
     for name in arguments.without:
         terms.get(name)
     files: dict[str, bytes] = {}
@@ -65,24 +65,29 @@ def _diagnosed(
     from study.diagnose.confirmed_faults import confirmed
     from study.diagnose.diagnosis_files import files, in_words, unneeded_in_words
     from study.diagnose.needless import needless
+    from study.diagnose.user_candidates import check_on, unfitted
     from study.diagnose.verdict import diagnose
     from study.faults.fault import paragraph
 
     name = ", ".join(record.name for record in records)
     with progress(" candidates", name=name) as step:
         accounted = accounted_together(arguments, model, records, path)
+        check_on(accounted.comparison.record, own)
         without = tuple(arguments.without)
         diagnosis = diagnose(accounted.comparison, extra=own, without=without, progress=lambda _: step(""))
         unneeded = needless(accounted.comparison)
+        untried = unfitted(diagnosis, own)
         words, faults = in_words(diagnosis), confirmed(accounted.faults, diagnosis)
     print(f"{name}: {diagnosis.verdict.replace('_', ' ')}")
     print(diagnosis_report.table(diagnosis))
+    for effect, why in untried.items():
+        print(f"{effect} could not be fitted: {why}")
     print("\n" + words)
     if faults:
         print("\n" + paragraph(faults))
     if unneeded:
         print(f"\n{unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
-    return files(diagnosis, words, unneeded, faults)
+    return files(diagnosis, words, unneeded, faults, untried)
 
 
 COMMAND = Command(

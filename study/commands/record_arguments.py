@@ -3,10 +3,13 @@
 import argparse
 import math
 import re
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from study.commands.command import number, whole
+from study.support.errors import StudyError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,6 +27,7 @@ MOTIONS = ("displacement", "velocity", "acceleration")
 RESULTS = Path("results")
 ALTERNATE = "every-other-block"
 GIVEN = ("dt", "fs", "group", "period", "accept_saturated", "accept_swapped", "free")  # as ``ReadOptions`` calls them
+DIGITS = 10  # of the number of a column; more are a name
 Span = tuple[int, int | None]
 
 
@@ -122,7 +126,7 @@ def read_options(arguments: argparse.Namespace) -> "ReadOptions":
 
     columns = assignments(arguments.column, "--column")
     return ReadOptions(
-        {role: int(name) if name.isdecimal() else name for role, name in columns.items()},
+        {role: int(name) if name.isdecimal() and len(name) < DIGITS else name for role, name in columns.items()},
         assignments(arguments.unit, "--unit"),
         **{name: getattr(arguments, name) for name in GIVEN},
     )
@@ -164,11 +168,25 @@ def accounted_together(
     from study.faults.instrument_settings import NOTHING_ASKED, settings_beside
     from study.faults.kinds_of_tests import accounted_test
 
-    settings = NOTHING_ASKED if arguments.no_measurement else settings_beside(path)
-    return accounted_test(
-        records, model, layout_of(arguments, records[0]), absolute=arguments.absolute, held=settings.held,
-        switched_off=settings.switched_off, **options,
-    )  # fmt: skip
+    with naming(path, arguments.model):
+        settings = NOTHING_ASKED if arguments.no_measurement else settings_beside(path)
+        return accounted_test(
+            records, model, layout_of(arguments, records[0]), absolute=arguments.absolute, held=settings.held,
+            switched_off=settings.switched_off, **options,
+        )  # fmt: skip
+
+
+@contextmanager
+def naming(record: Path, model: Path) -> Generator[None, None, None]:
+    """Begin a sentence that names neither file with the one that it is about: a formula's with the model's."""
+    try:
+        yield
+    except StudyError as error:
+        said = str(error)
+        if str(record) in said or str(model) in said:
+            raise
+        of_model = any(word in said for word in ("formula", "expression", "the model holds"))
+        raise StudyError(f"{model if of_model else record}: {said}") from None
 
 
 def _within(given: Span | None, record: "Record") -> tuple[int, int] | None:
@@ -210,7 +228,7 @@ def written_together(
 
     results = {folder / "comparison.json": as_json(document(reached))}
     keep(inputs_of(arguments), results)
-    made(folder)
     model: Path = arguments.model
     changed = {model: text.encode(), history.path_of(model): history.as_bytes(steps)}
-    replace_together(model, changed, results)
+    with made(folder):
+        replace_together(model, changed, results)

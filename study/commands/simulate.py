@@ -11,14 +11,16 @@ MOST_SAMPLES = 10_000_000
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", type=Path, help="model file (YAML) with every value given")
     parser.add_argument(
-        "--level", type=number(least=0.0), default=1.0,
+        "--level", type=number(least=0.0, most=1e50), default=1.0,
         help="mean square of the white force in N^2, before its low-pass (default %(default)s)",
     )  # fmt: skip
-    parser.add_argument("--cutoff", type=number(above=0.0), default=12.5, help="low-pass in Hz (default %(default)s)")
+    parser.add_argument(
+        "--cutoff", type=number(least=1e-15, most=1e15), default=12.5, help="low-pass in Hz (default %(default)s)"
+    )
     parser.add_argument("--seed", type=whole(0, 2**63 - 1), default=1, help="the same seed gives the same bytes")
     parser.add_argument("--samples", type=whole(16, MOST_SAMPLES), default=8192, help="default %(default)s")
     parser.add_argument(
-        "--dt", type=number(above=0.0), default=0.02, help="sampling interval in s (default %(default)s)"
+        "--dt", type=number(least=1e-15, most=1e15), default=0.02, help="sampling interval in s (default %(default)s)"
     )
     parser.add_argument("--steps", type=whole(1, 10_000), default=8, help="steps per sample (default %(default)s)")
     parser.add_argument("--out", type=Path, default=Path("record.csv"), help="where to (default %(default)s)")

@@ -127,10 +127,11 @@ def history_step(comparison: Comparison, added: str | None = None, dropped: str 
 
     ``added`` names the term that is new in it, ``dropped`` the one that was taken out.
     """
+    force = comparison.force.total
     return {
         "terms": [t.name for t in comparison.model.terms], "added": added, "dropped": dropped,
         "record": comparison.record.name,
-        "error": {"force": comparison.force.total, "response": comparison.prediction.error},
+        "error": {"force": None if math.isnan(force) else force, "response": comparison.prediction.error},
         "rms": float(comparison.prediction.error * comparison.prediction.size),
         "unit": comparison.record.units.get(comparison.plan.response, ""),
         "noise_floor": {"response": comparison.prediction.floor},

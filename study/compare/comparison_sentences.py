@@ -20,6 +20,8 @@ SURE = 0.4  # standard error of a power, at most, for it to be called by a whole
 HARDLY = 0.6  # a power below this is a step that noise has rounded, or close to one
 HIGHEST = 5.9  # the powers that are tried end at six
 HOPELESS = 0.98  # of the rms response: an error with which a model predicts nothing
+WORSE = 1.1  # of the rms response: more than no motion at all would leave
+LEAST = ("inertia", "linear_damping", "linear_stiffness")
 NAMES = {0: "constant size", 2: "square", 3: "cube", 4: "fourth power", 5: "fifth power"}
 PARITY = {"odd": "odd in it", "even": "even in it"}
 
@@ -28,7 +30,7 @@ def says(comparison: Comparison) -> str:
     """What a user should know of one record, in two or three sentences."""
     sentences = [_how_good(comparison)]
     if comparison.prediction.error >= HOPELESS:
-        sentences.append("Mass, damping and stiffness are the least that a model needs")
+        sentences.append(_least(comparison))
     elif comparison.prediction.structure > NEGLIGIBLE:
         sentences.append(_where(comparison))
     if not comparison.fit.converged:
@@ -36,6 +38,16 @@ def says(comparison: Comparison) -> str:
             f"The fit did not arrive at a minimum ({comparison.fit.message}), so this may be the fit's fault"
         )
     return ". ".join(s[0].upper() + s[1:] for s in sentences) + "."
+
+
+def _least(comparison: Comparison) -> str:
+    """What to look for when a model predicts nothing."""
+    lacking = [name.replace("_", " ") for name in LEAST if name not in comparison.model]
+    if lacking:
+        return f"mass, damping and stiffness are the least that a model needs; it lacks {' and '.join(lacking)}"
+    held = ", ".join(comparison.model.held_keys)
+    doubt = f"the values that it holds ({held}), " if held else ""
+    return f"look at {doubt}the columns, their signs and units, and whether the force is all that drives the motion"
 
 
 def _plain(number: float) -> str:
@@ -47,8 +59,9 @@ def _how_good(comparison: Comparison) -> str:
     error, floor = percent(comparison.prediction.error), percent(comparison.prediction.floor)
     start = f"the model misses the response by {error} of its rms"
     if comparison.prediction.error >= HOPELESS:
+        like = "as one" if comparison.prediction.error < WORSE else "more than one"
         return (
-            f"{start}, as one without any motion would: it cannot follow this record, and its fitted coefficients "
+            f"{start}, {like} without any motion would: it cannot follow this record, and its fitted coefficients "
             "mean nothing"
         )
     if comparison.prediction.noise.alone:

@@ -5,6 +5,7 @@ Inputs are the shapes of the model's terms along the measured motion, the output
 (4.38); what the fitted coefficients leave is at least that. Noise on the motion is part of both.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -44,15 +45,18 @@ class ForceError:
     @property
     def highest(self) -> float:
         """Frequency in hertz above which the force has hardly any power: pictures end there."""
-        return float(self.frequency[np.flatnonzero(self.force > HEARD * float(np.max(self.force)))[-1]])
+        heard = np.flatnonzero(self.force > HEARD * float(np.max(self.force)))
+        return float(self.frequency[heard[-1] if len(heard) else -1])
 
     def _over_band(self, share: Floats) -> float:
         weight = self.force[self.band]
+        if not np.sum(weight) > 0.0:
+            return math.nan  # of no force there is no share
         return float(np.sum(share[self.band] * weight) / np.sum(weight))
 
     @property
     def total(self) -> float:
-        """Share of the force's power that is unexplained, over the band."""
+        """Share of the force's power that is unexplained, over the band; not a number where there is no force."""
         return self._over_band(self.unexplained)
 
     @property
@@ -63,7 +67,7 @@ class ForceError:
     @property
     def noise_total(self) -> float:
         """The share of noise alone, over the band; at most one."""
-        return min(self._over_band(self.noise), 1.0)
+        return float(np.minimum(self._over_band(self.noise), 1.0))
 
 
 def force_error(model: Model, prediction: Prediction) -> ForceError:
@@ -85,7 +89,7 @@ def force_error(model: Model, prediction: Prediction) -> ForceError:
     response = matrix.density[:, -2, -2].real
     result = conditioned.analyse(reverse)
     freedom = result.averages / (result.averages - len(inputs))
-    force = np.maximum(result.output, np.finfo(float).tiny)
+    force = np.where(result.output > 0.0, result.output, np.inf)
     density = np.interp(matrix.frequency, noise.frequency, noise.density)
     return ForceError(
         frequency=matrix.frequency,

@@ -114,9 +114,9 @@ def significant(left: Leftover, level: float) -> float:
 
 def _families(left: Leftover) -> dict[str, Gain]:
     families = {**left.shapes, "past": _passed(left, _states(left)), "time": _passed(left, _times(left))}
-    found = {name: statistics.gain(*_held_out(left, columns)) for name, columns in families.items()}
+    found = {name: _held_out(left, columns) for name, columns in families.items()}
     for name, x in (("displacement", left.displacement), ("velocity", left.velocity)):
-        detailed = statistics.gain(*_held_out(left, _passed(left, _hats(x))))
+        detailed = _held_out(left, _passed(left, _hats(x)))
         found[name] = max(found[name], detailed, key=lambda gain: gain.explained)
     return found
 
@@ -129,7 +129,8 @@ def _one_by_one(left: Leftover, columns: Floats) -> list[Gain]:
     early, late = freed[: left.split], freed[left.split :]
     power = np.sum(early[:, 1:] ** 2, axis=0)
     each = early[:, 1:].T @ early[:, 0] / np.where(power > 0.0, power, np.inf)
-    return [statistics.gain(left.residual[left.split :], late[:, 0] - a * late[:, i]) for i, a in enumerate(each, 1)]
+    before, beside_own = left.residual[left.split :], _beside_own(left)
+    return [statistics.beside(before, a * late[:, i], beside_own) for i, a in enumerate(each, 1)]
 
 
 def _formulas(u: float, v: float) -> dict[str, list[str]]:
@@ -199,9 +200,15 @@ def _passed(left: Leftover, shapes: Sequence[Floats]) -> Floats:
     return np.column_stack([irfft(transfer * rfft(s, size), size)[:n] for s in shapes])
 
 
-def _held_out(left: Leftover, columns: Floats) -> tuple[Floats, Floats]:
-    """The residual of the judging part before and after the amounts, beside the model's own, of the fitting part."""
+def _held_out(left: Leftover, columns: Floats) -> Gain:
+    """What amounts from the fitting part, beside the model's own, explain of the judging part."""
     design = np.hstack([left.own, columns])
-    amounts = least_squares(design[: left.split], left.residual[: left.split], 1e-6)
-    before = left.residual[left.split :]
-    return before, before - design[left.split :] @ amounts
+    early, late = design[: left.split], design[left.split :]
+    amounts = least_squares(early, left.residual[: left.split], 1e-6)
+    amounts[: left.own.shape[1]] -= least_squares(left.own[: left.split], left.residual[: left.split], 1e-6)
+    return statistics.beside(left.residual[left.split :], late @ amounts, _beside_own(left))
+
+
+def _beside_own(left: Leftover) -> Floats:
+    """Residual of the judging part beside what the model's own coefficients, fitted to both parts, take of it."""
+    return (left.residual - left.own @ least_squares(left.own, left.residual, 1e-6))[left.split :]

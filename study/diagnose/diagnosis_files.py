@@ -1,6 +1,6 @@
 """A diagnosis in words, and as the files that a command writes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from study.compare.comparison_report import as_json, where
 from study.diagnose import diagnosis_pages, diagnosis_report
@@ -26,16 +26,18 @@ def unneeded_in_words(found: Sequence[Needless], diagnosis: Diagnosis) -> str:
 
 
 def files(
-    diagnosis: Diagnosis, words: str, unneeded: Sequence[Needless] = (), faults: Sequence[Fault] = ()
+    diagnosis: Diagnosis, words: str, unneeded: Sequence[Needless] = (), faults: Sequence[Fault] = (),
+    unfitted: Mapping[str, str] | None = None,
 ) -> dict[str, bytes]:  # fmt: skip
     """``diagnosis.json`` and the pictures by file name; ``words`` is the diagnosis in words.
 
     ``unneeded`` are the terms of the model that it does not need, ``faults`` those of the measurement that the record
-    was corrected for, or may have.
+    was corrected for, or may have, ``unfitted`` by name why candidates of the user's could not be fitted.
     """
     comparison = diagnosis.comparison
     content = diagnosis_report.fields(diagnosis)
     content |= {"record": comparison.record.name, "where": where(comparison), "says": words}
     content["not_needed"] = fields(unneeded)
+    content["not_fitted"] = dict(unfitted or {})
     content |= {"measurement": [fault.fields(f) for f in faults]}
     return {"diagnosis.json": as_json(content)} | diagnosis_pages.files(diagnosis, comparison.record.name)

@@ -1,17 +1,63 @@
-"""Candidates that the user brings: formulas on the command line."""
+"""Candidates that the user brings: formulas on the command line, each of which is tried or refused with a reason."""
 
 from collections.abc import Sequence
 
-from study.equations.terms import Term, custom
-from study.support.errors import StudyError
+from study.diagnose.verdict import Diagnosis, search_base, search_part
+from study.equations.model import Model, free
+from study.equations.redundancy import repeated_force
+from study.equations.terms import LIBRARY, Term, custom
+from study.identify.frequency_domain.inputs import history, reverse_inputs
+from study.identify.time_domain.fit_model import with_term
+from study.records.record import Record
+from study.support.errors import StudyError, expect
 
 
-def own_candidates(given: Sequence[str]) -> list[Term]:
-    """``NAME=FORMULA`` as terms; a ``StudyError`` if one is not of this form, or its formula is refused."""
+def own_candidates(given: Sequence[str], model: Model) -> list[Term]:
+    """``NAME=FORMULA`` as terms.
+
+    Raises
+    ------
+    StudyError
+        If one is not of this form, its formula is refused, its name is taken, or the model has its force already.
+    """
     terms: list[Term] = []
     for text in given:
         name, sign, formula = text.partition("=")
-        if not sign:
-            raise StudyError(f"{text!r} is no candidate; expected NAME=FORMULA such as 'bracket=u*abs(u)'")
-        terms.append(custom(name.strip(), formula.strip()))
+        expect(sign, f"{text!r} is no candidate; expected NAME=FORMULA such as 'bracket=u*abs(u)'")
+        term = custom(name.strip(), formula.strip())
+        expect(term.name not in model, f"--candidate {text}: the model has a term {term.name!r}; expected another name")
+        taken = any(term.name == other.name for other in terms)
+        expect(not taken, f"--candidate {text}: two candidates are called {term.name!r}; expected a name for each")
+        fault = repeated_force(model.with_term(term))
+        expect(fault is None, f"--candidate {text}: {fault}")
+        terms.append(term)
     return terms
+
+
+def check_on(record: Record, terms: Sequence[Term]) -> None:
+    """Refuse a formula that names what the record lacks, or has no finite value somewhere along it.
+
+    The record holds all three motions.
+    """
+    for term in terms:
+        formula = term.components[0].shape
+        try:
+            for item in reverse_inputs(Model("own", (free(LIBRARY["inertia"]), free(term)))):
+                if term.name in item.terms:
+                    history(item, record)
+        except StudyError as error:
+            raise StudyError(f"--candidate {term.name}={formula}: {error}; expected one that can be tried") from None
+
+
+def unfitted(diagnosis: Diagnosis, terms: Sequence[Term]) -> dict[str, str]:
+    """By name why a candidate of the user's is not in a diagnosis; empty where all are."""
+    ranked = {row.name for row in diagnosis.candidates}
+    prepared, found = diagnosis.comparison.prepared, dict[str, str]()
+    for term in (t for t in terms if t.name not in ranked):
+        base = search_base(diagnosis.comparison)
+        try:
+            with_term(base.fit, free(term), base, search_part(prepared))
+            found[term.name] = "fitted, its free run does not stay finite on the part that is judged"
+        except StudyError as error:
+            found[term.name] = str(error)
+    return found

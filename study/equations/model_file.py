@@ -33,6 +33,7 @@ from study.support.yaml_text import as_list, as_mapping, scalar, shown
 
 MOST_TERMS = 200
 LONGEST_NAME = 100
+SMALLEST, LARGEST = 1e-50, 1e50  # of a value: no unit makes one beyond, and the square of one beyond may be no number
 WANTED = "a YAML file with 'name' and 'terms', such as models/duffing.yaml"
 
 
@@ -220,7 +221,10 @@ def entry_from(item: Mapping[object, object]) -> ModelTerm:
     for parameter, value in zip(term.parameters, parameters, strict=True):
         if value is not None and value <= 0.0 and not parameter.signed:
             raise StudyError(f"{parameter.name} of {name} is {value:g}; expected a {parameter.meaning} above zero")
-    return ModelTerm(term, _coefficients(term, item), tuple(parameters))
+    coefficients = _coefficients(term, item)
+    if name == "inertia" and coefficients[0] is not None and coefficients[0] <= 0.0:
+        raise StudyError(f"value of {name} is {coefficients[0]:g}; expected a mass above zero")
+    return ModelTerm(term, coefficients, tuple(parameters))
 
 
 def _keys(term: Term) -> tuple[str, ...]:
@@ -268,17 +272,18 @@ def _by_symbol(term: Term, values: object) -> tuple[float | None, ...]:
 
 
 def _number(item: Mapping[object, object], key: str, owner: str) -> float | None:
-    """A finite number, or None if the key is left out."""
+    """A finite number of usual size, or None if the key is left out."""
     if key not in item:
         return None
     value = item[key]
     if isinstance(value, int | float) and not isinstance(value, bool):
         with suppress(OverflowError):
-            if math.isfinite(float(value)):
+            if value == 0 or SMALLEST <= abs(float(value)) <= LARGEST:
                 return float(value)
     if value is None:
         raise StudyError(f"{key} of {owner} is empty; give a number, or leave the key out to have it estimated")
-    raise StudyError(f"{key} of {owner} is {shown(value)}; expected a finite number such as 355.3 or 2.0e7")
+    like = f"such as 355.3 or 2.0e7 (0, or {SMALLEST:g} to {LARGEST:g} in size)"
+    raise StudyError(f"{key} of {owner} is {shown(value)}; expected a finite number {like}")
 
 
 def _refuse_unknown(item: Mapping[object, object], allowed: Sequence[str], owner: str) -> None:

@@ -17,6 +17,7 @@ from study.explore.session import Session
 from study.support.errors import StudyError
 from study.support.file_sets import write_files
 
+VALUES = "values"  # how to save a model: with what was fitted
 SETTLE = 0.4  # seconds in which pages are drawn, before a diagnosis takes the processors
 
 
@@ -115,9 +116,13 @@ class Desk:
         self._tell(session, accepted=text)
         self._behind.submit(self._examine, session.own)
 
-    def _save(self, _: str) -> None:
-        write_files(self.folder, files(self.session, self.model.name, self.text), self.inputs)
-        self._tell(notice=f"Saved in {self.folder}: {self.model.name}, {PAGE}, pictures and tables")
+    def _save(self, how: str) -> None:
+        contents = files(self.session, self.model.name, self.text, values=how == VALUES)
+        write_files(self.folder, contents, self.inputs)
+        with_them = "with" if how == VALUES else "without"
+        self._tell(
+            notice=f"Saved in {self.folder}: {self.model.name} {with_them} fitted values, {PAGE}, pictures and tables"
+        )
 
     def _examine(self, own: object = None) -> None:
         self._rest.wait(SETTLE)

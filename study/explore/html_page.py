@@ -1,5 +1,6 @@
 """The page: sources, panels and template put together, for a live document and for a saved one alike."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -7,11 +8,11 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from bokeh.models import ColumnDataSource, CustomJS
+from bokeh.models import BasicTicker, ColumnDataSource, CustomJS, FixedTicker
 from jinja2 import Environment, Template
 
 from study.compare.history import label
-from study.explore import plots, theme, words
+from study.explore import check_plots, plots, theme, words
 from study.explore.axis_scales import Columns
 from study.explore.page_units import in_text
 from study.explore.session import Session
@@ -27,6 +28,12 @@ KINDS = {
     "response": "time", "difference": "time", "force": "band", "coherence": "band", "spectrum": "band",
     "against_u": "u", "against_v": "v",
 }  # fmt: skip
+CLOSE, SHORT, LONG, TICKS = (
+    0.5,
+    1.4,
+    2.6,
+    5.0,
+)  # decades of an axis with many, three or two ticks in each; ticks of one longer
 SELECTED = "if (cb_obj.final) window.study.selected(kind, cb_obj.geometry.x0, cb_obj.geometry.x1)"
 
 
@@ -62,13 +69,17 @@ def build(seen: View, history: Columns, stores: Sequence[ColumnDataSource] = ())
         "spectrum": plots.spectrum(sources, frequency), "plane": plots.plane(sources),
         "against_u": plots.against(sources, "u"), "against_v": plots.against(sources, "v"),
         "history": plots.history(sources, history["name"], history_height(len(history["name"]))),
-        "constancy": plots.constancy(sources),
+        "constancy": plots.constancy(sources), **check_plots.panels(sources, frequency),
     }  # fmt: skip
     for name, kind in KINDS.items():
         panels[name].js_on_event("selectiongeometry", CustomJS(args={"kind": kind}, code=SELECTED))
         panels[name].js_on_event("reset", CustomJS(code="window.study.clear()"))
     # What no panel draws has to hang on one all the same, to be part of the document.
-    panels["response"].tags = [*sources.values(), *stores]
+    tickers = [
+        BasicTicker(name="frequency_even", desired_num_ticks=4),
+        FixedTicker(name="frequency_decades", ticks=[], minor_ticks=[]),
+    ]
+    panels["response"].tags = [*sources.values(), *stores, *tickers]
     return Page(sources, panels)
 
 
@@ -79,7 +90,7 @@ def placed(made: Page, diagnosed: bool) -> list[Any]:
 
 def history_height(steps: int) -> int:
     """Height of the history in pixels."""
-    return 84 + 27 * max(steps, 2)
+    return 104 + 27 * max(steps, 2)
 
 
 def history_columns(session: Session) -> Columns:
@@ -106,7 +117,7 @@ def frame(seen: View) -> Columns:
     labels = {
         "response": f"{seen.quantity} / {y}", "close": f"{seen.quantity} / {y}", "difference": f"difference / {d}",
         "spectrum": f"density / ({d}/√Hz)", "plane": f"velocity / {v}", "against_u": f"missing force / {f}",
-        "against_v": f"missing force / {f}",
+        "against_v": f"missing force / {f}", "frf": f"response over force / ({y}/{seen.force_unit})",
     }  # fmt: skip
     motions = {"plane": f"displacement / {u}", "against_u": f"displacement / {u}", "against_v": f"velocity / {v}"}
     rows: list[tuple[str, str, Any]] = [
@@ -114,8 +125,31 @@ def frame(seen: View) -> Columns:
         *((f"{name}_x", "axis_label", label) for name, label in motions.items()),
         ("mapper", "low", -largest), ("mapper", "high", largest), ("range_frequency", "end", seen.highest),
         ("range_force", "start", seen.limits[0]), ("range_force", "end", seen.limits[1]),
+        ("frequency_decades", "ticks", log_ticks(seen.highest / 300.0, seen.highest)),
+        *((f"{name}_ticks", "ticks", log_ticks(*ends)) for name, ends in _log_axes(seen).items()),
     ]  # fmt: skip
     return dict(zip(("model", "property", "value"), map(list, zip(*rows, strict=True)), strict=True))
+
+
+def _log_axes(seen: View) -> dict[str, tuple[float, float]]:
+    """Ends of the logarithmic axes of y, by the panel."""
+    shown = {"force": seen.limits}
+    for panel, names in (("spectrum", ("difference", "noise")), ("frf", ("measured", "predicted"))):
+        values = np.concatenate([np.asarray(seen.columns[panel][name], dtype=np.float64) for name in names])
+        values = values[np.isfinite(values) & (values > 0.0)]
+        shown[panel] = (float(np.min(values)), float(np.max(values))) if len(values) else (1.0, 1.0)
+    return shown
+
+
+def log_ticks(low: float, high: float) -> list[float]:
+    """Ticks of a logarithmic axis that do not collide: 1, 2, 5 of a decade, 1 and 3, or decades alone."""
+    reach = math.log10(high / low)
+    fine = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0)
+    rough = (1.0, 2.0, 5.0) if reach < SHORT else (1.0, 3.0) if reach < LONG else (1.0,)
+    mantissas = fine if reach < CLOSE else rough
+    every = max(1, math.ceil(reach / TICKS))
+    first, last = math.floor(math.log10(low)) - 1, math.ceil(math.log10(high)) + 1
+    return [m * 10.0**power for power in range(first, last + 1) if power % every == 0 for m in mantissas]
 
 
 @cache

@@ -52,18 +52,19 @@ window.study = (() => {
   const entry = (name, label, on) => { const item = model(`panel_${name}_${label}`); if (item) item.visible = on }
 
   function constancy(i) {
-    const rows = column("constancy", "row"), shown = {f: [], value: [], low: [], high: []}
+    const element = document.querySelector(`[data-candidate="${i}"]`)
+    const rows = element ? column("constancy", "row") : [], shown = {f: [], value: [], low: [], high: []}
     for (let k = 0; k < rows.length; k++)
       if (rows[k] === i) for (const key in shown) shown[key].push(column("constancy", key)[k])
     const none = [NaN, NaN]  // two points without a value: an axis needs some
     put("shown", shown.f.length ? {...shown, zero: shown.f.map(() => 0)} : {f: [0, 1], value: none, low: none, high: none, zero: [0, 0]})
-    const element = document.querySelector(`[data-candidate="${i}"]`)
     if (element) model("constancy_y").axis_label = element.dataset.label
     const title = place("constancy-of")
-    if (title) title.textContent = element ? element.querySelector(".name b").textContent : ""
-    const card = place("constancy-card"), empty = place("constancy-none")
-    if (card) card.hidden = !element
+    if (title) title.textContent = element ? element.querySelector(".name b").textContent : "no candidate"
+    const card = place("constancy-card"), empty = place("constancy-none"), detail = place("detail")
+    if (card) card.classList.toggle("none", !shown.f.length)
     if (empty) empty.hidden = !element || shown.f.length > 0
+    if (detail) detail.innerHTML = element ? element.querySelector("small").innerHTML : ""
     for (const row of document.querySelectorAll("[data-candidate]")) row.classList.toggle("shown", row === element)
   }
 
@@ -186,10 +187,71 @@ window.study = (() => {
       button.classList.toggle("now", button.dataset.name === String(k))
   }
 
+  // ---- axes of frequency, linear or logarithmic
+  function logarithm(button) {
+    const on = button.getAttribute("aria-pressed") !== "true", range = model("range_frequency")
+    button.setAttribute("aria-pressed", String(on))
+    const first = column("force", "f")[0]
+    range.start = on ? first : 0
+    for (const name of ["force", "coherence", "spectrum", "frf", "phase", "linearity"]) {
+      const figure = model(`panel_${name}`)
+      figure.x_scale = new (Bokeh.Models.get(on ? "LogScale" : "LinearScale"))()
+      model(`${name}_x`).ticker = on ? model("frequency_decades") : model("frequency_even")
+    }
+  }
+
+  // ---- the numbers of a panel as a file
+  const DRAWN = {
+    history: ["history"], response: ["time"], close: ["close"], force: ["force"], coherence: ["coherence"],
+    spectrum: ["spectrum"], plane: ["plane"], against_u: ["against_u"], against_v: ["against_v"], frf: ["frf"],
+    phase: ["frf"], linearity: ["frf"], autocorrelation: ["autocorrelation"], with_force: ["with_force"],
+    histogram: ["histogram"], constancy: ["shown"],
+  }
+
+  function table(name) {
+    const data = model(name).data, keys = Object.keys(data), rows = []
+    const cells = (value) => value != null && typeof value !== "string" && value.length !== undefined ? Array.from(value).join(" ") : value
+    for (let i = 0; i < model(name).get_length(); i++) rows.push(keys.map((key) => `"${String(cells(data[key][i])).replace(/"/g, '""')}"`.replace(/^"(-?[0-9.e+-]+)"$/, "$1")))
+    return [keys, ...rows].map((row) => row.join(",")).join("\n") + "\n"
+  }
+
+  function exported(panel) {
+    const units = [`${panel}_x`, `${panel}_y`].map((name) => model(name)?.axis_label).filter(Boolean).join("; ")
+    const link = document.createElement("a")
+    link.href = URL.createObjectURL(new Blob([`# ${units}\n`, ...DRAWN[panel].map(table)], {type: "text/csv"}))
+    link.download = `${document.title.replace(/[^\w]+/g, "_")}_${panel}.csv`
+    link.click()
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000)
+  }
+
+  function buttons() {
+    for (const shown of document.querySelectorAll("[data-panel]")) {
+      const panel = shown.dataset.panel, near = [shown.closest(".panel"), shown.closest(".card")]
+      const heading = near.map((place) => place?.querySelector(":scope > h2")).find(Boolean)
+      if (!heading || heading.querySelector(`[data-name=${panel}]`) || !DRAWN[panel]) continue
+      const button = document.createElement("button"), label = heading.querySelector(".csv") ? "CSV of the close-up" : "CSV"
+      Object.assign(button, {className: "csv", textContent: label, title: "the numbers of this panel as a file"})
+      Object.assign(button.dataset, {act: "csv", name: panel})
+      if (!heading.querySelector(".csvs")) heading.append(Object.assign(document.createElement("span"), {className: "csvs"}))
+      heading.querySelector(".csvs").append(button)
+    }
+  }
+
+  // Tools of the panels are for the mouse: the Tab key goes from one action to the next.
+  function untabbed(root) {
+    for (const element of root.querySelectorAll("*")) {
+      if (element.tabIndex >= 0) element.tabIndex = -1
+      if (element.shadowRoot) untabbed(element.shadowRoot)
+    }
+  }
+
   // ---- what is clicked goes to Python
   let count = 0
   function act(action, name) {
     if (action === "step") return step(Number(name))
+    if (action === "csv") return exported(name)
+    if (action === "logarithm") return logarithm(document.querySelector("[data-act=logarithm]"))
+    if (action === "save") name = place("with-values").checked ? "values" : "open"
     if (document.body.classList.contains("busy") && action !== "try") return
     put("asked", {act: [action], name: [String(name)], count: [++count]})
   }
@@ -234,6 +296,9 @@ window.study = (() => {
   const begin = () => {
     words()
     if (model("state")) { state(); put("asked", {act: ["hello"], name: [""], count: [++count]}) }
+    buttons()
+    for (const shown of document.querySelectorAll("[data-panel]")) untabbed(shown)
+    setTimeout(() => { for (const shown of document.querySelectorAll("[data-panel]")) untabbed(shown) }, 1500)
     window.study.ready = true
   }
   return {words, state, selected, clear, step, begin, ready: false}

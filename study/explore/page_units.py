@@ -4,8 +4,11 @@ import re
 from dataclasses import dataclass
 
 from study.figures import labels
+from study.support.errors import StudyError
+from study.support.units import FORCE, LENGTH, role_unit
 
 EASY = (0.1, 1e4)  # largest numbers of an axis that are read without a power of ten
+EXPONENT = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e([+-]?\d+)")
 RAISED = str.maketrans("0123456789-/.", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻ᐟ·")
 
 
@@ -41,7 +44,29 @@ def number(value: float, digits: int = 4) -> str:
     """A number as people write it: ``4.897·10⁵`` instead of ``4.897e+05``."""
     text = f"{value:.{digits}g}"
     mantissa, sign, exponent = text.partition("e")
+    if sign and 0 < int(exponent) < 5:  # 200, not 2·10²: rounded as the digits say
+        return f"{float(text):.0f}"
     return f"{mantissa}·10{str(int(exponent)).translate(RAISED)}" if sign else text
+
+
+def in_sentence(text: str) -> str:
+    """A sentence of the command line in the page's format: powers raised, ``±`` for ``+-``, no exponents."""
+    plain = re.sub(EXPONENT, lambda m: f"{m[1]}·10{str(int(m[2])).translate(RAISED)}", text)
+    return re.sub(r"\^(-?[0-9]+)", lambda m: m[1].translate(RAISED), plain.replace("+-", "±"))
+
+
+def mass(unit: str) -> Scale:
+    """Divisor of a coefficient of inertia and the unit that it is shown in: kilograms, also for ``kN s^2/mm``."""
+    wanted = re.fullmatch(r"(\S+) s\^2/(\S+)", unit)
+    if wanted is None:
+        return Scale(1.0, unit)
+    try:
+        force, length = role_unit("force", wanted[1]), role_unit("displacement", wanted[2])
+    except StudyError:  # counts
+        return Scale(1.0, unit)
+    if (force.powers, length.powers) != (FORCE, LENGTH):  # volts
+        return Scale(1.0, unit)
+    return Scale(length.factor / force.factor, "kg")
 
 
 def in_text(text: str) -> str:

@@ -13,7 +13,7 @@ Sources = Mapping[str, ColumnDataSource]
 
 def response(s: Sources, time: Any) -> Any:
     """Measured and predicted response."""
-    drawn = theme.panel("response", 150, "", "response", select=True, ranges=(time, None))
+    drawn = theme.panel("response", 170, "", "response", select=True, ranges=(time, None))
     drawn.xaxis.visible = False
     _blocks(drawn, s)
     measured = drawn.line("t", "measured", source=s["time"], **theme.MEASURED)
@@ -26,7 +26,7 @@ def response(s: Sources, time: Any) -> Any:
 
 def difference(s: Sources, time: Any) -> Any:
     """What the model misses, the noise, and what a candidate would leave."""
-    drawn = theme.panel("difference", 158, "time / s", "difference", select=True, ranges=(time, None))
+    drawn = theme.panel("difference", 178, "time / s", "difference", select=True, ranges=(time, None))
     _blocks(drawn, s)
     line = drawn.line("t", "difference", source=s["time"], **theme.DIFFERENCE)
     would = drawn.line("t", "y", source=s["ghost_time"], **theme.WOULD)
@@ -39,7 +39,7 @@ def difference(s: Sources, time: Any) -> Any:
 
 def close(s: Sources) -> Any:
     """The same where the model misses most, or where a stretch was selected."""
-    drawn = theme.panel("close", 308, "time / s", "response", narrow=True)
+    drawn = theme.panel("close", 348, "time / s", "response", narrow=True)
     measured = drawn.line("t", "measured", source=s["close"], **theme.MEASURED | {"line_width": 3.4})
     predicted = drawn.line("t", "predicted", source=s["close"], **theme.PREDICTED | {"line_width": 1.5})
     theme.legend(drawn, [("measured", [measured]), ("free run", [predicted])])
@@ -55,7 +55,7 @@ def _blocks(drawn: Any, s: Sources) -> None:
 def force(s: Sources, frequency: Any, share: Any) -> Any:
     """Unexplained share of the force with the noise floor."""
     drawn = theme.panel(
-        "force", 222, "frequency / Hz", "unexplained share / %", select=True, ranges=(frequency, share),
+        "force", 240, "frequency / Hz", "unexplained share / %", select=True, ranges=(frequency, share),
         narrow=True, y_axis_type="log",
     )  # fmt: skip
     left = drawn.line("f", "parametric", source=s["force"], line_color=theme.BLUE, line_width=1.6)
@@ -69,10 +69,10 @@ def force(s: Sources, frequency: Any, share: Any) -> Any:
 def coherence(s: Sources, frequency: Any) -> Any:
     """Cumulative coherence: what the inputs explain, one after the other."""
     ranges = (frequency, theme.fixed("range_coherence", 0.0, 1.03))
-    drawn = theme.panel("coherence", 222, "frequency / Hz", "cumulative coherence / 1", select=True, ranges=ranges,
+    drawn = theme.panel("coherence", 240, "frequency / Hz", "cumulative coherence / 1", select=True, ranges=ranges,
                         narrow=True)  # fmt: skip
     lines = drawn.multi_line("f", "share", source=s["coherence"], line_color="colour", line_dash="dash", line_width=1.5)
-    theme.legend(drawn, [({"field": "name"}, [lines])], "bottom_left")
+    theme.legend(drawn, [({"field": "name"}, [lines])])
     theme.chosen(drawn, "box_coherence")
     return drawn
 
@@ -80,7 +80,7 @@ def coherence(s: Sources, frequency: Any) -> Any:
 def spectrum(s: Sources, frequency: Any) -> Any:
     """The difference of the response by frequency, the noise, what is selected and what a candidate would leave."""
     drawn = theme.panel(
-        "spectrum", 222, "frequency / Hz", "difference", select=True, ranges=(frequency, None),
+        "spectrum", 240, "frequency / Hz", "difference", select=True, ranges=(frequency, None),
         narrow=True, y_axis_type="log",
     )  # fmt: skip
     line = drawn.line("f", "difference", source=s["spectrum"], line_color=theme.ORANGE, line_width=1.5)
@@ -95,7 +95,7 @@ def spectrum(s: Sources, frequency: Any) -> Any:
 
 def plane(s: Sources) -> Any:
     """The missing force over displacement and velocity; negative cells bear a dash, dots may be noise."""
-    drawn = theme.panel("plane", 250, "displacement", "velocity", narrow=True)
+    drawn = theme.panel("plane", 268, "displacement", "velocity", narrow=True)
     drawn.xaxis[0].ticker.desired_num_ticks = 3  # beside the colour bar there is little room
     mapper = LinearColorMapper(palette=RdBu11, low=-1.0, high=1.0, name="mapper", nan_color="rgba(0,0,0,0)")
     cells = drawn.quad(
@@ -126,7 +126,7 @@ def plane(s: Sources) -> Any:
 def against(s: Sources, of: str) -> Any:
     """Mean missing force against displacement (u) or velocity (v) with 95 % intervals."""
     name = f"against_{of}"
-    drawn = theme.panel(name, 250, of, "missing force", select=True, narrow=True)
+    drawn = theme.panel(name, 268, of, "missing force", select=True, narrow=True)
     drawn.add_layout(Span(location=0.0, dimension="width", line_color=theme.AXIS, line_width=1.0))
     mean = drawn.line("at", "mean", source=s[name], line_color=theme.BLUE, line_width=1.4)
     dots = drawn.scatter("at", "mean", source=s[name], fill_color=theme.BLUE, line_color=None, size=4.5)
@@ -142,7 +142,7 @@ def against(s: Sources, of: str) -> Any:
 
 def constancy(s: Sources) -> Any:
     """A_j(f): the coefficient of one candidate along frequency; that of a true term is a constant."""
-    drawn = theme.panel("constancy", 150, "frequency / Hz", "coefficient", ranges=(None, None))
+    drawn = theme.panel("constancy", 162, "frequency / Hz", "coefficient", ranges=(None, None))
     drawn.x_range.range_padding = 0.05
     line = drawn.line("f", "value", source=s["shown"], line_color=theme.BLUE, line_width=1.3)
     drawn.scatter("f", "value", source=s["shown"], fill_color=theme.BLUE, line_color=None, size=5)

@@ -3,7 +3,16 @@
 from collections.abc import Sequence
 from typing import Any
 
-from bokeh.models import BoxAnnotation, DataRange1d, Legend, LegendItem, Range1d, Title
+from bokeh.models import (
+    BoxAnnotation,
+    CustomJSTickFormatter,
+    DataRange1d,
+    FixedTicker,
+    Legend,
+    LegendItem,
+    Range1d,
+    Title,
+)
 from bokeh.models.tools import BoxSelectTool, PanTool, ResetTool, SaveTool, WheelZoomTool
 from bokeh.plotting import figure
 
@@ -17,6 +26,12 @@ NOISE: dict[str, Any] = {"line_color": "#000000", "line_width": 1.3, "line_dash"
 WOULD: dict[str, Any] = {"line_color": "#111111", "line_width": 1.3}
 PICKED: dict[str, Any] = {"line_color": "#7a1fa2", "line_width": 2.0, "line_dash": "dashed"}
 BAND = "#f5c04a"
+POWERS = """
+const power = Math.floor(Math.log10(tick) + 1e-9), mantissa = Number((tick / 10 ** power).toPrecision(2))
+if (power >= -2 && power <= 3) return String(Number(tick.toPrecision(3)))
+const raised = String(power).replace(/./g, (c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻")
+return (mantissa === 1 ? "10" : mantissa + "·10") + raised
+"""
 PASSING = ("candidate", "selected")  # entries of legends
 
 
@@ -37,7 +52,7 @@ def panel(
         name=f"panel_{name}", height=height, sizing_mode="stretch_width", min_width=140, tools=tools,
         x_axis_label=x, y_axis_label=y, x_range=ranges[0] or DataRange1d(range_padding=0.0),
         y_range=ranges[1] or DataRange1d(range_padding=0.06),
-        active_drag=tools[0] if select else None, active_scroll=None, toolbar_location="right", toolbar_inner=True,
+        active_drag=tools[0] if select else None, active_scroll=None, toolbar_location="above", toolbar_inner=False,
         min_border_right=8, outline_line_color=None, background_fill_color=None, border_fill_color=None, **more,
     )  # fmt: skip
     drawn.toolbar.autohide = True
@@ -48,8 +63,8 @@ def panel(
         ticker: Any = drawn.xaxis[0].ticker
         ticker.desired_num_ticks = 4
     if more.get("y_axis_type") == "log":
-        rough: Any = drawn.yaxis[0].ticker
-        rough.mantissas = [1, 3]
+        drawn.yaxis[0].ticker = FixedTicker(name=f"{name}_ticks", ticks=[], minor_ticks=[])
+        drawn.yaxis[0].formatter = CustomJSTickFormatter(code=POWERS)
     for grid in drawn.grid:
         grid.grid_line_color = RULE
     return drawn
@@ -79,7 +94,7 @@ def legend(drawn: Any, items: Sequence[tuple[Any, list[Any]]], place: Any = "abo
     words.padding = 0
     if place == "above":
         words.location = (-34, 0)
-        drawn.add_layout(Title(text=" ", text_font_size="6px", standoff=0), "above")  # room for the topmost tick label
+        drawn.add_layout(Title(text=" ", text_font_size="6px", standoff=0), "above")  # the row of the tools
         drawn.add_layout(words, "above")
     else:
         words.location = place

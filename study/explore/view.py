@@ -11,7 +11,7 @@ from study.compare.comparison import Comparison
 from study.compare.force_map import CELLS, curve, surface
 from study.compare.links import links
 from study.diagnose.ranked import Ranked
-from study.explore import decimate, preview, words
+from study.explore import check_columns, decimate, preview, words
 from study.explore.axis_scales import Columns, Floats, Scales, heard, least_force, scales_of, within
 from study.explore.page_units import Scale, in_text
 from study.explore.session import Stage
@@ -34,6 +34,7 @@ class View:
     quantity: str  # the measured motion
     limits: tuple[float, float]  # of the axis of the force
     least: float  # missing force, in the unit of its axis, below which nothing is to be seen
+    force_unit: str  # of the record, as text
 
 
 def view(stage: Stage, step: int, live: bool = True) -> View:
@@ -53,12 +54,14 @@ def view(stage: Stage, step: int, live: bool = True) -> View:
         "against_v": _against(v, missing, scales.velocity, force, least),
         "constancy": _constancy(rows),
         **preview.columns(stage, scales),
+        **check_columns.columns(comparison, scales),
         **_links(comparison, scales),
         "words": words.words(stage, rows, step, live, force.unit),
     }
     small = {name: _small(c) for name, c in columns.items()}
     limits, highest = force_limits(comparison), comparison.force.highest
-    return View(small, scales, highest, comparison.plan.response, limits, least / force.factor)
+    unit = in_text(comparison.record.units.get("force", ""))
+    return View(small, scales, highest, comparison.plan.response, limits, least / force.factor, unit)
 
 
 def _small(columns: Columns) -> Columns:

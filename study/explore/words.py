@@ -1,5 +1,6 @@
 """The words of a page as fragments of HTML, by the name of their place; whatever a user typed is escaped."""
 
+import math
 from collections.abc import Sequence
 from html import escape
 from typing import Any
@@ -7,13 +8,16 @@ from typing import Any
 from study.compare.comparison import Comparison
 from study.compare.comparison_sentences import says
 from study.compare.fitted_coefficients import Coefficient
+from study.compare.modal import modal
 from study.diagnose.needless import Needless
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, NOTHING
-from study.explore.page_units import in_text, length, number, rate
+from study.equations.terms import LIBRARY
+from study.explore.page_units import Scale, in_sentence, in_text, length, mass, number, rate
 from study.explore.session import Stage
 from study.figures.labels import power_of_ten, term_names
 from study.support.numbers import percent
+from study.support.thresholds import ALPHA
 
 VERDICTS = {MISSING: "An effect is missing", NOTHING: "Nothing is missing"}
 UNKNOWN = "Something is missing that no candidate explains"
@@ -21,7 +25,10 @@ WAITING = "Candidates are being tried …"
 NOT_ASKED = (
     "Not asked for here: <code>study diagnose</code> or <code>study explore</code> tells which effect is missing."
 )
-TIES = 2  # that a row names
+PREDICTED = "The model runs free under the measured force, on the part of the record that it was not fitted to."
+FLOOR = "From the quietest bands of what is left, or from what differs between periods."
+FORCE = "The model in reverse: what its terms, computed from the measured motion, leave of the measured force."
+ONLY_NOISE = "What is left is noise: the panels below have nothing to show."
 
 
 def words(stage: Stage, rows: Sequence[Ranked], step: int, live: bool, force_unit: str) -> dict[str, Any]:
@@ -29,12 +36,14 @@ def words(stage: Stage, rows: Sequence[Ranked], step: int, live: bool, force_uni
     comparison = stage.comparison
     fragments = {
         "figures": _figures(comparison),
-        "says": escape(says(comparison)),
+        "says": escape(in_sentence(says(comparison))),
         "verdict": _verdict(stage, live),
         "candidates": _candidates(stage, rows, live),
         "coefficients": _coefficients(stage, live),
         "equation": equation(stage),
-        "notes": escape("; ".join(comparison.notes)),
+        "equation-values": equation(stage, values=True),
+        "notes": escape(in_sentence("; ".join(comparison.notes))),
+        "only-noise": ONLY_NOISE if comparison.prediction.noise.alone else "",
         "step": escape(name(stage, step)),
         "force-unit": escape(in_text(force_unit)),
     }
@@ -51,11 +60,14 @@ def in_words(label: str) -> str:
     return term_names(label)
 
 
-def equation(stage: Stage) -> str:
-    """The equation of motion with its symbols."""
+def equation(stage: Stage, values: bool = False) -> str:
+    """The equation of motion with its symbols, or with the values of its coefficients in the units of the record."""
+    known = stage.values
     parts: list[str] = []
     for entry in stage.model.terms:
-        symbols = ", ".join(f"<i>{escape(s)}</i>" for s in entry.term.symbols)
+        symbols = ", ".join(
+            f"<b>{number(known[s], 4)}</b>" if values else f"<i>{escape(s)}</i>" for s in entry.term.symbols
+        )
         shape = escape(in_text(entry.term.formula).replace("d2u/dt2", "d²u/dt²"))
         parts.append(f"{symbols} {shape}" if shape.isalpha() or "d²" in shape else f"{symbols} [{shape}]")
     return " + ".join(parts) + " = F(t)"
@@ -65,15 +77,16 @@ def _figures(comparison: Comparison) -> str:
     size = comparison.prediction.error * comparison.prediction.size
     scaled = length if comparison.plan.response == "displacement" else rate
     shown = scaled(comparison.record.units.get(comparison.plan.response, ""), size)
-    rms = f"rms {size / shown.factor:.3g} {in_text(shown.unit)}"
+    rms = f"rms {size / shown.factor:.3g} {in_text(shown.unit)}; fit {percent(1.0 - comparison.prediction.error)}"
     cells = (
-        ("error", "Error of the response", percent(comparison.prediction.error), f"{rms}, free run, held out"),
-        ("floor", "Noise floor", percent(comparison.prediction.floor), "what no model could explain"),
-        ("force", "Error of the force", percent(comparison.force.total), "share of its power unexplained"),
+        ("error", "Error of the response", percent(comparison.prediction.error), rms, PREDICTED),
+        ("floor", "Noise floor", percent(comparison.prediction.floor), "what no model could explain", FLOOR),
+        ("force", "Error of the force", percent(comparison.force.total), "of its power unexplained", FORCE),
     )
     return "".join(
-        f'<div class="figure" id="figure-{key}"><span>{title}</span><b>{value}</b><small>{escape(about)}</small></div>'
-        for key, title, value, about in cells
+        f'<div class="figure" id="figure-{key}" title="{escape(meaning)}"><span>{title}</span><b>{value}</b>'
+        f"<small>{escape(about)}</small></div>"
+        for key, title, value, about, meaning in cells
     )
 
 
@@ -81,7 +94,7 @@ def _verdict(stage: Stage, live: bool) -> str:
     if stage.diagnosis is None:
         return f"<p class='waiting'>{WAITING if live else NOT_ASKED}</p>"
     head = VERDICTS.get(stage.diagnosis.verdict, UNKNOWN)
-    return f"<h3 class='{stage.diagnosis.verdict}'>{head}</h3><p>{escape(stage.said)}</p>"
+    return f"<h3 class='{stage.diagnosis.verdict}'>{head}</h3><p>{escape(in_sentence(stage.said))}</p>"
 
 
 def _candidates(stage: Stage, rows: Sequence[Ranked], live: bool) -> str:
@@ -90,26 +103,37 @@ def _candidates(stage: Stage, rows: Sequence[Ranked], live: bool) -> str:
     scale = "".join(f"<span style='left:{x}%'>{x}</span>" for x in (0, 50, 100))
     heading = "effect, and the share of the difference that it explains / %"
     head = f"<li class='scale'><span class='head'>{heading}</span><i class='axis'>{scale}</i></li>"
-    more = len(stage.diagnosis.candidates) - len(rows)
-    rest = f"<li class='more'>{more} more explain less</li>" if more > 0 else ""
-    return f"<ol>{head}{''.join(_row(i, row, stage, live) for i, row in enumerate(rows))}{rest}</ol>"
+    offered = [(i, row) for i, row in enumerate(rows) if gives(row) or row.name not in LIBRARY]
+    more = len(stage.diagnosis.candidates) - len(offered)
+    others = f"{more} more explain no more than chance would" if offered else f"none of {more} explains any of it"
+    rest = f"<li class='more'>{others}</li>" if more > 0 else ""
+    return f"<ol>{head}{''.join(_row(i, row, stage, live) for i, row in offered)}{rest}</ol>"
+
+
+def gives(row: Ranked) -> bool:
+    """Whether a candidate explains more than chance would: one that does not is not offered."""
+    return row.gain.explained > 0.0 and row.p_value < ALPHA
 
 
 def _row(place: int, row: Ranked, stage: Stage, live: bool) -> str:
     units = stage.comparison.record.units
     unit = row.term.unit(row.term.symbols[0], units.get("force", "N"), units.get("displacement", "m"))
     add = f"<button data-act='add' data-name='{escape(row.name)}'>Add</button>" if live else ""
-    explained = f"{round(100.0 * row.gain.explained, 1) + 0.0:.1f} ± {100.0 * row.gain.error:.1f} %"
+    explained = f"{round(100.0 * row.gain.explained, 1) + 0.0:.1f} %"
     formula = escape(in_text(row.term.formula))
-    title = f"<b>{escape(in_words(row.name))}</b>"
+    words = escape(in_words(row.name))
     meaning = row.term.meaning[0].upper() + row.term.meaning[1:]
     size = f"{number(row.coefficient)} ± {number(1.96 * row.error, 2)} {in_text(unit)}"
+    found = f" Found in {escape(row.term.cause)}." if row.name in LIBRARY else ""
+    detail = (
+        f"<b>{words}</b> <i>{formula}</i>, coefficient <em>{escape(size)}</em>; explains {explained[:-2]} ± "
+        f"{100.0 * row.gain.error:.1f} %, error with it {percent(row.response_error)}. {escape(meaning)}.{found}"
+    )
     return (
-        f"<li class='candidate' data-candidate='{place}' data-label='{escape(_label(row, unit))}' tabindex='0'>"
-        f"<span class='rank'>{_rank(place, row, stage)}</span><span class='name'>{title}</span>"
-        f"{_bar(row)}<span class='explained'>{explained}</span>{add}"
-        f"<small>{_ties(row)}<i>{formula}</i>; <em>{escape(size)}</em>, error with it {percent(row.response_error)}. "
-        f"{escape(meaning)}; common cause: {escape(row.term.cause)}.</small></li>"
+        f"<li class='candidate' data-candidate='{place}' data-label='{escape(_label(row, unit))}' tabindex='0' "
+        f"aria-label='{words}, explains {explained}'><span class='rank'>{_rank(place, row, stage)}</span>"
+        f"<span class='name' title='{words}'><b>{words}</b></span>{_ties(row)}"
+        f"{_bar(row)}<span class='explained'>{explained}</span>{add}<small hidden>{detail}</small></li>"
     )
 
 
@@ -128,11 +152,9 @@ def _rank(place: int, row: Ranked, stage: Stage) -> str:
 
 def _ties(row: Ranked) -> str:
     if not row.tied_with:
-        return ""
-    named = ", ".join(in_words(n) for n in row.tied_with[:TIES])
-    more = f" +{len(row.tied_with) - TIES}" if len(row.tied_with) > TIES else ""
+        return "<span></span>"
     everyone = ", ".join(in_words(n) for n in row.tied_with)
-    return f"<span class='tie' title='cannot be told from {escape(everyone)}'>tie: {escape(named)}{more}</span>"
+    return f"<span class='tie' title='cannot be told from {escape(everyone)}'>tie {len(row.tied_with) + 1}</span>"
 
 
 def _bar(row: Ranked) -> str:
@@ -153,7 +175,22 @@ def _coefficients(stage: Stage, live: bool) -> str:
     head = "<tr><th></th><th>term</th><th>value</th><th>95 % interval</th><th>unit</th><th></th></tr>"
     waiting = {n.name: n for n in stage.unneeded or ()}
     rows = [_coefficient(c, live, waiting.pop(c.term, None)) for c in stage.comparison.coefficients]
-    return f"<table>{head}{''.join(rows)}</table>"
+    return f"<table>{head}{''.join(rows)}{_modal(stage.comparison)}</table>"
+
+
+def _modal(comparison: Comparison) -> str:
+    """Natural frequency and damping ratio of the linear part, if it has them."""
+    rows = ""
+    named = (("f<sub>n</sub>", "natural frequency"), ("ζ", "damping ratio"))
+    for (symbol, what), found in zip(named, modal(comparison.fit, comparison.prepared), strict=True):
+        if found is not None:
+            value, error, unit = found
+            half = "held" if math.isnan(error) else f"± {number(1.96 * error, 2)}"
+            rows += (
+                f"<tr class='derived'><td><i>{symbol}</i></td><td>{what}</td><td class='number'>{number(value, 5)}</td>"
+                f"<td>{half}</td><td>{unit or '1'}</td><td></td></tr>"
+            )
+    return rows
 
 
 def _unneeded(term: Needless | None, live: bool) -> str:
@@ -165,12 +202,13 @@ def _unneeded(term: Needless | None, live: bool) -> str:
 
 
 def _coefficient(coefficient: Coefficient, live: bool, unneeded: Needless | None) -> str:
-    half = "held" if coefficient.error is None else f"± {number(1.96 * coefficient.error, 2)}"
+    shown = mass(coefficient.unit) if coefficient.term == "inertia" else Scale(1.0, coefficient.unit)
+    half = "held" if coefficient.error is None else f"± {number(1.96 * coefficient.error / shown.factor, 2)}"
     act, label = ("free", "Free") if coefficient.held else ("hold", "Hold")
     button = f"<button data-act='{act}' data-name='{escape(coefficient.key)}'>{label}</button>" if live else ""
     return (
         f"<tr data-key='{escape(coefficient.key)}'><td><i>{escape(coefficient.key.rpartition('.')[2])}</i></td>"
         f"<td>{escape(in_words(coefficient.term))}{_unneeded(unneeded, live)}</td>"
-        f"<td class='number'>{number(coefficient.value, 5)}</td><td>{half}</td>"
-        f"<td>{escape(in_text(coefficient.unit))}</td><td>{button}</td></tr>"
+        f"<td class='number'>{number(coefficient.value / shown.factor, 5)}</td><td>{half}</td>"
+        f"<td>{escape(in_text(shown.unit))}</td><td>{button}</td></tr>"
     )

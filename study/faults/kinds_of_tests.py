@@ -11,8 +11,8 @@ from typing import Any
 from study.equations.common_factor import per_unit_mass, with_known_mass
 from study.equations.model import Model, has_spring
 from study.faults.accounting import Accounted, accounted
-from study.records.base import on_a_moving_base, relative_to_base
 from study.records.layout import Layout, laid_out
+from study.records.moving_base import on_a_moving_base, relative_to_base
 from study.records.prepared import Prepared
 from study.records.record import Record
 from study.records.stretches import apart, runs_on

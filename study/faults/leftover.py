@@ -12,7 +12,7 @@ from study.identify.time_domain.part_fit import linearise, run_of
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
 from study.support.least_squares import least_squares
-from study.support.statistics import Gain, clustered_covariance, gain
+from study.support.statistics import Gain, beside, clustered_covariance, gain
 from study.support.thresholds import ALPHA, BLOCKS, TOLERANCE
 
 INDISTINCT = 1e-5  # share of a column's length that the model's own coefficients leave of it
@@ -51,6 +51,15 @@ class Leftover:
     def residual(self) -> tuple[Floats, Floats]:
         """Measured less predicted response on both parts."""
         return self.fit.residual, self.prediction.difference
+
+    @cached_property
+    def beside_own(self) -> Floats:
+        """Residual of the judging part beside what the model's own coefficients, fitted to both parts, take, (m,).
+
+        A change of the prediction is held against this (``study.support.statistics.beside``).
+        """
+        design = np.vstack(self.own)
+        return self.residual[1] - self.own[1] @ least_squares(design, np.concatenate(self.residual), 1e-9)
 
     @property
     def samples(self) -> tuple[Floats, Floats]:
@@ -100,18 +109,17 @@ def share(left: Leftover, columns: tuple[Floats, Floats], leading: bool = False)
     or, where ``leading``, of the first alone: the others stand for what is unknown beside it.
     """
     fitted, judged = left.known(columns)
-    own = left.own
-    alone = fitted - own[0] @ np.column_stack([least_squares(own[0], c, 1e-9) for c in fitted.T])
+    taken = np.column_stack([least_squares(left.own[0], c, 1e-9) for c in fitted.T])
+    alone = fitted - left.own[0] @ taken
     if np.any(np.linalg.norm(alone, axis=0) <= INDISTINCT * np.linalg.norm(fitted, axis=0)):
         return None
-    design = np.hstack([own[0], fitted])
-    amounts = least_squares(design, left.residual[0], 1e-9)
+    change = (judged - left.own[1] @ taken) @ least_squares(alone, left.residual[0], 1e-9)
     before = left.residual[1]
-    after = before - np.hstack([own[1], judged]) @ amounts
-    power = float(np.mean(before**2) - np.mean(after**2)) / left.size**2
+    power = float(np.mean(before**2) - np.mean((before - change) ** 2)) / left.size**2
     whole, covariance = amounts_on_both(left, columns)
     tested = slice(1) if leading else slice(None)
-    return Share(whole, covariance, _p_value(whole[tested], covariance[tested, tested]), gain(before, after), power)
+    return Share(whole, covariance, _p_value(whole[tested], covariance[tested, tested]),
+                 beside(before, change, left.beside_own), power)  # fmt: skip
 
 
 def _p_value(amounts: Floats, covariance: Floats) -> float:

@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from study.equations.model import Model, ModelTerm
+from study.equations.model import ModelTerm, free
 from study.equations.terms import LIBRARY, Term
 from study.faults.leftover import Leftover, better, leftover, share
 from study.identify.time_domain import shape_search
+from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part, run_of
 from study.records.prepared import Prepared
@@ -18,9 +19,8 @@ from study.support.cores import cores
 from study.support.errors import StudyError
 from study.support.statistics import worse
 
-LOOKED_AT = 2048  # samples of the fitting part, at most, in a search
+PERIODS, SHORT, LONG = 100.0, 2048, 8192  # of the motion in a search, and in samples no fewer and no more than these
 FITTED = 3  # effects of the largest linear share that are fitted
-POINTS = 2  # of the search over its shape, from which it is
 CHANCE = 2.0  # standard errors by which one effect may leave more than another and be as good
 RUNS = 20  # free runs of such a fit
 
@@ -38,9 +38,12 @@ def asks_for_more(left: Leftover) -> bool:
 
 
 def missing(left: Leftover) -> Leftover | None:
-    """What is left beside the effect that explains most; None if none explains any of it."""
+    """What is left beside the effect that explains most; None if none explains any of it.
+
+    One outside of what makes it physical, which is another effect or a fault in disguise, only where no other does.
+    """
     prepared, fit = left.prepared, left.fit
-    look = prepared.shortened(LOOKED_AT)
+    look = prepared.shortened(int(np.clip(prepared.samples_in(PERIODS), SHORT, LONG)))
     terms = [t for t in LIBRARY.values() if t.name not in fit.model and t.name != "inertia"]
     try:
         near = fit if look is prepared else fit_part(fit.model, look, fit.held, steps=fit.steps_per_sample)
@@ -49,17 +52,26 @@ def missing(left: Leftover) -> Leftover | None:
         return None
 
     def begun(term: Term) -> list[shape_search.Start]:
-        return shape_search.starts(term, base, look)[:POINTS]
+        return shape_search.starts(term, base, look)
 
     def fitted(start: tuple[Term, list[shape_search.Start]]) -> Leftover | None:
-        return _fitted(*start, base, look, prepared)
+        return _fitted(start[0], base, look, prepared)
 
     with ThreadPoolExecutor(cores()) as pool:
         starts = [(term, found) for term, found in zip(terms, pool.map(begun, terms), strict=True) if found]
         promising = sorted(starts, key=lambda s: -s[1][0].share)[:FITTED]
-        tried = list(pool.map(fitted, promising))
-    best = _simplest_of_the_best([t for t in tried if t is not None])
-    return best if best is not None and better(left, best, len(terms)) else None
+        tried = [t for t in pool.map(fitted, promising) if t is not None]
+    names = [t.name for t in terms]
+    for group in ([t for t in tried if not unphysical(t.fit, names)], tried):
+        best = _simplest_of_the_best(group)
+        if best is not None and better(left, best, len(terms)):
+            return best
+    return None
+
+
+def unphysical(fit: FreeRunFit, names: Sequence[str]) -> bool:
+    """Whether any of these effects is fitted outside of what makes it physical."""
+    return any(e.term.physical(fit.model.values) for e in fit.model.terms if e.name in names)
 
 
 def _simplest_of_the_best(tried: Sequence[Leftover]) -> Leftover | None:
@@ -93,24 +105,17 @@ def without_effect(fit: FreeRunFit, name: str, prepared: Prepared) -> FreeRunFit
         return None
 
 
-def _fitted(
-    term: Term, points: Sequence[shape_search.Start], base: shape_search.Baseline, look: Prepared, prepared: Prepared
-) -> Leftover | None:  # fmt: skip
-    """What the model with an effect leaves, its shape held at first, with few runs; None where it does not run."""
-    held, shapes = base.fit.held, tuple(f"{term.name}.{p.name}" for p in term.parameters)
-    entries = [ModelTerm(term, point.coefficients, point.parameters) for point in points]
-    first = [_tried(base.fit.model.with_term(e), look, (*held, *shapes), base.fit.steps_per_sample) for e in entries]
-    best = min((fit for fit in first if fit is not None), key=lambda fit: fit.rms, default=None)
-    for part in (look, prepared) if best is not None and shapes else (prepared,):
-        best = None if best is None else _tried(best.model, part, held, best.steps_per_sample)
-    return None if best is None else leftover(best, prepared)
-
-
-def _tried(model: Model, part: Prepared, held: Sequence[str], steps: int) -> FreeRunFit | None:
+def _fitted(term: Term, base: shape_search.Baseline, look: Prepared, prepared: Prepared) -> Leftover | None:
+    """What the model with an effect leaves, fitted as any candidate is; None where it does not run."""
     try:
-        return fit_part(model, part, held, steps=steps, max_iterations=RUNS)
+        near = with_term(base.fit, free(term), base, look)
+        initial = np.atleast_2d(near.initial)[:1] if near.first == prepared.plan.fit[0] else None
+        fit = fit_part(
+            near.model, prepared, base.fit.held, steps=near.steps_per_sample, max_iterations=RUNS, initial=initial
+        )
     except StudyError:
         return None
+    return leftover(fit, prepared)
 
 
 def _sensitivities(left: Leftover) -> tuple[Floats, Floats] | None:

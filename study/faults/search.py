@@ -6,7 +6,7 @@ these do all that it does, and it does all that they do, the record cannot tell,
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import ndtr
@@ -21,6 +21,7 @@ from study.faults.leftover import Leftover, better, leftover, share
 from study.faults.refinement import Refined, refined, relative_power
 from study.faults.spikes import spikes
 from study.faults.spotted import drop_outs, spotted, widened
+from study.faults.stage import Stage, fitted_again
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.settling import settled
 from study.records.prepared import Prepared, limited
@@ -30,34 +31,8 @@ from study.support.thresholds import ALPHA
 
 ROUNDS = 12  # faults and effects looked for one after the other
 PLAIN = (DRIFT, SPIKES, DROP_OUTS)  # which no physics imitates
-LONG = 8192  # samples of either part in which faults compete with physics
+SHORT, LONG = 8192, 16384  # samples of either part in which faults compete with physics
 EFFECTS = 3  # of the library that are added before a fault is believed
-
-
-@dataclass(frozen=True, eq=False)
-class Stage:
-    """Where a search stands: the record as given, the faults found, and the model fitted to the corrected record."""
-
-    given: Prepared
-    faults: tuple[Fault, ...]
-    left: Leftover  # of the model
-    rich: Leftover  # of the model and the effects that the record asks for
-
-    @property
-    def effects(self) -> list[str]:
-        """The effects that the record asks for."""
-        return [e.name for e in self.rich.fit.model.terms if e.name not in self.left.fit.model]
-
-    def named(self, fault: Fault) -> "Stage":
-        """The stage with a fault that nothing is corrected for."""
-        return replace(self, faults=(*self.faults, fault))
-
-    def without(self, *faults: Fault) -> "Stage | None":
-        """The stage with these faults corrected; None where a model does not run any more."""
-        known = (*(f for f in self.faults if f.fault not in [g.fault for g in faults if f.fault == SPIKES]), *faults)
-        prepared = corrected(self.given, known)
-        left, rich = (_again(one, prepared) for one in (self.left, self.rich))
-        return None if left is None or rich is None else Stage(self.given, known, left, _pruned(rich, left))
 
 
 def first_faults(prepared: Prepared, held: Mapping[str, float], asked: Sequence[str]) -> tuple[Fault, ...]:
@@ -77,7 +52,7 @@ def search(
     corrected. The fit that is given back begins there and searches no further. Of a long record, faults that compete
     with physics are looked for in a stretch of either part; the others everywhere.
     """
-    look = limited(given, LONG)
+    look = limited(given, int(np.clip(given.samples_in(physics.PERIODS), SHORT, LONG)))
     if look is given:
         stage = _searched(given, fit, fit, faults, asked)
         return (tuple(faults), fit) if stage is None else (stage.faults, stage.left.fit)
@@ -115,7 +90,7 @@ def _beyond_the_limits(stage: Stage) -> Stage:
     faults = [widened(f, stage.given, stage.left) if f.fault == CLIPPING else f for f in stage.faults]
     if not any(f.fault == CLIPPING for f in faults):
         return stage
-    left = _again(stage.left, corrected(stage.given, faults))
+    left = fitted_again(stage.left, corrected(stage.given, faults))
     return stage if left is None else Stage(stage.given, tuple(faults), left, left)
 
 
@@ -166,7 +141,7 @@ def _contested(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
     one = None if one is None or _may_be_none(one.fault, asked) else one
     effect = _effect(stage, one)
     if one is None:
-        return _noisy_force(stage, names, asked) if effect is None else replace(stage, rich=effect)
+        return _noisy_force(stage, names, asked) if effect is None else _beside(effect, stage)
     if effect is None:
         return _accepted(stage, one)
     fault_needed = share(effect, _columns(one.fault, effect), leading=one.fault.fault != HUM)
@@ -174,7 +149,7 @@ def _contested(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
     if needed == (False, False):
         return _tied(stage, one, effect)
     if needed == (False, True) or (all(needed) and relative_power(effect) < relative_power(one.left)):
-        return replace(stage, rich=effect)
+        return _beside(effect, stage)
     return _accepted(stage, one)
 
 
@@ -184,7 +159,7 @@ def _noisy_force(stage: Stage, names: Sequence[str], asked: int) -> Stage | None
         return None
     effect = physics.missing(stage.rich)
     if effect is not None:
-        return replace(stage, rich=effect)
+        return _beside(effect, stage)
     # What an integration in few steps leaves is shaped by the structure too.
     left = leftover(settled(stage.rich.fit, stage.rich.prepared), stage.rich.prepared)
     noise = None if left is None else force_noise(left, asked)
@@ -234,22 +209,39 @@ def _accepted(stage: Stage, one: Refined) -> Stage | None:
     return following if again is None else stage.without(_explaining(again.fault, stage.rich, again.left))
 
 
+def _beside(effect: Leftover, stage: Stage) -> Stage:
+    """The stage with an effect more, and the values of its faults found again beside it: its lack has moved them."""
+    stage = replace(stage, rich=effect)
+    for fault in stage.faults:
+        if fault.fault in adjustable.ADJUSTABLE and fault.corrected and not fault.held:
+            others = tuple(f for f in stage.faults if f is not fault)
+            again = refined(fault.fault, stage.given, others, stage.rich, fault.value)
+            following = None if again is None else replace(stage, faults=others).without(
+                replace(again.fault, explained=fault.explained)
+            )  # fmt: skip
+            stage = following or stage
+    return stage
+
+
 def _explaining(fault: Fault, before: Leftover, after: Leftover) -> Fault:
     return replace(fault, explained=gain(before.residual[1], after.residual[1]).explained)
 
 
 def _tied(stage: Stage, one: Refined, effect: Leftover) -> Stage | None:
-    """What becomes of a fault and an effect neither of which is needed beside the other: the fault is mentioned."""
-    if one.fault.fault == HUM and _beyond_reason(stage, effect):
-        return _accepted(stage, one)
+    """What becomes of a fault and an effect neither of which is needed beside the other: the fault is mentioned.
+
+    Not so beside an effect that is none, as a Maxwell element of negative stiffness, which hastens what is late.
+    """
     names = [e.name for e in effect.fit.model.terms if e.name not in stage.rich.fit.model]
+    if physics.unphysical(effect.fit, names) or (one.fault.fault == HUM and _beyond_reason(stage, effect)):
+        return _accepted(stage, one)
     fault = _explaining(one.fault, stage.rich, one.left).with_rivals(*names)
     return replace(stage, faults=(*stage.faults, fault), rich=effect)
 
 
 def _needs(one: Refined, effect: Leftover) -> bool:
     """Whether the effect explains anything beside the corrected fault."""
-    both = _again(effect, one.left.prepared)
+    both = fitted_again(effect, one.left.prepared)
     return both is not None and better(one.left, both, 1)
 
 
@@ -261,23 +253,13 @@ def _beyond_reason(stage: Stage, effect: Leftover) -> bool:
     return any(math.hypot(*(values[s] for s in symbols)) > largest for symbols in harmonic)
 
 
-def _pruned(rich: Leftover, left: Leftover) -> Leftover:
-    """Without the effects that the corrected record no longer asks for, the last one first."""
-    for name in reversed([e.name for e in rich.fit.model.terms if e.name not in left.fit.model]):
-        fit = physics.without_effect(rich.fit, name, rich.prepared)
-        fewer = None if fit is None else leftover(fit, rich.prepared)
-        if fewer is not None and not better(fewer, rich, 1):
-            rich = fewer
-    return left if len(rich.fit.model.terms) == len(left.fit.model.terms) else rich
-
-
 def _needed(stage: Stage, asked: int) -> Stage:
     """Without the faults that the effects found after them have made needless."""
     for fault in stage.faults:
         if fault.fault in (*adjustable.ADJUSTABLE, DRIFT) and fault.corrected and not fault.held:
             others = tuple(f for f in stage.faults if f is not fault)
             prepared = corrected(stage.given, others)
-            left, rich = (_again(one, prepared) for one in (stage.left, stage.rich))
+            left, rich = (fitted_again(one, prepared) for one in (stage.left, stage.rich))
             if left is None or rich is None:
                 continue
             if not _still_there(fault, rich, asked):
@@ -291,9 +273,3 @@ def _still_there(fault: Fault, rich: Leftover, asked: int) -> bool:
         return drift(rich, asked) is not None
     needed = share(rich, adjustable.columns(fault.fault, rich), leading=True)
     return needed is not None and needed.significant(asked)
-
-
-def _again(left: Leftover, prepared: Prepared) -> Leftover | None:
-    """A model fitted again to a record that was corrected."""
-    fit = physics.refitted(left.fit, prepared)
-    return None if fit is None else leftover(fit, prepared)

@@ -6,6 +6,7 @@ from scipy.special import stdtr
 
 from study.faults.fault import SPIKES, Fault
 from study.faults.leftover import Leftover
+from study.identify.time_domain.part_fit import run_of
 from study.support.arrays import Floats
 from study.support.thresholds import ALPHA, TOLERANCE
 
@@ -17,8 +18,9 @@ def spikes(left: Leftover, asked: int) -> Fault | None:
     """Spikes on both parts of the record, None without any."""
     record, prepared = left.prepared.record, left.prepared
     lost = np.zeros(len(record), dtype=np.bool_)
-    for span, residual in zip((left.fit.span, prepared.plan.judge), left.residual, strict=True):
-        known = prepared.known(np.ones(len(residual)), span) > 0.0
+    spans = left.fit.span, prepared.plan.judge
+    for span, residual, reversed_ in zip(spans, left.residual, reversals(left), strict=True):
+        known = (prepared.known(np.ones(len(residual)), span) > 0.0) & ~reversed_
         lost[slice(*span)] = alone(residual, known, ALPHA / asked)
     if not np.any(lost):
         return None
@@ -31,6 +33,24 @@ def spikes(left: Leftover, asked: int) -> Fault | None:
     beside = lost | np.roll(lost, 1) | np.roll(lost, -1)  # another spike there could not be told from this one
     error = float(np.sqrt(count / len(places)))  # of a count: small ones cannot be told from noise
     return Fault(SPIKES, prepared.response, count, error, "1", explained, lost=beside)
+
+
+def reversals(left: Leftover) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Samples beside which dry friction makes the acceleration jump, on both parts; none of another response.
+
+    An error of the model moves such a jump past a sample, which then stands alone as a spike does.
+    """
+    jumps = any("sgn(v)" in c.shape for entry in left.fit.model.terms for c in entry.term.components)
+    if left.prepared.response != "acceleration" or not jumps or left.prediction.run is None:
+        return np.zeros(len(left.residual[0]), np.bool_), np.zeros(len(left.residual[1]), np.bool_)
+    fitted = run_of(left.fit, left.prepared, motion="velocity").respond({}, left.fit.initial)[0]
+    return _turning(fitted), _turning(left.prediction.run.motion("velocity"))
+
+
+def _turning(velocity: Floats) -> NDArray[np.bool_]:
+    """Samples on either side of a change of sign, shape (n,)."""
+    turns = np.diff(np.sign(velocity)) != 0.0
+    return np.concatenate([turns, [False]]) | np.concatenate([[False], turns])
 
 
 def alone(residual: Floats, known: NDArray[np.bool_], level: float) -> NDArray[np.bool_]:

@@ -15,7 +15,7 @@ from scipy.special import fdtrc
 from study.faults.fault import CLIPPING, CONVERTER_STEPS, DROP_OUTS, Fault
 from study.faults.leftover import Leftover
 from study.records.prepared import Prepared
-from study.support.arrays import Floats
+from study.support.arrays import Floats, Ints
 from study.support.thresholds import ALPHA, TOLERANCE
 
 REPEATED = 0.5  # of the samples of a channel: whose values recur so often comes in steps
@@ -66,13 +66,19 @@ def at_the_limits(values: Floats, step: float | None) -> NDArray[np.bool_] | Non
 
 def _recurs(values: Floats, mask: NDArray[np.bool_], limit: float, step: float | None) -> bool:
     count, runs = int(np.count_nonzero(mask)), _runs(mask)
-    if _switches(values) or count < 4 or len(runs) < 2:
+    if _switches(values) or count < 4 or len(runs) < 2 or (count == len(runs) and _repeats(runs)):
         return False
     if step is None:
         return True
     inward = limit + step if limit < float(np.mean(values)) else limit - step
     beside = int(np.count_nonzero(np.abs(values - inward) < 0.25 * step))
     return count > beside + 5.0 * math.sqrt(beside + count)
+
+
+def _repeats(runs: Sequence[tuple[int, int]]) -> bool:
+    """Whether runs follow each other at multiples of one time, as the one largest value of a repeated motion does."""
+    apart = np.diff([first for first, _ in runs])
+    return int(np.gcd.reduce(apart)) == int(np.min(apart))
 
 
 def _switches(values: Floats) -> bool:
@@ -92,11 +98,16 @@ def drop_outs(left: Leftover, asked: int) -> Fault | None:
         return None
     mask, runs = _standing(values)
     places = np.concatenate(left.samples).astype(np.int64)
-    power, there = np.concatenate(left.residual) ** 2, mask[places]
-    if not 0.0 < float(np.mean(there)) < STANDING:
+    power = np.concatenate(left.residual) ** 2
+    if not 0.0 < float(np.mean(mask[places])) < STANDING:
+        return None
+    noisy = _noise(np.concatenate(left.residual)) > TOLERANCE * left.size
+    if _at_rest(prepared.response, values[mask]):
+        mask = _moving(mask, places, power, ALPHA / (asked * runs))
+    there = mask[places]
+    if not np.any(there):
         return None
     elsewhere = float(np.mean(power[~there]))
-    noisy = _noise(np.concatenate(left.residual)) > TOLERANCE * left.size
     if (
         not noisy
         and elsewhere > 0.0
@@ -105,6 +116,22 @@ def drop_outs(left: Leftover, asked: int) -> Fault | None:
         return None
     explained = float(np.sum(power[there]) / np.sum(power))
     return Fault(DROP_OUTS, prepared.response, float(np.mean(mask)), unit="1", explained=explained, lost=mask)
+
+
+def _at_rest(response: str, standing: Floats) -> bool:
+    """Whether a channel stands at what it shows of a system that friction holds."""
+    return response != "displacement" and not np.any(standing)
+
+
+def _moving(mask: NDArray[np.bool_], places: Ints, power: Floats, level: float) -> NDArray[np.bool_]:
+    """The runs of a mask in which more is left than elsewhere, by the F test of each as a single number, shape (n,)."""
+    left = np.full(len(mask), np.nan)
+    left[places] = power
+    elsewhere = max(float(np.nanmean(left[~mask])), np.finfo(float).tiny)
+    kept = np.zeros_like(mask)
+    for first, last in _runs(mask & ~np.isnan(left)):
+        kept[first:last] = float(fdtrc(1, len(power), np.mean(left[first:last]) / elsewhere)) < level
+    return kept
 
 
 def _standing(values: Floats) -> tuple[NDArray[np.bool_], int]:

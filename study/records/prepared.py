@@ -1,10 +1,12 @@
 """A record made ready once, for everything that fits, predicts, compares or diagnoses."""
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import rfft
 
 from study.records.completion import complete
 from study.records.plan import FEWEST, Plan, make_plan
@@ -12,6 +14,7 @@ from study.records.record import MOTIONS, Record
 from study.support.arrays import Floats
 
 FORCE = "force"  # what is predicted where the motion is prescribed
+QUIET = 0.5  # of the motion's size: a stretch that shows less is no picture of the record
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +76,13 @@ class Prepared:
         """Standard deviation of the response within the fitting part."""
         return float(np.std(self.fitted))
 
+    def samples_in(self, periods: float) -> int:
+        """Samples that so many periods of the motion take: those of the frequency that halves the response's power."""
+        values = self.fitted - np.mean(self.fitted)
+        power = np.cumsum(np.abs(rfft(values)) ** 2)
+        middle = max(1, int(np.searchsorted(power, 0.5 * power[-1])))
+        return math.ceil(periods * len(values) / middle)
+
     def known(self, values: Floats, span: tuple[int, int]) -> Floats:
         """Values along a span, shape (samples, ...), zero where the sample of the response is lost."""
         if self.lost is None:
@@ -111,12 +121,30 @@ class Prepared:
 
 
 def limited(prepared: Prepared, samples: int) -> Prepared:
-    """The same with no more than so many samples to fit and to judge; itself where it has no more."""
+    """The same with no more than so many samples to fit and to judge; itself where it has no more.
+
+    Those where the parts meet; where either is quiet there, as at the end of a sweep, stretches as far from the
+    beginning of both parts as shows most of the motion. A force that is repeated has the same frequencies in these.
+    """
     first, last = prepared.plan.judge
     shorter = prepared.shortened(samples)
     if last - first <= samples:
         return shorter
-    return replace(shorter, plan=replace(shorter.plan, judge=(first, first + samples)))
+    meeting = replace(shorter, plan=replace(shorter.plan, judge=(first, first + samples)))
+    if shorter is prepared or _shown(meeting, prepared) > QUIET:
+        return meeting
+    begin, length = prepared.plan.fit[0], min(prepared.plan.fit[1] - prepared.plan.fit[0], last - first)
+    moved = [
+        replace(prepared, plan=replace(prepared.plan, fit=(begin + k, begin + k + samples),
+                                       judge=(first + k, first + k + samples)))
+        for k in range(0, length - samples + 1, samples // 4)
+    ]  # fmt: skip
+    return max([meeting, *moved], key=lambda part: _shown(part, prepared))
+
+
+def _shown(part: Prepared, whole: Prepared) -> float:
+    """Size of the motion in a stretch over that in the whole of the same part, the smaller of both parts'."""
+    return min(float(np.std(part.fitted)) / whole.spread, float(np.std(part.judged)) / float(np.std(whole.judged)))
 
 
 def prepare_record(record: Record, plan: Plan | None = None, cutoff: float | None = None) -> Prepared:

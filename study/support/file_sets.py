@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Generator, Iterable, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
@@ -31,18 +31,26 @@ def write_files(folder: Path, files: Mapping[str, bytes], inputs: Iterable[Path]
         If they cannot be written, or one would take the place of one of the ``inputs``.
     """
     keep(inputs, (folder / name for name in files))
-    made(folder)
-    with staged({folder / name: content for name, content in files.items()}) as moves:
-        for move in moves:
-            move()
+    with made(folder), staged({folder / name: content for name, content in files.items()}) as moves:
+        for each in moves:
+            each()
 
 
-def made(folder: Path) -> None:
-    """See that a folder is there."""
+@contextmanager
+def made(folder: Path) -> Generator[None, None, None]:
+    """A folder that is there within the block; if that fails, what was made of it is taken away again."""
+    absent = [path for path in (folder, *folder.parents) if not path.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StudyError(f"{folder}: cannot be made ({reason(error)}); expected a writable folder") from None
+    try:
+        yield
+    except BaseException:
+        for path in absent:
+            with suppress(OSError):  # somebody else may have written there
+                path.rmdir()
+        raise
 
 
 def keep(inputs: Iterable[Path], outputs: Iterable[Path]) -> None:

@@ -5,7 +5,7 @@ over blocks much longer than the response's memory are practically independent.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -58,6 +58,17 @@ def gain(before: Floats, after: Floats) -> Gain:
     n = len(a)
     error = float(np.sqrt((n - 1) / n * np.sum((left_out - np.mean(left_out)) ** 2)))
     return Gain(explained, error, _p_value(a + apart - b))
+
+
+def beside(before: Floats, change: Floats, freed: Floats) -> Gain:
+    """What a change of the prediction explains of ``before``, which the model's own coefficients leave, all shape (n,).
+
+    These come from other samples with errors, and what errors leave goes with the motion as the change does: by chance
+    of a few coefficients, not of n samples. With J the sensitivities and C the covariance of the coefficients over the
+    noise's variance s^2, ``cov = s^2 (I + J C J^T)``, and the test is of ``change^T cov^-1 before``, in which
+    ``s^2 cov^-1 before`` is what coefficients fitted to these samples as well leave (Woodbury, 1950): ``freed``.
+    """
+    return replace(gain(before, before - change), p_value=gain(freed, freed - change).p_value)
 
 
 def worse(first: Floats, second: Floats) -> float:

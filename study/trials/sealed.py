@@ -3,7 +3,7 @@
 import base64
 import binascii
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -11,6 +11,7 @@ from study.equations.model_file import format_model
 from study.records.record import write_csv
 from study.support.errors import StudyError
 from study.support.files import read_text, replace_file, replacing
+from study.support.yaml_text import shown
 from study.trials.draw import Trial
 
 KEYS = {"hidden", "shares", "noise", "fault", "truth"}
@@ -55,7 +56,42 @@ def unseal(path: Path) -> dict[str, Any]:
         raise StudyError(f"{path}: this holds no sealed answer; expected {WANTED}") from None
     if not isinstance(answer, dict) or set(cast(dict[str, Any], answer)) != KEYS:
         raise StudyError(f"{path}: the answer in it is not that of a trial; expected {WANTED}")
-    return cast(dict[str, Any], answer)
+    found = cast(dict[str, Any], answer)
+    for key, kind in KINDS.items():
+        if not kind(found[key]):
+            raise StudyError(f"{path}: the answer in it has {key} = {shown(found[key])}; expected {WANTED}")
+    if len(found["hidden"]) != len(found["shares"]):
+        raise StudyError(f"{path}: the answer in it has not a share for each effect; expected {WANTED}")
+    return found
+
+
+def _is_number(value: object) -> bool:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return abs(value) < LARGEST
+
+
+def _are(value: object, kind: Callable[[object], bool]) -> bool:
+    return isinstance(value, list) and all(kind(item) for item in cast(list[object], value))
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str)
+
+
+def _is_fault(value: object) -> bool:
+    if not isinstance(value, dict):
+        return False
+    fault = cast(dict[str, object], value)
+    words = all(_is_text(fault.get(key)) for key in ("unit", "fault", "channel"))
+    return not fault or (words and _is_number(fault.get("value")))
+
+
+LARGEST = 1e50  # of a number in an answer
+KINDS: Mapping[str, Callable[[object], bool]] = {
+    "hidden": lambda value: _are(value, _is_text), "shares": lambda value: _are(value, _is_number),
+    "noise": _is_number, "fault": _is_fault, "truth": _is_text,
+}  # fmt: skip
 
 
 def sentences(answer: Mapping[str, Any]) -> str:

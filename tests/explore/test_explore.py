@@ -349,3 +349,56 @@ def test_bad_input_is_one_sentence_and_serves_nothing(words_, said, tmp_path, mo
     err = capsys.readouterr().err
     assert said in err
     assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(0.03, 0.8), (4.2, 7.9), (1e-5, 1e3), (0.9, 1.1e4), (1e-12, 1e-11), (2.0, 2.0)]
+)
+def test_ticks_of_a_logarithmic_axis_do_not_collide(low, high):
+    inside = [tick for tick in html_page.log_ticks(low, high) if low <= tick <= high]
+    apart = np.diff(np.log10(inside)) / max(np.log10(high / low), 1e-9)
+    assert len(inside) <= 8
+    assert len(inside) >= (2 if high > 1.5 * low else 0)
+    assert np.all(apart > 0.07), "of the height: about 11 pixels"
+
+
+@pytest.mark.parametrize(
+    ("unit", "value", "shown"),
+    [("kN s^2/mm", 0.001231, 1231.0), ("N s^2/m", 2.0, 2.0), ("kg", 2.0, 2.0), ("V s^2/V", 2.0, 2.0)],
+)
+def test_a_mass_is_shown_in_kilograms_where_it_can_be(unit, value, shown):
+    scale = page_units.mass(unit)
+    assert value / scale.factor == pytest.approx(shown)
+    assert scale.unit == ("V s^2/V" if "V" in unit else "kg")
+
+
+def test_numbers_have_one_format_on_the_page():
+    assert page_units.number(204.0, 2) == "200"
+    assert page_units.number(2.04e7, 2) == "2·10⁷"
+    said = page_units.in_sentence("k is 2.5e+07 +- 1e-3 N/m^3 (p = 6e-14)")
+    assert said == "k is 2.5·10⁷ ± 1·10⁻³ N/m³ (p = 6·10⁻¹⁴)"
+
+
+def test_what_gives_nothing_is_counted_and_not_offered(asked):
+    stage = asked.now
+    places = dict(zip(*words.words(stage, stage.shown, 0, True, "N").values(), strict=True))
+    offered = re.findall(r"data-candidate='(\d+)'", places["candidates"])
+    assert [int(i) for i in offered] == [i for i, row in enumerate(stage.shown) if words.gives(row)]
+    assert 0 < len(offered) < len(stage.shown)
+    assert f"{len(stage.diagnosis.candidates) - len(offered)} more explain no more than chance" in places["candidates"]
+
+
+def test_the_equation_stands_with_its_values_and_what_follows_from_them(grown):
+    places = dict(zip(*words.words(grown.now, (), 1, True, "N").values(), strict=True))
+    known = grown.now.values
+    assert f"<b>{page_units.number(known['m'], 4)}</b> d²u/dt²" in places["equation-values"]
+    f_n = np.sqrt(known["k"] / known["m"]) / (2.0 * np.pi)
+    assert f"<td class='number'>{page_units.number(f_n, 5)}</td>" in places["coefficients"]
+
+
+def test_saving_with_values_holds_what_was_fitted_and_keeps_comments(grown):
+    given = grown.stages[0].model
+    text = f"name: {given.name}\nterms:\n" + "".join(f"  - {t.name}  # mine\n" for t in given.terms)
+    written = files(grown, "rig.yaml", text, values=True)["rig.yaml"].decode()
+    assert written.count("# mine") == len(grown.stages[0].model.terms)
+    assert model_file.parse_model(written, Path("rig.yaml")).values == pytest.approx(grown.now.values)

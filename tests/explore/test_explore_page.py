@@ -110,7 +110,12 @@ def drag(page: Page, panel: str, first: float, last: float) -> None:
 def test_a_session_from_the_first_verdict_to_the_saved_page(page: Page, address: str, rig: Path) -> None:
     wrong, asked = watched(page)
     page.goto(address)
+    until(page, "document.querySelector('#figure-error b') && window.study.ready")
+    page.wait_for_timeout(500)
+    before = places(page)
     until(page, "document.querySelector('[data-candidate]')")
+    _nothing_jumps(page, before)
+    _tabbed(page)
     given = error(page)
     _read_the_verdict(page)
     _preview(page)
@@ -125,8 +130,12 @@ def test_a_session_from_the_first_verdict_to_the_saved_page(page: Page, address:
     _hostile(page, rig)
     page.click("[data-act=add][data-name=quadratic_damping]")
     until(page, f"parseFloat(document.querySelector('{ERROR}').textContent) === {reached}")
-    page.click("[data-act=save]")
-    until(page, "document.querySelector('#notice').textContent.startsWith('Saved')")
+    page.uncheck("#with-values")
+    _save(page, "without")
+    assert (rig / "saved" / "rig.yaml").read_text() == (rig / "rig.yaml").read_text() + "  - quadratic_damping\n"
+    page.check("#with-values")
+    _save(page, "with")
+    _export(page)
     assert not wrong
     hosts = {re.match(r"\w+://([^/]+)/", url)[1] for url in asked if not url.startswith("data:")}  # type: ignore[index]
     assert hosts == {address.removeprefix("http://").rstrip("/")}
@@ -138,7 +147,7 @@ def _read_the_verdict(page: Page) -> None:
     assert page.inner_text("#verdict h3") == "An effect is missing"
     assert "Quadratic damping is missing" in page.inner_text("#verdict")
     assert page.inner_text("[data-candidate='0'] .name") == "quadratic damping"
-    assert "v|v|" in page.inner_text("[data-candidate='0'] small")
+    assert "v|v|" in page.inner_text("#detail")
     labels = page.evaluate(
         "[...Bokeh.documents[0].all_models].filter((m) => m.axis_label && m.visible).map((m) => m.axis_label)"
     )
@@ -193,12 +202,60 @@ def _hostile(page: Page, rig: Path) -> None:
     assert page.inner_text("#answer") == ""
 
 
+def _save(page: Page, how: str) -> None:
+    page.click("[data-act=save]")
+    until(page, f"document.querySelector('#notice').textContent.includes(' {how} fitted values')")
+
+
+def _export(page: Page) -> None:
+    """The numbers of a panel as a file: as many lines as it draws points."""
+    for panel, name in (("frf", "frf"), ("autocorrelation", "autocorrelation"), ("response", "time")):
+        page.locator(f"[data-panel={panel}]").first.scroll_into_view_if_needed()
+        page.locator(f"[data-panel={panel}]").first.hover()
+        with page.expect_download() as download:
+            page.click(f"[data-act=csv][data-name={panel}]")
+        assert download.value.suggested_filename.endswith(f"_{panel}.csv")
+        lines = Path(download.value.path()).read_text().splitlines()
+        columns = lines[1].split(",")
+        assert len(lines) == 2 + len(source(page, name, columns[0]))
+        assert [float(x) for x in lines[2].split(",")] == pytest.approx([source(page, name, c)[0] for c in columns])
+
+
+def _nothing_jumps(page: Page, before: dict[str, float]) -> None:
+    """Cards stand where they stood while the verdict was awaited, and none of the mouse's targets moved."""
+    for key, top in places(page).items():
+        assert abs(top - before[key]) < 2.0, key
+
+
+def places(page: Page) -> dict[str, float]:
+    return page.evaluate(
+        "Object.fromEntries([...document.querySelectorAll('.card')].map((c, i) => "
+        "[i + ' ' + (c.querySelector('h2')?.firstChild.textContent ?? ''), c.getBoundingClientRect().top + scrollY]))"
+    )
+
+
+def _tabbed(page: Page) -> None:
+    """The Tab key goes from one named action to the next: buttons and candidates, no unnamed stops in between."""
+    page.evaluate("document.activeElement.blur(); scrollTo(0, 0)")
+    named: list[str] = []
+    for _ in range(12):
+        page.keyboard.press("Tab")
+        named.append(page.evaluate("(e => e.innerText?.trim() || e.ariaLabel || e.id)(document.activeElement)"))
+        if page.evaluate("document.activeElement.dataset.candidate") == "0":
+            break
+    assert all(named), named
+    assert page.evaluate("document.activeElement.dataset.candidate") == "0", named
+
+
 def _saved(rig: Path) -> None:
     names = {path.name for path in (rig / "saved").iterdir()}
     assert {"rig.yaml", "rig.history.json", "explore.html", "response.png", "history.svg"} <= names
+    assert (rig / "saved" / "coefficients.csv").is_file()
     text = (rig / "saved" / "rig.yaml").read_text()
-    assert text == (rig / "rig.yaml").read_text() + "  - quadratic_damping\n"
-    assert "quadratic_damping" in model_file.read_model(rig / "saved" / "rig.yaml")
+    assert text.count("# mine") == (rig / "rig.yaml").read_text().count("# mine"), "comments stay"
+    model = model_file.read_model(rig / "saved" / "rig.yaml")
+    assert model.terms[-1].name == "quadratic_damping"
+    assert None not in model.values.values(), "the values that were fitted are written"
     assert [s["added"] for s in history.read(rig / "saved" / "rig.yaml")] == [None, "quadratic_damping"]
 
 

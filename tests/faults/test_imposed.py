@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from study.faults.imposed import FAULTS, high_passed, impose, shifted
+from study.faults.spotted import at_the_limits
 from study.support.errors import StudyError
 from study.trials.draw import make_trial
 
@@ -40,3 +41,9 @@ def test_a_coupling_of_first_order_has_its_gain():
     time = dt * np.arange(20000)
     passed = high_passed(np.sin(2.0 * np.pi * cutoff * time), cutoff, dt)
     assert np.std(passed[10000:]) == pytest.approx(np.sqrt(0.5) * np.sqrt(0.5), rel=1e-2)
+
+
+def test_the_largest_value_of_a_repeated_motion_is_no_limit() -> None:
+    one = np.random.default_rng(1).standard_normal(500)
+    assert at_the_limits(np.tile(one, 8), None) is None
+    assert at_the_limits(np.clip(np.tile(one, 8), -2.0, 2.0), None) is not None

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from study.records.plan import Plan, make_plan
-from study.records.prepared import prepare_record, whole
-from study.records.record import MOTIONS
+from study.records.prepared import limited, prepare_record, whole
+from study.records.record import MOTIONS, Record
 from study.support.errors import StudyError
 
 
@@ -54,3 +54,14 @@ def test_a_whole_record_is_fitted_and_none_of_it_judged(records):
     prepared = whole(records["duffing"])
     np.testing.assert_array_equal(prepared.fitted, records["duffing"]["displacement"])
     assert len(prepared.judged) == 0
+
+
+def test_a_quiet_stretch_is_no_look_at_a_record():
+    """A sweep that is repeated passes its resonance in the middle of each part, away from where the parts meet."""
+    place = np.arange(4000) % 2000
+    sweep = np.cos(0.3 * place) * np.exp(-(((place - 1000.0) / 150.0) ** 2))
+    steady = np.random.default_rng(2).standard_normal(4000)
+    for motion, fit, judge in ((sweep, (750, 1250), (2750, 3250)), (steady, (1500, 2000), (2000, 2500))):
+        prepared = prepare_record(Record(0.01, {"force": steady, "displacement": motion}))
+        plan = limited(prepared, 500).plan
+        assert (plan.fit, plan.judge) == (fit, judge)

@@ -31,3 +31,20 @@ def test_a_variance_is_positive_where_a_single_sample_decides_an_estimate(seed):
     white = np.diag(np.linalg.inv(jacobian.T @ jacobian)) * float(residual @ residual) / (960 - 4)
     assert np.all(variance >= white * (1.0 - 1e-9))
     assert variance[3] == pytest.approx(white[3], rel=1e-6)
+
+
+def test_errors_of_a_models_own_coefficients_are_no_evidence_for_a_change_that_resembles_them():
+    """Its column grows along the judging part, as that of a frequency does; 400 samples of white noise, 300 times."""
+    rng, n = np.random.default_rng(4), 200
+    along = np.linspace(0.0, 1.0, 2 * n)
+    own, column = along * np.cos(300.0 * along), along**2 * np.cos(300.0 * along + 0.3)
+    alarms = dict.fromkeys(("gain", "beside"), 0)
+    for noise in rng.standard_normal((300, 2 * n)):
+        left = noise - own * (own[:n] @ noise[:n]) / (own[:n] @ own[:n])
+        alone = column - own * (own[:n] @ column[:n]) / (own[:n] @ own[:n])
+        change = alone[n:] * (alone[:n] @ left[:n]) / (alone[:n] @ alone[:n])
+        freed = noise - own * (own @ noise) / (own @ own)
+        alarms["gain"] += statistics.gain(left[n:], left[n:] - change).p_value < 0.02
+        alarms["beside"] += statistics.beside(left[n:], change, freed[n:]).p_value < 0.02
+    assert alarms["beside"] <= 14  # six are meant: more have a chance of 2 in a thousand
+    assert alarms["gain"] > 30  # what is held against the residual as it stands

@@ -19,6 +19,7 @@ from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
 INERTIA = 2  # order of its time derivative
+LARGEST = 1e150  # of an input: the square of one beyond may be no number
 STATE_STEPS = 4  # Runge-Kutta steps a sample for a term's own state
 
 
@@ -143,7 +144,8 @@ def _alone(part: Record) -> Record:
 
 
 def _finite(values: Floats, item: Input, record: Record) -> Floats:
-    bad = np.flatnonzero(~np.isfinite(values))
+    with np.errstate(invalid="ignore"):
+        bad = np.flatnonzero(~(np.abs(values) < LARGEST))
     if bad.size:
         formula, time = item.shape if item.state is None else item.state, record.time[bad[0]]
         raise StudyError(f"the formula {formula!r} has no finite value at t = {time:.6g} s of {record.name}")

@@ -5,9 +5,11 @@ alone. The reverse system (the report's estimate) gives every coefficient at onc
 no local minima, in which a fit from a linear model ends where the system is far from linear.
 """
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from study.equations.model import Model, free
 from study.equations.terms import get
@@ -15,28 +17,69 @@ from study.identify.frequency_domain import coefficients, conditioned
 from study.identify.frequency_domain.decay_start import along_the_motion, decay_start, drift_start, scaled
 from study.identify.frequency_domain.inputs import histories, reverse_inputs, without_inertia
 from study.records.prepared import FORCE, Prepared
-from study.records.record import MOTIONS
+from study.records.record import MOTIONS, Record
 from study.records.spectra import Segments, cross_spectra, cross_spectra_within
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 LINEAR_ORDERS = {"k": 0, "c": 1, "m": 2}
 FAINT = 1e-3  # share of the strongest line's force below which a line is leakage
+FEWEST_LINES = 4  # two more than mass, damping and stiffness need
+MAIN_LOBE = 5  # lines that a Hann window makes of one frequency, those above FAINT beside its main lobe included
 SHORT = 512  # samples below which coherence may be missing because the record is short
 CHANCE = 0.01  # probability that noise alone reaches the coherence of a line that the linear start uses
 LONGEST, SHORTEST, PARTS = 1024, 64, 12  # samples in a segment, at most and at least, and its share of the record
 
 
-def linear_start(model: Model, prepared: Prepared) -> dict[str, float]:
-    """Mass, damping and stiffness of the best linear approximation; zero for everything else."""
-    if prepared.response == FORCE:
-        linear = [key for key in LINEAR_ORDERS if key in model.values]
-        return dict.fromkeys(model.values, 0.0) | along_the_motion(_with_shapes(model), prepared, linear)
-    if prepared.free:
-        return decay_start(model, prepared)
+@dataclass(frozen=True)
+class Lines:
+    """Best linear approximation on the lines of the fitting part where force and response have something in common."""
+
+    omega: Complexes  # 2 pi j f, shape (lines,)
+    receptance: Complexes  # displacement over force, shape (lines,)
+    weight: Floats  # over the standard error of 1 / receptance, to a common factor; shape (lines,)
+    neighbours: int  # lines from the first to the last: a window alone makes some of a single frequency
+
+    @property
+    def single(self) -> bool:
+        """Whether the lines are as few and as near as those that a Hann window makes of one frequency."""
+        return self.neighbours <= MAIN_LOBE
+
+
+def coherent_lines(prepared: Prepared) -> Lines:
+    """The lines by the usual segments; by longer ones where too few lines of those are driven, as in slow records.
+
+    Raises
+    ------
+    StudyError
+        If force and response have nothing in common.
+    """
     record, response = prepared.record, prepared.response
     part = record.part(*prepared.plan.fit)
     length = min(LONGEST, 2 ** int(np.log2(max(len(part) // 8, 16))))
+    found, _ = _lines(part, response, length)
+    if len(found.omega) >= FEWEST_LINES:
+        return found
+    while length < len(part) // 2:
+        length = min(2 * length, len(part) // 2)
+        found, chance = _lines(part, response, length)
+        if len(found.omega) > max(1.0, chance):  # two lines are four equations
+            return found
+    if len(part) < SHORT:
+        raise StudyError(
+            f"the part to fit of {record.name!r} has {len(part)} samples, too few to see what force and {response} "
+            f"have in common; fit a longer part, {SHORT} samples or more"
+        )
+    raise StudyError(
+        f"force and {response} of {record.name!r} have nothing in common at any frequency; expected a response to this "
+        "force (are the columns and the samples of one measurement?)"
+    )
+
+
+def _lines(part: Record, response: str, length: int) -> tuple[Lines, float]:
+    """The lines by segments of a length, and how many of those driven may be coherent by chance."""
     force, motion = (part[name] - np.mean(part[name]) for name in ("force", response))
     if part.joints:
         matrix = cross_spectra_within([force, motion], part.joints, part.dt, Segments(length=length))
@@ -47,26 +90,46 @@ def linear_start(model: Model, prepared: Prepared) -> dict[str, float]:
     coherence = np.abs(g[:, 0, 1]) ** 2 / np.where(power > 0.0, power, np.inf)
     coherence = np.clip(coherence, 0.0, 1.0 - 1e-6)
     by_chance = 1.0 - CHANCE ** (1.0 / max(matrix.averages - 1.0, 1.0))
-    keep = (coherence > by_chance) & (g[:, 0, 0].real > FAINT * np.max(g[:, 0, 0].real))
-    if np.count_nonzero(keep) < 4 and "k" not in model.values and part.joints:
-        return drift_start(model, prepared)
-    if np.count_nonzero(keep) < 4:
-        if len(part) < SHORT:
-            raise StudyError(
-                f"the part to fit of {record.name!r} has {len(part)} samples, too few to see what force and {response} "
-                f"have in common; fit a longer part, {SHORT} samples or more"
-            )
-        raise StudyError(f"force and {response} of {record.name!r} have nothing in common at any frequency")
+    driven = g[:, 0, 0].real > FAINT * np.max(g[:, 0, 0].real)
+    keep = (coherence > by_chance) & driven
     omega = 2j * np.pi * f[keep]
     receptance = g[keep, 0, 1] / g[keep, 0, 0] / omega ** MOTIONS.index(response)
     weight = np.abs(receptance) * np.sqrt(coherence[keep] / (1.0 - coherence[keep]))
+    places = np.flatnonzero(keep)
+    neighbours = int(places[-1] - places[0]) + 1 if len(places) else 0
+    expected = CHANCE * float(np.count_nonzero(driven))
+    return Lines(omega, receptance, weight, neighbours), expected + 3.0 * float(np.sqrt(expected))
+
+
+def solved(lines: Lines, wanted: Sequence[str]) -> tuple[Floats, Floats]:
+    """Those of k, c and m that are wanted, and their standard errors from what the lines leave; shapes (wanted,)."""
+    design = np.stack([lines.omega ** LINEAR_ORDERS[key] for key in wanted], axis=1) * lines.weight[:, None]
+    target = lines.weight / lines.receptance
+    columns, goal = np.concatenate([design.real, design.imag]), np.concatenate([target.real, target.imag])
+    solution = least_squares(columns, goal)
+    length = np.linalg.norm(columns, axis=0)
+    length = np.where(length > 0.0, length, 1.0)
+    inverse = np.linalg.pinv((columns / length).T @ (columns / length))
+    variance = float(np.sum((goal - columns @ solution) ** 2)) / max(len(goal) - len(wanted), 1)
+    return solution, np.sqrt(np.diag(inverse).clip(0.0) * variance) / length
+
+
+def linear_start(model: Model, prepared: Prepared) -> dict[str, float]:
+    """Mass, damping and stiffness of the best linear approximation; zero for everything else."""
+    if prepared.response == FORCE:
+        linear = [key for key in LINEAR_ORDERS if key in model.values]
+        return dict.fromkeys(model.values, 0.0) | along_the_motion(_with_shapes(model), prepared, linear)
+    if prepared.free:
+        return decay_start(model, prepared)
+    if prepared.record.joints and "k" not in model.values:
+        return drift_start(model, prepared)
+    lines = coherent_lines(prepared)
     wanted = [key for key in LINEAR_ORDERS if key in model.values]
-    design = np.stack([omega ** LINEAR_ORDERS[key] for key in wanted], axis=1) * weight[:, None]
-    target = weight / receptance
-    solution = least_squares(np.concatenate([design.real, design.imag]), np.concatenate([target.real, target.imag]))
+    solution, _ = solved(lines, wanted)
     start = dict.fromkeys(model.values, 0.0) | dict(zip(wanted, solution.tolist(), strict=True))
     if start["m"] <= 0.0:
-        start["m"] = float(np.linalg.norm(target)) / float(np.linalg.norm(omega**2 * weight))
+        target = lines.weight / lines.receptance
+        start["m"] = float(np.linalg.norm(target)) / float(np.linalg.norm(lines.omega**2 * lines.weight))
     return start
 
 

@@ -19,6 +19,7 @@ from study.identify.frequency_domain.inputs import history, reverse_inputs
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.no_response import LINEAR, unfit, why_no_response
 from study.identify.time_domain.part_fit import STEPS, fit_part
 from study.identify.time_domain.settling import KEPT, better, continued, from_segments, settled
 from study.identify.time_domain.shape_search import Baseline
@@ -68,7 +69,16 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
     for entry in unknown:
         fit = with_term(fit, entry, shape_search.baseline(fit, look), look)
     ordered = replace(model, terms=tuple(next(t for t in fit.model.terms if t.name == e.name) for e in model.terms))
-    return settled(continued(replace(fit, model=ordered), prepared), prepared)
+    return _followed(settled(continued(replace(fit, model=ordered), prepared), prepared), model, prepared)
+
+
+def _followed(fit: FreeRunFit, model: Model, prepared: Prepared) -> FreeRunFit:
+    """The fit; a linear system is never chaotic: one that needs segments is refused where there is a plain reason."""
+    if fit.restarts and all(term.name in LINEAR for term in model.terms):
+        sentence = unfit(model, prepared)
+        if sentence:
+            raise StudyError(sentence)
+    return fit
 
 
 def first_starts(model: Model, prepared: Prepared) -> list[dict[str, float]]:
@@ -114,7 +124,8 @@ def best_fit(
     """The best of fits from several starts; the others stay with it (``elsewhere``).
 
     With open shape parameters each start is first fitted with these held: the misfit along a dead band or a gap has
-    kinks and local minima in which a fit of everything at once gets stuck.
+    kinks and local minima in which a fit of everything at once gets stuck. A minimum outside of what makes the terms
+    physical is taken only where no start leads to one inside.
 
     Raises
     ------
@@ -128,7 +139,22 @@ def best_fit(
     nearer = [_halfway(begun[0], start) for start, fit in zip(begun[1:], each[1:], strict=True) if fit is None]
     each += [_tried(model, prepared, (*held, *shapes), start, TRIED) for start in nearer]
     first = sorted((fit for fit in each if fit is not None), key=lambda fit: fit.rms)
-    best = first[0] if first else None
+    best = _at_minimum(first[0] if first else None, model, prepared, held)
+    inside = next((fit for fit in first if fit.converged and not _unphysical(fit)), None)
+    if best is not None and inside is not None and inside is not first[0] and _unphysical(best):
+        bound = _at_minimum(inside, model, prepared, held)
+        best = best if bound is None or _unphysical(bound) else bound
+    if best is None:
+        raise StudyError(why_no_response(model, prepared))
+    return replace(best, elsewhere=tuple(first[1:]))
+
+
+def _at_minimum(
+    fit: FreeRunFit | None, model: Model, prepared: Prepared, held: Sequence[str]
+) -> FreeRunFit | None:  # fmt: skip
+    """A fit that tried a start, its shapes freed; from multiple shooting where it came to no minimum."""
+    shapes = tuple(key for key in model.values if "." in key and key not in held)
+    best = fit
     if best is not None and (shapes or not best.converged):
         best = _freed(best, prepared, held)
     if best is None or not best.converged:
@@ -136,9 +162,11 @@ def best_fit(
         if apart is not None and shapes:
             apart = _freed(apart, prepared, held)
         best = better(best, apart)
-    if best is None:
-        raise StudyError(f"{model.name!r} has no finite response to the force of {prepared.record.name!r}")
-    return replace(best, elsewhere=tuple(first[1:]))
+    return best
+
+
+def _unphysical(fit: FreeRunFit) -> bool:
+    return any(entry.term.physical(fit.model.values) for entry in fit.model.terms)
 
 
 def _rough(model: Model, prepared: Prepared, start: Values) -> int:

@@ -14,9 +14,11 @@ from study.records.readers.sampling import even_interval
 from study.records.readers.table import Column, Table
 from study.records.record import MOTIONS, SI_UNITS, Record
 from study.support.errors import StudyError, at, expect
+from study.support.terminal import harmless
 from study.support.units import ROLES, is_unit, parse_unit, role_unit
 
 Floats = NDArray[np.float64]
+LONGEST_NAME = 120  # characters of a record's name: names of files have 255 bytes, and more is put to it
 AGREE = 0.01  # share by which a given interval may differ from that of the times
 AGAIN = 0.7  # of its rms: a force that changes by more after a period does not repeat (a random one changes by 1.4)
 
@@ -29,6 +31,7 @@ def record_from(path: Path, table: Table, options: ReadOptions) -> Record:
     for column in roles.values():
         expect(not column.fault, f"{path}: {column.fault}")
     _check_lengths(path, roles, options)
+    _check_apart(path, roles)
     units = _units(path, roles, options)
     first, last = _range(path, len(next(iter(roles.values())).values), options)
     cut = table.from_sample(first)
@@ -45,7 +48,19 @@ def record_from(path: Path, table: Table, options: ReadOptions) -> Record:
 def _name(path: Path, options: ReadOptions) -> str:
     """The file's own name; the folder's for what the simulator writes, which is always ``record.csv``."""
     stem = path.resolve().parent.name if path.stem == "record" else path.stem
-    return f"{stem}_{options.group.strip('/').replace('/', '_')}" if options.group else stem
+    name = f"{stem}_{options.group.strip('/').replace('/', '_')}" if options.group else stem
+    return harmless(name)[:LONGEST_NAME]  # files are named after it, and pictures show it
+
+
+def _check_apart(path: Path, roles: Mapping[str, Column]) -> None:
+    """Refuse one column in two places."""
+    taken: dict[int, str] = {}
+    for role, column in roles.items():
+        other = taken.setdefault(id(column), role)
+        expect(other == role, f"{path}: column {column.name!r} is given as {other} and as {role}; expected one of each")
+    for motion in (m for m in MOTIONS if m in roles):
+        same = np.array_equal(roles["force"].values, roles[motion].values)
+        expect(not same, f"{path}: force and {motion} hold the same numbers; expected two measured channels")
 
 
 def _check_lengths(path: Path, roles: Mapping[str, Column], options: ReadOptions) -> None:
@@ -85,7 +100,7 @@ def _usable(path: Path, roles: Mapping[str, Column], table: Table, options: Read
     """The channels, each checked; an extra channel with gaps that nobody asked for is left out."""
     usable: dict[str, Column] = {}
     for role, column in roles.items():
-        fault = checks.not_finite(column.values, table.place)
+        fault = checks.not_finite(column.values, table.place) or checks.beyond(column.values, table.place)
         if fault is not None and role not in (*ROLES, *options.columns):
             continue
         resting = role == "force" and not np.any(column.values)  # no force acts: a free decay
@@ -105,6 +120,10 @@ def _sampling(
 ) -> tuple[float, float]:
     """Interval and first time: what the user says, what the times say, what the file states."""
     stated = options.interval
+    given = stated if stated is not None else table.dt
+    usual = given is None or checks.SHORTEST <= given <= checks.LONGEST
+    limits = f"{checks.SHORTEST:g} to {checks.LONGEST:g} s"
+    expect(usual, f"{path}: the sampling interval is {given or 0.0:g} s; expected one of {limits}")
     if "time" in roles:
         time = roles["time"].values * parse_unit(units.get("time", "s")).factor
         if stated is None:

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 FEWEST_SAMPLES = 16
+SMALLEST, LARGEST = 1e-50, 1e50  # size of a value
+SHORTEST, LONGEST = 1e-15, 1e15  # seconds between samples
 FEWEST_CLIPPED = 10  # samples at the very same extreme value ...
 CLIPPED_SHARE = 1e-3  # ... and this share of the record ...
 CLIPPED_RATIO = 10.0  # ... and this many times as many as at the values next to it: then it is clipped
@@ -23,6 +25,17 @@ def not_finite(values: Floats, place: Callable[[int], str]) -> str | None:
     value = "no number" if np.isnan(values[bad[0]]) else "an infinite value"
     more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
     return f"has {value} in {place(int(bad[0]))}{more}; fill the gap, or cut it away by 'samples: [first, last]'"
+
+
+def beyond(values: Floats, place: Callable[[int], str]) -> str | None:
+    """A sentence on a number of a size that no unit makes: its square, or its derivatives', may be no number."""
+    size = np.abs(values)
+    large = np.flatnonzero(size > LARGEST)
+    if len(large):
+        return f"holds {values[large[0]]:g} in {place(int(large[0]))}; expected numbers below {LARGEST:g}"
+    if 0.0 < float(np.ptp(values)) < SMALLEST:
+        return f"moves by {np.ptp(values):g} alone; expected a signal of more than {SMALLEST:g} in its unit"
+    return None
 
 
 def constant(values: Floats) -> str | None:

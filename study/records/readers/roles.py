@@ -9,12 +9,13 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
-from study.records.base import BASE
+from study.records.moving_base import BASE
 from study.records.readers.options import BESIDE, ReadOptions
 from study.records.readers.table import Column, Table
 from study.records.record import MOTIONS
 from study.support.errors import StudyError, expect
 from study.support.units import ROLES, parse_unit
+from study.support.yaml_text import shown
 
 NAMES: dict[str, tuple[str, ...]] = {
     "force": ("f", "force", "input", "fin", "forcein", "inputforce", "excitation", "load", "appliedforce"),
@@ -66,7 +67,7 @@ def _named(path: Path, table: Table, role: str, wanted: str | int) -> Column:
     if not matches and re.fullmatch(r"[0-9]{1,9}", str(wanted)):
         matches = [c for k, c in enumerate(table.columns, start=1) if k == int(wanted)]
     if not matches:
-        raise _ask(path, table, f"there is no column {wanted!r} for {role}")
+        raise _ask(path, table, f"there is no column {shown(wanted)} for {role}")
     if len(matches) > 1:
         numbers = " and ".join(str(k) for k, c in enumerate(table.columns, start=1) if any(c is m for m in matches))
         raise _ask(path, table, f"the column {wanted!r} for {role} is there {len(matches)} times, as {numbers}")

@@ -32,6 +32,7 @@ DIALECTS = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (BLANK
 COMMENTS = ("#", "%", "!", "//")
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
 EXPECTED = "expected a table with one line for each sample"
+WORDS = re.compile(rb"true|false", re.IGNORECASE)  # the compiled parser takes these for 1 and 0
 NO_TEXT = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f]")  # control characters that no text file holds
 
 
@@ -198,11 +199,13 @@ def _table(path: Path, body: bytes, layout: Layout) -> Table:
 def _frame(body: bytes, layout: Layout) -> tuple[pd.DataFrame, Callable[..., Column]]:
     """The cells, and how to make a column of them: as numbers at once, or where a cell holds text, cell by cell."""
     try:
-        return _parse(body, layout, "float64"), _numbers
+        if not WORDS.search(body):
+            return _parse(body, layout, "float64"), _numbers
     except pd.errors.ParserError:  # cells too many, which the slow road would not mend
         raise
     except (ValueError, OverflowError):
-        return _parse(body, layout, "str"), _checked
+        pass
+    return _parse(body, layout, "str"), _checked
 
 
 def _parse(body: bytes, layout: Layout, dtype: str) -> pd.DataFrame:

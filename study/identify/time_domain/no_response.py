@@ -1,0 +1,61 @@
+"""Why no values of a model let it follow a record, as far as the record or the model says."""
+
+import numpy as np
+
+from study.equations.model import Model
+from study.identify.frequency_domain.starting_values import coherent_lines, solved
+from study.records.prepared import FORCE, Prepared
+from study.support.errors import StudyError
+
+SURE = 3.0  # standard errors by which a coefficient must differ from zero to have a sign
+ORDER = ("m", "c", "k")
+LINEAR = ("inertia", "linear_damping", "linear_stiffness")
+
+
+def why_no_response(model: Model, prepared: Prepared) -> str:
+    """One sentence for a model that has no finite response to a record's force from any start."""
+    sentence = unfit(model, prepared)
+    if sentence:
+        return sentence
+    return (
+        f"{model.name!r} has no finite response to the force of {prepared.record.name!r}; expected a model with other "
+        "terms, or values in it that come near those of the record"
+    )
+
+
+def unfit(model: Model, prepared: Prepared) -> str:
+    """What speaks against a model or a record before any fit; empty if nothing does.
+
+    What is wrong with the record is read from its best linear approximation: mass, damping and stiffness, each with its
+    standard error.
+    """
+    name, response = prepared.record.name, prepared.response
+    held = [f"{key} = {model.values[key]:g}" for key in ("c", "k") if (model.values.get(key) or 0.0) < 0.0]
+    if held and all(term.name in LINEAR for term in model.terms):
+        grows = "with which any motion grows without end; expected a value above zero, or none"
+        return f"the model holds {' and '.join(held)}, {grows}"
+    if prepared.free or prepared.response == FORCE or prepared.record.stretches:
+        return ""  # no force, a prescribed motion, or stretches too short to ask: the fit has starts of its own there
+    try:
+        lines = coherent_lines(prepared)
+    except StudyError as error:
+        return str(error)
+    if lines.single:
+        frequency = float(np.mean(np.abs(lines.omega))) / (2.0 * np.pi)
+        return (
+            f"the force of {name!r} drives one frequency, {frequency:.3g} Hz, which cannot tell mass from stiffness; "
+            "expected a force of several frequencies, or a model that gives the value of one of them"
+        )
+    values, errors = solved(lines, ORDER)
+    mass, error = float(values[0]), float(errors[0])
+    if mass < -SURE * error and float(values[1]) < SURE * float(errors[1]):
+        return (
+            f"the {response} of {name!r} seems to have the other sign: its best linear system has the mass {mass:.3g}; "
+            f"expected force and {response} positive in the same direction"
+        )
+    if mass < SURE * error:
+        return (
+            f"{name!r} shows no mass: its best linear system has m = {mass:.3g} +- {error:.2g}; expected a force that "
+            "reaches the resonance, or a model that gives the mass"
+        )
+    return ""
