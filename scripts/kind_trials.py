@@ -1,4 +1,4 @@
-"""Trials by kind of test: ``python scripts/kind_trials.py docs/trials_by_test.csv 50 free_decay ...`` adds rows."""
+"""Trials by kind of test: ``kind_trials.py docs/trials_by_test.csv 50 free_decay ...`` adds their rows."""
 
 import csv
 import sys

@@ -84,8 +84,8 @@ def _diagnosed(
         words, faults = in_words(diagnosis), confirmed(accounted.faults, diagnosis)
     print(f"{name}: {diagnosis.verdict.replace('_', ' ')}")
     print(diagnosis_report.table(diagnosis))
-    for candidate, why in untried.items():
-        print(f"{candidate} could not be fitted: {why}")
+    for effect, why in untried.items():
+        print(f"{effect} could not be fitted: {why}")
     print("\n" + words)
     if faults:
         print("\n" + paragraph(faults))

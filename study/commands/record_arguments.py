@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 RANGE = re.compile(r"([0-9]{0,15}):([0-9]{0,15})")
 MOTIONS = ("displacement", "velocity", "acceleration")
 RESULTS = Path("results")
+ALTERNATE = "every-other-block"
 GIVEN = ("dt", "fs", "group", "period", "accept_saturated", "accept_swapped", "free")  # as ``ReadOptions`` calls them
 DIGITS = 10  # of the number of a column; more are a name
-ALTERNATE = "every-other-block"
 Span = tuple[int, int | None]
 
 
@@ -68,7 +68,7 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     reading.add_argument(
         "--absolute", action="store_true", help="on a moving base (column base_acceleration): the response is absolute"
     )  # fmt: skip
-    reading.add_argument("--free", action="store_true", help="no force acts: a free decay (a column of it is left out)")
+    reading.add_argument("--free", action="store_true", help="a free decay: no force acts, a column of it is left out")
     reading.add_argument(
         "--no-measurement", action="store_true", help="look for no faults of the measurement: drift, delay, spikes ..."
     )
@@ -76,8 +76,8 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     judging.add_argument("--fit", type=span, metavar="A:B", help="samples to fit, A to B - 1 (default: the first half)")
     judging.add_argument(
         "--judge", type=judged, metavar="A:B",
-        help=f"samples to judge (default: the second half), or '{ALTERNATE}': each from a state of its own, the "
-        "default of free decays and of several stretches, and right for sweeps, whose halves have other frequencies",
+        help=f"samples to judge (default: the second half), or '{ALTERNATE}': the default of free decays, "
+        "components and several stretches, and right for sweeps, whose halves have other frequencies",
     )  # fmt: skip
     judging.add_argument(
         "--use", action="append", type=times, default=[], metavar="S:T",

@@ -437,8 +437,8 @@ def integrate_known(
     """A force along a known motion, with its exact derivatives; the terms' own states alone are integrated.
 
     ``drive`` has displacement, velocity and channels, 2 steps rows a sample. Row 0 of ``slots`` names the registers of
-    the force and of its derivatives by states and keys, the others those of the states' slopes. ``states`` has, for
-    each segment between ``bounds``, the states beside their sensitivities. Result as in :func:`integrate_rk4`.
+    the force and of its derivatives by states and keys, the others those of the states' slopes. ``states`` has, of each
+    segment between neighbouring ``bounds``, the states beside their sensitivities. Result as :func:`integrate_rk4`.
     """
     h = dt / steps
     for k in range(bounds.shape[0] - 1):

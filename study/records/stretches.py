@@ -67,7 +67,7 @@ def _refuse_different(first: Record, other: Record) -> None:
 
 
 def sure(completed: CompletedRecord, first: int, last: int) -> Stretch:
-    """A stretch of a completed record without the samples at its ends that its derivatives leave uncertain."""
+    """A stretch of a completed record without the samples at its ends that derivatives leave uncertain."""
     edge = completed.edge
     low, high = max(first, edge), min(last, len(completed.record) - edge)
     expect(

@@ -96,7 +96,7 @@ def _run(model: Model, force: Floats, dt: float, initial: Sequence[float] = (0.0
 
 
 def _with_hidden(rng: np.random.Generator, model: Model, names: Sequence[str], quiet: Record) -> Model:
-    """The model and the effects, sized along the motion without them: dampers by the viscous force, springs so too."""
+    """The model and the effects, sized along the motion without them: dampers by the viscous force."""
     values = model.numbers()
     for name in names:
         entry = _shaped(rng, name, quiet)

@@ -1,4 +1,4 @@
-"""Starting values where no force acts, from frequency and decay of the motion; and where the motion is given."""
+"""Starting values where no force acts: from the frequency and the decay of the motion; and where it is given."""
 
 import numpy as np
 from scipy.fft import rfft, rfftfreq

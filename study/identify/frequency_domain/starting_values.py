@@ -116,17 +116,15 @@ def solved(lines: Lines, wanted: Sequence[str]) -> tuple[Floats, Floats]:
 
 def linear_start(model: Model, prepared: Prepared) -> dict[str, float]:
     """Mass, damping and stiffness of the best linear approximation; zero for everything else."""
-    wanted = [key for key in LINEAR_ORDERS if key in model.values]
     if prepared.response == FORCE:
-        return dict.fromkeys(model.values, 0.0) | along_the_motion(_with_shapes(model), prepared, wanted)
+        linear = [key for key in LINEAR_ORDERS if key in model.values]
+        return dict.fromkeys(model.values, 0.0) | along_the_motion(_with_shapes(model), prepared, linear)
     if prepared.free:
         return decay_start(model, prepared)
-    try:
-        lines = coherent_lines(prepared)
-    except StudyError:
-        if "k" in model.values or not prepared.record.joints:
-            raise
+    if prepared.record.joints and "k" not in model.values:
         return drift_start(model, prepared)
+    lines = coherent_lines(prepared)
+    wanted = [key for key in LINEAR_ORDERS if key in model.values]
     solution, _ = solved(lines, wanted)
     start = dict.fromkeys(model.values, 0.0) | dict(zip(wanted, solution.tolist(), strict=True))
     if start["m"] <= 0.0:

@@ -4,7 +4,7 @@ import numpy as np
 
 from study.equations.model import Model
 from study.identify.frequency_domain.starting_values import coherent_lines, solved
-from study.records.prepared import Prepared
+from study.records.prepared import FORCE, Prepared
 from study.support.errors import StudyError
 
 SURE = 3.0  # standard errors by which a coefficient must differ from zero to have a sign
@@ -34,6 +34,8 @@ def unfit(model: Model, prepared: Prepared) -> str:
     if held and all(term.name in LINEAR for term in model.terms):
         grows = "with which any motion grows without end; expected a value above zero, or none"
         return f"the model holds {' and '.join(held)}, {grows}"
+    if prepared.free or prepared.response == FORCE or prepared.record.stretches:
+        return ""  # no force, a prescribed motion, or stretches too short to ask: the fit has starts of its own there
     try:
         lines = coherent_lines(prepared)
     except StudyError as error:
