@@ -244,10 +244,19 @@ def integration_shift(fit: StructureFit, prepared: PreparedStructure, jacobian: 
 
 
 def covariance_of(fit: StructureFit, prepared: PreparedStructure, jacobian: Floats) -> Floats:
-    """Covariance of estimates and initial state: of whatever is left, in blocks of time, and of the integration."""
-    moved = integration_shift(fit, prepared, jacobian)
+    """Covariance of estimates and initial state: of whatever is left, in blocks of time, and of the integration.
+
+    Variances are those of blocks of time, or of white noise where that has larger ones; correlations are those of white
+    noise, as the scatter of a few dozen blocks cannot tell those of as many coefficients as a structure has.
+    """
+    moved, columns = integration_shift(fit, prepared, jacobian), flat(fit, jacobian)
+    length = np.linalg.norm(columns, axis=0)
+    scaled = columns / np.where(length > 0.0, length, 1.0)
+    white = np.linalg.pinv(scaled.T @ scaled, rcond=1e-12, hermitian=True)
+    size = np.sqrt(np.maximum(np.diag(white), np.finfo(float).tiny))
+    deviation = np.sqrt(np.diag(clustered_covariance(columns, flat(fit, fit.residual))))
     with np.errstate(over="ignore"):
-        return clustered_covariance(flat(fit, jacobian), flat(fit, fit.residual)) + np.outer(moved, moved)
+        return white / np.outer(size, size) * np.outer(deviation, deviation) + np.outer(moved, moved)
 
 
 def settled(fit: StructureFit, prepared: PreparedStructure) -> StructureFit:

@@ -23,9 +23,9 @@ def noise_over_motion(comparison):
 def test_the_true_model_is_found_within_its_errors(frame, record_of, motion, without):
     free = frame.with_values(dict.fromkeys(frame.values, None))
     comparison = compare_structure(free, prepare_structure(record_of(motion, without=without), free))
-    off = [(c.value - frame.values[c.key]) / c.error for c in comparison.coefficients]
-    assert np.max(np.abs(off)) < 3.5
-    assert np.sqrt(np.mean(np.square(off))) < 1.6
+    off = comparison.fit.values - [frame.values[key] for key in comparison.fit.keys]
+    distance = off @ np.linalg.solve(comparison.covariance, off)  # chi square with ten degrees of freedom
+    assert distance < 35.0
     assert comparison.prediction.error == pytest.approx(noise_over_motion(comparison), rel=0.05)
     assert comparison.prediction.floor == pytest.approx(comparison.prediction.error, rel=0.05)
     true = 2.16976, 5.07901, 7.31513
