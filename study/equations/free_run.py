@@ -216,7 +216,12 @@ def prepare(
     )
     factor = 2 * steps_per_sample
     part = slice(factor * first, factor * (last - 1) + 1)
-    drive = np.column_stack([_between(record[name].tobytes(), factor)[part] for name in ("force", *channels)])
+    drive = np.column_stack(
+        [
+            _between(record[name].tobytes(), factor, record.between if name == "force" else "band_limited")[part]
+            for name in ("force", *channels)
+        ]
+    )
     return FreeRun(
         program, variation, tuple(keys), drive, record.dt, steps_per_sample,
         record.start + first * record.dt, last - first, MOTIONS.index(response), tuple(r - first for r in restarts),
@@ -224,9 +229,9 @@ def prepare(
 
 
 @lru_cache(maxsize=REMEMBERED)
-def _between(values: bytes, factor: int) -> Floats:
+def _between(values: bytes, factor: int, reading: str) -> Floats:
     """A channel between its samples; a diagnosis makes hundreds of runs under the same force."""
-    fine = between_samples(np.frombuffer(values), factor)
+    fine = between_samples(np.frombuffer(values), factor, reading)
     fine.flags.writeable = False
     return fine
 

@@ -30,6 +30,8 @@ class Record:
         Time of the first sample in seconds.
     period : int, optional
         Samples in one period, where the excitation is periodic.
+    between : str
+        What the force does between its samples: one of ``interpolation.READINGS``.
     """
 
     dt: float
@@ -38,6 +40,7 @@ class Record:
     name: str = "record"
     start: float = 0.0
     period: int | None = None
+    between: str = "band_limited"
 
     def __len__(self) -> int:
         """Number of samples."""
