@@ -68,9 +68,9 @@ def _diagnosed(
     from study.diagnose import diagnosis_report
     from study.diagnose.confirmed_faults import confirmed
     from study.diagnose.diagnosis_files import files, in_words, unneeded_in_words
+    from study.diagnose.force_between import diagnose_as_read
     from study.diagnose.needless import needless
     from study.diagnose.user_candidates import check_on, unfitted
-    from study.diagnose.verdict import diagnose
     from study.faults.fault import paragraph
 
     name = ", ".join(record.name for record in records)
@@ -78,7 +78,7 @@ def _diagnosed(
         accounted = accounted_together(arguments, model, records, path)
         check_on(accounted.comparison.record, own)
         without = tuple(arguments.without)
-        diagnosis = diagnose(accounted.comparison, extra=own, without=without, progress=lambda _: step(""))
+        diagnosis = diagnose_as_read(accounted.comparison, extra=own, without=without, progress=lambda _: step(""))
         unneeded = needless(accounted.comparison)
         untried = unfitted(diagnosis, own)
         words, faults = in_words(diagnosis), confirmed(accounted.faults, diagnosis)

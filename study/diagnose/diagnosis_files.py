@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from study.compare.comparison_report import as_json, where
 from study.diagnose import diagnosis_pages, diagnosis_report
 from study.diagnose.diagnosis_sentences import sentences
+from study.diagnose.force_between import reading_in_words
 from study.diagnose.needless import Needless, fields, paragraph
 from study.diagnose.separating_test import advice
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
@@ -17,6 +18,7 @@ def in_words(diagnosis: Diagnosis) -> str:
     said = sentences(diagnosis)
     if diagnosis.verdict == MISSING:
         said.append(advice(diagnosis.candidates, diagnosis.comparison.prepared))
+    said.append(reading_in_words(diagnosis.comparison))
     return " ".join(s for s in said if s)
 
 

@@ -18,7 +18,7 @@ from study.equations import kernels
 from study.equations.graph import Op, Program
 from study.equations.machine_code import OFTEN, Variation, machine_code
 from study.equations.model import Model, forward_graph, named_channels, with_registers
-from study.records.interpolation import between_runs, between_samples, runs_of
+from study.records.interpolation import BAND_LIMITED, between_runs, between_samples, runs_of
 from study.records.record import MOTIONS, Record
 from study.support.arrays import Floats, Ints
 from study.support.errors import DivergenceError, StudyError
@@ -266,7 +266,9 @@ def prepare(
         drive, starts, places = _along_stretches(record, (first, last), driving, factor)
     else:
         part = slice(factor * first, factor * (last - 1) + 1)
-        drive = np.column_stack([_between(record[name].tobytes(), factor)[part] for name in driving])
+        drive = np.column_stack(
+            [_between(record[name].tobytes(), factor, _reading(record, name))[part] for name in driving]
+        )
     row = MOTIONS.index(response) if response in MOTIONS else len(MOTIONS)
     motion = record[response][first:last] if known and response in MOTIONS else None
     return FreeRun(
@@ -295,11 +297,16 @@ def _along_stretches(
 
 
 @lru_cache(maxsize=REMEMBERED)
-def _between(values: bytes, factor: int) -> Floats:
+def _between(values: bytes, factor: int, reading: str) -> Floats:
     """A channel between its samples; a diagnosis makes hundreds of runs under the same force."""
-    fine = between_samples(np.frombuffer(values), factor)
+    fine = between_samples(np.frombuffer(values), factor, reading)
     fine.flags.writeable = False
     return fine
+
+
+def _reading(record: Record, name: str) -> str:
+    """How a channel goes on between its samples: a motion is band-limited."""
+    return record.between if name == FORCE else BAND_LIMITED
 
 
 def _checked_span(record: Record, span: tuple[int, int] | None) -> tuple[int, int]:

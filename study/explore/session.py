@@ -16,10 +16,11 @@ from study.diagnose import candidates, dropping
 from study.diagnose.adding import added_candidate
 from study.diagnose.candidates import Candidate
 from study.diagnose.diagnosis_files import in_words, unneeded_in_words
+from study.diagnose.force_between import diagnose_as_read
 from study.diagnose.needless import Needless, needless
 from study.diagnose.ranked import Ranked
 from study.diagnose.ranking import rank
-from study.diagnose.verdict import Diagnosis, diagnose, search_base, search_part
+from study.diagnose.verdict import Diagnosis, search_base, search_part
 from study.equations import formulas
 from study.equations.model import Model
 from study.equations.terms import LIBRARY, Term, custom
@@ -158,7 +159,7 @@ def examined(session: Session, progress: Callable[[int], None] | None = None) ->
 
     And the diagnosis.
     """
-    diagnosis = diagnose(session.now.comparison, extra=session.own, progress=progress)
+    diagnosis = diagnose_as_read(session.now.comparison, extra=session.own, progress=progress)
     now = weighed(session).now
     said = f"{in_words(diagnosis)} {unneeded_in_words(now.unneeded or (), diagnosis)}".strip()
     return _foreseen(replace(now, diagnosis=diagnosis, said=said)), diagnosis

@@ -13,20 +13,31 @@ from scipy.fft import irfft, rfft
 from study.records.record import Record
 from study.support.arrays import Floats, Ints
 
+BAND_LIMITED = "band_limited"
+READINGS = (BAND_LIMITED, "straight", "held")
 EDGE = 512  # samples by which a record that does not close on itself is continued at each end
 CLOSES = 10.0  # a record that does not close has many times the energy there of one whose ends are continued
 
 
-def between_samples(values: Floats, factor: int) -> Floats:
+def between_samples(values: Floats, factor: int, reading: str = BAND_LIMITED) -> Floats:
     """Values on a grid ``factor`` times as fine, shape (factor (n - 1) + 1,); every ``factor``-th is the sample itself.
 
     A record that closes on itself is taken as periodic, which is exact for a periodic excitation; otherwise its ends
     are continued by point reflection and faded, which confines the error to the first and last few samples. A jump
     from the last sample to the first is recognised by its power up to the Nyquist frequency.
+
+    ``reading`` is one of :data:`READINGS`: a force that a program made may be straight or held between its samples.
+    Where a held one jumps, the mean of both values stands: an integrator's steps on both sides then add up to the jump.
     """
     n = len(values)
     if factor == 1 or n == 1:
         return values.copy()
+    if reading == "straight":
+        return np.interp(np.arange(factor * (n - 1) + 1) / factor, np.arange(n), values)
+    if reading == "held":
+        fine = np.append(np.repeat(values[:-1], factor), values[-1])
+        fine[factor:-1:factor] = 0.5 * (values[:-2] + values[1:-1])
+        return fine
     edge = min(EDGE, n - 1)
     fade = 0.5 - 0.5 * np.cos(np.pi * np.arange(edge) / edge)
     before = (2.0 * values[0] - values[edge:0:-1]) * fade
@@ -72,10 +83,11 @@ def between_runs(record: Record, name: str, factor: int) -> Floats:
     parts: list[Floats] = []
     runs, places = runs_of(record)
     own, begin = name in record.changed, 0
+    reading = record.between if name == "force" else BAND_LIMITED
     for run in runs:
         inside = (places >= begin) & (places < begin + len(run))
         along = np.interp(np.arange(begin, begin + len(run)), places[inside], record[name][inside]) if own else None
-        fine = between_samples(run.source[name] if along is None else along, factor)
+        fine = between_samples(run.source[name] if along is None else along, factor, reading)
         fine = fine[0 if own else factor * run.first :][: factor * len(run)]
         parts.append(np.pad(fine, (0, factor * len(run) - len(fine)), mode="edge"))
         begin += len(run)

@@ -59,6 +59,8 @@ class Record:
         What it is strung together of; empty for a record of its own.
     changed : set of str
         Channels that are no longer those of its stretches.
+    between : str
+        What the force does between its samples: one of ``interpolation.READINGS``.
     """
 
     dt: float
@@ -69,6 +71,7 @@ class Record:
     period: int | None = None
     stretches: tuple[Stretch, ...] = ()
     changed: frozenset[str] = frozenset()
+    between: str = "band_limited"
 
     def __len__(self) -> int:
         """Number of samples."""

@@ -83,6 +83,10 @@ def _beside(path: Path) -> Generator[Path, None, None]:
     """A name for a file beside ``path``; nothing is left under it."""
     target = Path(os.path.realpath(path))
     beside = target.with_name(f"{BESIDE}{secrets.token_hex(8)}{target.suffix}")
+    try:
+        os.stat(f"{target.parent}/.")  # noqa: PTH116  (the dot asks whether it is a folder)
+    except OSError as error:
+        raise _unwritten(path, error) from None
     if target.exists() and not os.access(target, os.W_OK):
         raise _unwritten(path, PermissionError(errno.EACCES, "it is write-protected"))
     try:

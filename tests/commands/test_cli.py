@@ -150,7 +150,7 @@ BAD = {
     "text_level": (["simulate", DUFFING, "--level", "loud"], "'loud' is not a finite number"),
     "nan_level": (["simulate", DUFFING, "--level", "nan"], "'nan' is not a finite number"),
     "negative_level": (["simulate", DUFFING, "--level=-1"], "of at least 0"),
-    "zero_dt": (["simulate", DUFFING, "--dt", "0"], "above 0"),
+    "zero_dt": (["simulate", DUFFING, "--dt", "0"], "at least 1e-15"),
     "few_samples": (["simulate", DUFFING, "--samples", "2"], "from 16 to"),
     "many_samples": (["simulate", DUFFING, "--samples", "1e12"], "from 16 to"),
     "half_sample": (["simulate", DUFFING, "--samples", "99.5"], "'99.5' is not a whole number"),

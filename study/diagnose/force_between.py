@@ -1,0 +1,80 @@
+"""What a force does between its samples, before an effect is called missing.
+
+A force is known at its samples. Read as band-limited, which a measured one is behind its filter, one that a program has
+made straight or held between them leaves an error that grows with the square of frequency over sampling rate: a few
+samples a period make it look like relaxation, and a resonance above the Nyquist frequency is driven by nothing else.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from study.compare.comparison import Comparison, compare
+from study.compare.prediction import predict
+from study.diagnose.verdict import NOTHING, Diagnosis, diagnose, search_part
+from study.equations.terms import Term
+from study.identify.time_domain.fit_model import fit_model
+from study.identify.time_domain.rivals import larger
+from study.records.interpolation import READINGS
+from study.records.prepared import Prepared
+from study.support.errors import StudyError
+from study.support.numbers import percent
+
+WORDS = {"straight": "goes in straight lines from sample to sample", "held": "is held from each sample to the next"}
+
+
+def diagnose_as_read(
+    comparison: Comparison,
+    *,
+    extra: Sequence[Term] = (),
+    without: Sequence[str] = (),
+    progress: Callable[[int], None] | None = None,
+) -> Diagnosis:
+    """The diagnosis of :func:`study.diagnose.verdict.diagnose`, unless another reading of the force explains it all.
+
+    That reading must leave significantly less than the band-limited one and less than the best candidate does, and
+    nothing may be missing with it: then the diagnosis is that of the record as it is read then, and its notes say so.
+    """
+    found = diagnose(comparison, extra=extra, without=without, progress=progress)
+    if found.verdict == NOTHING or comparison.fit.restarts or not comparison.fit.keys:
+        return found
+    best = min((row.response_error for row in found.candidates), default=comparison.prediction.error)
+    for prepared in _better_read(comparison, min(best, comparison.prediction.error)):
+        other = diagnose(compare(comparison.model, prepared), extra=extra, without=without, progress=progress)
+        if other.verdict == NOTHING:
+            return other
+    return found
+
+
+def _better_read(comparison: Comparison, best: float) -> Iterator[Prepared]:
+    """The record under the other readings that leave less than ``best`` and significantly less than the present one.
+
+    A reading that moves the response by less than what is unexplained cannot explain it, and is not fitted. The fit
+    begins from nothing: what was fitted under a wrong reading may be far from the truth.
+    """
+    prepared, now = comparison.prepared, comparison.prediction
+    for reading in (name for name in READINGS if name != prepared.record.between):
+        record = replace(prepared.record, between=reading)
+        other = replace(prepared, record=record, notes=(*prepared.notes, _note(reading, comparison)))
+        try:
+            moved = predict(comparison.fit, other).residual - now.residual
+            if np.std(moved) < np.std(now.residual):
+                continue
+            again = predict(fit_model(comparison.model, search_part(other)), other)
+        except StudyError:
+            continue
+        if again.error < best and larger(now.residual, again.residual):
+            yield other
+
+
+def _note(reading: str, comparison: Comparison) -> str:
+    error = percent(comparison.prediction.error)
+    return f"the force {WORDS[reading]}: read as band-limited, as a measured one is, it leaves {error} of the response"
+
+
+def reading_in_words(comparison: Comparison) -> str:
+    """A sentence on how the force is read, empty where it is band-limited."""
+    said = WORDS.get(comparison.record.between, "")
+    note = next((note for note in comparison.notes if said and said in note), "")
+    return f"{note[0].upper()}{note[1:]}." if note else ""
