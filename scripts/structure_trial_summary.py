@@ -14,7 +14,7 @@ def main(parts: Sequence[str], trials: str, rates: str, effects: str, places: st
     table = pd.concat([pd.read_csv(part, keep_default_na=False, na_values=["nan"]) for part in parts])
     table = table.sort_values("seed")
     tables.write_csv(table, Path(trials))
-    rows = table.to_dict("records")
+    rows = [{str(key): value for key, value in row.items()} for row in table.to_dict("records")]
     tables.write_csv(pd.DataFrame(structure_runs.rates(rows)), Path(rates))
     for columns, path in ((("hidden", "first"), effects), (("place", "first_place"), places)):
         counts = table.groupby(list(columns)).size().rename("trials").reset_index()

@@ -56,7 +56,7 @@ def _run(arguments: argparse.Namespace) -> None:
 def _added(arguments: argparse.Namespace, model: "Model", term: "Term", text: str, folder: Path) -> None:
     """Fit without and with the term, write model and history, and say what was reached."""
     from study.compare import history
-    from study.compare.comparison_report import history_step, summary
+    from study.compare.comparison_report import as_json, document, history_step, summary
     from study.diagnose.adding import added
     from study.diagnose.needless import needless, of_records
 
@@ -75,7 +75,7 @@ def _added(arguments: argparse.Namespace, model: "Model", term: "Term", text: st
     said = of_records([record.name for record in records], unneeded, any_more=True)
     for before, after in pairs:
         steps = history.climbed(steps, history_step(before), history_step(after, term.name))
-    written_together(arguments, text, steps, [after for _, after in pairs], folder)
+    written_together(arguments, text, steps, as_json(document([after for _, after in pairs])), folder)
     print(summary([after for _, after in pairs]))
     print("\n" + history.table(steps) + (f"\n\n{said}" if said else ""))
 

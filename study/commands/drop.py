@@ -46,7 +46,7 @@ def _run(arguments: argparse.Namespace) -> None:
 def _dropped(arguments: argparse.Namespace, model: "Model", text: str, folder: Path) -> None:
     """Fit with and without the term, write model and history, and say what was reached."""
     from study.compare import history
-    from study.compare.comparison_report import history_step, summary
+    from study.compare.comparison_report import as_json, document, history_step, summary
     from study.diagnose.dropping import dropped
     from study.diagnose.needless import needless, of_records
 
@@ -65,7 +65,7 @@ def _dropped(arguments: argparse.Namespace, model: "Model", text: str, folder: P
     said = of_records([record.name for record in records], unneeded)
     for before, after in pairs:
         steps = history.climbed(steps, history_step(before), history_step(after, dropped=name))
-    written_together(arguments, text, steps, [after for _, after in pairs], folder)
+    written_together(arguments, text, steps, as_json(document([after for _, after in pairs])), folder)
     print(summary([after for _, after in pairs]))
     print("\n" + history.table(steps) + (f"\n\n{said}" if said else ""))
 

@@ -14,7 +14,6 @@ from study.support.errors import StudyError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from study.compare.comparison import Comparison
     from study.compare.history import Step
     from study.equations.model import Model
     from study.faults.accounting import Accounted
@@ -218,15 +217,14 @@ def inputs_of(arguments: argparse.Namespace) -> list[Path]:
 
 
 def written_together(
-    arguments: argparse.Namespace, text: str, steps: "list[Step]", reached: "list[Comparison]", folder: Path
+    arguments: argparse.Namespace, text: str, steps: "list[Step]", comparison: bytes, folder: Path
 ) -> None:
     """Write the model's new text, its history and the comparison, all or none; the model must be locked."""
     from study.compare import history
-    from study.compare.comparison_report import as_json, document
     from study.support.file_sets import keep, made
     from study.support.transaction import replace_together
 
-    results = {folder / "comparison.json": as_json(document(reached))}
+    results = {folder / "comparison.json": comparison}
     keep(inputs_of(arguments), results)
     model: Path = arguments.model
     changed = {model: text.encode(), history.path_of(model): history.as_bytes(steps)}

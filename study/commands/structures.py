@@ -4,7 +4,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from study.commands.command import progress
-from study.commands.record_arguments import out_folder, read_options
+from study.commands.record_arguments import out_folder, read_options, written_together
 
 if TYPE_CHECKING:
     from study.equations.model import Model
@@ -59,7 +59,7 @@ def diagnose(arguments: argparse.Namespace, model: "Model") -> None:
     from study.support.file_sets import write_files
 
     folder = out_folder(arguments)
-    own = own_candidates(arguments.candidate)
+    own = own_candidates(arguments.candidate, model)
     for name in arguments.without:
         terms.get(name)
     files: dict[str, bytes] = {}
@@ -82,28 +82,28 @@ def add(arguments: argparse.Namespace, model: "Model") -> None:
     from study.compare.comparison_report import as_json
     from study.equations import layout, terms
     from study.equations.model import free
-    from study.equations.model_file import add_term
+    from study.equations.model_file import text_with
     from study.structure.structure_comparison import compare_structure, document, history_step, summary
     from study.structure.structure_verdict import added_term
     from study.support.errors import at
-    from study.support.file_sets import write_files
+    from study.support.transaction import locked
 
     folder = out_folder(arguments)
     term = terms.get(arguments.term) if arguments.force is None else terms.custom(arguments.term, arguments.force)
     with at(arguments.model):
-        where = {"at": arguments.at} if arguments.at else {}
+        where: dict[object, object] = {"at": arguments.at} if arguments.at else {}
         where |= {"between": arguments.between} if arguments.between else {}
         place = layout.place_of(where, term.name, model.coordinates)
         entry = free(term, place)
         layout.check(model.with_term(entry))
-    steps = history.read(arguments.model)
-    comparisons: list[StructureComparison] = []
-    for prepared in prepared_structures(arguments, model):
-        before = compare_structure(model, prepared)
-        comparisons.append(added_term(before, entry))
-        steps = history.climbed(steps, history_step(before), history_step(comparisons[-1], entry.name))
-    history.write(arguments.model, steps)
-    add_term(arguments.model, entry)
-    write_files(folder, {"comparison.json": as_json(document(comparisons[-1]))})
+    with locked(arguments.model):  # another run may have changed it meanwhile
+        text, steps = text_with(arguments.model, entry), history.read(arguments.model)
+        comparisons: list[StructureComparison] = []
+        for prepared in prepared_structures(arguments, model):
+            before = compare_structure(model, prepared)
+            comparisons.append(added_term(before, entry))
+            steps = history.climbed(steps, history_step(before), history_step(comparisons[-1], entry.name))
+        page = as_json(document(comparisons[-1]))
+        written_together(arguments, text, steps, page, folder)
     print("\n\n".join(summary(c) for c in comparisons))
     print("\n" + history.table(steps))

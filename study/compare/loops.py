@@ -33,8 +33,8 @@ def loops(prediction: Prediction) -> Loops:
         if stroke < SMALL * largest or any(first < joint <= last for joint in joints):
             continue
         cycle = slice(first, last + 1)
-        energies = (_energy(f[cycle], u[cycle]) for f in (prediction.measured, prediction.predicted))
-        rows.append((stroke, *energies))
+        measured, predicted = (_energy(f[cycle], u[cycle]) for f in (prediction.measured, prediction.predicted))
+        rows.append((stroke, measured, predicted))
     return Loops(*np.array(rows).reshape(-1, 3).T)
 
 

@@ -194,6 +194,8 @@ def _times(left: Leftover) -> list[Floats]:
 def _passed(left: Leftover, shapes: Sequence[Floats]) -> Floats:
     """Forces of these shapes passed through the linear system, shape (n, shapes)."""
     n = len(left.residual)
+    if not shapes:  # a spectrum without a single line has no times: what is nothing explains nothing
+        return np.zeros((n, 1))
     size = next_fast_len(2 * n)
     omega = np.asarray(2j * np.pi * rfftfreq(size, left.base.dt), dtype=np.complex128)
     omega[0] = omega[1]  # a constant goes through as the lowest line does

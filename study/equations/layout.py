@@ -79,7 +79,7 @@ def place_of(item: Mapping[object, object], term: object, coordinates: Sequence[
         return None
     like = f"'at: {coordinates[0]}' or 'between: [{GROUND}, {coordinates[0]}]'"
     expect(len(ways) == 1, f"{term} says {' and '.join(ways) or 'not'} where it acts; expected one of {like}")
-    kind = ways[0]
+    kind = cast(Kind, ways[0])
     if kind == "at":
         return Place("at", (_known(item["at"], f"{term} is at", coordinates),))
     return pair(kind, as_list(item[kind]) or [item[kind]], str(term), coordinates)

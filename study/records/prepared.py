@@ -79,7 +79,8 @@ class Prepared:
     def samples_in(self, periods: float) -> int:
         """Samples that so many periods of the motion take: those of the frequency that halves the response's power."""
         values = self.fitted - np.mean(self.fitted)
-        power = np.cumsum(np.abs(rfft(values)) ** 2)
+        lines = np.asarray(rfft(values), dtype=np.complex128)
+        power = np.cumsum(np.abs(lines) ** 2)
         middle = max(1, int(np.searchsorted(power, 0.5 * power[-1])))
         return math.ceil(periods * len(values) / middle)
 

@@ -106,7 +106,7 @@ def predict_structure(fit: StructureFit, prepared: PreparedStructure) -> Structu
     except DivergenceError:
         flat = np.broadcast_to(np.mean(judged, axis=0), judged.shape).copy()
         return StructurePrediction(
-            fit, prepared, fit.first, fit.initial, flat, np.zeros(judged.shape[1]), diverged=True
+            fit, prepared, fit.first, fit.initial, flat, np.zeros(len(prepared.sensors)), diverged=True
         )
     change = np.asarray(runs[1] - runs[0], dtype=np.float64)
     moved = np.asarray(np.sqrt(np.mean(change**2, axis=0)), dtype=np.float64)

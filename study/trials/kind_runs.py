@@ -13,7 +13,7 @@ from study.trials.findings import intervals, tie_set
 from study.trials.kinds import make_test
 
 Row = dict[str, Any]
-COLUMNS = (
+COLUMNS: tuple[str, ...] = (
     "test", "seed", "noise", "hidden", "verdict", "first", "tied", "right", "error_before", "error_after", "held",
     "asked", "seconds", "trouble",
 )  # fmt: skip

@@ -4,6 +4,7 @@ Free decays, blows of a hammer, a moving base, a component whose motion is presc
 system with an effect hidden behind what its owner believes, or with none.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -69,10 +70,15 @@ def make_test(test: str, seed: int, hidden: Sequence[str] | None = None, noise: 
     raise StudyError(f"no system of {test} {seed} stays finite with {', '.join(hidden)}")
 
 
+def _evenly(rng: np.random.Generator, low: float, high: float) -> float:
+    """A number drawn evenly on a logarithmic scale."""
+    return math.exp(rng.uniform(math.log(low), math.log(high)))
+
+
 def _oscillator(rng: np.random.Generator, damping: tuple[float, float]) -> tuple[Model, float, float]:
     """Inertia, damping and stiffness, with the natural frequency in Hz and the sampling interval."""
-    frequency, mass = float(np.exp(rng.uniform(np.log(0.3), np.log(30.0)))), float(np.exp(rng.uniform(-2.0, 4.0)))
-    zeta = float(np.exp(rng.uniform(*np.log(damping))))
+    frequency, mass = _evenly(rng, 0.3, 30.0), float(np.exp(rng.uniform(-2.0, 4.0)))
+    zeta = _evenly(rng, *damping)
     omega = 2.0 * np.pi * frequency
     values = {"m": mass, "c": 2.0 * zeta * omega * mass, "k": mass * omega**2}
     model = Model("believed", tuple(free(get(n)).with_values(values) for n in ("inertia", *LINEAR)))
@@ -172,7 +178,7 @@ def _base(rng: np.random.Generator, hidden: tuple[str, ...]) -> Drawn:
 
 def _component(rng: np.random.Generator, hidden: tuple[str, ...]) -> Drawn:
     """A damper or mount in a rig that prescribes its motion: noise in a band; the force is measured."""
-    frequency, samples = float(np.exp(rng.uniform(np.log(0.5), np.log(20.0)))), 3000
+    frequency, samples = _evenly(rng, 0.5, 20.0), 3000
     dt = 1.0 / (frequency * float(rng.uniform(30.0, 60.0)))
     stroke = float(np.exp(rng.uniform(-6.0, -2.0)))
     u = stroke * _band(rng, samples, 1.5 * frequency * dt)

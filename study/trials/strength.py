@@ -59,7 +59,7 @@ def _between(amount: float, wanted: float) -> float:
 
 def _amount(one: tuple[float, float], other: tuple[float, float], wanted: float) -> float:
     """The next amount from the last two with their shares; ``wanted`` if the share grew as the amount does."""
-    if min(one) <= 0.0 or one[0] == other[0]:
+    if not (min(*one, *other) > 0.0 and math.isfinite(other[1]) and one[0] != other[0]):
         return _between(other[0], wanted)
     slope = math.log(other[1] / one[1]) / math.log(other[0] / one[0])
     return other[0] * (wanted / other[0]) ** (1.0 / min(max(slope, 1.0 / STEEPEST), STEEPEST))

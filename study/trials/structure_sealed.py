@@ -24,7 +24,7 @@ def write(trial: StructureTrial, folder: Path) -> tuple[Path, Path, Path]:
         write_structure_csv(trial.record, beside)
     replace_file(model, format_model(trial.believed).encode())
     hidden = [trial.hidden.name] if trial.hidden else []
-    content = {
+    content: dict[str, object] = {
         "hidden": hidden, "shares": [trial.share] if hidden else [], "noise": trial.noise, "fault": {},
         "truth": format_model(trial.truth),
     }  # fmt: skip

@@ -92,7 +92,7 @@ def _lines(part: Record, response: str, length: int) -> tuple[Lines, float]:
     by_chance = 1.0 - CHANCE ** (1.0 / max(matrix.averages - 1.0, 1.0))
     driven = g[:, 0, 0].real > FAINT * np.max(g[:, 0, 0].real)
     keep = (coherence > by_chance) & driven
-    omega = 2j * np.pi * f[keep]
+    omega = np.asarray(2j * np.pi * f[keep], dtype=np.complex128)
     receptance = g[keep, 0, 1] / g[keep, 0, 0] / omega ** MOTIONS.index(response)
     weight = np.abs(receptance) * np.sqrt(coherence[keep] / (1.0 - coherence[keep]))
     places = np.flatnonzero(keep)

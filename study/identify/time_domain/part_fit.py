@@ -78,10 +78,10 @@ def covariance_of(fit: FreeRunFit, jacobian: Floats) -> Floats:
 def integration_shift(fit: FreeRunFit, prepared: Prepared, jacobian: Floats) -> Floats:
     """By how much halving the steps would move the estimates, shape (keys + 2,), by one step of Gauss and Newton."""
     try:
-        coarse, fine = (run_of(fit, prepared, finer=n).respond({}, fit.initial)[0] for n in (1, 2))
+        runs = [run_of(fit, prepared, finer=n).respond({}, fit.initial)[0] for n in (1, 2)]
     except DivergenceError:  # a motion that stays finite by the error of its integration alone
-        return np.full(jacobian.shape[1], FAR)
-    return least_squares(whitened(jacobian, fit.noise), whitened(np.subtract(coarse, fine), fit.noise))
+        return np.full(jacobian.shape[1], FAR, dtype=np.float64)
+    return least_squares(whitened(jacobian, fit.noise), whitened(runs[0] - runs[1], fit.noise))
 
 
 def uncertainty(fit: FreeRunFit, prepared: Prepared, jacobian: Floats) -> Floats:
