@@ -52,7 +52,7 @@ rule structure_trial_runs:
     output:
         table="results/trials_mdof/part_{part}.csv",
     params:
-        count=STRUCTURE_TRIALS,
+        trials=STRUCTURE_TRIALS,
         jobs=STRUCTURE_JOBS,
     wildcard_constraints:
         part="[0-9]+",

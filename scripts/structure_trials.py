@@ -25,4 +25,4 @@ def main(count: int, number: int, jobs: int, output: str) -> None:
 if "snakemake" in globals():
     step = globals()["snakemake"]
     with one_sentence():
-        main(step.params.count, int(step.wildcards.part), step.params.jobs, step.output.table)
+        main(step.params.trials, int(step.wildcards.part), step.params.jobs, step.output.table)

@@ -113,7 +113,7 @@ def _with_hidden(rng: np.random.Generator, model: Model, names: Sequence[str], q
         beside = viscous if drains and viscous > 0.0 else values.get("k", 0.0) * float(np.std(u)) or viscous
         share = float(rng.uniform(WEAK, STRONG)) * (2.5 if drains else 1.0)
         amount = share * beside / max(float(np.sqrt(np.mean(unit**2))), 1e-300)
-        sign = -1.0 if entry.term.either_sign and rng.random() < 0.5 and name != "constant_force" else 1.0
+        sign = -1.0 if entry.term.either_sign and rng.random() < 0.5 and not entry.term.steady else 1.0
         model = model.with_term(replace(entry, coefficients=(sign * amount,)))
     return model
 
@@ -255,7 +255,7 @@ TESTS: dict[str, Maker] = {
 _ONE = tuple(n for n, t in LIBRARY.items() if n not in ("inertia", *LINEAR, *TIMED) and len(t.components) == 1)
 HIDDEN: dict[str, tuple[str, ...]] = {
     # A decay swings at one frequency, at which a relaxation is damping and stiffness.
-    "free_decay": tuple(n for n in _ONE if n != "relaxation"), "blows": _ONE, "base": _ONE,
+    "free_decay": tuple(sorted({*_ONE} - {"relaxation"}, key=_ONE.index)), "blows": _ONE, "base": _ONE,
     "component": _ONE,
     "axis": ("coulomb_friction", "constant_force", "quadratic_damping", "cubic_damping"),
 }  # fmt: skip

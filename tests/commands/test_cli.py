@@ -72,7 +72,7 @@ def test_each_help_shows_an_example_that_is_understood(command: Command, capsys:
     shown = capsys.readouterr().out
     assert "example:" in shown
     for line in command.example.splitlines():
-        words = shlex.split(line)
+        words = shlex.split(line, comments=True)
         assert line.strip() in shown
         assert words[0] == "study"
         assert parser.parser().parse_args(words[1:]).run is command.run

@@ -152,7 +152,7 @@ def test_a_climb_goes_forwards_and_backwards(rig, capsys):
 def test_a_climb_does_not_go_in_a_circle(rig, capsys, monkeypatch):
     """A diagnosis that asks for what was just taken out, again and again, ends the climb."""
     (rig / "rig.yaml").write_text((rig / "rig.yaml").read_text() + "  - quadratic_stiffness\n")
-    original = sessions.diagnose
+    original = sessions.diagnose_as_read
 
     def stubborn(comparison, **options):
         found = original(comparison, **options)
@@ -162,7 +162,7 @@ def test_a_climb_does_not_go_in_a_circle(rig, capsys, monkeypatch):
         return verdict.Diagnosis(**{**vars(found), "verdict": verdict.MISSING if first else found.verdict,
                                     "candidates": shown})  # fmt: skip
 
-    monkeypatch.setattr(sessions, "diagnose", stubborn)
+    monkeypatch.setattr(sessions, "diagnose_as_read", stubborn)
     steps = climb.climb(rig / "rig.csv", rig / "rig.yaml", [], 6, rig / "out")
     assert [history.label(s) for s in steps] == ["as given", "+ quadratic_damping", "- quadratic_stiffness"]
     assert "the climb ends" in capsys.readouterr().out

@@ -87,8 +87,9 @@ def test_random_structures_shaped_like_a_model(tree: dict[str, object]) -> None:
     _model_or_error(_as_yaml(tree))
 
 
-VALUES = st.none() | st.floats(allow_nan=False, allow_infinity=False)
-POSITIVE = st.none() | st.floats(min_value=0.0, exclude_min=True, allow_infinity=False)
+SIZES = st.floats(min_value=1e-50, max_value=1e50)  # what a file may hold
+VALUES = st.none() | st.just(0.0) | SIZES | SIZES.map(lambda size: -size)
+POSITIVE = st.none() | SIZES
 
 
 @st.composite
@@ -97,7 +98,7 @@ def models(draw: st.DrawFn) -> Model:
     entries: list[ModelTerm] = []
     for name in chosen:
         term = LIBRARY[name] if name in LIBRARY else custom(name, draw(st.sampled_from(["u*v", "max(u, 0)", "wind*v"])))
-        coefficients = tuple(draw(VALUES) for _ in term.symbols)
+        coefficients = tuple(draw(POSITIVE if name == "inertia" else VALUES) for _ in term.symbols)
         parameters = tuple(draw(VALUES if p.signed else POSITIVE) for p in term.parameters)
         entries.append(ModelTerm(term, coefficients, parameters))
     name = draw(st.text(min_size=1, max_size=20).filter(lambda s: s.isprintable() and s.strip()))

@@ -83,7 +83,7 @@ def test_values_name_each_coefficient() -> None:
     ("text", "value"), [("2.0e7", 2e7), ("2e7", 2e7), ("-1", -1.0), ("1_000", 1000.0), (".5", 0.5), ("0x10", 16.0)]
 )
 def test_numbers_as_people_write_them(text: str, value: float) -> None:
-    assert parse_model(f"terms: [{{term: inertia, value: {text}}}]", HERE).values == {"m": value}
+    assert parse_model(f"terms: [{{term: linear_stiffness, value: {text}}}]", HERE).values == {"k": value}
 
 
 def test_a_term_of_the_users_own_may_name_a_measured_channel() -> None:

@@ -98,10 +98,9 @@ def texts() -> Iterator[Case]:
         "times back": (csv(columns=(TIME[::-1], FORCE, U)), ("runs backwards", "line 3")),
         "a gap": (csv(columns=(np.where(TIME > 5.0, TIME + 1.0, TIME), FORCE, U)), ("gap",)),
         "uneven": (csv(columns=(TIME**1.2, FORCE, U)), ("line",)),
-        "force rests": (csv(columns=(TIME, 0.0 * FORCE, U)), ("force", "0 throughout")),
         "response rests": (csv(columns=(TIME, FORCE, 0.0 * U + 3.0)), ("displacement", "3 throughout")),
         "short": (csv(columns=(TIME[:9], FORCE[:9], U[:9])), ("9 samples",)),
-        "one column": (csv("force", (FORCE,)), ("displacement",)), "no force": (csv("time,x", (TIME, U)), ("force",)),
+        "one column": (csv("force", (FORCE,)), ("displacement",)),
         "no names": (csv("1,2,3"), ("force",)), "no times": (csv("force,displacement", (FORCE, U)), ("--fs",)),
         "force twice": (csv("time,force,force"), ("force", "2 times")),
         "two motions alike": (csv("time,force,displ,disp", (TIME, FORCE, U, U)), ("'displ' and 'disp'",)),
@@ -236,8 +235,9 @@ def models() -> Iterator[Case]:
     for name, (content, said) in bad.items():
         text = content if isinstance(content, bytes) else content.encode()
         fits = name in ("no channel", "log of u", "too large", "negative damping", "root of -1", "log of 0")
-        yield Case(f"model {name}", ("compare", "rig.csv", "--model", "bad.yaml", *READ), ("bad.yaml", *said),
-                   {"bad.yaml": text})  # fmt: skip
+        if name != "no mass":  # which makes it a test of a component
+            yield Case(f"model {name}", ("compare", "rig.csv", "--model", "bad.yaml", *READ), ("bad.yaml", *said),
+                       {"bad.yaml": text})  # fmt: skip
         if fits:
             continue
         alone = [("simulate", "bad.yaml"), ("drop", "bad.yaml", "linear_damping", "--data", "rig.csv")]

@@ -106,7 +106,7 @@ def test_files_that_are_none(folder, name, content):
         ("value: 2.0e7", "value: much", "value of cubic_stiffness is 'much'"),
         ("cubic_stiffness", "cubic_stifness", "there is no term 'cubic_stifness'"),
         (", value: 2.0e7", "", "gives no value for k3"),
-        ("value: 1.0", "value: -1.0", "has the mass -1"),
+        ("value: 1.0", "value: -1.0", "value of inertia is -1"),
         ("cubic_stiffness, value: 2.0e7", "own, force: 'u*tension', value: 1.0", "tension"),
     ],
 )

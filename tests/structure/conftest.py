@@ -10,7 +10,7 @@ from study.equations.model_file import read_model
 from study.records.excitation import Excitation, force
 from study.structure.structure_simulation import simulate_structure
 
-FRAME = Path(__file__).parents[2] / "models" / "frame.yaml"
+FRAME = Path(__file__).parents[2] / "models" / "structures" / "frame.yaml"
 NOISE = 0.01  # mean square over that of each motion
 
 

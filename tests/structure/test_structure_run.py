@@ -185,4 +185,4 @@ def test_a_structure_that_nothing_ties_down_has_a_rigid_mode():
 
 
 def test_the_frame_is_a_model():
-    assert modes_of(read_model(ROOT / "models" / "frame.yaml")).rigid == 0
+    assert modes_of(read_model(ROOT / "models" / "structures" / "frame.yaml")).rigid == 0
