@@ -149,17 +149,20 @@ def widened(fault: Fault, given: Prepared, left: Leftover) -> Fault:
     """Clipping with all samples lost whose true motion may be beyond the limit, as the free run tells.
 
     Noise decides whether a sample near the limit is clipped. If those that are not were kept, their noise would not
-    have zero mean, and the coefficients a bias.
+    have zero mean, and the coefficients a bias. What was read far from the limit was not clipped, wherever the free run
+    of a model that lacks something goes.
     """
     if fault.lost is None:
         return fault
     prepared, lost = left.prepared, fault.lost.copy()
     values = given.record[given.response]
-    margin = MARGIN * _noise(np.concatenate(left.residual))
+    # Either is the noise and more: what is left by edges of what is lost, and the measured motion by its own bends.
+    margin = MARGIN * min(_noise(np.concatenate(left.residual)), _noise(values))
     for limit in np.unique(values[fault.lost]).tolist():
         sign = 1.0 if limit > float(np.mean(values)) else -1.0
         for span, predicted in zip((left.fit.span, prepared.plan.judge), left.predicted, strict=True):
-            lost[slice(*span)] |= sign * (predicted - limit) > -margin
+            near = sign * (values[slice(*span)] - limit) > -3.0 * margin
+            lost[slice(*span)] |= near & (sign * (predicted - limit) > -margin)
     return replace(fault, lost=lost)
 
 

@@ -10,6 +10,7 @@ from study.faults.imposed import FAULTS, impose
 from study.records.excitation import displacement_noise
 from study.records.prepared import Prepared, prepare_record
 from study.records.record import Record
+from study.trials.draw import make_trial
 
 COUNTED = {
     "spikes": 0.02,
@@ -142,3 +143,14 @@ def test_lost_samples_are_neither_fitted_nor_judged(measured, systems):
     assert np.all(comparison.fit.residual[prepared.lost[slice(*comparison.fit.span)]] == 0.0)
     assert np.all(comparison.prediction.difference[prepared.lost[slice(*prepared.plan.judge)]] == 0.0)
     assert comparison.prediction.error == pytest.approx(np.sqrt(NOISE), rel=0.1)
+
+
+def test_what_was_read_far_from_the_limits_is_kept_though_the_model_lacks_something() -> None:
+    """A record whose every sample is lost would be followed without any error."""
+    trial = make_trial(12, ("cubic_stiffness",), 0.01, "displacement", "clipping")
+    comparison = accounted(trial.believed, prepare_record(trial.record)).comparison
+    lost, values = comparison.prepared.lost, comparison.record["displacement"]
+    assert lost is not None
+    assert np.mean(lost) < 0.3
+    assert not np.any(lost[np.abs(values) < 0.2 * np.max(np.abs(values))])
+    assert comparison.prediction.error > 0.05
