@@ -6,7 +6,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import rfft
 
 from study.records.completion import complete
 from study.records.plan import FEWEST, Plan, make_plan
@@ -79,9 +78,8 @@ class Prepared:
     def samples_in(self, periods: float) -> int:
         """Samples that so many periods of the motion take: those of the frequency that halves the response's power."""
         values = self.fitted - np.mean(self.fitted)
-        lines = np.asarray(rfft(values), dtype=np.complex128)
-        power = np.cumsum(np.abs(lines) ** 2)
-        middle = max(1, int(np.searchsorted(power, 0.5 * power[-1])))
+        power: Floats = np.cumsum(np.abs(np.fft.rfft(values)) ** 2)
+        middle = max(1, int(np.searchsorted(power, 0.5 * float(power[-1]))))
         return math.ceil(periods * len(values) / middle)
 
     def known(self, values: Floats, span: tuple[int, int]) -> Floats:

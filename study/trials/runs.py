@@ -125,8 +125,9 @@ def _judged(order: Order, trial: Trial) -> Row:
     diagnosis = diagnose(before, without=order.hidden if order.kind == REMOVED else ())
     named = tie_set(diagnosis)
     after = added(before, diagnosis.candidates[0].term) if named else before
+    first = next((c.name for c in diagnosis.candidates), "")
     row: Row = {
-        "verdict": diagnosis.verdict, "first": next((c.name for c in diagnosis.candidates), ""), "tie_set": "+".join(named),
+        "verdict": diagnosis.verdict, "first": first, "tie_set": "+".join(named),
         "tie_size": len(named), "pair": "+".join(diagnosis.pair), "left": diagnosis.left,
         "error_before": before.prediction.error, "error_after": after.prediction.error,
         "error_true": error_of_truth(trial, before.prepared, after.fit.steps_per_sample),

@@ -80,7 +80,7 @@ def integration_shift(fit: FreeRunFit, prepared: Prepared, jacobian: Floats) -> 
     try:
         runs = [run_of(fit, prepared, finer=n).respond({}, fit.initial)[0] for n in (1, 2)]
     except DivergenceError:  # a motion that stays finite by the error of its integration alone
-        return np.full(jacobian.shape[1], FAR, dtype=np.float64)
+        return FAR * np.ones(jacobian.shape[1])
     return least_squares(whitened(jacobian, fit.noise), whitened(runs[0] - runs[1], fit.noise))
 
 
