@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, cast
 
+from study.equations.model import Model
 from study.equations.model_file import format_model
 from study.records.record import write_csv
 from study.support.errors import StudyError
@@ -20,18 +21,25 @@ WANTED = "the answer file of a trial, as 'study trial' writes it"
 
 def write(trial: Trial, folder: Path) -> tuple[Path, Path, Path]:
     """Write record, believed model and sealed answer: their paths, or a ``StudyError`` if that cannot be."""
+    record = trial.record
+    return write_files(record.name, lambda path: write_csv(record, path), trial.believed, contents(trial), folder)
+
+
+def write_files(
+    stem: str, record_to: Callable[[Path], object], believed: Model, content: Mapping[str, Any], folder: Path
+) -> tuple[Path, Path, Path]:
+    """Write the three files of a trial named ``stem``; ``record_to`` writes its record to a path. As :func:`write`."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StudyError(
             f"{folder}: no such folder can be made ({error.strerror}); expected a writable place"
         ) from None
-    stem = trial.record.name
     record, model, answer = (folder / f"{stem}{ending}" for ending in (".csv", ".yaml", ".answer.json"))
     with replacing(record) as beside:
-        write_csv(trial.record, beside)
-    replace_file(model, format_model(trial.believed).encode())
-    seal(contents(trial), answer, stem)
+        record_to(beside)
+    replace_file(model, format_model(believed).encode())
+    seal(content, answer, stem)
     return record, model, answer
 
 
