@@ -137,7 +137,7 @@ def test_a_layout_that_cannot_be_changed_is_refused_before_anything_is_written(r
 def test_a_climb_goes_forwards_and_backwards(rig, capsys):
     """It begins with an effect that does some of the work of the missing one, and ends without it."""
     (rig / "rig.yaml").write_text((rig / "rig.yaml").read_text() + "  - cubic_damping  # a guess\n")
-    steps = climb.climb(rig / "rig.csv", rig / "rig.yaml", [], 3, rig / "out")
+    steps = climb.climb([rig / "rig.csv"], rig / "rig.yaml", [], 3, rig / "out")
     assert [history.label(s) for s in steps] == ["as given", "+ quadratic_damping", "- cubic_damping"]
     assert steps[-1]["error"]["response"] == pytest.approx(steps[-2]["error"]["response"], rel=0.01)
     assert "Cubic damping is not needed any more" in capsys.readouterr().out
@@ -163,7 +163,7 @@ def test_a_climb_does_not_go_in_a_circle(rig, capsys, monkeypatch):
                                     "candidates": shown})  # fmt: skip
 
     monkeypatch.setattr(sessions, "diagnose_as_read", stubborn)
-    steps = climb.climb(rig / "rig.csv", rig / "rig.yaml", [], 6, rig / "out")
+    steps = climb.climb([rig / "rig.csv"], rig / "rig.yaml", [], 6, rig / "out")
     assert [history.label(s) for s in steps] == ["as given", "+ quadratic_damping", "- quadratic_stiffness"]
     assert "the climb ends" in capsys.readouterr().out
 
