@@ -2,7 +2,8 @@
 
 The analytic signal of the response (D. Gabor, 1946; M. Feldman, Mechanical Systems and Signal Processing 25, 2011) has
 an amplitude and a phase at each instant. Over windows of some periods straight lines through its phase and through the
-logarithm of its amplitude give the frequency, and the rate at which the motion decays.
+logarithm of its amplitude give the frequency, and the rate at which the motion decays; where the decay begins, they
+are read by :mod:`study.compare.release`.
 """
 
 from dataclasses import dataclass, replace
@@ -10,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.fft import fft, fftfreq, ifft
 
+from study.compare.release import at_the_release
 from study.equations.free_run import prepare
 from study.identify.frequency_domain.decay_start import frequency_and_rate
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -101,6 +103,8 @@ def _decay(values: Floats, dt: float, omega: float, least: float) -> Decay:
         part = signal[begin : begin + width]
         if float(np.median(np.abs(part))) > least:
             rows.append(_window(part, dt))
+    if rows and rows[0][0] > least:  # where it begins, which no window of an analytic signal reaches
+        rows.insert(0, at_the_release(values[:width], dt, 2.0 * np.pi * rows[0][1], 2.0 * WINDOW))
     return Decay(*np.array(rows).reshape(-1, 5).T)
 
 
