@@ -4,7 +4,7 @@ Components with the same shape are one input: u carries stiffness, damping and m
 cubic stiffness and Van der Pol's damping. The output is always the force.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -20,7 +20,9 @@ from study.support.errors import StudyError
 
 INERTIA = 2  # order of its time derivative
 LARGEST = 1e150  # of an input: the square of one beyond may be no number
-STATE_STEPS = 4  # Runge-Kutta steps a sample for a term's own state
+STATE_STEPS = 4  # Runge-Kutta steps a sample for a term's own state ...
+MOST_STEPS = 64  # ... and at most
+AGREED = 0.01  # of a state's rms: what other steps may change
 
 
 @dataclass(frozen=True)
@@ -122,20 +124,37 @@ def history(item: Input, record: Record) -> Floats:
         bounds = pairwise((0, *record.joints, len(record)))
         return np.concatenate([history(item, _alone(record.part(a, b))) for a, b in bounds])
     if item.state is not None:
-        states = np.empty(len(record))
-        for steps in (STATE_STEPS, 4 * STATE_STEPS, 16 * STATE_STEPS):  # loops that close sharply ask for more
+
+        def integrated(steps: int) -> Floats:
+            states = np.empty(len(record))
             fine = np.column_stack([between_samples(x, 2 * steps) for x in data])
             kernels.integrate_state(
                 program.code, program.first, registers, positions, program.inputs["z"], int(output[0]),
                 record.dt / steps, steps, fine, states,
             )  # fmt: skip
-            if np.all(np.isfinite(states)):
-                break
-        return _finite(states, item, record)
+            return states
+
+        return _finite(_settled(integrated), item, record)
     table = np.column_stack(data) if data else np.zeros((len(record), 0))
     out = np.empty((len(record), 1))
     kernels.evaluate(program.code, program.first, registers, positions, table, output, out)
     return _finite(out[:, 0], item, record)
+
+
+def _settled(integrated: Callable[[int], Floats]) -> Floats:
+    """A term's state, in so many steps a sample that four times as many hardly change it.
+
+    Loops that close sharply, and motion that is fast beside the sampling, ask for more; steps that are too long for a
+    short memory make a state that grows without end, and may yet be finite.
+    """
+    states, steps = integrated(STATE_STEPS), STATE_STEPS
+    while steps < MOST_STEPS:
+        steps *= 4
+        coarse, states = states, integrated(steps)
+        with np.errstate(all="ignore"):
+            if np.sum((states - coarse) ** 2) <= AGREED**2 * np.sum(states**2):  # false where one is not finite
+                return coarse
+    return states
 
 
 def _alone(part: Record) -> Record:
