@@ -46,8 +46,8 @@ rule summary:
         errors="results/estimators.csv",
         benchmarks=BENCHMARKS,
         pictures=[picture["file"] for picture in PICTURES],
-        style="study/reproduction/study_page.css",
-        behaviour="study/reproduction/study_page.js",
+        style="study/support/picture_page.css",
+        behaviour="study/support/picture_page.js",
         code=CODE["summary"],
     output:
         page="results/summary.md",

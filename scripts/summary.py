@@ -9,6 +9,7 @@ import pandas as pd
 from study.reproduction import study_page, summary
 from study.support import document
 from study.support.files import replace_file
+from study.support.picture_page import Picture
 from study.support.workflow_step import one_sentence
 
 
@@ -39,7 +40,7 @@ def main(
     replace_file(Path(outputs["html"]), document.page(study_page.TITLE, blocks).encode())
     replace_file(Path(outputs["estimators"]), document.markdown(summary.estimators(tables)).encode())
     pictures = [
-        study_page.Picture(p["system"], p["number"], p["shows"], Path(p["file"]).read_bytes()) for p in told["pictures"]
+        Picture(p["system"], p["number"], p["shows"], Path(p["file"]).read_bytes()) for p in told["pictures"]
     ]
     replace_file(Path(outputs["study"]), study_page.page(tables, pictures))
 

@@ -8,7 +8,7 @@ import pytest
 
 STUDY = Path(__file__).parents[1] / "study"
 FLOORS = (
-    "cli", "commands", "interface", "explore", "trials", "structure", "diagnose", "faults", "reproduction", "compare",
+    "cli", "commands", "interface", "explore", "trials", "gallery", "structure", "diagnose", "faults", "reproduction", "compare",
     "figures",
     "identify", "equations", "records", "support",
 )  # fmt: skip
