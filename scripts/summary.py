@@ -39,9 +39,7 @@ def main(
     replace_file(Path(outputs["page"]), document.markdown(blocks).encode())
     replace_file(Path(outputs["html"]), document.page(study_page.TITLE, blocks).encode())
     replace_file(Path(outputs["estimators"]), document.markdown(summary.estimators(tables)).encode())
-    pictures = [
-        Picture(p["system"], p["number"], p["shows"], Path(p["file"]).read_bytes()) for p in told["pictures"]
-    ]
+    pictures = [Picture(p["system"], p["number"], p["shows"], Path(p["file"]).read_bytes()) for p in told["pictures"]]
     replace_file(Path(outputs["study"]), study_page.page(tables, pictures))
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.fft import fft, fftfreq, ifft
 
+from study.compare.comparison import Comparison
 from study.compare.release import at_the_release
 from study.equations.free_run import prepare
 from study.identify.frequency_domain.decay_start import frequency_and_rate
@@ -44,6 +45,17 @@ class Decays:
 
     measured: Decay
     predicted: Decay | None
+
+    def plain(self) -> dict[str, dict[str, list[float]] | None]:
+        """As plain rows of numbers."""
+        parts = {"measured": self.measured, "predicted": self.predicted}
+        return {k: d and {n: np.asarray(x).tolist() for n, x in vars(d).items()} for k, d in parts.items()}
+
+
+def decays_of(comparison: Comparison) -> Decays | None:
+    """Those of a comparison; None where it is no free decay, or too short a one."""
+    prepared = comparison.prediction.prepared
+    return decays(comparison.fit, prepared, comparison.prediction.noise.rms) if prepared.free else None
 
 
 def decays(fit: FreeRunFit, prepared: Prepared, floor: float) -> Decays | None:

@@ -35,9 +35,7 @@ class Section:
 def page(title: str, sections: Sequence[Section]) -> bytes:
     """The page, in UTF-8."""
     links = "".join(f'<a href="#{s.anchor}">{html.escape(s.title)}</a>' for s in sections)
-    body = "".join(
-        f'<section id="{s.anchor}"><h2>{html.escape(s.title)}</h2>{s.content}</section>' for s in sections
-    )
+    body = "".join(f'<section id="{s.anchor}"><h2>{html.escape(s.title)}</h2>{s.content}</section>' for s in sections)
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
@@ -56,9 +54,7 @@ def fragment(blocks: Sequence[Block]) -> str:
 def groups(pictures: Sequence[Picture]) -> str:
     """Thumbnails under the names of their groups."""
     names = dict.fromkeys(picture.group for picture in pictures)
-    return "".join(
-        f"<h3>{html.escape(name)}</h3>{grid([p for p in pictures if p.group == name])}" for name in names
-    )
+    return "".join(f"<h3>{html.escape(name)}</h3>{grid([p for p in pictures if p.group == name])}" for name in names)
 
 
 def grid(pictures: Sequence[Picture]) -> str:

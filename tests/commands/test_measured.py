@@ -100,7 +100,11 @@ def test_without_the_variable_a_job_says_what_to_set(monkeypatch):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("\nsilverbox\t", "\nSilverbox\t", "record is 'Silverbox'; expected up to 64 of a to z, 0 to 9 and _, a letter"),
+        (
+            "\nsilverbox\t",
+            "\nSilverbox\t",
+            "record is 'Silverbox'; expected up to 64 of a to z, 0 to 9 and _,",
+        ),
         ("oscillator\t6", "oscillator\t21", "(record 'silverbox'): steps is '21'; expected 20 or less"),
         ("oscillator\t6", "oscillator\tsix", "(record 'silverbox'): steps is 'six'; expected a whole number"),
         ("believed/oscillator\t6", "oscilator\t6", "there is no model 'oscilator'; models/ holds dead_band, duffing"),
