@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: study report test test-cluster checks lint picture fault_pictures notebooks docs readme estimators trials clean
+.PHONY: study report test test-cluster checks lint picture fault_pictures notebooks docs gallery readme estimators trials clean
 
 study: $(READY)
 	$(BIN)/snakemake -j2
@@ -41,6 +41,10 @@ notebooks: $(READY)
 docs: $(READY)
 	$(BIN)/mkdocs build --strict --quiet
 	@echo "open site/index.html"
+
+gallery: $(READY)
+	$(BIN)/snakemake -j2 gallery
+	PYTHONPATH=. $(BIN)/python scripts/gallery_docs.py
 
 readme: study
 	$(BIN)/python scripts/readme.py

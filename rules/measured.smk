@@ -11,6 +11,7 @@ with one_sentence():
 
 CODE["measured"] = rests_on(Path("scripts/measured.py"))
 CODE["measured"] += [f"study/explore/page.{ending}" for ending in ("html", "css", "js")]
+CODE["gallery"] = rests_on(Path("scripts/gallery.py"))
 STRUCTURES = {name for name, row in MEASUREMENTS.items() if measurements.is_structure(row)}
 ENTRIES = dict.fromkeys(row.entry for row in MEASUREMENTS.values())
 SEEN = {
@@ -96,3 +97,18 @@ for _entry in ENTRIES:
 rule gallery:
     input:
         made_of(MEASUREMENTS),
+        "results/gallery.html",
+
+
+rule gallery_page:
+    input:
+        [path for name in MEASUREMENTS for path in climbed(name)],
+        known=[f"config/{name}.tsv" for name in ("literature", "published")],
+        style=[f"study/support/picture_page.{ending}" for ending in ("css", "js")],
+        code=CODE["gallery"],
+    output:
+        page="results/gallery.html",
+    params:
+        records={entry: [name for name, row in MEASUREMENTS.items() if row.entry == entry] for entry in ENTRIES},
+    script:
+        "../scripts/gallery.py"

@@ -50,9 +50,7 @@ class Measurement(Row):
 
     record: Name
     entry: Name  # of the gallery, and the target that makes it: rows of one structure share it
-    paths: Annotated[
-        tuple[Text, ...], BeforeValidator(_files), Field(min_length=1)
-    ]  # one model is fitted to all
+    paths: Annotated[tuple[Text, ...], BeforeValidator(_files), Field(min_length=1)]  # one model is fitted to all
     model: Text  # that is compared, and from which a climb begins: its name below ``models/``, or its file
     steps: Annotated[int, Field(ge=1, le=20)]  # effects that a climb may add
     options: Annotated[tuple[str, ...], BeforeValidator(_words)]  # of ``study compare``
