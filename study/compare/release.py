@@ -30,20 +30,23 @@ def at_the_release(values: Floats, dt: float, omega: float, independent: float) 
     """
     t = dt * np.arange(len(values))
     turn = omega * t
-    slow = t[:, None] ** np.arange(DEGREE + 1)
-    carrier = np.stack([slow * np.cos(turn)[:, None], -slow * np.sin(turn)[:, None]], axis=2).reshape(len(t), -1)
-    beside = [f(n * turn) for n in range(2, OVERTONES + 1) for f in (np.cos, np.sin)]
-    design = np.column_stack([carrier, *beside, np.ones_like(t)])
-    size = np.linalg.norm(design, axis=0)
-    found, _, rank, _ = np.linalg.lstsq(design / size, values, rcond=None)
-    spare = max(independent * (1.0 - rank / len(values)), 1.0)
-    left = values - (design / size) @ found
-    inverse = np.linalg.pinv((design / size).T @ (design / size))[:4, :4] * float(left @ left) / spare
-    a, b, da, db = found[:4] / size[:4]
+    slow: Floats = t[:, None] ** np.arange(DEGREE + 1)
+    around = [slow * np.cos(turn)[:, None], -slow * np.sin(turn)[:, None]]
+    carrier: Floats = np.stack(around, axis=2).reshape(len(t), -1)
+    beside: list[Floats] = [f(n * turn) for n in range(2, OVERTONES + 1) for f in (np.cos, np.sin)]
+    design: Floats = np.column_stack([carrier, *beside, np.ones_like(t)])
+    size = np.asarray(np.linalg.norm(design, axis=0), dtype=np.float64)
+    scaled: Floats = design / size
+    inverse = np.asarray(np.linalg.pinv(scaled.T @ scaled), dtype=np.float64)
+    found: Floats = inverse @ (scaled.T @ values)
+    left = values - scaled @ found
+    spare = max(independent * (1.0 - scaled.shape[1] / len(values)), 1.0)
+    covariance: Floats = inverse[:4, :4] * float(left @ left) / spare
+    a, b, da, db = (float(x) for x in found[:4] / size[:4])
     z, slope = complex(a, b), complex(da, db)
     growth = slope / z  # rate of the amplitude's logarithm, and of the phase beside the carrier's
     fall, rate = growth.real, omega + growth.imag
     natural = float(np.hypot(rate, fall))
     gradient = np.array([-growth / z, -1j * growth / z, 1.0 / z, 1j / z]) / size[:4]
-    errors = [float(np.sqrt(part @ inverse @ part)) for part in (gradient.imag, gradient.real)]
+    errors = [float(np.sqrt(part @ covariance @ part)) for part in (gradient.imag, gradient.real)]
     return abs(z), natural / (2.0 * np.pi), -fall / natural, errors[0] / (2.0 * np.pi), errors[1] / natural

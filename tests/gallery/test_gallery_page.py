@@ -28,8 +28,8 @@ def step(error, added=None, **values):
 
 def diagnosis(verdict, **more):
     candidate = {
-        "term": "dry_friction", "explained": 0.9, "response_error": 0.1, "changes": {"frequency": 0.3, "amplitude": 0.1},
-        "tied_with": ["dead_band"],
+        "term": "dry_friction", "explained": 0.9, "response_error": 0.1, "tied_with": ["dead_band"],
+        "changes": {"frequency": 0.3, "amplitude": 0.1},
     }  # fmt: skip
     return {"verdict": verdict, "says": f"says <{verdict}>", "left": 0.05, "candidates": [candidate]} | more
 
@@ -44,8 +44,10 @@ def folder(tmp_path):
     write("history.json", {"steps": [step(0.5, c=2.0), step(0.1, "hysteresis", c=1.0, kz=60.0, beta=20.0)]})
     write("climb/step_0/diagnosis.json", diagnosis("missing_effect"))
     write("climb/step_1/diagnosis.json", diagnosis("unknown_effect"))
-    decay = {"frequency": [42.0, 40.0, 37.0, 36.8], "frequency_error": [0.1] * 4, "damping": [0.004, 0.008, 0.01, 0.002],
-             "damping_error": [0.0001, 0.0001, 0.02, 0.001]}  # fmt: skip
+    decay = {
+        "frequency": [42.0, 40.0, 37.0, 36.8], "frequency_error": [0.1] * 4,
+        "damping": [0.004, 0.008, 0.01, 0.002], "damping_error": [0.0001, 0.0001, 0.02, 0.001],
+    }  # fmt: skip
     write("climb/comparison.json", {"model": {"equation": "c [v] = F"}, "decay": {"measured": decay}})
     (tmp_path / "run" / "climb" / "loops.png").write_bytes(PNG)
     return tmp_path / "run"

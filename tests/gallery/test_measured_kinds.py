@@ -1,0 +1,88 @@
+"""Measured tests without a force or without a mass: a damper, a pendulum. The data lie where STUDY_DATA says."""
+
+import itertools
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.special import ellipk
+
+from study.compare.comparison import compare
+from study.compare.prediction import predict
+from study.diagnose.verdict import MISSING, diagnose
+from study.equations.model_file import read_model
+from study.equations.terms import LIBRARY, get
+from study.faults.kinds_of_tests import made_ready
+from study.identify.time_domain.fit_model import fit_model
+from study.records.readers import ReadOptions, read_record
+from study.records.record_layout import Layout
+from study.records.stretches import apart
+
+ROOT = Path(__file__).parents[2]
+DATA = Path(os.environ.get("STUDY_DATA", ROOT.parent / "shared" / "data"))
+MODELS = ROOT / "models" / "measured"
+AUTHORS = {"4.1": (57.4, 0.768, 0.12), "4.4": (209.7, 1.31, 0.09)}  # Kw in N, Kx in N s/mm, share left of the force
+RIVALS = {
+    "hysteresis", "coulomb_friction", "quadratic_damping", "cubic_damping", "van_der_pol_damping",
+    "displacement_damping", "linear_stiffness", "cubic_stiffness",
+}  # fmt: skip
+
+
+def damper(run, model):
+    record = read_record(DATA / "damper" / f"run_{run}.csv", ReadOptions())
+    return made_ready([record], read_model(MODELS / f"{model}.yaml"), Layout())
+
+
+@pytest.mark.parametrize("run", list(AUTHORS))
+def test_the_authors_model_of_the_damper(run):
+    """Of the whole run, one half of which is held out; run_4.4 rests on its one block, so its Kw is not compared."""
+    model, prepared = damper(run, "dahl_damper")
+    fit = fit_model(model, prepared)
+    prediction = predict(fit, prepared)
+    squares = np.concatenate([fit.residual**2, prediction.residual**2])
+    whole, kx, most = AUTHORS[run]
+    assert float(np.sqrt(np.mean(squares)) / prediction.size) < most
+    values = fit.model.numbers()
+    if run == "4.1":
+        assert values["kz"] / values["hysteresis.beta"] == pytest.approx(whole, rel=0.15)
+        assert values["c"] == pytest.approx(kx, rel=0.15)
+
+
+@pytest.mark.parametrize("run", list(AUTHORS))
+def test_the_damper_is_hysteretic_before_it_is_any_polynomial(run):
+    model, prepared = damper(run, "viscous_damper")
+    *_, prepared = apart(prepared)
+    found = diagnose(compare(model, prepared), without=[n for n in LIBRARY if n not in RIVALS and n not in model])
+    assert found.verdict == MISSING
+    assert found.candidates[0].name == "hysteresis"
+    assert found.candidates[0].gain.explained > 1.3 * max(r.gain.explained for r in found.candidates[1:])
+
+
+def pendulum():
+    columns = {"displacement": "angle", "velocity": "angular velocity"}
+    record = read_record(DATA / "pendulum" / "single.csv", ReadOptions(columns))
+    return made_ready([record], read_model(MODELS / "pendulum.yaml"), Layout())
+
+
+def test_the_pendulum_and_the_law_of_its_friction():
+    """k/I from periods and amplitudes alone, T = 4 K(sin^2(a/2)) / sqrt(k/I), is the other path to the same value."""
+    model, prepared = pendulum()
+    errors = []
+    for names in ((), ("coulomb_friction",), ("coulomb_friction", "quadratic_damping")):
+        tried = model
+        for name in names:
+            tried = tried.with_term(get(name))
+        fit = fit_model(tried, prepared)
+        errors.append(predict(fit, prepared).error)
+        assert fit.model.numbers()["q_gravity"] == pytest.approx(by_periods(), abs=0.1)
+    assert errors[0] > errors[1] > errors[2]
+
+
+def by_periods() -> float:
+    t, angle, _ = np.loadtxt(DATA / "pendulum" / "single.csv", delimiter=",", skiprows=1).T
+    up = np.flatnonzero((angle[:-1] < 0.0) & (angle[1:] >= 0.0))
+    crossings = t[up] - angle[up] * (t[1] - t[0]) / (angle[up + 1] - angle[up])
+    spans = [angle[a:b] for a, b in itertools.pairwise(up)]
+    amplitude = 0.5 * np.array([np.max(s) - np.min(s) for s in spans])
+    return float(np.mean((4.0 * ellipk(np.sin(0.5 * amplitude) ** 2) / np.diff(crossings)) ** 2))
