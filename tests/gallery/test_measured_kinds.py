@@ -10,6 +10,7 @@ from scipy.special import ellipk
 
 from study.compare.comparison import compare
 from study.compare.prediction import predict
+from study.diagnose.separating_test import advice, separating_level
 from study.diagnose.verdict import MISSING, diagnose
 from study.equations.model_file import read_model
 from study.equations.terms import LIBRARY, get
@@ -56,7 +57,9 @@ def test_the_damper_is_hysteretic_before_it_is_any_polynomial(run):
     found = diagnose(compare(model, prepared), without=[n for n in LIBRARY if n not in RIVALS and n not in model])
     assert found.verdict == MISSING
     assert found.candidates[0].name == "hysteresis"
-    assert found.candidates[0].gain.explained > 1.3 * max(r.gain.explained for r in found.candidates[1:])
+    first, second = found.candidates[:2]
+    assert first.gain.explained > 1.3 * max(r.gain.explained for r in found.candidates[1:])
+    assert separating_level(first, second, prepared) == 1.2, "they differ much, and more stroke shows it"
 
 
 def pendulum():
@@ -77,6 +80,15 @@ def test_the_pendulum_and_the_law_of_its_friction():
         errors.append(predict(fit, prepared).error)
         assert fit.model.numbers()["q_gravity"] == pytest.approx(by_periods(), abs=0.1)
     assert errors[0] > errors[1] > errors[2]
+
+
+def test_more_than_a_decay_is_asked_for_by_its_amplitude():
+    """Dry friction and a dead band are a tie on this record: only a decay from further out could tell them apart."""
+    model, prepared = pendulum()
+    names = {"coulomb_friction", "dead_band"}
+    found = diagnose(compare(model, prepared), without=[n for n in LIBRARY if n not in names and n not in model])
+    assert {r.name for r in found.candidates} == names
+    assert "apart, let it go at 1.2 times this level" in advice(found.candidates, prepared)
 
 
 def by_periods() -> float:
