@@ -190,7 +190,9 @@ def test_targets_by_name_and_by_number(built):
 def test_measured_records_are_planned_without_their_data_and_ask_for_them_by_name(built, monkeypatch):
     monkeypatch.delenv("STUDY_DATA", raising=False)
     jobs = planned(built, "gallery")
-    assert {"climb.silverbox", "compare.bouc_wen", "diagnose.silverbox", "gallery"} <= set(jobs)
+    assert {"climb.silverbox", "compare.bouc_wen", "diagnose.silverbox", "gallery", "gallery_page"} <= set(jobs)
+    damper = {name for name in jobs if "damper" in name or "dahl" in name}
+    assert set(planned(built, "damper")) == damper | {"damper"}, "an entry's target makes all of its rows, no other's"
     said = run(built, "-j1", "results/silverbox/comparison.json", code=1)
     assert "study: $STUDY_DATA/silverbox/SNLS80mV.mat: STUDY_DATA is not set; expected the folder that holds" in said
     assert "Traceback" not in said
