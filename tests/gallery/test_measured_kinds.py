@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
+from study.commands.climb import climb
 from study.compare.comparison import compare
 from study.compare.prediction import predict
 from study.diagnose.separating_test import advice, separating_level
@@ -15,6 +16,8 @@ from study.diagnose.verdict import MISSING, diagnose
 from study.equations.model_file import read_model
 from study.equations.terms import LIBRARY, get
 from study.faults.kinds_of_tests import made_ready
+from study.gallery.findings_of_record import beside, read
+from study.gallery.known import Published
 from study.identify.time_domain.fit_model import fit_model
 from study.records.readers import ReadOptions, read_record
 from study.records.record_layout import Layout
@@ -98,3 +101,18 @@ def by_periods() -> float:
     spans = [angle[a:b] for a, b in itertools.pairwise(up)]
     amplitude = 0.5 * np.array([np.max(s) - np.min(s) for s in spans])
     return float(np.mean((4.0 * ellipk(np.sin(0.5 * amplitude) ** 2) / np.diff(crossings)) ** 2))
+
+
+def test_a_climb_of_a_structure_leaves_what_the_gallery_reads(tmp_path):
+    """Each diagnosis is kept, and the structure reached."""
+    options = ["--fit", "0:700", "--judge", "700:1200"]
+    steps = climb([DATA / "wing" / "model_2.csv"], MODELS / "wing_2.yaml", options, 1, tmp_path)
+    found = read(tmp_path, "wing_2")
+    assert [s["added"] for s in found.steps] == [s["added"] for s in steps]
+    assert found.first["says"]
+    assert len(list((tmp_path / "climb").glob("step_*"))) == len(steps)
+    model = read_model(tmp_path / "climb" / "wing_2.yaml")
+    assert len(model.terms) == 7 + sum(s["added"] is not None for s in steps)
+    row = Published(record="wing_2", step="given", key="k[ground-heave]", quantity="", unit="", value=3318.0, within="")
+    known = {c["key"]: c["value"] for c in steps[0]["coefficients"]}
+    assert beside(row, found).found == known["k[ground-heave]"] > 0.0
