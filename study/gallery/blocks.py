@@ -65,20 +65,19 @@ def left(found: Found) -> str:
 
 def _still(found: Found) -> str:
     first = found.last["candidates"][0]
-    name, where = _spoken(first["term"]), first.get("place", "")
-    tied = [_spoken(t) for t in first.get("tied_with", ())]
+    tied = [_effect(t) for t in first.get("tied_with", ())]
     also = f", which the record cannot tell from {', '.join(tied)}," if tied else ""
     return (
-        f"The diagnosis still names {name}{f' {where}' if isinstance(where, str) and where else ''}{also} and with it "
-        f"{percent(first['response_error'])} would be left; the climb ends here."
+        f"The diagnosis still names {_effect(first)}{also} and with it {percent(first['response_error'])} would be "
+        "left; the climb ends here."
     )
 
 
 def candidates(found: Found) -> Block:
     """The first candidates of the model as given."""
     rows = [
-        (_spoken(c["term"]), percent(c["explained"]), percent(c["response_error"]), _changes(c),
-         ", ".join(_spoken(t) for t in c["tied_with"][:3]))
+        (_effect(c), percent(c["explained"]), percent(c["response_error"]), _changes(c),
+         ", ".join(_effect(t) for t in c["tied_with"][:3]))
         for c in found.first["candidates"][:SHOWN]
     ]  # fmt: skip
     return document.table(("candidate", "explains", "error with it", "its coefficient changes by", "tied with"), rows)
@@ -108,6 +107,15 @@ def _number(value: float, unit: str) -> str:
 
 def _in_units(step: Fields) -> str:
     return f"{step['rms']:.3g} {step['unit']}" if step["unit"] else ""
+
+
+def _effect(candidate: Fields | str) -> str:
+    """An effect, in a structure with its place."""
+    if isinstance(candidate, str):
+        return _spoken(candidate)
+    place = " and ".join(candidate.get("between", ()))
+    where = f" between {place}" if place else f" at {candidate['at']}" if "at" in candidate else ""
+    return _spoken(candidate["term"]) + where
 
 
 def _spoken(name: str) -> str:

@@ -72,6 +72,21 @@ def test_what_is_left_is_no_noise_where_the_last_verdict_says_so(folder):
     assert "still names dry friction, which the record cannot tell from dead band," in said(folder)
 
 
+def test_a_candidate_of_a_structure_has_a_place(folder):
+    tied = [{"term": "dead_band", "at": "pitch"}]
+    placed = {
+        "term": "stop",
+        "between": ["ground", "pitch"],
+        "explained": 0.9,
+        "response_error": 0.1,
+        "tied_with": tied,
+    }
+    (folder / "climb/step_0/diagnosis.json").write_text(json.dumps(diagnosis("missing_effect", candidates=[placed])))
+    text = document.markdown([blocks.candidates(read(folder, "run"))])
+    assert "stop between ground and pitch" in text
+    assert "dead band at pitch" in text
+
+
 def test_the_last_of_ten_diagnoses_counts(folder):
     """Folders are ordered by number, not by letter."""
     for number in range(2, 11):
