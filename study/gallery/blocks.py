@@ -59,7 +59,7 @@ def left(found: Found) -> str:
     depends = percent(last["left"]) if last.get("left") else "much"
     return (
         f"{size} (noise floor {floor}): no noise, but nothing with a name either. General functions of the motion "
-        f"explain a part of {depends} of the response, and no single candidate does."
+        f"explain a part of it, {depends} of the response; no single candidate does."
     )
 
 

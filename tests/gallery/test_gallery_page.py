@@ -81,7 +81,9 @@ def test_a_candidate_of_a_structure_has_a_place(folder):
         "response_error": 0.1,
         "tied_with": tied,
     }
-    (folder / "climb/step_0/diagnosis.json").write_text(json.dumps(diagnosis("missing_effect", candidates=[placed])))
+    (folder / "climb/step_0/diagnosis.json").write_text(
+        json.dumps(diagnosis("missing_effect", candidates=[placed | {"tied_with": tied}]))
+    )
     text = document.markdown([blocks.candidates(read(folder, "run"))])
     assert "stop between ground and pitch" in text
     assert "dead band at pitch" in text
