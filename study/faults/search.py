@@ -155,9 +155,9 @@ def _contested(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
 
 def _noisy_force(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
     """The stage with noise on the force, which is said of what no effect explains; None if it is not seen or known."""
-    if FORCE_NOISE not in names or len(stage.effects) >= EFFECTS or force_noise(stage.rich, asked) is None:
+    if FORCE_NOISE not in names or force_noise(stage.rich, asked) is None:
         return None
-    effect = physics.missing(stage.rich)
+    effect = physics.missing(stage.rich) if len(stage.effects) < EFFECTS else None
     if effect is not None:
         return _beside(effect, stage)
     # What an integration in few steps leaves is shaped by the structure too.

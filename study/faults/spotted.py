@@ -178,13 +178,14 @@ def widened(fault: Fault, given: Prepared, left: Leftover) -> Fault:
     have zero mean, and the coefficients a bias. What was read far from the limit was not clipped, wherever the free run
     of a model that lacks something goes.
     """
-    if fault.lost is None:
-        return fault
-    prepared, lost = left.prepared, fault.lost.copy()
     values = given.record[given.response]
+    clipped = at_the_limits(values, converter_step(values))
+    if clipped is None:
+        return fault
+    prepared, lost = left.prepared, clipped.copy()
     # Either is the noise and more: what is left by edges of what is lost, and the measured motion by its own bends.
     margin = MARGIN * min(_noise(np.concatenate(left.residual)), _noise(values))
-    for limit in np.unique(values[fault.lost]).tolist():
+    for limit in np.unique(values[clipped]).tolist():
         sign = 1.0 if limit > float(np.mean(values)) else -1.0
         for span, predicted in zip((left.fit.span, prepared.plan.judge), left.predicted, strict=True):
             near = sign * (values[slice(*span)] - limit) > -3.0 * margin
