@@ -153,6 +153,15 @@ def _contested(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
     return _accepted(stage, one)
 
 
+def _no_effect(effect: Leftover, stage: Stage) -> bool:
+    """Whether what the record asks for most lies outside of what makes it physical."""
+    return physics.unphysical(effect.fit, _added(effect, stage))
+
+
+def _added(effect: Leftover, stage: Stage) -> list[str]:
+    return [e.name for e in effect.fit.model.terms if e.name not in stage.rich.fit.model]
+
+
 def _noisy_force(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
     """The stage with noise on the force, which is said of what no effect explains; None if it is not seen or known."""
     if FORCE_NOISE not in names or force_noise(stage.rich, asked) is None:
@@ -230,10 +239,13 @@ def _explaining(fault: Fault, before: Leftover, after: Leftover) -> Fault:
 def _tied(stage: Stage, one: Refined, effect: Leftover) -> Stage | None:
     """What becomes of a fault and an effect neither of which is needed beside the other: the fault is mentioned.
 
-    Not so beside an effect that is none, as a Maxwell element of negative stiffness, which hastens what is late.
+    Not so beside an effect that is none, as a Maxwell element of negative stiffness, which hastens what is late, or one
+    that takes more unknowns to do the same: the simplest of what the record cannot tell apart comes first.
     """
-    names = [e.name for e in effect.fit.model.terms if e.name not in stage.rich.fit.model]
-    if physics.unphysical(effect.fit, names) or (one.fault.fault == HUM and _beyond_reason(stage, effect)):
+    names = _added(effect, stage)
+    if _no_effect(effect, stage) or (one.fault.fault == HUM and _beyond_reason(stage, effect)):
+        return _accepted(stage, one)
+    if one.fault.fault != HUM and len(effect.fit.keys) > len(stage.rich.fit.keys) + 1:
         return _accepted(stage, one)
     fault = _explaining(one.fault, stage.rich, one.left).with_rivals(*names)
     return replace(stage, faults=(*stage.faults, fault), rich=effect)

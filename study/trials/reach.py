@@ -20,7 +20,7 @@ from study.trials.runs import COMPLETED, NONE, PAIR, REMOVED, SINGLE, WITH, WITH
 VERY_LITTLE, LITTLE = 0.01, 0.05  # noise up to which ties are to be short, and the true effect has to come first
 WITHIN = 1.05  # held-out error after adding, over that of the true model
 WORDS = (
-    "kind", "hidden", "response", "known", "faults", "fault", "fault_channel", "faults_found", "found", "found_channel", "verdict", "first",
+    "kind", "hidden", "response", "known", "faults", "fault", "fault_channel", "faults_found", "fault_rivals", "found", "found_channel", "verdict", "first",
     "tie_set", "second_verdict", "second_tie_set", "whole_tie_set", "pair", "trouble",
 )  # fmt: skip
 Wanted = Mapping[str, Sequence[float]]
@@ -55,8 +55,12 @@ def tied_score(row: Row) -> float:
 
 
 def nothing_score(row: Row) -> float:
-    """One if it is said that nothing is missing."""
-    return float(row["verdict"] == NOTHING)
+    """One if it is said that nothing is missing, or nothing but what the fault that was found may be instead.
+
+    An offset of the displacement and a constant force are one equation where all else is linear.
+    """
+    or_the_fault = row["found"] == row["fault"] and row["first"] in row["fault_rivals"].split("+")
+    return float(row["verdict"] == NOTHING or (row["verdict"] == MISSING and or_the_fault))
 
 
 def pair_score(row: Row) -> float:
