@@ -64,7 +64,23 @@ def search(
     left, rich = (physics.refitted(one.fit, corrected(given, known)) for one in (part.left, part.rich))
     plain = tuple(name for name in asked if name in PLAIN)
     stage = None if left is None or rich is None else _searched(given, left, rich, known, plain)
-    return (tuple(faults), fit) if stage is None else (stage.faults, stage.left.fit)
+    if stage is None:
+        return tuple(faults), fit
+    stage = _values_again(stage)
+    return stage.faults, stage.left.fit
+
+
+def _values_again(stage: Stage) -> Stage:
+    """The stage with the values of its faults found again, beside the effects and the other faults known by now."""
+    for fault in stage.faults:
+        if fault.fault in adjustable.ADJUSTABLE and fault.corrected and not fault.held:
+            others = tuple(f for f in stage.faults if f is not fault)
+            again = refined(fault.fault, stage.given, others, stage.rich, fault.value)
+            following = None if again is None else replace(stage, faults=others).without(
+                replace(again.fault, explained=fault.explained)
+            )  # fmt: skip
+            stage = following or stage
+    return stage
 
 
 def _searched(
@@ -220,16 +236,7 @@ def _accepted(stage: Stage, one: Refined) -> Stage | None:
 
 def _beside(effect: Leftover, stage: Stage) -> Stage:
     """The stage with an effect more, and the values of its faults found again beside it: its lack has moved them."""
-    stage = replace(stage, rich=effect)
-    for fault in stage.faults:
-        if fault.fault in adjustable.ADJUSTABLE and fault.corrected and not fault.held:
-            others = tuple(f for f in stage.faults if f is not fault)
-            again = refined(fault.fault, stage.given, others, stage.rich, fault.value)
-            following = None if again is None else replace(stage, faults=others).without(
-                replace(again.fault, explained=fault.explained)
-            )  # fmt: skip
-            stage = following or stage
-    return stage
+    return _values_again(replace(stage, rich=effect))
 
 
 def _explaining(fault: Fault, before: Leftover, after: Leftover) -> Fault:
