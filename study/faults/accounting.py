@@ -102,13 +102,10 @@ def _compared(
 
 
 def still_seen(faults: Sequence[Fault], fit: FreeRunFit, prepared: Prepared) -> tuple[Fault, ...]:
-    """The faults, noise on the force as a fuller model shows it that was fitted to the corrected record, if it does.
+    """The faults without noise on the force where a fuller model, fitted to the corrected record, shows none.
 
     What passes through the structure may be a force that the model lacked.
     """
     left = leftover(fit, prepared) if any(fault.fault == FORCE_NOISE for fault in faults) else None
-    if left is None:
-        return tuple(faults)
-    again = force_noise(left, len(FAULTS))
-    kept = [again if fault.fault == FORCE_NOISE else fault for fault in faults]
-    return tuple(fault for fault in kept if fault is not None)
+    gone = left is not None and force_noise(left, len(FAULTS)) is None
+    return tuple(fault for fault in faults if not (gone and fault.fault == FORCE_NOISE))

@@ -246,13 +246,10 @@ def _explaining(fault: Fault, before: Leftover, after: Leftover) -> Fault:
 def _tied(stage: Stage, one: Refined, effect: Leftover) -> Stage | None:
     """What becomes of a fault and an effect neither of which is needed beside the other: the fault is mentioned.
 
-    Not so beside an effect that is none, as a Maxwell element of negative stiffness, which hastens what is late, or one
-    that takes more unknowns to do the same: the simplest of what the record cannot tell apart comes first.
+    Not so beside an effect that is none, as a Maxwell element of negative stiffness, which hastens what is late.
     """
     names = _added(effect, stage)
     if _no_effect(effect, stage) or (one.fault.fault == HUM and _beyond_reason(stage, effect)):
-        return _accepted(stage, one)
-    if one.fault.fault != HUM and len(effect.fit.keys) > len(stage.rich.fit.keys) + 1:
         return _accepted(stage, one)
     fault = _explaining(one.fault, stage.rich, one.left).with_rivals(*names)
     return replace(stage, faults=(*stage.faults, fault), rich=effect)

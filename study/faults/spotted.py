@@ -21,7 +21,6 @@ from study.support.thresholds import ALPHA, TOLERANCE
 REPEATED = 0.5  # of the samples of a channel: whose values recur so often comes in steps
 MARGIN = 2.0  # standard deviations of the noise from a limit, within which a sample may have been clipped
 RUN = 3  # samples in a row with the same value: a channel that counts in no steps has stood still
-ITERATIONS = 50  # after which the shares of two kinds of runs no longer change
 STANDING = 0.05  # of the samples: a channel that stands still longer is at rest, and has not dropped out
 
 
@@ -104,7 +103,7 @@ def drop_outs(left: Leftover, asked: int) -> Fault | None:
         return None
     noisy = _noise(np.concatenate(left.residual)) > TOLERANCE * left.size
     if _at_rest(prepared.response, values[mask]):
-        mask = _moving(mask, places, power, ALPHA / (asked * runs))
+        mask = _moving(mask, places, power, ALPHA / (asked * runs), noisy)
     there = mask[places]
     if not np.any(there):
         return None
@@ -124,40 +123,20 @@ def _at_rest(response: str, standing: Floats) -> bool:
     return response != "displacement" and not np.any(standing)
 
 
-def _moving(mask: NDArray[np.bool_], places: Ints, power: Floats, level: float) -> NDArray[np.bool_]:
-    """The runs of a mask that the model says were motion and no rest, shape (n,).
+def _moving(mask: NDArray[np.bool_], places: Ints, power: Floats, level: float, noisy: bool) -> NDArray[np.bool_]:
+    """The runs of a mask in which more is left than elsewhere, by the F test of each as a single number, shape (n,).
 
-    There are some if more is left in any run than elsewhere, by the F test of each as a single number. Then every run
-    is what is more likely: a rest, in which as much is left as elsewhere, or a drop-out, which leaves the motion too. A
-    drop-out where the motion passes through zero anyway looks like either, and is what the others are.
+    All of them, if there is any, where noise lies on the channel: what is at rest under noise does not stand still.
     """
     left = np.full(len(mask), np.nan)
     left[places] = power
     elsewhere = max(float(np.nanmean(left[~mask])), np.finfo(float).tiny)
     runs = _runs(mask & ~np.isnan(left))
-    ratios = np.array([float(np.mean(left[first:last])) / elsewhere for first, last in runs])
+    sure = [float(fdtrc(1, len(power), np.mean(left[first:last]) / elsewhere)) < level for first, last in runs]
     kept = np.zeros_like(mask)
-    if not np.any(fdtrc(1, len(power), ratios) < level):
-        return kept
-    for (first, last), lost in zip(runs, _of_the_wider(ratios), strict=True):
-        kept[first:last] = lost
+    for (first, last), lost in zip(runs, sure, strict=True):
+        kept[first:last] = lost or (noisy and any(sure))
     return kept
-
-
-def _of_the_wider(ratios: Floats) -> NDArray[np.bool_]:
-    """Which squares of normal variables are of a part with a variance above one, the others having one, shape (n,).
-
-    Expectation and maximisation (Dempster, Laird and Rubin, 1977) of the share of that part and its variance.
-    """
-    share, variance = 0.5, max(float(np.max(ratios)), 2.0)
-    odds = np.zeros(len(ratios))
-    for _ in range(ITERATIONS):
-        with np.errstate(over="ignore"):
-            odds = share / (1.0 - share) * np.exp(0.5 * ratios * (1.0 - 1.0 / variance)) / math.sqrt(variance)
-        belongs = np.where(np.isfinite(odds), odds / (1.0 + odds), 1.0)
-        share = min(float(np.mean(belongs)), 1.0 - 1e-9)
-        variance = max(float(belongs @ ratios / np.sum(belongs)), 1.0)
-    return odds > 1.0
 
 
 def _standing(values: Floats) -> tuple[NDArray[np.bool_], int]:
