@@ -77,6 +77,11 @@ def removed_score(row: Row) -> float:
     return float(row["verdict"] == MISSING and row["first"] in whole and row["hidden"] in whole)
 
 
+def removed_or_as_good(row: Row) -> float:
+    """The same, or what is said leaves no more than the true model: then nothing in the record speaks against it."""
+    return max(removed_score(row), as_good_as_truth(row))
+
+
 def fault_score(row: Row) -> float:
     """One if the fault is named in its channel with an interval that holds its value."""
     if (row["found"], row["found_channel"]) != (row["fault"], row["fault_channel"]):
@@ -115,6 +120,7 @@ RATES: tuple[tuple[str, Member, Score, str], ...] = (
     ("... of completed models", _kinds(COMPLETED), nothing_score, ""),
     ("both of two, by diagnose and add", _kinds(PAIR), pair_score, "both"),
     ("out of the library: unknown, or in the tie set", _kinds(REMOVED), removed_score, "removed"),
+    ("... or what is said leaves as little as the true model", _kinds(REMOVED), removed_or_as_good, ""),
     ("the fault named, its value within its interval", _faulty, fault_score, "fault"),
     ("no fault named where there is none", lambda r: not _faulty(r), no_fault_score, ""),
     ("error after adding within 5 % of the true model's", _single(), as_good_as_truth, ""),
