@@ -39,6 +39,8 @@ class Prepared:
         The motions that were measured; the others are derivatives and integrals of them.
     lost : bool array, shape (n,), optional
         Samples of the response that say nothing, such as clipped ones: they are neither fitted nor judged.
+    as_sampled : Prepared, optional
+        The record with all of its samples, where this has every so-manieth (:mod:`study.records.oversampling`).
     """
 
     record: Record
@@ -49,6 +51,7 @@ class Prepared:
     low: float = 0.0
     measured: tuple[str, ...] = ()
     lost: NDArray[np.bool_] | None = None
+    as_sampled: "Prepared | None" = None
 
     @property
     def response(self) -> str:
