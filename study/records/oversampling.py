@@ -1,4 +1,4 @@
-"""Records sampled more finely than their motion asks for: every so-manieth sample behind a low-pass filter.
+"""Records sampled more finely than their motion asks for: some of the samples, behind a low-pass filter.
 
 What lies above the highest frequency at which the measured motion stands above its noise is noise. A filter whose power
 and that of its image add up to one leaves white noise white, so that the samples that are kept hold as much of every
@@ -6,7 +6,9 @@ coefficient as all of them did, with standard errors that are as true.
 """
 
 import math
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
@@ -22,6 +24,8 @@ from study.support.arrays import Floats
 from study.support.thresholds import ALPHA
 
 ORDER = 3  # products of the motion up to this order do not fold into its band: those of most library terms' forces
+BIAS = 0.1  # standard errors by which what is left out may shift a coefficient
+JUMP = 2.0  # power of the frequency with which the density of an acceleration that jumps falls
 LEAST = 512  # samples in either part: what a segment of the spectra takes
 LINES = 8192  # samples in a segment of the spectrum, at most
 PARTS = 4  # segments that a record holds side by side, at least
@@ -30,15 +34,16 @@ PASSED = 2.0 / 3.0  # of the new Nyquist frequency, and its mirror image 4/3: wh
 
 
 def without_spare_samples(prepared: Prepared) -> Prepared:
-    """The record with every so-manieth sample, where it has more than its motion asks for; else itself.
+    """The record without the samples that its motion does not ask for; itself where it asks for all.
 
     A record of stretches is left as it is (:func:`completed_without_spare` comes before these are strung together), as
-    are one with lost samples, which a filter would spread, and a prescribed motion, whose kinks count.
+    are one with lost samples, which a filter would spread, a prescribed motion, whose kinks count, and a free decay,
+    which tells most at its very beginning.
     """
-    if prepared.record.stretches or prepared.lost is not None or prepared.response == FORCE:
+    if prepared.record.stretches or prepared.lost is not None or prepared.response == FORCE or prepared.free:
         return prepared
     parts = prepared.plan.fit, prepared.plan.judge
-    factor = spare_factor(prepared.record, prepared.measured, min(b - a for a, b in parts))
+    factor = spare_factor([prepared.record], prepared.measured, min(b - a for a, b in parts))
     if factor == 1:
         return prepared
     record = decimated(prepared.record, factor)
@@ -48,36 +53,39 @@ def without_spare_samples(prepared: Prepared) -> Prepared:
     return replace(
         prepared, record=record, plan=Plan(prepared.plan.response, fit, judge), band=_band(prepared.band, record),
         edge=max(-(-prepared.edge // factor), EDGE), notes=(*prepared.notes, _said(prepared.record, factor, parts[0])),
-        lost=lost, as_sampled=prepared,
+        lost=lost, every=factor, as_sampled=prepared,
     )  # fmt: skip
 
 
-def completed_without_spare(completed: CompletedRecord, shortest: int) -> CompletedRecord:
-    """The same of a record that is to be cut into stretches, of which the shortest part has so many samples."""
-    measured = tuple(m for m in MOTIONS if m in completed.record)
-    factor = spare_factor(completed.record, measured, shortest)
-    if factor == 1:
-        return completed
+def completed_without_spare(
+    completed: Sequence[CompletedRecord], measured: Sequence[str], shortest: int
+) -> tuple[list[CompletedRecord], int]:  # fmt: skip
+    """The same of driven records that are to be cut into stretches, and how many of their samples there are to one.
+
+    ``measured`` and ``shortest`` as for :func:`spare_factor`.
+    """
+    factor = spare_factor([c.record for c in completed], measured, shortest)
+    return [_fewer(c, factor) if factor > 1 else c for c in completed], factor
+
+
+def _fewer(completed: CompletedRecord, factor: int) -> CompletedRecord:
     record = decimated(completed.record, factor)
     edge = max(-(-completed.edge // factor), EDGE)
-    said = _said(completed.record, factor, (0, len(completed.record)))
-    return replace(
-        completed, record=record, band=_band(completed.band, record), edge=edge, notes=(*completed.notes, said)
-    )
+    notes = (*completed.notes, _said(completed.record, factor, (0, len(completed.record))))
+    return replace(completed, record=record, band=_band(completed.band, record), edge=edge, notes=notes)
 
 
-def spare_factor(record: Record, measured: tuple[str, ...], shortest: int) -> int:
+def spare_factor(records: Sequence[Record], measured: Sequence[str], shortest: int) -> int:
     """The largest whole number by which the sampling may be divided without loss; 1 if none.
 
-    The new Nyquist frequency is ``(ORDER + 1) / 2`` times the highest frequency at which any measured motion stands
-    above its noise: products of so many factors then fold to frequencies above that. A force that closes on itself,
-    and the period of the excitation, still hold whole numbers of samples, and either part is long enough for spectra.
+    Each measured motion allows a new Nyquist frequency (:meth:`Content.enough`). A force that closes on itself, and the
+    period of the excitation, still hold whole numbers of samples, and either part is long enough for spectra.
 
     Parameters
     ----------
-    record : Record
+    records : sequence of Record
         With completed motions.
-    measured : tuple of str
+    measured : sequence of str
         Those that were measured: the others are louder at high frequencies, not more telling.
     shortest : int
         Samples in the shorter of both parts.
@@ -85,38 +93,95 @@ def spare_factor(record: Record, measured: tuple[str, ...], shortest: int) -> in
     most = shortest // LEAST
     if most < 2:
         return 1
-    highest = max(highest_frequency(record[name], record.dt) for name in measured)
-    most = min(most, int(0.5 / record.dt / (0.5 * (ORDER + 1) * max(highest, 1.0 / (len(record) * record.dt)))))
-    whole = [n for n in (record.period,) if n]
-    if _goes_round(record[FORCE]):
-        whole.append(len(record))
+    needed = max(content(record[name], record.dt).enough for record in records for name in measured)
+    most = min(most, int(0.5 / records[0].dt / needed))
+    whole = [record.period for record in records if record.period]
+    whole += [len(record) for record in records if _goes_round(record[FORCE])]
     return next((k for k in range(most, 1, -1) if not any(n % k for n in whole)), 1)
 
 
-def highest_frequency(values: Floats, dt: float) -> float:
-    """Highest frequency in hertz at which a channel stands above its noise; the Nyquist frequency if it does up there.
+@dataclass(frozen=True)
+class Content:
+    """What a channel holds above its noise.
+
+    Attributes
+    ----------
+    highest : float
+        Highest frequency in hertz at which it stands above its noise.
+    fall : float
+        Power of the frequency with which its density falls there: 2 for an acceleration that jumps, as dry friction
+        makes it, or more.
+    energy : float
+        Of what is assumed to lie above, in mean squares of the noise at a sample: that of a density which equals that
+        of the noise at ``highest`` and falls on from there.
+    signal : float
+        Energy of the whole channel in the same measure.
+    """
+
+    highest: float
+    fall: float
+    energy: float
+    signal: float
+
+    @property
+    def enough(self) -> float:
+        """The Nyquist frequency in hertz that suffices.
+
+        First, ``(ORDER + 1) / 2`` times ``highest``: products of so many factors fold to frequencies above that.
+        Second, what lies above folds too, or is lost, and shifts coefficients: by as many standard errors, at most, as
+        its energy over the root of the signal's, if a coefficient moves it as it moves the whole.
+        """
+        excess = self.energy / (BIAS * math.sqrt(self.signal)) if self.signal > 0.0 else 1.0
+        return self.highest * max(0.5 * (ORDER + 1), excess ** (1.0 / (self.fall - 1.0)))
+
+
+def content(values: Floats, dt: float) -> Content:
+    """What a channel of shape (n,) holds above its noise; up to the Nyquist frequency where no noise is seen.
 
     The noise is the median of the spectrum: of an oversampled channel most lines hold nothing else. A line stands above
-    it if chance gives one so high among all in less than ``ALPHA`` of the records, or a third of an octave of them does.
+    it if chance gives one so high among all in less than ``ALPHA`` of the records, alone or with a third of an octave.
     """
     length = 2 ** int(math.log2(min(len(values) // PARTS, LINES)))
     cut = Segments(length, 0.75, "kaiser")
     frequency, power = autospectrum(values - np.mean(values), dt, cut)
     averages = cut.effective_averages(len(values))
-    inner, bins = power[1:-1], frequency[1:-1]
+    inner, nyquist = power[1:-1], 0.5 / dt
     noise = float(np.median(inner)) / (1.0 - 1.0 / (9.0 * averages)) ** 3  # median of chi square (Wilson, Hilferty)
     if not noise > 0.0:
-        return 0.5 / dt
-    share = inner / noise
+        return Content(nyquist, JUMP, 0.0, 0.0)
+    last = _last_above(inner / noise, averages, cut.line_inflation())
+    highest, samples = float(frequency[last + 1]), len(values)
+    fall = _fall(inner / noise - 1.0, last + 1, averages / cut.line_inflation())
+    energy = samples * highest / ((fall - 1.0) * nyquist)
+    return Content(highest, fall, energy, samples * max(float(np.mean(inner)) / noise - 1.0, 0.0))
+
+
+def _last_above(share: Floats, averages: float, inflation: float) -> int:
+    """The last line whose density, in that of the noise, stands above it; 0 if there is none."""
     above = gammaincc(averages, averages * share) * len(share) < 0.5 * ALPHA
-    edges = np.unique(np.round(2.0 ** np.arange(0.0, math.log2(len(inner)), 1.0 / 3.0)).astype(int))
-    bands = [(int(a), int(b)) for a, b in zip(edges, [*edges[1:], len(inner)], strict=True)]
+    edges = np.unique(np.round(2.0 ** np.arange(0.0, math.log2(len(share)), 1.0 / 3.0)).astype(int)).tolist()
+    bands = list(pairwise([*edges, len(share)]))
     for a, b in bands:
-        together = averages * max((b - a) / cut.line_inflation(), 1.0)
+        together = averages * max((b - a) / inflation, 1.0)
         if gammaincc(together, together * float(np.mean(share[a:b]))) * len(bands) < 0.5 * ALPHA:
             above[b - 1] = True
-    found = np.flatnonzero(above)
-    return float(bins[found[-1]]) if len(found) else 0.0
+    return int(np.max(np.flatnonzero(above), initial=0))
+
+
+def _fall(excess: Floats, last: int, averages: float) -> float:
+    """The power of the frequency with which a density falls over the octave up to a line, by its two halves.
+
+    Less what chance may have added; at least ``JUMP``: no motion of a mass falls more slowly.
+    """
+    lower, middle = last // 2, round(last / math.sqrt(2.0))
+    if middle - lower < 1 or last - middle < 1:
+        return JUMP
+    (one, sure), (other, unsure) = (
+        (float(np.mean(part)), float(np.mean(part + 1.0)) / math.sqrt(max(averages * len(part), 1.0)))
+        for part in (excess[lower:middle], excess[middle:last])
+    )
+    ratio = (one - 2.0 * sure) / max(other + 2.0 * unsure, 1e-300)
+    return max(2.0 * math.log2(ratio), JUMP) if ratio > 0.0 else JUMP
 
 
 def decimated(record: Record, factor: int) -> Record:
@@ -129,9 +194,7 @@ def decimated(record: Record, factor: int) -> Record:
         for name, values in record.channels.items()
     }
     period = None if record.period is None else record.period // factor
-    return replace(
-        record, dt=record.dt * factor, channels=channels, period=period, between=BAND_LIMITED
-    )
+    return replace(record, dt=record.dt * factor, channels=channels, period=period, between=BAND_LIMITED)
 
 
 def _filtered(values: Floats, factor: int, between: str) -> Floats:
@@ -170,11 +233,15 @@ def _band(band: tuple[float, float], record: Record) -> tuple[float, float]:
 
 def _said(record: Record, factor: int, span: tuple[int, int]) -> str:
     """A sentence on what was done, by the period of the strongest line of the motion."""
-    values = record[next(m for m in MOTIONS if m in record)][slice(*span)]
+    values = record[MOTIONS[0]][slice(*span)]
     power = np.abs(np.asarray(rfft(values - np.mean(values))))
     a_period = len(values) / max(int(np.argmax(power)), 1)
     return (
-        f"the record is sampled {a_period:.0f} times a period of its strongest motion, finer than anything in it above "
-        f"its noise: every {factor}th sample is used after a low-pass filter, which loses nothing (--as-sampled uses "
-        "all)"
+        f"{record.name} is sampled {a_period:.0f} times a period of its strongest motion, more finely than all in it "
+        f"that is no noise: every {_ordinal(factor)} sample is used after a low-pass filter, which loses nothing "
+        "(--as-sampled uses all)"
     )
+
+
+def _ordinal(number: int) -> str:
+    return {2: "second", 3: "third"}.get(number, f"{number}th")
