@@ -24,8 +24,8 @@ def in_words(diagnosis: Diagnosis) -> str:
 
 
 def chosen(notes: Sequence[str]) -> list[str]:
-    """What was chosen for the user, who may choose else: it is said beside the verdict."""
-    return [note for note in notes if "(--" in note]
+    """What was chosen for the user, who may choose else, and a sampling that is too coarse: said beside the verdict."""
+    return [note for note in notes if "(--" in note or "too coarsely" in note]
 
 
 def unneeded_in_words(found: Sequence[Needless], diagnosis: Diagnosis) -> str:

@@ -15,6 +15,7 @@ from study.faults.search import first_faults, search
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.settling import settled
+from study.records.coarse_sampling import too_coarse
 from study.records.oversampling import without_spare_samples
 from study.records.prepared import FORCE, Prepared
 from study.support.errors import StudyError
@@ -71,6 +72,8 @@ def accounted(
     asked = tuple(name for name in FAULTS if name not in switched_off and name not in known)
     if asked and not _may_be_asked(prepared):
         asked, prepared = (), replace(prepared, notes=(*prepared.notes, NOT_ASKED))
+    coarse = too_coarse(prepared)
+    prepared = replace(prepared, notes=(*prepared.notes, coarse)) if coarse else prepared
     needed = _all_samples if as_sampled else without_spare_samples
     faults = first_faults(prepared, known, asked)
     first = corrected(prepared, faults)

@@ -237,9 +237,9 @@ def _said(record: Record, factor: int, span: tuple[int, int]) -> str:
     power = np.abs(np.asarray(rfft(values - np.mean(values))))
     a_period = len(values) / max(int(np.argmax(power)), 1)
     return (
-        f"{record.name} is sampled {a_period:.0f} times a period of its strongest motion, more finely than all in it "
-        f"that is no noise: every {_ordinal(factor)} sample is used after a low-pass filter, which loses nothing "
-        "(--as-sampled uses all)"
+        f"the record {record.name} is sampled {a_period:.0f} times a period of its strongest motion, more finely than "
+        f"anything but noise in it asks for: every {_ordinal(factor)} sample is used after a low-pass filter, which "
+        "loses nothing (--as-sampled uses all)"
     )
 
 

@@ -128,7 +128,7 @@ def _why(record: Record, plan: Plan) -> str:
     share = percent(shared(record, plan.fit, plan.judge), ".0f")
     return (
         f"the halves of the record share {share} of the force's power at the same frequencies, as those of a sweep or "
-        "of dwells do, so that one says little of the other (--fit and --judge A:B choose parts)"
+        "of dwells do, so that every other block is judged in place of a half (--fit and --judge A:B choose parts)"
     )
 
 
