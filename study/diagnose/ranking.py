@@ -44,7 +44,7 @@ def rank(candidates: Sequence[Candidate], comparison: Comparison) -> list[Ranked
     white = {r.name: r.held_out.white(noise) for r in rows}
     prepared = comparison.prepared
     own = held_out(comparison.fit, before, linearise(comparison.fit, prepared), prepared).white(noise)
-    rows = [replace(r, p_value=min(1.0, len(rows) * _p_value(own, white[r.name]))) for r in rows]
+    rows = [replace(r, p_value=min(1.0, len(rows) * _p_value(own, white[r.name], _independent(r)))) for r in rows]
     return [replace(r, distance=away, tied_with=tied) for r, away, tied in in_order(rows, white, len(rows))]
 
 
@@ -123,8 +123,18 @@ def distance(row: Row, other: Row, white: Mapping[str, Floats]) -> float:
     return statistics.worse(*_common(white[row.name], white[other.name]))
 
 
-def _p_value(before: Floats, after: Floats) -> float:
-    return statistics.gain(*_common(before, after)).p_value
+def _independent(row: Ranked) -> int | None:
+    """How many samples, of those held out, had no part in what was fitted; None where all are such.
+
+    A frequency is where the fitting part has its largest line, by chance if it is noise: its blocks all agree there
+    with whatever amplitude the judging part gives that line, so that they bear witness of nothing.
+    """
+    return len(row.held_out.judged) if row.term.tuned else None
+
+
+def _p_value(before: Floats, after: Floats, samples: int | None) -> float:
+    one, other = _common(before, after)
+    return statistics.gain(one[:samples], other[:samples]).p_value
 
 
 def _common(one: Floats, other: Floats) -> tuple[Floats, Floats]:
