@@ -205,7 +205,7 @@ class Term:
 
     @property
     def tuned(self) -> bool:
-        """Whether a frequency of its own is picked from the lines of what is left: as many as the record has samples."""
+        """Whether a frequency of its own is picked from the lines of what is left, as many as the record shows."""
         return any(p.search.kind.startswith("lines of") for p in self.parameters)
 
     @property

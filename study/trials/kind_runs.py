@@ -4,8 +4,8 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from study.diagnose.credibility import credible
-from study.diagnose.verdict import MISSING, NOTHING, diagnose
+from study.diagnose.held_out import held_out_of
+from study.diagnose.verdict import MISSING, NOTHING, believed, diagnose
 from study.faults.kinds_of_tests import accounted_test
 from study.support.errors import StudyError
 from study.trials.draw import Trial
@@ -41,7 +41,7 @@ def _diagnosed(trial: Trial) -> Row:
     first = diagnosis.candidates[0] if diagnosis.candidates else None
     # Without noise an interval is as wide as rounding: nothing is asked of those.
     right = diagnosis.verdict == NOTHING if not trial.hidden else set(named) >= set(trial.hidden)
-    seen = first is not None and credible(found.comparison.prediction, first.prediction, first.interval, first.p_value)
+    seen = first is not None and believed(first, found.comparison.prediction, held_out_of(found.comparison))
     row: Row = {
         "verdict": diagnosis.verdict, "first": named[0] if named else "", "tied": "+".join(named[1:]),
         "right": int(right), "error_before": round(found.comparison.prediction.error, 6),

@@ -88,7 +88,7 @@ def _units(path: Path, roles: Mapping[str, Column], options: ReadOptions) -> dic
 
 
 def _refuse_contradiction(path: Path, column: Column, role: str, options: ReadOptions) -> None:
-    """Refuse a unit that is given where the file says another: one of them is a factor wrong, and nobody knows which."""
+    """Refuse a unit that is given where the file says another: one is a factor wrong, and nobody knows which."""
     given, own = options.units.get(role, ""), own_unit(column, role)
     if not (is_unit(given) and is_unit(own)):
         return
@@ -96,7 +96,7 @@ def _refuse_contradiction(path: Path, column: Column, role: str, options: ReadOp
     same = one.powers == other.powers and abs(one.factor / other.factor - 1.0) < ROUNDING
     expect(
         same,
-        f"{path}: column {column.name!r} is in {other.text} by the file and a unit of {one.text} is given for the {role}; "
+        f"{path}: column {column.name!r} is in {other.text} by the file and a unit of {one.text} is given; "
         "leave the unit out, or correct it in the file",
     )
 
