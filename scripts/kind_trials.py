@@ -1,6 +1,7 @@
 """Snakemake step: the trials of one kind of test.
 
-By hand, ``kind_trials.py TABLE FIRST_SEED COUNT KIND ...``, the trials that the table lacks are run, one after the other, a seed of every kind before the next seed.
+By hand, ``kind_trials.py TABLE FIRST_SEED COUNT KIND ...``, the trials that the table lacks are run and added one after
+the other, a seed of every kind before the next seed.
 """
 
 import csv

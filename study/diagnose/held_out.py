@@ -100,7 +100,9 @@ def independent(residual: Floats, derivatives: Floats, spread: Floats) -> Floats
 
     The coefficients that predict it have errors, which it bears all along: where a quiet part predicts a loud one, as
     in a decay, these are many times the noise, and all samples tell of one chance. With ``L L^T`` the covariance of the
-    coefficients over the noise's variance and J their derivatives, the residual times ``(I + J L L^T J^T)^(-1/2)``.
+    coefficients over the noise's variance and J their derivatives, the residual times ``(I + J L L^T J^T)^(-1/2)``, and
+    times the 2n-th root of that matrix's determinant: so that, as in the likelihood of a prediction, a model gains
+    nothing by coefficients that are so uncertain that anything is expected of them.
 
     Parameters
     ----------
@@ -113,7 +115,8 @@ def independent(residual: Floats, derivatives: Floats, spread: Floats) -> Floats
     """
     directions, sizes, _ = np.linalg.svd(derivatives @ spread, full_matrices=False)
     share = 1.0 - 1.0 / np.sqrt(1.0 + sizes**2)
-    return np.asarray(residual - directions @ (share * (directions.T @ residual)), dtype=np.float64)
+    price = np.exp(0.5 * np.sum(np.log1p(sizes**2)) / len(residual))
+    return np.asarray(price * (residual - directions @ (share * (directions.T @ residual))), dtype=np.float64)
 
 
 def _own(jacobian: Floats, own: int) -> Floats:
