@@ -3,7 +3,14 @@
 import argparse
 
 from study.commands.command import Command, progress, whole
-from study.commands.record_arguments import accounted_for, add_record_arguments, inputs_of, out_folder, read_records
+from study.commands.record_arguments import (
+    accounted_for,
+    add_record_arguments,
+    inputs_of,
+    out_folder,
+    read_records,
+    refuse_groups,
+)
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -15,6 +22,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> None:
     from study.support.extras import needed
 
+    refuse_groups(arguments)
     needed("bokeh", "'study explore'", "explore")
     from study.compare import history
     from study.compare.comparison import STEPS

@@ -4,7 +4,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from study.commands.command import progress
-from study.commands.record_arguments import out_folder, read_options, written_together
+from study.commands.record_arguments import out_folder, read_options, refuse_groups, written_together
 
 if TYPE_CHECKING:
     from study.equations.model import Model
@@ -18,6 +18,7 @@ def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[
     from study.structure.structure_reader import read_structure
     from study.support.errors import at
 
+    refuse_groups(arguments)
     made: list[PreparedStructure] = []
     for path in arguments.records:
         record = read_structure(path, model, read_options(arguments))

@@ -1,6 +1,7 @@
 """A diagnosis in words, and as the files that a command writes."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from study.compare.comparison_report import as_json, where
 from study.diagnose import diagnosis_pages, diagnosis_report
@@ -35,12 +36,13 @@ def unneeded_in_words(found: Sequence[Needless], diagnosis: Diagnosis) -> str:
 
 def files(
     diagnosis: Diagnosis, words: str, unneeded: Sequence[Needless] = (), faults: Sequence[Fault] = (),
-    unfitted: Mapping[str, str] | None = None,
+    unfitted: Mapping[str, str] | None = None, by_record: Sequence[Mapping[str, Any]] = (),
 ) -> dict[str, bytes]:  # fmt: skip
     """``diagnosis.json`` and the pictures by file name; ``words`` is the diagnosis in words.
 
     ``unneeded`` are the terms of the model that it does not need, ``faults`` those of the measurement that the record
-    was corrected for, or may have, ``unfitted`` by name why candidates of the user's could not be fitted.
+    was corrected for, or may have, ``unfitted`` by name why candidates of the user's could not be fitted,
+    ``by_record`` the coefficients that may differ between records.
     """
     comparison = diagnosis.comparison
     content = diagnosis_report.fields(diagnosis)
@@ -49,4 +51,6 @@ def files(
     content["not_fitted"] = dict(unfitted or {})
     content |= {"notes": list(comparison.notes), "every_sample": comparison.prepared.every}
     content |= {"measurement": [fault.fields(f) for f in faults]}
+    if by_record:
+        content["coefficients_by_record"] = list(by_record)
     return {"diagnosis.json": as_json(content)} | diagnosis_pages.files(diagnosis, comparison.record.name)

@@ -78,6 +78,8 @@ def laid_out(records: Sequence[Record], layout: Layout, *, prescribed: bool = Fa
         "--use and --fit or --judge A:B exclude each other; expected '--judge every-other-block' beside --use"
     )
     expect(not (explicit and (layout.use or layout.alternate)), contradiction)
+    if prescribed:
+        _refuse_unforced(records)
     readied = [with_prescribed_motion(r) if prescribed else (r, ()) for r in records]
     records = [r for r, _ in readied]
     free = not prescribed and all(_unforced(r, layout) for r in records)
@@ -147,6 +149,15 @@ def _response(record: Record, wanted: str | None, prescribed: bool) -> str:
         usable = wanted is None or wanted in measured
         expect(usable, f"no {wanted} was measured; expected --response {', '.join(measured)}")
         return wanted or measured[0]
+
+
+def _refuse_unforced(records: Sequence[Record]) -> None:
+    for record in records:
+        expect(
+            np.any(record[FORCE]),
+            f"{record.name}: no force was measured, which a model without inertia predicts; expected a column of the "
+            "force, or a model with inertia",
+        )
 
 
 def _seen(response: str) -> str:
