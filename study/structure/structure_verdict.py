@@ -84,7 +84,8 @@ def _decide(rows: list[PlacedRanked], comparison: StructureComparison, asked: in
     if not believed:
         families = left_over(prediction)
         left = _left(prediction, families)
-        verdict = UNKNOWN if left > TOLERANCE else NOTHING
+        hopeless = prediction.error >= 1.0  # worse than to predict no motion at all, whatever it depends on
+        verdict = UNKNOWN if hopeless or left > TOLERANCE else NOTHING
         return StructureDiagnosis(verdict, comparison, tuple(rows), asked, left, _ordered(families))
     first = believed[0]
     families = left_over(first.prediction)

@@ -12,7 +12,6 @@ from study.structure.placed_ranking import PlacedRanked
 from study.structure.prepared_structure import PreparedStructure, prepare_structure
 from study.structure.structure_comparison import compare_structure
 from study.structure.structure_fit import fit_structure, settled
-from study.structure.structure_prediction import predict_structure
 from study.structure.structure_verdict import MISSING, NOTHING, StructureDiagnosis, diagnose_structure
 from study.support.errors import StudyError
 from study.trials.structure_draw import HIDDEN, NOISES, StructureTrial, make_structure_trial
@@ -22,7 +21,7 @@ FIRST_SEED, NONE_EVERY = 20_000, 6  # one trial out of so many hides nothing
 COLUMNS = (
     "seed", "coordinates", "hidden", "place", "noise", "response", "share", "verdict", "first", "first_place",
     "effect_first", "place_first", "tie_set", "tie_holds", "error_before", "error_after", "error_true", "noise_floor",
-    "left", "asked", "p_value", "seconds", "trouble",
+    "left", "asked", "p_value", "true_inside", "true_keys", "seconds", "trouble",
 )  # fmt: skip
 
 
@@ -61,7 +60,7 @@ def run_structure(order: StructureOrder) -> Row:
         diagnosis = diagnose_structure(compare_structure(trial.believed, prepared))
     except StudyError as error:
         return row | {"trouble": str(error), "seconds": time.perf_counter() - begun}
-    row |= _found(trial, diagnosis) | {"error_true": _true_error(trial, prepared)}
+    row |= _found(trial, diagnosis) | _true(trial, prepared)
     return row | {"seconds": time.perf_counter() - begun, "trouble": ""}
 
 
@@ -92,14 +91,21 @@ def _there(row: PlacedRanked, hidden: ModelTerm) -> bool:
     return row.entry.place is not None and hidden.place is not None and row.entry.place.path == hidden.place.path
 
 
-def _true_error(trial: StructureTrial, prepared: PreparedStructure) -> float:
-    """Error of the true model, fitted from its true values."""
-    model = trial.completed
+def _true(trial: StructureTrial, prepared: PreparedStructure) -> Row:
+    """Error of the true model, fitted from its true values, and how many of these its 95 % intervals hold.
+
+    Without noise nothing is asked of intervals: what is left is the integration's.
+    """
+    model, true = trial.completed, trial.truth.numbers()
     try:
-        fit = fit_structure(model, prepared, (), trial.truth.numbers())
-        return predict_structure(settled(fit, prepared), prepared).error
+        fit = settled(fit_structure(model, prepared, (), true), prepared)
+        comparison = compare_structure(model, prepared, fit)
     except StudyError:
-        return math.nan
+        return {"error_true": math.nan}
+    spans = [(true[c.key], c.interval) for c in comparison.coefficients if c.interval is not None]
+    inside = sum(low <= value <= high for value, (low, high) in spans)
+    counted = {"true_inside": inside, "true_keys": len(spans)} if trial.noise > 0.0 else {}
+    return {"error_true": comparison.prediction.error} | counted
 
 
 def rates(rows: Sequence[Row]) -> list[Row]:
