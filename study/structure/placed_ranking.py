@@ -55,6 +55,11 @@ class PlacedRanked:
         return self.entry.term
 
     @property
+    def response_error(self) -> float:
+        """Error of the motions with it, held out."""
+        return self.prediction.error
+
+    @property
     def residual(self) -> Floats:
         """Held-out residual in shares of the sensors' sizes, those of one time side by side."""
         return (self.prediction.residual / self.prediction.size).ravel()

@@ -104,8 +104,8 @@ def _true(trial: StructureTrial, prepared: PreparedStructure) -> Row:
         return {"error_true": math.nan}
     spans = [(true[c.key], c.interval) for c in comparison.coefficients if c.interval is not None]
     inside = sum(low <= value <= high for value, (low, high) in spans)
-    counted = {"true_inside": inside, "true_keys": len(spans)} if trial.noise > 0.0 else {}
-    return {"error_true": comparison.prediction.error} | counted
+    row: Row = {"error_true": comparison.prediction.error}
+    return row | {"true_inside": inside, "true_keys": len(spans)} if trial.noise > 0.0 else row
 
 
 def rates(rows: Sequence[Row]) -> list[Row]:
