@@ -10,7 +10,15 @@ from study.diagnose.credibility import credible
 from study.equations.model import ModelTerm
 from study.equations.term import Term
 from study.structure.modes import Modes, modes_of
-from study.structure.placed_candidates import candidate_entries, promising, screened, try_all, with_best_settled
+from study.structure.placed_candidates import (
+    candidate_entries,
+    elsewhere,
+    one_side,
+    promising,
+    screened,
+    try_all,
+    with_best_settled,
+)
 from study.structure.placed_ranking import PlacedRanked, rank_placed
 from study.structure.placed_search import PlacedBaseline, placed_baseline, with_placed_term
 from study.structure.structure_comparison import StructureComparison, compare_structure
@@ -58,8 +66,9 @@ def diagnose_structure(
     """
     base = search_base(comparison)
     entries = candidate_entries(comparison.fit.model, extra, without)
-    chosen = promising(screened(entries, base))
-    tried = try_all(chosen, base, progress or (lambda _: None))
+    ordered, report = screened(entries, base), progress or (lambda _: None)
+    tried = try_all(promising(ordered), base, report)
+    tried = one_side([*tried, *try_all(elsewhere(tried, ordered), base, report)])
     settled_ones = with_best_settled(tried, comparison.prepared)
     rows = rank_placed(settled_ones, comparison.fit, comparison.prediction, len(entries))
     return _decide(rows, comparison, len(entries))
