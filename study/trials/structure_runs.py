@@ -23,6 +23,11 @@ COLUMNS = (
     "effect_first", "place_first", "tie_set", "tie_holds", "error_before", "error_after", "error_true", "noise_floor",
     "left", "asked", "p_value", "true_inside", "true_keys", "seconds", "trouble",
 )  # fmt: skip
+WORDS = (
+    "hidden", "place", "response", "verdict", "first", "first_place", "effect_first", "place_first", "tie_set",
+    "tie_holds", "trouble",
+)  # fmt: skip
+LOOSE = ("left", "p_value", "error_true")  # they change with rounding
 
 
 @dataclass(frozen=True)
@@ -106,37 +111,3 @@ def _true(trial: StructureTrial, prepared: PreparedStructure) -> Row:
     inside = sum(low <= value <= high for value, (low, high) in spans)
     row: Row = {"error_true": comparison.prediction.error}
     return row | {"true_inside": inside, "true_keys": len(spans)} if trial.noise > 0.0 else row
-
-
-def rates(rows: Sequence[Row]) -> list[Row]:
-    """How often effect and place come first, ties hold the truth, and nothing is found where nothing is.
-
-    ``rows`` are as :func:`run_structure` gives them, or as a table of them reads back.
-    """
-    hidden = [r for r in rows if r["hidden"] != "none"]
-    none = [r for r in rows if r["hidden"] == "none"]
-    first = [(float(str(r["noise"])), _yes(r, "effect_first") and _yes(r, "place_first")) for r in hidden]
-    near = [_number(r, "error_after") <= 1.05 * _number(r, "error_true") for r in hidden]
-    return [
-        _rate("effect and place first, noise to 1 %", [holds for noise, holds in first if noise <= NOISES[1]]),
-        _rate("effect and place first, noise of 5 %", [holds for noise, holds in first if noise > NOISES[1]]),
-        _rate("place first", [_yes(r, "place_first") for r in hidden]),
-        _rate("tie set holds the truth", [_yes(r, "tie_holds") for r in hidden]),
-        _rate("nothing missing where nothing is", [r.get("verdict") == NOTHING for r in none]),
-        _rate("error after adding within 5 % of the true model's", near),
-    ]
-
-
-def _yes(row: Row, key: str) -> bool:
-    return str(row.get(key)) == "True"
-
-
-def _number(row: Row, key: str) -> float:
-    try:
-        return float(str(row.get(key)))
-    except ValueError:
-        return math.nan
-
-
-def _rate(what: str, holds: Sequence[bool]) -> Row:
-    return {"what": what, "of": len(holds), "holds": sum(holds), "share": sum(holds) / max(len(holds), 1)}

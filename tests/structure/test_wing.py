@@ -6,7 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from study.equations.model import free
 from study.equations.model_file import parse_model
+from study.equations.place import Place
+from study.equations.terms import get
 from study.structure.placed_candidates import candidate_entries, screened
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure
@@ -58,6 +61,28 @@ def test_stiffness_is_found_and_what_is_missing_is_in_pitch(name):
     assert not any(
         e.place and len(e.place.moving) > 1 for e, _ in ordered
     )  # one body: nothing lies between its motions
+
+
+def test_heave_of_the_second_wing_has_dry_friction():
+    """With friction and a stiffness of second and third order in pitch; about 2.7 N, as it comes to rest."""
+    model = wing("model_2")
+    for effect, where in (
+        ("quadratic_stiffness", "pitch"), ("cubic_stiffness", "pitch"), ("coulomb_friction", "heave"),
+        ("coulomb_friction", "pitch"),
+    ):  # fmt: skip
+        model = model.with_term(free(get(effect), Place("between", ("ground", where))))
+    record = read_structure(DATA / "wing" / "model_2.csv", model)
+    comparison = compare_structure(model, prepare_structure(record, model, (0, 2400), (2400, 4000)))
+    found = {c.key: c for c in comparison.coefficients}
+    friction = found["fc[ground-heave]"]
+    assert friction.value == pytest.approx(2.7, rel=0.1)
+    assert friction.error is not None
+    assert friction.value > 3.0 * friction.error
+    _, _, heave, pitch = AUTHORS["model_2"]
+    assert found["k[ground-heave]"].value == pytest.approx(heave, rel=0.15)
+    assert found["k[ground-pitch]"].value == pytest.approx(pitch, rel=0.15)
+    left = np.sqrt(np.mean(comparison.fit.residual**2, axis=0)) / comparison.prepared.scale
+    assert left[1] < 0.2, "of pitch; linear terms alone leave 0.43"
 
 
 def test_without_a_force_masses_must_be_given():
