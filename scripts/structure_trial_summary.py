@@ -1,4 +1,4 @@
-"""Snakemake step: all trials of structures -> one table, rates, confusion of effects and of places, and their pictures."""
+"""Snakemake step: all trials of structures -> one table, rates, both confusions, and their pictures."""
 
 import sys
 from collections.abc import Mapping, Sequence

@@ -66,7 +66,8 @@ def diagnose_structure(
     """
     base = search_base(comparison)
     entries = candidate_entries(comparison.fit.model, extra, without)
-    ordered, report = screened(entries, base), progress or (lambda _: None)
+    report: Callable[[str], None] = progress or (lambda _: None)
+    ordered = screened(entries, base)
     tried = try_all(promising(ordered), base, report)
     tried = one_side([*tried, *try_all(elsewhere(tried, ordered), base, report)])
     settled_ones = with_best_settled(tried, comparison.prepared)

@@ -15,7 +15,8 @@ NEAR = 1.05  # times the true model's error, which the error after adding may be
 WANTED = {
     "effect and place first, noise to 1 %": 0.9, "effect and place first, noise of 5 %": 0.8,
     "tie set holds the truth": 0.95, "nothing missing where nothing is": 0.95,
-    "error after adding within 5 % of the true model's": 0.9, "95 % intervals of the true model that hold its values": 0.95,
+    "error after adding within 5 % of the true model's": 0.9,
+    "95 % intervals of the true model that hold its values": 0.95,
 }  # fmt: skip
 SAID = {"nothing_missing": "nothing missing", "unknown_effect": "unknown effect"}
 EFFECTS, PLACES = "trials_of_structures_effects.png", "trials_of_structures_places.png"
@@ -104,7 +105,7 @@ def _where_said(row: Row) -> str:
 def _path(row: Row, key: str) -> set[str]:
     """What a place lies between; empty if there is none."""
     text = str(row.get(key) or "")
-    ends = set() if text in ("", "nan") else set(text.split("-"))
+    ends = set[str]() if text in ("", "nan") else set(text.split("-"))
     return ends | {"ground"} if len(ends) == 1 else ends
 
 
@@ -128,7 +129,8 @@ def in_document(rows: Sequence[Row]) -> list[Block]:
     )
     lines = [(str(line["what"]), _shown(line), _wanted(line)) for line in rates(rows)]
     return [
-        Text(about), table(("", "reached", "wanted"), lines), Image("Effects: what was hidden and what was said", EFFECTS),
+        Text(about), table(("", "reached", "wanted"), lines),
+        Image("Effects: what was hidden and what was said", EFFECTS),
         Image("Places: where it was hidden and where it was found", PLACES),
     ]  # fmt: skip
 
