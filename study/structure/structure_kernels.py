@@ -2,7 +2,7 @@
 
 ``w[k]`` holds the states (rows: displacements, velocities, own states z) beside their derivatives (columns): w[0] where
 a step stands, w[1] to w[3] room for a trial, its slope and their sum, w[4] where a part of a step begins. Numba's disk
-cache does not notice a change of :func:`study.equations.kernels.run`, which this file calls: change this one with it.
+cache does not notice a change of what this file calls of :mod:`study.equations.kernels`: change this one with it.
 
 Dry friction makes a force that is linear in the sign s of a relative velocity ``e.v``. While a place moves, s is 1 or
 -1 and a step is cut where ``e.v`` vanishes; while it is held, s is whatever keeps ``e.a`` at zero, and it lets go where
@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from study.equations.jit import compiled
-from study.equations.kernels import run
+from study.equations.kernels import first_zero, run
 from study.support.arrays import Floats, Ints
 
 CUTS = 6  # of a step, for each place with friction
@@ -246,19 +246,6 @@ def _part(
 
 
 @compiled
-def _zero(v0: float, v1: float, mean: float) -> float:
-    """First zero in (0, 1) of the parabola with these ends and mean, v0 >= 0; 2 if it has none."""
-    c = 3.0 * (v0 + v1) - 6.0 * mean
-    b = v1 - v0 - c
-    square = b * b - 4.0 * c * v0
-    dips = v0 > 0.0 and c > 0.0 and -2.0 * c < b < 0.0 and square > 0.0
-    if v1 > 0.0 and not dips:
-        return 2.0
-    root = math.sqrt(max(square, 0.0))
-    return 2.0 * v0 / (root - b) if b < 0.0 else (b + root) / (-2.0 * c)
-
-
-@compiled
 def _next_event(
     r: Floats, sides: Ints, directions: Floats, held: Ints, early: Floats, fresh: Ints, span: float, w: Floats
 ) -> tuple[int, float]:
@@ -274,7 +261,7 @@ def _next_event(
         if held[a] == 0:  # the mean velocity is the change of displacement: it shows a dip below zero between two steps
             mean = (_along(directions, a, w, 0, 0, 0) - _along(directions, a, w, 4, 0, 0)) / span
             v0 = 0.0 if fresh[a] != 0 else max(float(s * _along(directions, a, w, 4, n, 0)), 0.0)
-            x = _zero(v0, float(s * _along(directions, a, w, 0, n, 0)), float(s * mean))
+            x = first_zero(v0, float(s * _along(directions, a, w, 0, n, 0)), float(s * mean))
         elif abs(early[a]) > 1.0:  # what else switched has set it free
             x = 0.0
         elif abs(s) > 1.0:

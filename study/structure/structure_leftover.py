@@ -14,7 +14,7 @@ from study.diagnose.dependence import DEGREE, TAUS, hysteretic, relaxed
 from study.equations.place import Place
 from study.records.record import MOTIONS
 from study.structure.mass_matrix import matrices
-from study.structure.placed_search import modulation_lines, residual_lines
+from study.structure.placed_lines import modulation_lines, residual_lines
 from study.structure.places import connections, transfer
 from study.structure.structure_prediction import StructurePrediction
 from study.structure.structure_record import Sensor
