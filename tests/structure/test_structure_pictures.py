@@ -122,3 +122,14 @@ def test_what_cannot_be_dropped_gets_its_sentence(given, capsys, words, said):
     assert main(["drop", str(given / "frame.yaml"), *words, "--data", str(given / "short.csv")]) == 2
     assert said in capsys.readouterr().err
     assert (given / "frame.yaml").read_bytes() == before
+
+
+def test_explore_writes_the_diagnosis_as_a_page(given, capsys):
+    command = ["explore", str(given / "short.csv"), "--model", str(given / "frame.yaml"), "--no-browser"]
+    assert main([*command, "--fit", "0:700", "--judge", "700:1400", "--out", str(given / "e")]) == 0
+    assert "structure.html shows the structure" in capsys.readouterr().out
+    text = (given / "e" / "structure.html").read_text()
+    block = re.search(r'<div class="place selected" data-place="floor2-floor3">(.*?)</div>', text, re.DOTALL)
+    assert block is not None
+    assert "<td>cubic stiffness" in block[1]
+    assert "missing effect" in text
