@@ -5,12 +5,12 @@ it: the shares that a force and that functions of the motion there explain, its 
 Without scripts all places are shown one after the other.
 """
 
+import re
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
 
-from study.equations import dimensions
 from study.equations.place import Place
 from study.equations.place import in_words as placed
 from study.figures import page
@@ -120,7 +120,7 @@ def _candidates(rows: Sequence[PlacedRanked]) -> str:
     lines = [
         f"<tr><td>{escape(term_names(r.term.name))}<td>{percent(r.gain.explained, 'z.1f', r.gain.error, '.1f')}"
         f"<td>{percent(r.response_error)}<td>{r.coefficient:.4g} ± {1.96 * r.error:.2g} "
-        f"{escape(dimensions.pretty(r.term.unit(r.term.symbols[0], 'N', 'm')))}<td>{r.p_value:.1g}"
+        f"{_unit(r.term.unit(r.term.symbols[0], 'N', 'm'))}<td>{r.p_value:.1g}"
         for r in rows
     ]
     head = "<tr><th>candidate<th>explains<th>error with it<th>coefficient<th>p"
@@ -131,10 +131,15 @@ def _coefficients(comparison: StructureComparison) -> str:
     lines = [
         f"<tr><td>{escape(c.key)}<td>{c.value:.5g}<td>"
         + ("held" if c.interval is None else f"{c.interval[0]:.5g} to {c.interval[1]:.5g}")
-        + f"<td>{escape(dimensions.pretty(c.unit))}"
+        + f"<td>{_unit(c.unit)}"
         for c in comparison.coefficients
     ]
     return f"<table><tr><th><th>value<th>95 % interval<th>unit{''.join(lines)}</table>"
+
+
+def _unit(text: str) -> str:
+    """``N/m^3`` with its exponent raised."""
+    return re.sub(r"\^(-?\d+)", r"<sup>\1</sup>", escape(text))
 
 
 def _image(data: bytes, title: str) -> str:

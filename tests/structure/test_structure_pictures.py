@@ -131,5 +131,5 @@ def test_explore_writes_the_diagnosis_as_a_page(given, capsys):
     text = (given / "e" / "structure.html").read_text()
     block = re.search(r'<div class="place selected" data-place="floor2-floor3">(.*?)</div>', text, re.DOTALL)
     assert block is not None
-    assert "<td>cubic stiffness" in block[1]
+    assert re.search(r"<td>cubic stiffness.*N/m<sup>3</sup>", block[1])
     assert "missing effect" in text
