@@ -75,3 +75,31 @@ rule trials_mdof:
         places_figure=pictures("trials_of_structures_places"),
     script:
         "../scripts/structure_trial_summary.py"
+
+
+# Trials of each kind of test: `snakemake -j2 trials_kinds`, not part of `all`; scripts/kind_docs.py puts them in docs.
+KINDS_OF_TESTS, FIRST_OF_KINDS, TRIALS_OF_A_KIND = ("free_decay", "blows", "base", "component", "axis"), 620001, 50
+KIND_CODE = rests_on(Path("scripts/kind_trials.py"))
+
+
+rule trials_of_a_kind:
+    input:
+        code=KIND_CODE,
+    output:
+        table="results/trials_by_test/{kind}.csv",
+    params:
+        first=FIRST_OF_KINDS,
+        trials=TRIALS_OF_A_KIND,
+    wildcard_constraints:
+        kind="|".join(KINDS_OF_TESTS),
+    script:
+        "../scripts/kind_trials.py"
+
+
+rule trials_kinds:
+    input:
+        tables=[f"results/trials_by_test/{kind}.csv" for kind in KINDS_OF_TESTS],
+    output:
+        table="results/trials_by_test/trials.csv",
+    script:
+        "../scripts/join.py"

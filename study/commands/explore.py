@@ -4,7 +4,14 @@ import argparse
 
 from study.commands import structures
 from study.commands.command import Command, progress, whole
-from study.commands.record_arguments import accounted_for, add_record_arguments, inputs_of, out_folder, read_records
+from study.commands.record_arguments import (
+    accounted_for,
+    add_record_arguments,
+    inputs_of,
+    out_folder,
+    read_records,
+    refuse_groups,
+)
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,6 +24,7 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.equations.model_file import read_model
     from study.support.extras import needed
 
+    refuse_groups(arguments)
     if read_model(arguments.model).coordinates:
         structures.explore(arguments)
         return

@@ -4,7 +4,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from study.commands.command import progress
-from study.commands.record_arguments import inputs_of, out_folder, read_options, written_together
+from study.commands.record_arguments import inputs_of, out_folder, read_options, refuse_groups, written_together
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,6 +20,7 @@ def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[
     from study.structure.structure_reader import read_structure
     from study.support.errors import at
 
+    refuse_groups(arguments)
     made: list[PreparedStructure] = []
     for path in arguments.records:
         record = read_structure(path, model, read_options(arguments))
