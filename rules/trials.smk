@@ -39,7 +39,8 @@ rule trials:
         "../scripts/trial_summary.py"
 
 
-# Trials of structures: `snakemake -j2 trials_mdof`, not part of `all`.
+# Trials of structures: `snakemake -j2 trials_mdof`, not part of `all`;
+# `make structure_trials` writes docs/trials_of_structures.csv and the table of docs/structures.md of them.
 STRUCTURE_TRIALS, STRUCTURE_JOBS = 120, 12
 STRUCTURE_CODE = {
     name: rests_on(Path(f"scripts/{name}.py")) for name in ("structure_trials", "structure_trial_summary")
@@ -63,12 +64,15 @@ rule structure_trial_runs:
 rule trials_mdof:
     input:
         parts=[f"results/trials_mdof/part_{part}.csv" for part in range(STRUCTURE_JOBS)],
+        style=STYLE,
         code=STRUCTURE_CODE["structure_trial_summary"],
     output:
         trials="results/trials_mdof/trials.csv",
         rates="results/trials_mdof/rates.csv",
         effects="results/trials_mdof/confusion_of_effects.csv",
         places="results/trials_mdof/confusion_of_places.csv",
+        effects_figure=pictures("trials_of_structures_effects"),
+        places_figure=pictures("trials_of_structures_places"),
     script:
         "../scripts/structure_trial_summary.py"
 
