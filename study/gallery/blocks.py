@@ -49,6 +49,10 @@ def left(found: Found) -> str:
     last, step = found.last, found.steps[-1]
     size = f"{percent(step['error']['response'])} of the response"
     floor = percent(step["noise_floor"]["response"])
+    if step["error"]["response"] >= 1.0:
+        return (
+            f"{size} (noise floor {floor}): more than the response itself, so the model predicts nothing of this part."
+        )
     if last["verdict"] == NOTHING:
         return (
             f"{size} (noise floor {floor}), which depends no more than chance has it on the motion or its past: noise, "

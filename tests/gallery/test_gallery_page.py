@@ -70,6 +70,9 @@ def test_what_is_left_is_no_noise_where_the_last_verdict_says_so(folder):
     assert "noise, as far as this record can say" in said(folder)
     (folder / "climb/step_1/diagnosis.json").write_text(json.dumps(diagnosis("missing_effect")))
     assert "still names dry friction, which the record cannot tell from dead band," in said(folder)
+    (folder / "climb/step_1/diagnosis.json").write_text(json.dumps(diagnosis("nothing_missing")))
+    (folder / "history.json").write_text(json.dumps({"steps": [step(1.2, c=2.0)]}))
+    assert "more than the response itself" in said(folder), "whatever the verdict says"
 
 
 def test_a_candidate_of_a_structure_has_a_place(folder):
