@@ -50,9 +50,7 @@ def left(found: Found) -> str:
     size = f"{percent(step['error']['response'])} of the response"
     floor = percent(step["noise_floor"]["response"])
     if step["error"]["response"] >= 1.0:
-        return (
-            f"{size} (noise floor {floor}): more than the response itself, so the model predicts none of it."
-        )
+        return f"{size} (noise floor {floor}): more than the response itself, so the model predicts none of it."
     if last["verdict"] == NOTHING:
         return (
             f"{size} (noise floor {floor}), which depends no more than chance has it on the motion or its past: noise, "

@@ -107,7 +107,7 @@ def test_without_the_variable_a_job_says_what_to_set(monkeypatch):
         ),
         ("oscillator\t6", "oscillator\t21", "(record 'silverbox'): steps is '21'; expected 20 or less"),
         ("oscillator\t6", "oscillator\tsix", "(record 'silverbox'): steps is 'six'; expected a whole number"),
-        ("believed/oscillator\t6", "oscilator\t6", "there is no model 'oscilator'; models/ holds dead_band, duffing"),
+        ("believed/oscillator\t6", "oscilator\t6", "there is no model 'oscilator'; models/ holds "),
         ("--column force=V1", "--out a", "options name --out, which the workflow gives; leave it out"),
         ("--column force=V1", "--column 'force", "cannot be split into words: No closing quotation"),
         ("--fs 610.3515625", "--fs fast", "(record 'silverbox'): options: "),
