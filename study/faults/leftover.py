@@ -85,7 +85,9 @@ class Share:
     covariance: Floats  # shape (k, k), clustered
     p_value: float  # of such amounts, or the first of them, if they were zero
     gain: Gain  # on the judging part, of the amounts of the fitting part
-    power: float  # mean square on both parts of what the amounts from both add beside the model's own, over the response's
+    power: (
+        float  # mean square on both parts of what the amounts from both add beside the model's own, over the response's
+    )
 
     def significant(self, asked: int) -> bool:
         """Whether that is no chance, of so many that were asked for, and more than integration resolves."""
