@@ -20,7 +20,8 @@ from study.trials.runs import COMPLETED, NONE, PAIR, REMOVED, SINGLE, WITH, WITH
 VERY_LITTLE, LITTLE = 0.01, 0.05  # noise up to which ties are to be short, and the true effect has to come first
 WITHIN = 1.05  # held-out error after adding, over that of the true model
 WORDS = (
-    "kind", "hidden", "response", "known", "faults", "fault", "fault_channel", "faults_found", "fault_rivals", "found", "found_channel", "verdict", "first",
+    "kind", "hidden", "response", "known", "faults", "fault", "fault_channel", "faults_found", "fault_rivals",
+    "found", "found_channel", "verdict", "first",
     "tie_set", "second_verdict", "second_tie_set", "whole_tie_set", "pair", "trouble",
 )  # fmt: skip
 Wanted = Mapping[str, Sequence[float]]
