@@ -1,5 +1,4 @@
 # What several rules share: the modules that each stage rests on, settings and files by case.
-from study.reproduction.config import PRELIMINARY
 from study.identify.estimators import ESTIMATORS
 from study.support.code_dependencies import rests_on
 
@@ -11,7 +10,6 @@ CODE = {
     "identify": rests_on(Path("scripts/identify.py"), also=ESTIMATORS.values()),
     "draw": rests_on(Path("scripts/draw_case.py")),
     "draw_estimators": rests_on(Path("scripts/draw_estimators.py")),
-    "preliminary": rests_on(Path("scripts/draw_preliminary.py")),
     "monte_carlo": rests_on(Path("scripts/monte_carlo.py"), also=ESTIMATORS.values()),
     "rates": rests_on(Path("scripts/rates.py")),
     "join": rests_on(Path("scripts/join.py")),
@@ -68,23 +66,17 @@ def products(case):
     return tables + [path for stem in STUDY.cases[case].figures.values() for path in pictures(stem)]
 
 
-def draws_preliminary(case):
-    """Whether figures of the preliminary analysis are drawn of a case."""
-    return any(kind in case.figures for kind in PRELIMINARY)
-
-
-def figures_of(case, kinds, described):
-    """Outputs of a rule that draws: by kind the files, the PNG of each with its words in the report page."""
+def figures_of(case):
+    """Outputs of the rule that draws a case: by kind the files, the PNG of each with its words in the report page."""
     found = {}
     for kind, stem in STUDY.cases[case].figures.items():
-        if kind in kinds:
-            png, svg = pictures(stem)
-            number = stem.removeprefix("figure_").rjust(2) if stem.startswith("figure_") else "not in the report"
-            page = {
-                "caption": f"captions/{kind}.rst",
-                "category": "Figures",
-                "subcategory": STUDY.cases[case].title,
-                "labels": {"figure": number, "shows": described[kind]},
-            }
-            found[kind] = [report(png, **page), svg]
+        png, svg = pictures(stem)
+        number = stem.removeprefix("figure_").rjust(2) if stem.startswith("figure_") else "not in the report"
+        page = {
+            "caption": f"captions/{kind}.rst",
+            "category": "Figures",
+            "subcategory": STUDY.cases[case].title,
+            "labels": {"figure": number, "shows": DESCRIBED[kind]},
+        }
+        found[kind] = [report(png, **page), svg]
     return found
