@@ -149,5 +149,5 @@ def test_one_motion_is_measured_in_each():
 
 
 if __name__ == "__main__":
-    told_here = {name: result(made.believed, made.record) for name, made in ((name, trial(name)) for name in sys.argv[1:])}
-    print(json.dumps(told_here))
+    made_here = {name: trial(name) for name in sys.argv[1:]}
+    print(json.dumps({name: result(made.believed, made.record) for name, made in made_here.items()}))
