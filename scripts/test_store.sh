@@ -68,7 +68,7 @@ POD
 chmod +x "$work/submit" "$work/status"
 (
   cd "$work/away"
-  printf '__pycache__/\n.snakemake/\nresults/\nfigures/\n' > .gitignore
+  printf '%s\n' __pycache__/ .snakemake/ /results/ /figures/ > .gitignore
   git init -q . && git add -A
   export PATH="$(dirname "$python"):$PATH"
   time PYTHONPATH=$work/away "$python" -m snakemake --profile profiles/kubernetes --executor cluster-generic --jobs 2 \
