@@ -98,7 +98,7 @@ def _verdict(record: Measured) -> tuple[str, ...]:
     tied = ", ".join(["", *first.get("tied_with", ())])
     return (
         record.name, record.shown_level, percent(record.comparison["error"]["response"]),
-        percent(record.comparison["noise_floor"]["response"]), VERDICTS.get(found["verdict"], found["verdict"]),
+        percent(record.comparison["noise_floor"]["response"]), VERDICTS.get(str(found["verdict"]), str(found["verdict"])),
         f"{first['term']}{tied}" if first else "", percent(first["explained"]) if first else "",
         percent(first["response_error"]) if first else "",
     )  # fmt: skip

@@ -12,7 +12,6 @@ from study.explore import session as sessions
 from study.explore.saved_files import PAGE
 from study.records.record import write_csv
 
-
 # A climb diagnoses at each step; the few that could take part in what is tested are enough to choose from.
 TRIED = ("quadratic_damping", "cubic_damping", "quadratic_stiffness", "cubic_stiffness", "coulomb_friction")
 
@@ -20,7 +19,9 @@ TRIED = ("quadratic_damping", "cubic_damping", "quadratic_stiffness", "cubic_sti
 @pytest.fixture
 def few(monkeypatch):
     original, others = sessions.diagnose_as_read, [name for name in LIBRARY if name not in TRIED]
-    monkeypatch.setattr(sessions, "diagnose_as_read", lambda c, **options: original(c, **{"without": others, **options}))
+    monkeypatch.setattr(
+        sessions, "diagnose_as_read", lambda c, **options: original(c, **{"without": others, **options})
+    )
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 """One error and one noise floor of a model: compare, diagnose, add, history and the page tell the same numbers."""
 
 import json
-from dataclasses import replace
 
 import pytest
 
@@ -17,20 +16,13 @@ from study.trials import make_trial
 from study.trials.sealed import write
 
 ALIKE = 1e-9  # relative: the same computation, whoever asks for it
-SAMPLES = 3000
 TRIALS = [(31, "cubic_stiffness", 0.0, "displacement"), (32, "quadratic_damping", 0.01, "acceleration")]
 TRIALS += [(33, "dead_band", 0.05, "velocity")]
 
 
-def written(folder, *drawn):
-    """The beginning of a trial's record, and its model, as files."""
-    trial = make_trial(*drawn)
-    return write(replace(trial, record=trial.record.part(0, SAMPLES)), folder)
-
-
 @pytest.mark.parametrize(("seed", "hidden", "noise", "response"), TRIALS)
 def test_one_error_and_one_floor(seed, hidden, noise, response, tmp_path, capsys):
-    data, model, _ = written(tmp_path, seed, (hidden,), noise, response)
+    data, model, _ = write(make_trial(seed, (hidden,), noise, response), tmp_path)
 
     def told(*words):
         assert cli.main([str(w) for w in words]) == 0
@@ -71,7 +63,7 @@ def assert_same(one, other):
 
 
 def test_a_cut_off_is_heeded_by_all(tmp_path, capsys):
-    data, model, _ = written(tmp_path, 32, ("quadratic_damping",), 0.01, "acceleration")
+    data, model, _ = write(make_trial(32, ("quadratic_damping",), 0.01, "acceleration"), tmp_path)
     errors = {}
     for cutoff in ((), ("--cutoff", "6")):
         for command, name in (("compare", "comparison.json"), ("diagnose", "diagnosis.json")):

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -150,5 +151,5 @@ def departure(spectra: Floats) -> Departure:
     error: Floats = np.std(spectra, axis=0, ddof=1) / math.sqrt(seeds)
     score: Floats = away / error
     worst = int(np.argmax(score))
-    allowed = -float(stdtrit(seeds - 1, BY_CHANCE / (2.0 * lines)))
+    allowed = -float(cast(float, stdtrit(seeds - 1, BY_CHANCE / (2.0 * lines))))
     return Departure(float(away[worst]) / average(mean), float(score[worst]), allowed)
