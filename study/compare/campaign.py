@@ -93,12 +93,13 @@ def _by_rig(records: Iterable[Measured]) -> dict[tuple[str, str], list[Measured]
 
 def _verdict(record: Measured) -> tuple[str, ...]:
     found = record.diagnosis
-    missing = found["verdict"] == "missing_effect"
+    verdict = str(found["verdict"])
+    missing = verdict == "missing_effect"
     first: Mapping[str, Any] = found["candidates"][0] if found["candidates"] and missing else {}
     tied = ", ".join(["", *first.get("tied_with", ())])
     return (
         record.name, record.shown_level, percent(record.comparison["error"]["response"]),
-        percent(record.comparison["noise_floor"]["response"]), VERDICTS.get(str(found["verdict"]), str(found["verdict"])),
+        percent(record.comparison["noise_floor"]["response"]), VERDICTS.get(verdict, verdict),
         f"{first['term']}{tied}" if first else "", percent(first["explained"]) if first else "",
         percent(first["response_error"]) if first else "",
     )  # fmt: skip
