@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: study report test test-cluster checks lint picture fault_pictures notebooks docs readme estimators trials clean
+.PHONY: study report test test-cluster checks lint picture fault_pictures notebooks docs readme estimators trials structure_trials clean
 
 study: $(READY)
 	$(BIN)/snakemake -j2
@@ -54,6 +54,11 @@ estimators: $(READY)
 trials: $(READY)
 	$(BIN)/snakemake -j2 trials
 	$(BIN)/python scripts/trial_docs.py results/trials/trials.csv figures/trials_confusion.png
+
+structure_trials: $(READY)
+	$(BIN)/snakemake -j2 trials_mdof
+	$(BIN)/python scripts/structure_trial_docs.py results/trials_mdof/trials.csv \
+	  figures/trials_of_structures_effects.png figures/trials_of_structures_places.png
 
 $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \

@@ -39,7 +39,8 @@ rule trials:
         "../scripts/trial_summary.py"
 
 
-# Trials of structures: `snakemake -j2 trials_mdof`, not part of `all`.
+# Trials of structures: `snakemake -j2 trials_mdof`, not part of `all`;
+# `make structure_trials` writes docs/trials_of_structures.csv and the table of docs/structures.md of them.
 STRUCTURE_TRIALS, STRUCTURE_JOBS = 120, 12
 STRUCTURE_CODE = {
     name: modules(name) for name in ("structure_trials", "structure_trial_summary")
@@ -63,11 +64,42 @@ rule structure_trial_runs:
 rule trials_mdof:
     input:
         parts=[f"results/trials_mdof/part_{part}.csv" for part in range(STRUCTURE_JOBS)],
+        style=STYLE,
         code=STRUCTURE_CODE["structure_trial_summary"],
     output:
         trials="results/trials_mdof/trials.csv",
         rates="results/trials_mdof/rates.csv",
         effects="results/trials_mdof/confusion_of_effects.csv",
         places="results/trials_mdof/confusion_of_places.csv",
+        effects_figure=pictures("trials_of_structures_effects"),
+        places_figure=pictures("trials_of_structures_places"),
     script:
         "../scripts/structure_trial_summary.py"
+
+
+# Trials of each kind of test: `snakemake -j2 trials_kinds`, not part of `all`; scripts/kind_docs.py puts them in docs.
+KINDS_OF_TESTS, FIRST_OF_KINDS, TRIALS_OF_A_KIND = ("free_decay", "blows", "base", "component", "axis"), 620001, 50
+KIND_CODE = rests_on(Path("scripts/kind_trials.py"))
+
+
+rule trials_of_a_kind:
+    input:
+        code=KIND_CODE,
+    output:
+        table="results/trials_by_test/{kind}.csv",
+    params:
+        first=FIRST_OF_KINDS,
+        trials=TRIALS_OF_A_KIND,
+    wildcard_constraints:
+        kind="|".join(KINDS_OF_TESTS),
+    script:
+        "../scripts/kind_trials.py"
+
+
+rule trials_kinds:
+    input:
+        tables=[f"results/trials_by_test/{kind}.csv" for kind in KINDS_OF_TESTS],
+    output:
+        table="results/trials_by_test/trials.csv",
+    script:
+        "../scripts/join.py"

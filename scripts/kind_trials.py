@@ -1,26 +1,38 @@
-"""Trials by kind of test: ``kind_trials.py docs/trials_by_test.csv 50 free_decay ...`` adds their rows."""
+"""Snakemake step: the trials of one kind of test.
+
+By hand, ``kind_trials.py TABLE FIRST_SEED COUNT KIND ...``, the trials that the table lacks are run and added one after
+the other, a seed of every kind before the next seed.
+"""
 
 import csv
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
+from study.support.workflow_step import one_sentence
 from study.trials.kind_runs import COLUMNS, run_test
 
 
-def main(table: Path, seeds: range, tests: list[str]) -> None:
-    """Append the trials that the table lacks, one row after the other."""
-    rows = list(csv.DictReader(table.open())) if table.is_file() else []
+def main(path: Path, seeds: range, tests: Sequence[str]) -> None:
+    """Append the trials that the table lacks."""
+    rows = list(csv.DictReader(path.open())) if path.is_file() else []
     known = {(row["test"], int(row["seed"])) for row in rows}
-    with table.open("a", newline="") as stream:
+    with path.open("a", newline="") as stream:
         writer = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
         if not rows:
             writer.writeheader()
-        for seed in seeds:
-            for test in tests:
-                if (test, seed) not in known:
-                    writer.writerow(run_test(test, seed))
-                    stream.flush()
+        for seed, test in ((s, t) for s in seeds for t in tests if (t, s) not in known):
+            writer.writerow(run_test(test, seed))
+            stream.flush()
 
 
-if __name__ == "__main__":
-    main(Path(sys.argv[1]), range(int(sys.argv[2])), sys.argv[3:])
+if "snakemake" in globals():
+    step = globals()["snakemake"]
+    with one_sentence():
+        output = Path(step.output.table)
+        output.unlink(missing_ok=True)
+        main(output, range(step.params.first, step.params.first + step.params.trials), [step.wildcards.kind])
+elif __name__ == "__main__":
+    first, count = int(sys.argv[2]), int(sys.argv[3])
+    with one_sentence():
+        main(Path(sys.argv[1]), range(first, first + count), sys.argv[4:])

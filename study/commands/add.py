@@ -12,6 +12,7 @@ from study.commands.record_arguments import (
     add_reading_arguments,
     out_folder,
     read_records,
+    sources,
     written_together,
 )
 
@@ -65,7 +66,7 @@ def _added(arguments: argparse.Namespace, model: "Model", term: "Term", text: st
     pairs: list[tuple[Comparison, Comparison]] = []
     unneeded: list[tuple[Needless, ...]] = []
     with progress(" fits", 3 * len(records)) as step:
-        for record, path in zip(records, arguments.records, strict=True):
+        for record, path in zip(records, sources(arguments), strict=True):
             before = accounted_for(arguments, model, record, path).comparison
             step("")
             pairs.append((before, added(before, term)))

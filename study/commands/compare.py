@@ -5,7 +5,16 @@ from typing import TYPE_CHECKING
 
 from study.commands import structures
 from study.commands.command import Command, progress
-from study.commands.record_arguments import accounted_for, add_record_arguments, inputs_of, out_folder, read_records
+from study.commands.record_arguments import (
+    accounted_together,
+    add_each_record_argument,
+    add_record_arguments,
+    inputs_of,
+    out_folder,
+    read_records,
+    separated_records,
+    sources,
+)
 from study.identify.estimators import ESTIMATORS
 
 if TYPE_CHECKING:
@@ -17,6 +26,7 @@ WITHOUT = ("siso", "miso_hand_read")  # estimators that do not find all coeffici
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     add_record_arguments(parser)
+    add_each_record_argument(parser)
     parser.add_argument(
         "--estimator", choices=[n for n in ESTIMATORS if n not in WITHOUT], default="output_error",
         help="what finds the coefficients: a fit in free run (default), or in reverse from the frequency response "
@@ -25,9 +35,11 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
+    from study.compare import each_record
     from study.compare.comparison import STEPS, across
     from study.compare.comparison_pictures import level_pictures, pictures
     from study.compare.comparison_report import as_json, document, summary, tables
+    from study.compare.each_record import by_record
     from study.equations.model_file import read_model
     from study.faults.fault import fields
     from study.support.extras import lacking
@@ -39,12 +51,14 @@ def _run(arguments: argparse.Namespace) -> None:
         structures.compare(arguments, model)
         return
     records = read_records(arguments)
-    many, unpaged = len(records) > 1, lacking("bokeh", PAGE, "explore")
+    model, marked, separate = separated_records(arguments, model, records)
+    tests = [marked] if separate else [[record] for record in records]
+    many, unpaged = len(tests) > 1, lacking("bokeh", PAGE, "explore")
     files: dict[str, bytes] = {}
-    with progress("step", (STEPS + 1) * len(records)) as step:
+    with progress("step", (STEPS + 1) * len(tests)) as step:
         accounted = [
-            accounted_for(arguments, model, record, path, estimator=arguments.estimator, progress=step)
-            for record, path in zip(records, arguments.records, strict=True)
+            accounted_together(arguments, model, test, path, estimator=arguments.estimator, progress=step)
+            for test, path in zip(tests, sources(arguments), strict=not separate)
         ]
         comparisons = [a.comparison for a in accounted]
         for comparison in comparisons:
@@ -56,9 +70,15 @@ def _run(arguments: argparse.Namespace) -> None:
     levels = across(comparisons)
     files |= level_pictures(levels, comparisons[0].record.units.get("force", "N"))
     files |= {f"{name}.csv": content for name, content in tables(comparisons, levels).items()}
-    files["comparison.json"] = as_json(document(comparisons, levels) | {"measurement": measurement})
+    content = document(comparisons, levels) | {"measurement": measurement}
+    said = summary(comparisons, levels)
+    if separate:
+        each = by_record(comparisons[0], separate, records)
+        content["coefficients_by_record"] = each_record.rows(each, records)
+        said = f"{each_record.table(each, records)}\n\n{said}"
+    files["comparison.json"] = as_json(content)
     write_files(folder, files, inputs_of(arguments))
-    print(summary(comparisons, levels))
+    print(said)
     page = f"no page ({unpaged})" if unpaged else "a page for each record" if many else PAGE
     count = {kind: sum(name.endswith(kind) for name in files) for kind in (".csv", ".png")}
     print(f"\n{folder}: {page}, comparison.json, {count['.csv']} tables, {count['.png']} pictures (PNG and SVG)")

@@ -8,15 +8,16 @@ from study.commands import structures
 from study.commands.command import Command, progress
 from study.commands.record_arguments import (
     accounted_together,
+    add_each_record_argument,
     add_record_arguments,
     inputs_of,
     out_folder,
     read_records,
+    separated_records,
+    sources,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from study.equations.model import Model
     from study.equations.terms import Term
     from study.records.record import Record
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     add_record_arguments(parser)
+    add_each_record_argument(parser)
     parser.add_argument(
         "--candidate", action="append", default=[], metavar="NAME=FORMULA", help="a candidate of your own"
     )
@@ -38,8 +40,10 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.equations import terms
     from study.equations.model_file import read_model
     from study.faults.instrument_settings import settings_beside
+    from study.support.errors import expect
     from study.support.file_sets import write_files
 
+    expect(not (arguments.each and arguments.each_record), "--each and --each-record exclude each other; expected one")
     folder = out_folder(arguments)
     model = read_model(arguments.model)
     if model.coordinates:
@@ -54,7 +58,7 @@ def _run(arguments: argparse.Namespace) -> None:
         settings_beside(path)  # what is wrong there is said before the work begins
     if not arguments.each:  # one verdict on one structure
         files = _diagnosed(model, records, arguments.records[0], arguments, own)
-    for record, path in zip(records, arguments.records, strict=True) if arguments.each else ():
+    for record, path in zip(records, sources(arguments), strict=True) if arguments.each else ():
         prefix = f"{record.name}_" if len(records) > 1 else ""
         files |= {prefix + name: data for name, data in _diagnosed(model, [record], path, arguments, own).items()}
     write_files(folder, files, inputs_of(arguments))
@@ -62,9 +66,11 @@ def _run(arguments: argparse.Namespace) -> None:
 
 
 def _diagnosed(
-    model: "Model", records: "Sequence[Record]", path: Path, arguments: argparse.Namespace, own: "list[Term]"
+    model: "Model", records: "list[Record]", path: Path, arguments: argparse.Namespace, own: "list[Term]"
 ) -> dict[str, bytes]:  # fmt: skip
     """Diagnose one record, or several together, print the diagnosis, and give the files' contents."""
+    from study.compare import each_record
+    from study.compare.each_record import by_record
     from study.diagnose import diagnosis_report
     from study.diagnose.confirmed_faults import confirmed
     from study.diagnose.diagnosis_files import files, in_words, unneeded_in_words
@@ -75,7 +81,8 @@ def _diagnosed(
 
     name = ", ".join(record.name for record in records)
     with progress(" candidates", name=name) as step:
-        accounted = accounted_together(arguments, model, records, path)
+        model, marked, separate = separated_records(arguments, model, records)
+        accounted = accounted_together(arguments, model, marked, path)
         check_on(accounted.comparison.record, own)
         without = tuple(arguments.without)
         diagnosis = diagnose_as_read(accounted.comparison, extra=own, without=without, progress=lambda _: step(""))
@@ -86,18 +93,22 @@ def _diagnosed(
     print(diagnosis_report.table(diagnosis))
     for effect, why in untried.items():
         print(f"{effect} could not be fitted: {why}")
+    levels = by_record(accounted.comparison, separate, records)
+    if levels:
+        print(f"\nCoefficients of the model as it was given, by record:\n{each_record.table(levels, records)}")
     print("\n" + words)
     if faults:
         print("\n" + paragraph(faults))
     if unneeded:
         print(f"\n{unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
-    return files(diagnosis, words, unneeded, faults, untried)
+    return files(diagnosis, words, unneeded, faults, untried, each_record.rows(levels, records))
 
 
 COMMAND = Command(
     "diagnose", "which effect is missing from a model",
     "study diagnose rig.csv --model rig.yaml\n"
     "  study diagnose low.csv mid.csv high.csv --model rig.yaml  # one verdict on all; --each: one on each\n"
+    "  study diagnose rig.h5 --group low --group high --each-record linear_damping --model rig.yaml\n"
     "  study diagnose roll.csv --free --model rig.yaml  # a free decay: no force acts\n"
     "  study diagnose blows.csv --use 2.0:9.5 --use 12.0:30.0 --model rig.yaml  # the stretches between blows\n"
     "  study diagnose damper.csv --model damper.yaml  # a component test: the model has no inertia\n"

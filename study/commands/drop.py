@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from study.commands import structures
 from study.commands.command import Command, progress
 from study.commands.record_arguments import (
     accounted_for,
@@ -11,6 +12,7 @@ from study.commands.record_arguments import (
     add_reading_arguments,
     out_folder,
     read_records,
+    sources,
     written_together,
 )
 
@@ -23,6 +25,9 @@ if TYPE_CHECKING:
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", type=Path, help="model file (YAML); the term is taken out of it")
     parser.add_argument("term", help="an effect of the model")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--between", nargs=2, metavar="PLACE", help="of a structure: where the term is")
+    where.add_argument("--at", metavar="COORDINATE", help="of a structure: the coordinate that it acts on")
     parser.add_argument("--data", dest="records", type=Path, nargs="+", required=True, metavar="RECORD")
     add_reading_arguments(parser)
     add_out_argument(parser)
@@ -38,9 +43,25 @@ def _run(arguments: argparse.Namespace) -> None:
     read_model(arguments.model)
     with locked(arguments.model):  # another run may have changed it meanwhile
         model, name = read_model(arguments.model), arguments.term
+        if model.coordinates:
+            with at(arguments.model):
+                name = _placed(arguments, model)
+            structures.drop(arguments, model, name, text_without(arguments.model, name))
+            return
         with at(arguments.model):
             check_can_go(model, name)
         _dropped(arguments, model, text_without(arguments.model, name), folder)
+
+
+def _placed(arguments: argparse.Namespace, model: "Model") -> str:
+    """Name of the term of a structure that is meant: by name and place, or by its name with the place in brackets."""
+    from study.equations import layout
+    from study.structure.placed_dropping import term_at
+
+    where: dict[object, object] = {"at": arguments.at} if arguments.at else {}
+    where |= {"between": arguments.between} if arguments.between else {}
+    place = layout.place_of(where, arguments.term, model.coordinates) if where else None
+    return term_at(model, arguments.term, place)
 
 
 def _dropped(arguments: argparse.Namespace, model: "Model", text: str, folder: Path) -> None:
@@ -55,7 +76,7 @@ def _dropped(arguments: argparse.Namespace, model: "Model", text: str, folder: P
     pairs: list[tuple[Comparison, Comparison]] = []
     unneeded: list[tuple[Needless, ...]] = []
     with progress(" fits", 3 * len(records)) as step:
-        for record, path in zip(records, arguments.records, strict=True):
+        for record, path in zip(records, sources(arguments), strict=True):
             before = accounted_for(arguments, model, record, path).comparison
             step("")
             pairs.append((before, dropped(before, name)))
@@ -72,6 +93,7 @@ def _dropped(arguments: argparse.Namespace, model: "Model", text: str, folder: P
 
 COMMAND = Command(
     "drop", "take an effect out, fit again: error before and after",
-    "study drop rig.yaml hysteresis --data rig.csv",
+    "study drop rig.yaml hysteresis --data rig.csv\n"
+    "  study drop frame.yaml cubic_stiffness --between floor2 floor3 --data frame.csv",
     _arguments, _run,
 )  # fmt: skip

@@ -2,8 +2,16 @@
 
 import argparse
 
+from study.commands import structures
 from study.commands.command import Command, progress, whole
-from study.commands.record_arguments import accounted_for, add_record_arguments, inputs_of, out_folder, read_records
+from study.commands.record_arguments import (
+    accounted_for,
+    add_record_arguments,
+    inputs_of,
+    out_folder,
+    read_records,
+    refuse_groups,
+)
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -13,8 +21,13 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
+    from study.equations.model_file import read_model
     from study.support.extras import needed
 
+    refuse_groups(arguments)
+    if read_model(arguments.model).coordinates:
+        structures.explore(arguments)
+        return
     needed("bokeh", "'study explore'", "explore")
     from study.compare import history
     from study.compare.comparison import STEPS
@@ -42,11 +55,8 @@ def _run(arguments: argparse.Namespace) -> None:
 
 
 def _ready(address: str, browser: bool) -> None:
-    import webbrowser
-
     print(f"{address} shows the session; Ctrl-C ends it", flush=True)
-    if browser:
-        webbrowser.open(address)
+    structures.opened(address, browser)
 
 
 COMMAND = Command(

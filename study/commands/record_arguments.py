@@ -5,6 +5,7 @@ import math
 import re
 from collections.abc import Generator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from study.support.errors import StudyError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from study.compare.each_record import Separate
     from study.compare.history import Step
     from study.equations.model import Model
     from study.faults.accounting import Accounted
@@ -25,7 +27,7 @@ RANGE = re.compile(r"([0-9]{0,15}):([0-9]{0,15})")
 MOTIONS = ("displacement", "velocity", "acceleration")
 RESULTS = Path("results")
 ALTERNATE = "every-other-block"
-GIVEN = ("dt", "fs", "group", "period", "accept_saturated", "accept_swapped", "free")  # as ``ReadOptions`` calls them
+GIVEN = ("dt", "fs", "period", "accept_saturated", "accept_swapped", "free", "as_sampled")  # of ``ReadOptions``
 DIGITS = 10  # of the number of a column; more are a name
 Span = tuple[int, int | None]
 
@@ -38,6 +40,15 @@ def add_record_arguments(
     add_reading_arguments(parser)
     parser.add_argument("--model", type=Path, required=True, help="model file (YAML); what it gives is held")
     add_out_argument(parser, out)
+
+
+def add_each_record_argument(parser: argparse.ArgumentParser) -> None:
+    """Coefficients that are to differ between records that are fitted together."""
+    parser.add_argument(
+        "--each-record", action="append", default=[], metavar="TERM",
+        help="a term or coefficient that may differ between the records, to which one model is fitted: all others are "
+        "shared",
+    )  # fmt: skip
 
 
 def add_out_argument(parser: argparse.ArgumentParser, out: str = "folder for results") -> None:
@@ -56,7 +67,10 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     rate = reading.add_mutually_exclusive_group()
     rate.add_argument("--fs", type=number(above=0.0), help="sampling rate in Hz, if there is no column of times")
     rate.add_argument("--dt", type=number(above=0.0), help="sampling interval in s, instead of --fs")
-    reading.add_argument("--group", help="folder or structure of an HDF5 or MATLAB file")
+    reading.add_argument(
+        "--group", action="append", default=[],
+        help="folder or structure of an HDF5 or MATLAB file; several are a record each",
+    )  # fmt: skip
     reading.add_argument("--period", type=whole(2, 2**40), help="samples in a period of a periodic excitation")
     reading.add_argument(
         "--accept-saturated", action="store_true", help="take a channel that rests at its extreme for what it is"
@@ -66,6 +80,9 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     )
     reading.add_argument(
         "--absolute", action="store_true", help="on a moving base (column base_acceleration): the response is absolute"
+    )  # fmt: skip
+    reading.add_argument(
+        "--as-sampled", action="store_true", help="use all samples, though the motion asks for fewer"
     )  # fmt: skip
     reading.add_argument("--free", action="store_true", help="a free decay: no force acts, a column of it is left out")
     reading.add_argument(
@@ -119,25 +136,33 @@ def times(text: str) -> tuple[float, float | None]:
     return found
 
 
-def read_options(arguments: argparse.Namespace) -> "ReadOptions":
-    """What the user says about the files."""
+def read_options(arguments: argparse.Namespace, group: str | None = None) -> "ReadOptions":
+    """What the user says about the files; of several groups, the one that is to be read."""
     from study.records.readers import ReadOptions, assignments
 
-    columns = assignments(arguments.column, "--column")
+    columns, groups = assignments(arguments.column, "--column"), arguments.group
     return ReadOptions(
         {role: int(name) if name.isdecimal() and len(name) < DIGITS else name for role, name in columns.items()},
         assignments(arguments.unit, "--unit"),
+        group=group if group is not None or not groups else groups[0],
         **{name: getattr(arguments, name) for name in GIVEN},
     )
 
 
 def read_records(arguments: argparse.Namespace) -> list["Record"]:
-    """The records, each with a name of its own."""
+    """The records, each with a name of its own: one for each file, or for each group of each."""
     from study.compare.comparison import distinct
     from study.records.readers import read_record
 
-    options = read_options(arguments)
-    return list(distinct([read_record(path, options) for path in arguments.records]))
+    groups: list[str | None] = list(arguments.group) or [None]
+    for group in (g for g in groups if groups.count(g) > 1):
+        raise StudyError(f"--group {group} is given twice; expected each group once")
+    return list(distinct([read_record(p, read_options(arguments, g)) for p in arguments.records for g in groups]))
+
+
+def sources(arguments: argparse.Namespace) -> list[Path]:
+    """The file of each record that :func:`read_records` gives."""
+    return [path for path in arguments.records for _ in range(max(len(arguments.group), 1))]
 
 
 def layout_of(arguments: argparse.Namespace, record: "Record") -> "Layout":
@@ -168,11 +193,35 @@ def accounted_together(
     from study.faults.kinds_of_tests import accounted_test
 
     with naming(path, arguments.model):
-        settings = NOTHING_ASKED if arguments.no_measurement else settings_beside(path)
+        beside = settings_beside(path)
+        settings = NOTHING_ASKED if arguments.no_measurement else beside
+        layout = replace(layout_of(arguments, records[0]), as_sampled=arguments.as_sampled or beside.as_sampled)
         return accounted_test(
-            records, model, layout_of(arguments, records[0]), absolute=arguments.absolute, held=settings.held,
-            switched_off=settings.switched_off, **options,
-        )  # fmt: skip
+            records,
+            model,
+            layout,
+            absolute=arguments.absolute,
+            held=settings.held,
+            switched_off=settings.switched_off,
+            **options,
+        )
+
+
+def separated_records(
+    arguments: argparse.Namespace, model: "Model", records: "list[Record]"
+) -> "tuple[Model, list[Record], tuple[Separate, ...]]":
+    """The model and the records with what ``--each-record`` asks for; as they are where it asks for nothing."""
+    if not arguments.each_record:
+        return model, records, ()
+    from study.compare.each_record import separated
+
+    return separated(model, records, arguments.each_record)
+
+
+def refuse_groups(arguments: argparse.Namespace) -> None:
+    """For what takes one record of a file."""
+    if len(arguments.group) > 1:
+        raise StudyError(f"--group {arguments.group[1]}: a second group; expected one here, a record at a time")
 
 
 @contextmanager

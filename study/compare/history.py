@@ -107,6 +107,16 @@ def label(step: Step) -> str:
     return f"- {step['dropped']}" if step.get("dropped") else "as given"
 
 
+def _listed(names: list[str]) -> str:
+    """Terms of a model; of a structure, which has them at places, how many there are of each effect."""
+    effects = [name.partition("[")[0] for name in names]
+    return ", ".join(
+        name if effects.count(effect) == 1 else f"{effects.count(effect)} {effect}"
+        for i, (name, effect) in enumerate(zip(names, effects, strict=True))
+        if effects.index(effect) == i
+    )
+
+
 def table(steps: list[Step]) -> str:
     """The history for people, one line a model."""
     from tabulate import tabulate
@@ -114,7 +124,7 @@ def table(steps: list[Step]) -> str:
     rows: list[list[str]] = []
     for number, step in enumerate(steps):
         done = label(step)
-        what = ", ".join(step["terms"]) if done == "as given" else done
+        what = _listed(step["terms"]) if done == "as given" else done
         error = step["error"]
         force = "-" if error["force"] is None else percent(error["force"])
         rows.append(

@@ -1,6 +1,7 @@
 """A diagnosis in words, and as the files that a command writes."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from study.compare.comparison_report import as_json, where
 from study.diagnose import diagnosis_pages, diagnosis_report
@@ -18,8 +19,14 @@ def in_words(diagnosis: Diagnosis) -> str:
     said = sentences(diagnosis)
     if diagnosis.verdict == MISSING:
         said.append(advice(diagnosis.candidates, diagnosis.comparison.prepared))
+    said += [f"{note[0].upper()}{note[1:]}." for note in chosen(diagnosis.comparison.notes)]
     said.append(reading_in_words(diagnosis.comparison))
     return " ".join(s for s in said if s)
+
+
+def chosen(notes: Sequence[str]) -> list[str]:
+    """What was chosen for the user, who may choose else, and a sampling that is too coarse: said beside the verdict."""
+    return [note for note in notes if "(--" in note or "too coarsely" in note]
 
 
 def unneeded_in_words(found: Sequence[Needless], diagnosis: Diagnosis) -> str:
@@ -29,17 +36,21 @@ def unneeded_in_words(found: Sequence[Needless], diagnosis: Diagnosis) -> str:
 
 def files(
     diagnosis: Diagnosis, words: str, unneeded: Sequence[Needless] = (), faults: Sequence[Fault] = (),
-    unfitted: Mapping[str, str] | None = None,
+    unfitted: Mapping[str, str] | None = None, by_record: Sequence[Mapping[str, Any]] = (),
 ) -> dict[str, bytes]:  # fmt: skip
     """``diagnosis.json`` and the pictures by file name; ``words`` is the diagnosis in words.
 
     ``unneeded`` are the terms of the model that it does not need, ``faults`` those of the measurement that the record
-    was corrected for, or may have, ``unfitted`` by name why candidates of the user's could not be fitted.
+    was corrected for, or may have, ``unfitted`` by name why candidates of the user's could not be fitted,
+    ``by_record`` the coefficients that may differ between records.
     """
     comparison = diagnosis.comparison
     content = diagnosis_report.fields(diagnosis)
     content |= {"record": comparison.record.name, "where": where(comparison), "says": words}
     content["not_needed"] = fields(unneeded)
     content["not_fitted"] = dict(unfitted or {})
+    content |= {"notes": list(comparison.notes), "every_sample": comparison.prepared.every}
     content |= {"measurement": [fault.fields(f) for f in faults]}
+    if by_record:
+        content["coefficients_by_record"] = list(by_record)
     return {"diagnosis.json": as_json(content)} | diagnosis_pages.files(diagnosis, comparison.record.name)

@@ -4,21 +4,90 @@
 # pyright: reportUnknownMemberType=false
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from study.diagnose.ranked import Ranked
-from study.diagnose.verdict import Diagnosis
+from study.diagnose.constancy import Curve
 from study.figures.labels import term_names
 from study.support.numbers import percent
+from study.support.statistics import Gain
 
 SHOWN = 10
 LEAST = -30.0  # per cent: a candidate that explains less than nothing is drawn no further
 FURTHEST = (-4.0, 6.0)  # of a coefficient, relative to its value: what lies beyond is no constant
 
 
-def ranking(axes: Axes, diagnosis: Diagnosis) -> Axes:
+class Row(Protocol):
+    """What the pictures show of a candidate, at a place or without one."""
+
+    @property
+    def name(self) -> str:
+        """Effect, and place if it has one."""
+        ...
+
+    @property
+    def gain(self) -> Gain:
+        """What it explains, held out."""
+        ...
+
+    @property
+    def response_error(self) -> float:
+        """Error of the response with it, held out."""
+        ...
+
+    @property
+    def coefficient(self) -> float:
+        """Its size."""
+        ...
+
+    @property
+    def flatness(self) -> Curve | None:
+        """The coefficient along frequency."""
+        ...
+
+    @property
+    def steadiness(self) -> Curve | None:
+        """The coefficient along amplitude."""
+        ...
+
+    @property
+    def tied_with(self) -> tuple[str, ...]:
+        """Names of those that the record cannot tell from it."""
+        ...
+
+
+class _Judged(Protocol):
+    @property
+    def error(self) -> float: ...
+
+
+class _Compared(Protocol):
+    @property
+    def prediction(self) -> _Judged: ...
+
+
+class Found(Protocol):
+    """What they show of a diagnosis, of a structure or of a single mass."""
+
+    @property
+    def verdict(self) -> str:
+        """What is said."""
+        ...
+
+    @property
+    def candidates(self) -> Sequence[Row]:
+        """Best first."""
+        ...
+
+    @property
+    def comparison(self) -> _Compared:
+        """Of the model as it is."""
+        ...
+
+
+def ranking(axes: Axes, diagnosis: Found) -> Axes:
     """Share of the held-out difference that each candidate explains, with its standard error."""
     rows = diagnosis.candidates[:SHOWN]
     place = np.arange(len(rows))
@@ -40,12 +109,12 @@ def ranking(axes: Axes, diagnosis: Diagnosis) -> Axes:
     return axes
 
 
-def _label(row: Ranked, first: Ranked) -> str:
+def _label(row: Row, first: Row) -> str:
     tied = row.name in first.tied_with or (row is first and bool(first.tied_with))
     return term_names(row.name) + (" (tie)" if tied else "")
 
 
-def constancy(frequency: Axes, amplitude: Axes, rows: Sequence[Ranked]) -> None:
+def constancy(frequency: Axes, amplitude: Axes, rows: Sequence[Row]) -> None:
     """The coefficient of the first candidates along frequency and amplitude, relative to its value."""
     followed(frequency, rows, "frequency")
     followed(amplitude, rows, "amplitude")
@@ -55,7 +124,7 @@ def constancy(frequency: Axes, amplitude: Axes, rows: Sequence[Ranked]) -> None:
     amplitude.set_ylabel("")
 
 
-def followed(axes: Axes, rows: Sequence[Ranked], along: str) -> Axes:
+def followed(axes: Axes, rows: Sequence[Row], along: str) -> Axes:
     """The coefficient of candidates along ``frequency`` or ``amplitude``, relative to its value."""
     low, high = -0.5, 2.5
     styles = (("o", "-", "0.1"), ("s", "--", "0.45"), ("^", ":", "0.6"))

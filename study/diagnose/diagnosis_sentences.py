@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 
 from study.diagnose.constancy import wavers
+from study.diagnose.held_out import evidence, held_out_of
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
 from study.figures.labels import term_names
@@ -34,13 +35,27 @@ def _nothing(diagnosis: Diagnosis) -> str:
     )
 
 
+def _before_and_after(diagnosis: Diagnosis, first: Ranked) -> str:
+    """Errors without and with an effect: those of both parts, each predicted by the other, where it shows in the one.
+
+    That is so of a weak damping of a decay, which the loud stretches show.
+    """
+    comparison = diagnosis.comparison
+    errors = percent(comparison.prediction.error), percent(first.response_error)
+    seen = first.response_error < comparison.prediction.error and errors[0] != errors[1]
+    if comparison.record.stretches and not seen:
+        both = evidence(comparison.prediction, held_out_of(comparison)), evidence(first.prediction, first.held_out)
+        return f"{percent(both[0].error)} to {percent(both[1].error)}, of all stretches as the others predict them"
+    return f"{errors[0]} to {errors[1]}"
+
+
 def _missing(diagnosis: Diagnosis) -> list[str]:
     first, units = diagnosis.candidates[0], diagnosis.comparison.record.units
     force, length = units.get("force", "N"), units.get("displacement", "m")
     said = [
         f"{_words(first.name)} is missing ({first.term.meaning}).",
-        f"With it the held-out error of the response falls from {percent(diagnosis.comparison.prediction.error)} to "
-        f"{percent(first.response_error)}; the noise floor is {percent(first.prediction.floor)}.",
+        f"With it the held-out error of the response falls from {_before_and_after(diagnosis, first)}; the noise floor "
+        f"is {percent(first.prediction.floor)}.",
         f"Its coefficient is {_amount(first, force, length)}{_shape(first, length)}.",
     ]
     if diagnosis.pair:

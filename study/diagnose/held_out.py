@@ -8,13 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from study.compare.comparison import Comparison
 from study.compare.prediction import Prediction
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.part_fit import linearise
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
 from study.support.autoregression import whitened
 from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares
+
+RANK = 1e-9  # of the largest singular value: directions below are not seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +31,40 @@ class HeldOut:
     def white(self, noise: Floats) -> Floats:
         """Both strung together, filtered with the coefficients of an autoregressive noise, shape (n,)."""
         return np.concatenate([whitened(part, noise) for part in (self.judged, self.fitted) if len(part)])
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What a model leaves of samples that it was not fitted to, as far as it counts for or against it."""
+
+    residual: Floats
+    error: float  # rms of it over that of the response
+
+
+def evidence(prediction: Prediction, held: HeldOut) -> Evidence:
+    """The judging part's residual; with stretches to fit and to judge in turn, those of both parts.
+
+    The first stretch of a decay is the loudest, and is fitted: what shows there alone is seen the other way round.
+    """
+    prepared = prediction.prepared
+    if not (prepared.record.stretches and len(held.fitted)):
+        return Evidence(prediction.residual, prediction.error)
+    both = np.concatenate([held.judged, held.fitted])
+    size = float(np.std(np.concatenate([prediction.above(prepared.judged), prediction.above(prepared.fitted)])))
+    return Evidence(both, float(np.sqrt(np.mean(both**2))) / size)
+
+
+def evidence_of(fit: FreeRunFit, prediction: Prediction, both: bool = True) -> Evidence:
+    """The same of a fitted model; of the judging part alone unless ``both`` count."""
+    prepared = prediction.prepared
+    if not (both and prepared.record.stretches):
+        return Evidence(prediction.residual, prediction.error)
+    return evidence(prediction, held_out(fit, prediction, linearise(fit, prepared), prepared))
+
+
+def alike(one: Evidence, other: Evidence) -> bool:
+    """Whether two models have been judged on the same samples."""
+    return len(one.residual) == len(other.residual)
 
 
 def held_out(fit: FreeRunFit, prediction: Prediction, jacobian: Floats, prepared: Prepared) -> HeldOut:
@@ -42,4 +80,55 @@ def held_out(fit: FreeRunFit, prediction: Prediction, jacobian: Floats, prepared
     step = least_squares(there, prediction.difference)[:own]
     other = fit.residual - jacobian[:, :own] @ step
     begin = jacobian[:, own:]  # the initial state is no part of what is predicted
-    return HeldOut(prediction.residual, prediction.above(other - begin @ least_squares(begin, other)))
+    back = prediction.above(other - begin @ least_squares(begin, other))
+    if not prepared.record.stretches:
+        return HeldOut(prediction.residual, back)
+    judged, fitted = _own(there, own), _own(jacobian, own)
+    return HeldOut(
+        independent(prediction.residual, judged, _spread(fitted)), independent(back, fitted, _spread(judged))
+    )
+
+
+def held_out_of(comparison: Comparison) -> HeldOut:
+    """Held-out residuals of the model of a comparison."""
+    fit, prepared = comparison.fit, comparison.prepared
+    return held_out(fit, comparison.prediction, linearise(fit, prepared), prepared)
+
+
+def independent(residual: Floats, derivatives: Floats, spread: Floats) -> Floats:
+    """A predicted part's residual with samples that are independent where noise is white, shape (n,).
+
+    The coefficients that predict it have errors, which it bears all along: where a quiet part predicts a loud one, as
+    in a decay, these are many times the noise, and all samples tell of one chance. With ``L L^T`` the covariance of the
+    coefficients over the noise's variance and J their derivatives, the residual times ``(I + J L L^T J^T)^(-1/2)``, and
+    times the 2n-th root of that matrix's determinant: so that, as in the likelihood of a prediction, a model gains
+    nothing by coefficients that are so uncertain that anything is expected of them.
+
+    Parameters
+    ----------
+    residual : array, shape (n,)
+        Of what is predicted.
+    derivatives : array, shape (n, coefficients)
+        J, on the same samples.
+    spread : array, shape (coefficients, any)
+        L, of the part that the coefficients come from.
+    """
+    directions, sizes, _ = np.linalg.svd(derivatives @ spread, full_matrices=False)
+    share = 1.0 - 1.0 / np.sqrt(1.0 + sizes**2)
+    price = np.exp(0.5 * np.sum(np.log1p(sizes**2)) / len(residual))
+    return np.asarray(price * (residual - directions @ (share * (directions.T @ residual))), dtype=np.float64)
+
+
+def _own(jacobian: Floats, own: int) -> Floats:
+    """Derivatives by the coefficients, without what the states that the parts begin with can do."""
+    begin, keys = jacobian[:, own:], jacobian[:, :own]
+    return keys - np.column_stack([begin @ least_squares(begin, column) for column in keys.T])
+
+
+def _spread(jacobian: Floats) -> Floats:
+    """A root of the covariance of least-squares estimates over the noise's variance, shape (keys, keys)."""
+    scale = np.linalg.norm(jacobian, axis=0)
+    scale = np.where(scale > 0.0, scale, 1.0)
+    _, sizes, directions = np.linalg.svd(jacobian / scale, full_matrices=False)
+    seen = sizes > RANK * sizes[0]
+    return np.asarray(directions[seen].T / sizes[seen] / scale[:, None], dtype=np.float64)

@@ -13,6 +13,7 @@ from study.compare.comparison import Comparison
 from study.compare.prediction import Prediction, predict
 from study.diagnose.credibility import certain
 from study.diagnose.dropping import fitted_without, removal
+from study.diagnose.held_out import Evidence, alike, evidence_of
 from study.equations.model import ModelTerm
 from study.figures.labels import term_names
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -150,16 +151,22 @@ class _Stage:
             return None
         for fit in fitted_without(self.fit, entry.name, self.given.prepared, gone.start):
             without = predict(fit, self.given.prepared)
-            chances = [
-                min(1.0, asked * gain(without.residual, p.residual).p_value)
-                for p in (self.prediction, self.given.prediction)
-            ]
-            better = zip((self.prediction, self.given.prediction), chances, strict=True)
-            if not any(certain(without, p, sized, chance) for p, chance in better):
+            left_then, *models = self._evidence(fit, without, not entry.term.tuned)
+            chances = [min(1.0, asked * gain(left_then.residual, m.residual).p_value) for m in models]
+            if not any(certain(left_then, m, sized, chance) for m, chance in zip(models, chances, strict=True)):
                 return Needless(entry.name, self.prediction.error, without.error, chances[0], fit, without)
             if fit.converged:
                 break
         return None
+
+    def _evidence(self, fit: FreeRunFit, without: Prediction, both: bool) -> list[Evidence]:
+        """What a model without a term leaves, this one and the one that was given; of both parts if all have them.
+
+        A frequency was picked by the fitting part's own chance, which bears no witness of it then.
+        """
+        models = (fit, without), (self.fit, self.prediction), (self.given.fit, self.given.prediction)
+        found = [evidence_of(*model, both) for model in models]
+        return found if all(alike(found[0], e) for e in found) else [evidence_of(*model, False) for model in models]
 
     def _relative_interval(self, entry: ModelTerm, covariance: Floats) -> tuple[float, float]:
         """95 % interval of the size of a term's coefficients, over that size: without zero where they are not zero.

@@ -1,6 +1,7 @@
 """One candidate with what an engineer needs to believe or doubt it."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from study.compare.prediction import Prediction
 from study.diagnose.candidates import Candidate
 from study.diagnose.constancy import Curve, changes, curves, wavers
 from study.diagnose.held_out import HeldOut, held_out
+from study.equations.model import ModelTerm, free
 from study.equations.terms import Term
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import linearise, uncertainty
@@ -97,7 +99,8 @@ def examined(candidate: Candidate, before: Prediction) -> Ranked:
     """A candidate with its coefficient's error and constancy; ``before`` is the prediction without it."""
     fit, prepared = candidate.fit, before.prepared
     jacobian = linearise(fit, prepared)
-    coefficient, error, parameters, errors = _amount(candidate, uncertainty(fit, prepared, jacobian))
+    covariance = uncertainty(fit, prepared, jacobian)
+    coefficient, error, parameters, errors = amount(free(candidate.term), fit.keys, fit.values, covariance)
     flatness, steadiness = curves(fit, candidate.term, prepared, jacobian)
     return Ranked(
         term=candidate.term, fit=fit, prediction=candidate.prediction,
@@ -107,21 +110,27 @@ def examined(candidate: Candidate, before: Prediction) -> Ranked:
     )  # fmt: skip
 
 
-def _amount(candidate: Candidate, covariance: Floats) -> tuple[float, float, dict[str, float], dict[str, float]]:
-    """Coefficient and shape parameters of the candidate with standard errors."""
-    fit, term = candidate.fit, candidate.term
-    place = {key: i for i, key in enumerate(fit.keys)}
-    values = {key: float(fit.values[i]) for key, i in place.items()}
+def amount(
+    entry: ModelTerm, keys: Sequence[str], estimates: Floats, covariance: Floats
+) -> tuple[float, float, dict[str, float], dict[str, float]]:
+    """Coefficient and shape parameters of a fitted term with standard errors.
+
+    ``estimates`` are those of ``keys``, shape (keys,), and ``covariance`` has them first. Of an effect of any phase the
+    coefficient is the amplitude, and the phase is among the parameters.
+    """
+    place = {key: i for i, key in enumerate(keys)}
+    values = {key: float(estimates[i]) for key, i in place.items()}
     errors = {key: math.sqrt(max(float(covariance[i, i]), 0.0)) for key, i in place.items()}
-    names = {p.name: f"{term.name}.{p.name}" for p in term.parameters}
+    names = {p.name: f"{entry.name}.{p.name}" for p in entry.term.parameters}
     parameters = {name: values[key] for name, key in names.items() if key in values}
     parameter_errors = {name: errors[key] for name, key in names.items() if key in values}
-    if len(term.symbols) == 1:
-        return values[term.symbols[0]], errors[term.symbols[0]], parameters, parameter_errors
-    a, b = (values[s] for s in term.symbols)
+    if len(entry.symbols) == 1:
+        return values[entry.symbols[0]], errors[entry.symbols[0]], parameters, parameter_errors
+    a, b = (values[s] for s in entry.symbols)
     size = math.hypot(a, b)
     direction = np.array([a, b]) / size if size > 0.0 else np.array([1.0, 0.0])
-    block = covariance[np.ix_([place[s] for s in term.symbols], [place[s] for s in term.symbols])]
+    rows = [place[s] for s in entry.symbols]
+    block = covariance[np.ix_(rows, rows)]
     across = np.array([direction[1], -direction[0]])
     parameters["phase"] = math.atan2(-b, a)
     parameter_errors["phase"] = math.sqrt(max(float(across @ block @ across), 0.0)) / size if size > 0.0 else math.inf

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from study.compare.comparison import Comparison
 from study.diagnose.candidates import Candidate
-from study.diagnose.held_out import held_out
+from study.diagnose.held_out import Evidence, alike, evidence, held_out_of
 from study.diagnose.ranked import Ranked, examined
 from study.equations.term import Term
-from study.identify.time_domain.part_fit import linearise
 from study.support import statistics
 from study.support.autoregression import autoregression
 from study.support.cores import cores
@@ -42,9 +41,9 @@ def rank(candidates: Sequence[Candidate], comparison: Comparison) -> list[Ranked
     rows.sort(key=lambda r: float(r.residual @ r.residual))
     noise = autoregression(rows[0].fit.residual)
     white = {r.name: r.held_out.white(noise) for r in rows}
-    prepared = comparison.prepared
-    own = held_out(comparison.fit, before, linearise(comparison.fit, prepared), prepared).white(noise)
-    rows = [replace(r, p_value=min(1.0, len(rows) * _p_value(own, white[r.name]))) for r in rows]
+    alone = held_out_of(comparison)
+    rows, own = [_gained(r, evidence(before, alone)) for r in rows], alone.white(noise)
+    rows = [replace(r, p_value=min(1.0, len(rows) * _p_value(own, white[r.name], _independent(r)))) for r in rows]
     return [replace(r, distance=away, tied_with=tied) for r, away, tied in in_order(rows, white, len(rows))]
 
 
@@ -123,8 +122,24 @@ def distance(row: Row, other: Row, white: Mapping[str, Floats]) -> float:
     return statistics.worse(*_common(white[row.name], white[other.name]))
 
 
-def _p_value(before: Floats, after: Floats) -> float:
-    return statistics.gain(*_common(before, after)).p_value
+def _gained(row: Ranked, before: Evidence) -> Ranked:
+    """A candidate with what it explains of all that counts of the held-out residual."""
+    after = evidence(row.prediction, row.held_out)
+    return replace(row, gain=statistics.gain(before.residual, after.residual)) if alike(before, after) else row
+
+
+def _independent(row: Ranked) -> int | None:
+    """How many samples, of those held out, had no part in what was fitted; None where all are such.
+
+    A frequency is where the fitting part has its largest line, by chance if it is noise: its blocks all agree there
+    with whatever amplitude the judging part gives that line, so that they bear witness of nothing.
+    """
+    return len(row.held_out.judged) if row.term.tuned else None
+
+
+def _p_value(before: Floats, after: Floats, samples: int | None) -> float:
+    one, other = _common(before, after)
+    return statistics.gain(one[:samples], other[:samples]).p_value
 
 
 def _common(one: Floats, other: Floats) -> tuple[Floats, Floats]:

@@ -12,6 +12,7 @@ from study.diagnose import candidates, dependence, pairs
 from study.diagnose.candidates import Candidate
 from study.diagnose.constancy import changes, curves, wavers
 from study.diagnose.credibility import credible
+from study.diagnose.held_out import HeldOut, alike, evidence, held_out_of
 from study.diagnose.pairs import Pair
 from study.diagnose.ranked import Ranked
 from study.diagnose.ranking import rank
@@ -107,11 +108,12 @@ def _decide(
 ) -> tuple[str, list[Ranked], float, tuple[str, ...]]:
     """Verdict, candidates in their final order, what is left, and the pair that explains it if none does alone."""
     prediction = comparison.prediction
-    believed = [r for r in rows if credible(prediction, r.prediction, r.interval, r.p_value)]
-    if not believed:
+    own = held_out_of(comparison)
+    trusted = [r for r in rows if believed(r, prediction, own)]
+    if not trusted:
         left = _left(comparison.fit, prediction)
         return (UNKNOWN if left > TOLERANCE else NOTHING), rows, left, ()
-    first = believed[0]
+    first = trusted[0]
     left = _left(first.fit, first.prediction)
     rows = [first] + [r for r in rows if r is not first]
     if (first.gain.explained >= ENOUGH or left <= GOOD) and not first.wanders(len(rows)):
@@ -122,6 +124,14 @@ def _decide(
         return MISSING if _stands_out(first, comparison.prepared) else UNKNOWN, rows, left, ()
     first = next(r for r in rows if r.name == pair.names[0])
     return MISSING, [first] + [r for r in rows if r is not first], _left(pair.fit, pair.prediction), pair.names
+
+
+def believed(row: Ranked, prediction: Prediction, own: HeldOut) -> bool:
+    """Whether an effect is believed, by all samples that neither the model with it nor that without was fitted to."""
+    without, with_it = evidence(prediction, own), evidence(row.prediction, row.held_out)
+    if not alike(without, with_it):
+        return credible(prediction, row.prediction, row.interval, row.p_value)
+    return credible(without, with_it, row.interval, row.p_value)
 
 
 def _stands_out(first: Ranked, prepared: Prepared) -> bool:

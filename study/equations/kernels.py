@@ -240,7 +240,7 @@ def _substep(
 
 
 @compiled
-def _zero(v0: float, v1: float, mean: float) -> float:
+def first_zero(v0: float, v1: float, mean: float) -> float:
     """First zero in (0, 1) of the parabola with these ends and mean, v0 >= 0; 2 if it has none."""
     c = 3.0 * (v0 + v1) - 6.0 * mean
     b = v1 - v0 - c
@@ -324,7 +324,7 @@ def _switching_step(
             begin = _to_release(native, r, side, time, h, begin, drive, j, local, w)
         else:  # the mean velocity is the change of displacement: it shows a dip below zero between two steps
             mean = (w[0, 0, 0] - w[3, 0, 0]) / ((1.0 - begin) * h)
-            x = _zero(r[side] * w[3, 1, 0], r[side] * w[0, 1, 0], r[side] * mean)
+            x = first_zero(r[side] * w[3, 1, 0], r[side] * w[0, 1, 0], r[side] * mean)
             if x > 1.0:
                 return
             begin = _to_crossing(native, r, side, time, h, begin, x, drive, j, local, w)

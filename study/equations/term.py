@@ -204,6 +204,11 @@ class Term:
         return math.hypot(cosine, sine), math.atan2(0.0 - sine, cosine)  # 0 - 0, not -0
 
     @property
+    def tuned(self) -> bool:
+        """Whether a frequency of its own is picked from the lines of what is left, as many as the record shows."""
+        return any(p.search.kind.startswith("lines of") for p in self.parameters)
+
+    @property
     def steady(self) -> bool:
         """Whether nothing changes its force: it moves the system to another place of rest."""
         return not any(formulas.names(c.shape) for c in self.components)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
 
 from study.records.record import Record
 from study.support.arrays import Floats
@@ -15,6 +16,18 @@ def angular_rate(values: Floats, dt: float) -> float:
     """Typical angular frequency of a motion in rad/s: rms of its derivative over its own."""
     size = float(np.std(values))
     return float(np.sqrt(np.mean(np.diff(values) ** 2))) / (dt * size) if size > 0.0 else 1.0 / dt
+
+
+def period(values: Floats) -> float:
+    """Samples in a period of a motion: four times the lag at which the autocorrelation first vanishes.
+
+    White noise does not move it.
+    """
+    n, centred = len(values), values - np.mean(values)
+    size = next_fast_len(2 * n)
+    correlation = irfft(np.abs(rfft(centred, size)) ** 2, size)[:n]
+    below = np.flatnonzero(correlation <= 0.0)
+    return 4.0 * float(below[0]) if len(below) else 4.0 * n
 
 
 def starting_states(record: Record, response: str, samples: Sequence[int], reach: float = REACH) -> Floats:
@@ -29,7 +42,10 @@ def starting_states(record: Record, response: str, samples: Sequence[int], reach
         ]
         return np.column_stack(columns)
     values = record[response]
-    wanted = round(reach * 2.0 * np.pi / (angular_rate(values, record.dt) * record.dt))
+    if record.stretches:  # a wrong velocity may keep the fit of a stretch's state from its minimum
+        wanted = round(reach * period(values))
+    else:
+        wanted = round(reach * 2.0 * np.pi / (angular_rate(values, record.dt) * record.dt))
     states = np.empty((len(samples), 2))
     for i, sample in enumerate(samples):
         begin, end = record.stretch_of(sample)

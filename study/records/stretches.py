@@ -10,13 +10,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
 
 from study.records.completion import CompletedRecord
 from study.records.plan import FEWEST, Plan
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record, Stretch
-from study.support.arrays import Floats
+from study.records.states import period
 from study.support.errors import StudyError, expect
 
 PERIODS = 5.0  # of the motion in a block, at least
@@ -105,7 +104,7 @@ def apart(prepared: Prepared) -> Iterator[Prepared]:
     """
     yield _begun_anew(prepared, [replace(s, continues=False) for s in prepared.record.stretches])
     response = MOTIONS[0] if prepared.response == FORCE else prepared.response
-    samples = PERIODS * _period(prepared.record[response])
+    samples = PERIODS * period(prepared.record[response])
     pieces: list[Stretch] = []
     for stretch in prepared.record.stretches:
         pieces += cut(replace(stretch, continues=False), max(round(len(stretch) / max(samples, FEWEST)), 1))
@@ -123,23 +122,13 @@ def _begun_anew(prepared: Prepared, pieces: Sequence[Stretch]) -> Prepared:
 
 
 def _blocks(stretch: Stretch, response: str) -> list[Stretch]:
-    period = period_of(stretch, response)
-    most = int(len(stretch) / max(PERIODS * period, FEWEST))
+    most = int(len(stretch) / max(PERIODS * period_of(stretch, response), FEWEST))
     return cut(stretch, int(np.clip(most, 2, BLOCKS)))
 
 
 def period_of(stretch: Stretch, response: str) -> float:
     """Samples in a period of the motion."""
-    return _period(stretch.source[response][stretch.first : stretch.last])
-
-
-def _period(values: Floats) -> float:
-    """Four times the lag at which the autocorrelation first vanishes: white noise does not move it."""
-    n, centred = len(values), values - np.mean(values)
-    size = next_fast_len(2 * n)
-    correlation = irfft(np.abs(rfft(centred, size)) ** 2, size)[:n]
-    below = np.flatnonzero(correlation <= 0.0)
-    return 4.0 * float(below[0]) if len(below) else 4.0 * n
+    return period(stretch.source[response][stretch.first : stretch.last])
 
 
 def cut(stretch: Stretch, count: int) -> list[Stretch]:

@@ -14,7 +14,7 @@ import numpy as np
 from study.equations.model import Model
 from study.records.record import MOTIONS
 from study.records.spectra import Segments, cross_spectra
-from study.structure.mass_matrix import linear_keys, matrices, patterns
+from study.structure.mass_matrix import linear_keys, loose_motions, matrices, patterns
 from study.structure.prepared_structure import PreparedStructure
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError, expect
@@ -76,7 +76,9 @@ def frequency_responses(prepared: PreparedStructure, model: Model) -> Responses:
     by_chance = 1.0 - CHANCE ** (1.0 / max(matrix.averages - n, 1.0))
     keep = np.any(coherence > by_chance, axis=1)
     if np.count_nonzero(keep) < 4:
-        raise StudyError(f"forces and motions of {prepared.record.name!r} have nothing in common at any frequency")
+        said = f"forces and motions of {prepared.record.name!r} have nothing in common at any frequency"
+        floats = f"nothing ties {model.name!r} down and what is measured drifts; expected accelerations, which do not"
+        raise StudyError(f"{said}: {floats}" if loose_motions(model) else said)
     noise = own * np.maximum(1.0 - coherence, CLEAN) / max(matrix.averages - n, 1.0)
     error = np.sqrt(noise[:, :, None] * np.einsum("fkk->fk", inverse).real[:, None, :])
     thin = np.flatnonzero(keep)[:: max(1, np.count_nonzero(keep) // LINES)]

@@ -4,7 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from study.equations.model import Model
+from study.equations import formulas
+from study.equations.model import Model, ModelTerm
 from study.structure.equations_of_motion import mass_entries
 from study.support.arrays import Floats
 from study.support.errors import StudyError
@@ -49,6 +50,25 @@ def checked_mass_matrix(model: Model) -> Floats:
         If it is not positive definite: some motion would have no kinetic energy, or a negative one.
     """
     mass = matrices(model, model.numbers())[2]
+    _check_positive(model, mass)
+    return mass
+
+
+def check_held_masses(model: Model) -> None:
+    """Refuse a mass matrix that no values of what is open could make positive definite.
+
+    The rows and columns of which all is given are a principal minor of it, positive definite as the whole is.
+    """
+    open_keys = [key for key, value in model.values.items() if value is None]
+    known = matrices(model, {key: value or 0.0 for key, value in model.values.items()})[2]
+    orders = linear_keys(model)
+    unknown = [np.any(p != 0.0, axis=0) for k, p in patterns(model).items() if k in open_keys and orders[k] == 2]
+    given = ~np.any(unknown, axis=0) if unknown else np.ones(len(model.coordinates), dtype=np.bool_)
+    if np.any(given):
+        _check_positive(model, known[np.ix_(given, given)])
+
+
+def _check_positive(model: Model, mass: Floats) -> None:
     scale = np.sqrt(np.abs(np.diag(mass)))
     lowest = float(np.min(np.linalg.eigvalsh(mass / np.maximum(np.outer(scale, scale), np.finfo(float).tiny))))
     if lowest <= 1e-9 or np.any(np.diag(mass) <= 0.0):
@@ -57,4 +77,18 @@ def checked_mass_matrix(model: Model) -> Floats:
             f"the mass matrix of {model.name!r}, [{rows}], is not positive definite; expected masses above zero, and "
             "couplings smaller than the root of the product of the two masses that they couple"
         )
-    return mass
+
+
+def loose_motions(model: Model) -> int:
+    """In how many of its motions no spring, joint or anything else that feels a displacement ties a structure down."""
+    ties = [
+        np.array(entry.place.direction(model.coordinates))
+        for entry in model.terms
+        if entry.place is not None and any("u" in formulas.names(text) for text in _texts(entry))
+    ]
+    return len(model.coordinates) - (int(np.linalg.matrix_rank(np.stack(ties))) if ties else 0)
+
+
+def _texts(entry: ModelTerm) -> list[str]:
+    shapes = [component.shape for component in entry.term.components if component.order == 0]
+    return [*shapes, *([entry.term.state] if entry.term.state else [])]

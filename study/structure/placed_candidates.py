@@ -133,6 +133,25 @@ def promising(
     return chosen
 
 
+def elsewhere(
+    tried: Sequence[PlacedCandidate], ordered: Sequence[tuple[ModelTerm, list[PlacedStart]]]
+) -> list[tuple[ModelTerm, list[PlacedStart]]]:
+    """The best effect at the places where it was not tried and explains a share like that where it was.
+
+    Two places that the sensors cannot tell apart explain alike: a place is believed only if the others were tried.
+    """
+    if not tried:
+        return []
+    best = min(tried, key=lambda c: (bool(c.unphysical), c.left)).entry
+    done = {c.entry.name for c in tried}
+    share = max(points[0].share for entry, points in ordered if entry.term.name == best.term.name)
+    return [
+        (entry, points)
+        for entry, points in ordered
+        if entry.term.name == best.term.name and entry.name not in done and points[0].share >= PROMISING * share
+    ]
+
+
 def try_all(
     chosen: Sequence[tuple[ModelTerm, list[PlacedStart]]], base: PlacedBaseline, progress: Progress
 ) -> list[PlacedCandidate]:
@@ -153,10 +172,11 @@ def try_all(
             progress("")
             if candidate is not None:
                 done.append(candidate)
-    return _one_side(done)
+    return one_side(done)
 
 
-def _one_side(candidates: Sequence[PlacedCandidate]) -> list[PlacedCandidate]:
+def one_side(candidates: Sequence[PlacedCandidate]) -> list[PlacedCandidate]:
+    """Of candidates that are the same effect on two sides of a place the better."""
     best: dict[tuple[str, frozenset[str]], PlacedCandidate] = {}
     for candidate in sorted(candidates, key=lambda c: (bool(c.unphysical), c.left)):
         assert candidate.entry.place is not None, "every candidate of a structure has a place"

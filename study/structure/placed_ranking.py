@@ -55,6 +55,11 @@ class PlacedRanked:
         return self.entry.term
 
     @property
+    def response_error(self) -> float:
+        """Error of the motions with it, held out."""
+        return self.prediction.error
+
+    @property
     def residual(self) -> Floats:
         """Held-out residual in shares of the sensors' sizes, those of one time side by side."""
         return (self.prediction.residual / self.prediction.size).ravel()
@@ -183,7 +188,7 @@ def _examined(candidate: PlacedCandidate, before: StructurePrediction) -> Placed
     fit, prepared = candidate.fit, candidate.prediction.prepared
     jacobian = linearise(fit, prepared)
     covariance = covariance_of(fit, prepared, jacobian)
-    coefficient, error, parameters, errors = _amount(candidate.entry, fit, covariance)
+    coefficient, error, parameters, errors = ranked.amount(candidate.entry, fit.keys, fit.values, covariance)
     flatness, steadiness = _curves(
         fit, candidate.entry, prepared.dt, jacobian / prepared.scale[:, None], prepared.scale
     )
@@ -194,29 +199,6 @@ def _examined(candidate: PlacedCandidate, before: StructurePrediction) -> Placed
         coefficient, error, parameters, errors, flatness, steadiness,
         held_out_parts(fit, candidate.prediction, jacobian, before.prepared.fit),
     )  # fmt: skip
-
-
-def _amount(
-    entry: ModelTerm, fit: StructureFit, covariance: Floats
-) -> tuple[float, float, dict[str, float], dict[str, float]]:
-    """Coefficient and shape parameters of a candidate with standard errors."""
-    place = {key: i for i, key in enumerate(fit.keys)}
-    values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
-    errors = {key: math.sqrt(max(float(covariance[i, i]), 0.0)) for key, i in place.items()}
-    names = {p.name: f"{entry.name}.{p.name}" for p in entry.term.parameters}
-    parameters = {name: values[key] for name, key in names.items() if key in values}
-    parameter_errors = {name: errors[key] for name, key in names.items() if key in values}
-    if len(entry.symbols) == 1:
-        return values[entry.symbols[0]], errors[entry.symbols[0]], parameters, parameter_errors
-    a, b = (values[s] for s in entry.symbols)
-    size = math.hypot(a, b)
-    direction = np.array([a, b]) / size if size > 0.0 else np.array([1.0, 0.0])
-    rows = [place[s] for s in entry.symbols]
-    block = covariance[np.ix_(rows, rows)]
-    across = np.array([direction[1], -direction[0]])
-    parameters["phase"] = math.atan2(-b, a)
-    parameter_errors["phase"] = math.sqrt(max(float(across @ block @ across), 0.0)) / size if size > 0.0 else math.inf
-    return size, math.sqrt(max(float(direction @ block @ direction), 0.0)), parameters, parameter_errors
 
 
 def _curves(

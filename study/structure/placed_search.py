@@ -16,12 +16,13 @@ from scipy.fft import irfft, rfft, rfftfreq
 
 from study.equations.model import Model, ModelTerm
 from study.equations.place import Place
-from study.equations.term import Parameter, Term
+from study.equations.term import Term
 from study.identify.frequency_domain.inputs import history
-from study.identify.time_domain.shape_search import highest_lines
+from study.identify.time_domain.shape_search import MODULATION, values_to_try
 from study.records.record import MOTIONS, Record
 from study.structure.mass_matrix import LINEAR, linear_keys, matrices, patterns
 from study.structure.missing_forces import corrected_motion, placed_inputs, relative_record
+from study.structure.placed_lines import modulation_lines, residual_lines
 from study.structure.places import transfer
 from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_fit import StructureFit, fit_structure, flat, linearise
@@ -34,8 +35,6 @@ from study.support.least_squares import least_squares
 TRIED, KEPT = 15, 40  # free runs of a fit that tries a start, and of one that is kept
 NEAR = 0.01  # standard errors: as near a minimum as the fit of a search has to come
 CUTOFF = 1e-8  # of the largest singular value
-PEAKS = 8  # lines that are tried as the frequency of a periodic effect
-RARE = 1e-3  # of the largest: lines at which a modulation could hardly show
 STARTS = 3  # points of the search that start a fit
 
 
@@ -226,65 +225,19 @@ def unit_lines(entry: ModelTerm, record: Record, base: PlacedBaseline) -> list[C
 def _grid(
     term: Term, place: Place, u: Floats, base: PlacedBaseline, known: Sequence[float | None]
 ) -> list[tuple[float, ...]]:
+    def lines(kind: str, shifts: Floats) -> Floats:
+        found = base.modulation(u, place) if kind == MODULATION else residual_lines(base.by_sensor)
+        return np.add.outer(found, shifts).ravel() / (len(u) * base.prepared.dt)
+
     points: list[tuple[float, ...]] = [()]
     for parameter, value in zip(term.parameters, known, strict=True):
         points = [
             (*point, x)
             for point in points
-            for x in ([value] if value is not None else _places(parameter, point, u, place, base))
+            for x in ([value] if value is not None else values_to_try(parameter, point, u, base.prepared.dt, lines))
+            if np.isfinite(x)
         ]
     return points
-
-
-def _places(
-    parameter: Parameter, point: tuple[float, ...], u: Floats, place: Place, base: PlacedBaseline
-) -> list[float]:
-    """Values of one shape parameter to try, as ``shape_search`` has them for a single coordinate."""
-    places, dt = np.array(parameter.search.places), base.prepared.dt
-    match parameter.search.kind:
-        case "quantiles of |u|":
-            tried = np.quantile(np.abs(u), places)
-        case "quantiles of u":
-            tried = np.quantile(u, places)
-        case "times of the motion":
-            tried = places / float(np.std(np.gradient(u, dt)) / np.std(u))
-        case "per amplitude":
-            tried = places / float(np.std(u))
-        case "shares of the one before":
-            tried = places * point[-1]
-        case "lines of the modulation":
-            tried = np.add.outer(base.modulation(u, place), places).ravel() / (len(u) * dt)
-        case "lines of the residual":
-            tried = np.add.outer(residual_lines(base.by_sensor), places).ravel() / (len(u) * dt)
-    return [float(x) for x in tried if np.isfinite(x)]
-
-
-def _windowed(values: Floats) -> Complexes:
-    return np.asarray(rfft(values * np.hanning(len(values))), dtype=np.complex128)
-
-
-def residual_lines(residual: Floats) -> Floats:
-    """Lines that stand out of the residuals' own spectra; ``residual`` has shape (samples, sensors)."""
-    return np.array(highest_lines(np.sum([np.abs(_windowed(x)) ** 2 for x in residual.T], axis=0)))
-
-
-def modulation_lines(u: Floats, path: Complexes, residual: Floats) -> Floats:
-    """Lines at which a stiffness of a place that varies with time would explain most, by a matched filter.
-
-    ``path`` leads from a force at the place to the sensors, shape (lines, sensors), ``residual`` and the relative
-    displacement ``u`` have as many samples as these lines are of.
-    """
-    n = len(u)
-    spectra = np.asarray(rfft(residual, axis=0), dtype=np.complex128)
-    matched = np.asarray(irfft(np.sum(np.conj(path) * spectra, axis=1), n), dtype=np.float64)
-    numerator = np.abs(_windowed(matched * u)) ** 2
-    passband = np.asarray(irfft(np.sum(np.abs(path) ** 2, axis=1), n), dtype=np.float64)
-    spread = np.asarray(irfft(np.abs(np.asarray(rfft(u), dtype=np.complex128)) ** 2, n), dtype=np.float64)
-    expected = np.abs(np.asarray(rfft(passband * spread), dtype=np.complex128))
-    explained = numerator / np.maximum(expected, RARE * np.max(expected))
-    inner = np.arange(3, len(explained) - 1)
-    peaks = inner[(explained[inner] >= explained[inner - 1]) & (explained[inner] > explained[inner + 1])]
-    return peaks[np.argsort(-explained[peaks])][:PEAKS].astype(np.float64)
 
 
 def with_placed_term(

@@ -10,6 +10,7 @@ from study.equations.model import Model
 from study.records.completion import CompletedRecord, complete
 from study.records.plan import FEWEST
 from study.records.record import MOTIONS, Record
+from study.structure.mass_matrix import check_held_masses
 from study.structure.structure_record import Sensor, StructureRecord
 from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
@@ -97,8 +98,10 @@ def prepare_structure(
     Raises
     ------
     StudyError
-        If the parts overlap or are too short, or nothing measures a coordinate and nothing ties it to another.
+        If the parts overlap or are too short, nothing measures a coordinate and nothing ties it to another, or the
+        masses that are given leave no positive definite mass matrix.
     """
+    check_held_masses(model)
     half = len(record) // 2
     fit, judge = fit or (0, half), judge or (half, len(record))
     for name, (first, last) in (("fit", fit), ("judge", judge)):

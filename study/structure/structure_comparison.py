@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from study.structure.missing_forces import MissingForces, missing_forces
 from study.structure.modes import Modes, modes_of, modes_table
 from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_fit import StructureFit, covariance_of, linearise, settled
+from study.structure.structure_leftover import Leftover, explained_by_place, left_over
 from study.structure.structure_prediction import StructurePrediction, predict_structure
 from study.structure.structure_start import first_fit
 from study.support.arrays import Floats
@@ -50,6 +52,11 @@ class StructureComparison:
     modes: Modes
     forces: MissingForces  # what each coordinate's equation leaves, and between which places
     notes: tuple[str, ...]
+
+    @cached_property
+    def leftovers(self) -> tuple[Leftover, ...]:
+        """What general shapes of the motion at each place explain of what is left, held out; asked for when shown."""
+        return tuple(left_over(self.prediction))
 
 
 def compare_structure(
@@ -130,6 +137,7 @@ def says(comparison: StructureComparison) -> str:
 def document(comparison: StructureComparison) -> dict[str, Any]:
     """What ``comparison.json`` holds."""
     prediction, fit, forces = comparison.prediction, comparison.fit, comparison.forces
+    explained = explained_by_place(comparison.leftovers)
     return {
         "record": prediction.prepared.record.name,
         "model": {
@@ -155,7 +163,10 @@ def document(comparison: StructureComparison) -> dict[str, Any]:
                 {"coordinate": c, "residual_force": float(r), "force": float(f)}
                 for c, r, f in zip(forces.coordinates, forces.rms, forces.size, strict=True)
             ],
-            "places": [{**place.plain(), "share": share} for place, share in forces.aligned],
+            "places": [
+                {**place.plain(), "share": share, "explained": explained.get(place.path, 0.0)}
+                for place, share in forces.aligned
+            ],
             "shared_force": forces.matrix.tolist(),
             "maps": {
                 label: {"at": c.at.tolist(), "force": c.mean.tolist(), "error": c.error.tolist()}

@@ -2,7 +2,7 @@
 
 ``w[k]`` holds the states (rows: displacements, velocities, own states z) beside their derivatives (columns): w[0] where
 a step stands, w[1] to w[3] room for a trial, its slope and their sum, w[4] where a part of a step begins. Numba's disk
-cache does not notice a change of :func:`study.equations.kernels.run`, which this file calls: change this one with it.
+cache does not notice a change of what this file calls of :mod:`study.equations.kernels`: change this one with it.
 
 Dry friction makes a force that is linear in the sign s of a relative velocity ``e.v``. While a place moves, s is 1 or
 -1 and a step is cut where ``e.v`` vanishes; while it is held, s is whatever keeps ``e.a`` at zero, and it lets go where
@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from study.equations.jit import compiled
-from study.equations.kernels import run
+from study.equations.kernels import first_zero, run
 from study.support.arrays import Floats, Ints
 
 CUTS = 6  # of a step, for each place with friction
@@ -114,9 +114,11 @@ def _hold(
 
 
 @compiled
-def _hold_derivatives(r: Floats, sides: Ints, by_side: Ints, directions: Floats, held: Ints, w: Floats) -> None:
+def _hold_derivatives(
+    r: Floats, sides: Ints, by_side: Ints, directions: Floats, held: Ints, w: Floats, columns: int
+) -> None:  # fmt: skip
     """Derivatives of the accelerations with those of the held signs, which keep each held ``e.a`` at zero."""
-    n, columns = directions.shape[1], w.shape[2]
+    n = directions.shape[1]
     matrix = np.zeros((len(sides), len(sides)))
     right = np.zeros((len(sides), columns))
     count = _held_system(r, sides, by_side, directions, held, matrix)
@@ -142,13 +144,14 @@ def _hold_derivatives(r: Floats, sides: Ints, by_side: Ints, directions: Floats,
 @compiled
 def _variation(
     code: Ints, first: int, r: Floats, slopes: Ints, by_state: Ints, by_key: Ints, sides: Ints, by_side: Ints,
-    directions: Floats, held: Ints, time: float, drive: Floats, j: int, w: Floats,
+    directions: Floats, held: Ints, time: float, drive: Floats, j: int, w: Floats, columns: int,
 ) -> None:  # fmt: skip
     """Derivatives of ``w[1]`` into ``w[2]``: the states in the first column, their sensitivities in the others.
 
-    ``ds/dt = (df/dx) s + df/dp``; columns beyond those of the keys are those of the initial state.
+    ``ds/dt = (df/dx) s + df/dp``; columns beyond those of the keys are those of the initial state. Only so many are
+    taken as ``columns`` says.
     """
-    n, columns = directions.shape[1], w.shape[2]
+    n = directions.shape[1]
     _evaluate(code, first, r, n, time, drive, j, w)
     holding = False
     for a in range(len(sides)):
@@ -173,31 +176,33 @@ def _variation(
             for c in range(1, columns):
                 w[2, i, c] += partial * w[1, m, c]
     if holding:
-        _hold_derivatives(r, sides, by_side, directions, held, w)
+        _hold_derivatives(r, sides, by_side, directions, held, w, columns)
 
 
 @compiled
 def _rk4_step(
     code: Ints, first: int, r: Floats, slopes: Ints, by_state: Ints, by_key: Ints, sides: Ints, by_side: Ints,
-    directions: Floats, held: Ints, time: float, h: float, drive: Floats, j: int, w: Floats,
+    directions: Floats, held: Ints, time: float, h: float, drive: Floats, j: int, w: Floats, columns: int,
 ) -> None:  # fmt: skip
     """One Runge-Kutta step of ``w[0]`` in place; drive[j], drive[j + 1], drive[j + 2] are half a step apart."""
-    w[1] = w[0]
-    w[3] = 0.0
+    for i in range(w.shape[1]):
+        for c in range(columns):
+            w[1, i, c] = w[0, i, c]
+            w[3, i, c] = 0.0
     for stage in range(4):
         late = (stage + 1) // 2
         _variation(
             code, first, r, slopes, by_state, by_key, sides, by_side, directions, held,
-            time + 0.5 * h * late, drive, j + late, w,
+            time + 0.5 * h * late, drive, j + late, w, columns,
         )  # fmt: skip
         weight = h / 3.0 if late == 1 else h / 6.0
         ahead = h if stage == 2 else 0.5 * h
         for i in range(w.shape[1]):
-            for c in range(w.shape[2]):
+            for c in range(columns):
                 w[3, i, c] += weight * w[2, i, c]
                 w[1, i, c] = w[0, i, c] + ahead * w[2, i, c]
     for i in range(w.shape[1]):
-        for c in range(w.shape[2]):
+        for c in range(columns):
             w[0, i, c] += w[3, i, c]
 
 
@@ -214,38 +219,30 @@ def _along(directions: Floats, a: int, w: Floats, row: int, offset: int, c: int)
 def _part(
     code: Ints, first: int, r: Floats, slopes: Ints, by_state: Ints, by_key: Ints, sides: Ints, by_side: Ints,
     directions: Floats, held: Ints, time: float, h: float, begin: float, end: float,
-    drive: Floats, j: int, local: Floats, w: Floats,
+    drive: Floats, j: int, local: Floats, w: Floats, columns: int,
 ) -> None:  # fmt: skip
     """From ``w[4]`` into ``w[0]``: the part of a step between two fractions of it, what is held staying held.
 
     ``local`` gets the drive at both and between, from the parabola through the step's three points. The program has
-    then run at the end.
+    then run at the end, and ``w[2]`` has the slopes of the states there. A search for an event takes one column.
     """
     for i in range(3):
         x = begin + 0.5 * i * (end - begin)
         for c in range(drive.shape[1]):
             outer = (1.0 - x) * drive[j, c] - x * drive[j + 2, c]
             local[i, c] = (1.0 - 2.0 * x) * outer + 4.0 * x * (1.0 - x) * drive[j + 1, c]
-    w[0] = w[4]
+    for i in range(w.shape[1]):
+        for c in range(columns):
+            w[0, i, c] = w[4, i, c]
     _rk4_step(
         code, first, r, slopes, by_state, by_key, sides, by_side, directions, held,
-        time + begin * h, (end - begin) * h, local, 0, w,
+        time + begin * h, (end - begin) * h, local, 0, w, columns,
     )  # fmt: skip
-    w[1] = w[0]
-    _variation(code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, time + end * h, local, 2, w)
-
-
-@compiled
-def _zero(v0: float, v1: float, mean: float) -> float:
-    """First zero in (0, 1) of the parabola with these ends and mean, v0 >= 0; 2 if it has none."""
-    c = 3.0 * (v0 + v1) - 6.0 * mean
-    b = v1 - v0 - c
-    square = b * b - 4.0 * c * v0
-    dips = v0 > 0.0 and c > 0.0 and -2.0 * c < b < 0.0 and square > 0.0
-    if v1 > 0.0 and not dips:
-        return 2.0
-    root = math.sqrt(max(square, 0.0))
-    return 2.0 * v0 / (root - b) if b < 0.0 else (b + root) / (-2.0 * c)
+    for i in range(w.shape[1]):
+        w[1, i, 0] = w[0, i, 0]
+    _variation(
+        code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, time + end * h, local, 2, w, 1
+    )
 
 
 @compiled
@@ -264,7 +261,7 @@ def _next_event(
         if held[a] == 0:  # the mean velocity is the change of displacement: it shows a dip below zero between two steps
             mean = (_along(directions, a, w, 0, 0, 0) - _along(directions, a, w, 4, 0, 0)) / span
             v0 = 0.0 if fresh[a] != 0 else max(float(s * _along(directions, a, w, 4, n, 0)), 0.0)
-            x = _zero(v0, float(s * _along(directions, a, w, 0, n, 0)), float(s * mean))
+            x = first_zero(v0, float(s * _along(directions, a, w, 0, n, 0)), float(s * mean))
         elif abs(early[a]) > 1.0:  # what else switched has set it free
             x = 0.0
         elif abs(s) > 1.0:
@@ -297,24 +294,31 @@ def _switch(
         end = begin + x * (1.0 - begin)
         _part(
             code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, time, h, begin, end,
-            drive, j, local, w,
+            drive, j, local, w, 1,
         )  # fmt: skip
         before = _along(directions, a, w, 2, n, 0)
         if before * s >= 0.0:
             break
         x -= _along(directions, a, w, 0, n, 0) / (before * span)
+    _part(
+        code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, time, h, begin, end,
+        drive, j, local, w, w.shape[2],
+    )  # fmt: skip
     was = w[2, n : 2 * n, 0].copy()
     left = _along(directions, a, w, 0, n, 0) / before if before != 0.0 else 0.0  # time by which Newton misses
     for i in range(n):
         w[0, i, 0] -= w[0, n + i, 0] * left
         w[0, n + i, 0] -= was[i] * left
-    w[1] = w[0]
+    for i in range(w.shape[1]):
+        w[1, i, 0] = w[0, i, 0]
     r[sides[a]] = -s
-    _variation(code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, time + end * h, local, 2, w)
+    _variation(
+        code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, time + end * h, local, 2, w, 1
+    )
     if _along(directions, a, w, 2, n, 0) * s >= 0.0:
         held[a] = 1
         _variation(
-            code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, time + end * h, local, 2, w
+            code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, time + end * h, local, 2, w, 1
         )
     for c in range(1, w.shape[2]):
         rate = _along(directions, a, w, 0, n, c) / before if before != 0.0 else 0.0
@@ -341,7 +345,7 @@ def _release(
         end = begin + x * (1.0 - begin)
         _part(
             code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, time, h, begin, end,
-            drive, j, local, w,
+            drive, j, local, w, 1,
         )  # fmt: skip
         now = float(sign * r[sides[a]])
         if now == at_low or abs(now - 1.0) < CLOSE:
@@ -351,6 +355,10 @@ def _release(
         if rise <= 0.0:
             break
         x = min(max(x + (1.0 - now) / rise, 0.0), 1.0)
+    _part(
+        code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, time, h, begin, end,
+        drive, j, local, w, w.shape[2],
+    )  # fmt: skip
     held[a], r[sides[a]] = 0, sign
     return end
 
@@ -369,7 +377,7 @@ def _switching_step(
             early[a] = r[sides[a]]
         _part(
             code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, time, h, begin, 1.0,
-            drive, j, local, w,
+            drive, j, local, w, w.shape[2],
         )  # fmt: skip
         a, x = _next_event(r, sides, directions, held, early, fresh, (1.0 - begin) * h, w)
         if a < 0 or cut == CUTS * len(sides):
@@ -403,7 +411,7 @@ def _set_sides(
         r[sides[a]] = np.sign(v)
     for _ in range(len(sides)):
         w[1] = w[0]
-        _variation(code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, time, drive, 0, w)
+        _variation(code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, time, drive, 0, w, 1)
         for a in range(len(sides)):
             if held[a] != 0 and abs(r[sides[a]]) > 1.0:
                 held[a], r[sides[a]] = 0, math.copysign(1.0, r[sides[a]])
@@ -431,7 +439,21 @@ def integrate_structure(
         j = 2 * steps * sample
         w[1] = w[0]
         _variation(
-            code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, start + sample * dt, drive, j, w
+            code,
+            first,
+            r,
+            slopes,
+            by_state,
+            by_key,
+            sides,
+            by_side,
+            directions,
+            held,
+            start + sample * dt,
+            drive,
+            j,
+            w,
+            w.shape[2],
         )
         for i in range(n):
             if not (abs(w[0, i, 0]) < 1e150 and abs(w[0, n + i, 0]) < 1e150 and math.isfinite(w[2, n + i, 0])):
@@ -445,7 +467,7 @@ def integrate_structure(
                 if len(sides) == 0:
                     _rk4_step(
                         code, first, r, slopes, by_state, by_key, sides, by_side, directions, held,
-                        time, h, drive, j + 2 * m, w,
+                        time, h, drive, j + 2 * m, w, w.shape[2],
                     )  # fmt: skip
                 else:
                     _switching_step(

@@ -4,7 +4,7 @@ As for a single coordinate (``diagnose.dependence``): amounts from the first par
 the second. A force of each shape at each place passes through the linear approximation of the structure.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ from study.diagnose.dependence import DEGREE, TAUS, hysteretic, relaxed
 from study.equations.place import Place
 from study.records.record import MOTIONS
 from study.structure.mass_matrix import matrices
-from study.structure.placed_search import modulation_lines, residual_lines
+from study.structure.placed_lines import modulation_lines, residual_lines
 from study.structure.places import connections, transfer
 from study.structure.structure_prediction import StructurePrediction
 from study.structure.structure_record import Sensor
@@ -24,6 +24,7 @@ from study.support.arrays import Complexes, Floats
 from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares
 from study.support.statistics import Gain
+from study.support.thresholds import ALPHA
 
 LONGEST = 8192  # samples of either part that are looked at
 
@@ -35,6 +36,15 @@ class Leftover:
     place: Place
     family: str  # ``displacement``, ``velocity``, ``displacement and velocity``, ``past`` or ``time``
     gain: Gain
+
+
+def explained_by_place(found: Sequence[Leftover]) -> dict[frozenset[str], float]:
+    """The largest share that any family explains at each place, of those that do so not by chance."""
+    shares: dict[frozenset[str], float] = {}
+    for item in found:
+        if item.gain.p_value * len(found) < ALPHA and item.gain.explained > 0.0:
+            shares[item.place.path] = max(shares.get(item.place.path, 0.0), item.gain.explained)
+    return shares
 
 
 def left_over(prediction: StructurePrediction) -> list[Leftover]:

@@ -59,7 +59,7 @@ def read_structure(path: Path, model: Model, options: ReadOptions | None = None)
             _check(column, table.from_sample(first), given)
         volts: set[bool] = set()
         scaled = {key: _converted(key, column, given, volts) for key, column in usable.items()}
-        _same_kind(usable, volts)
+        _same_kind(usable, volts, given)
     dt, start = _sampling(path, table, given, cut)
     named = path.resolve().parent.name if path.stem == "record" else path.stem
     return StructureRecord(
@@ -162,9 +162,7 @@ def _check(column: Column, table: Table, options: ReadOptions) -> None:
 
 def _converted(key: str | Sensor, column: Column, options: ReadOptions, volts: set[bool]) -> Floats:
     """A column in N, m (or N m, rad) and s."""
-    role = key.motion if isinstance(key, Sensor) else "force"
-    said = {_key(name): unit for name, unit in options.units.items()}
-    text = said.get(str(key).lower()) or said.get(role) or column.unit
+    role, text = _role(key), _unit_text(key, column, options)
     if not text:
         return column.values
     plain, factor = _straight(text)
@@ -176,9 +174,25 @@ def _converted(key: str | Sensor, column: Column, options: ReadOptions, volts: s
     return column.values * (unit.factor * factor)
 
 
-def _same_kind(columns: Mapping[str | Sensor, Column], volts: set[bool]) -> None:
-    names = ", ".join(f"{key} in {c.unit or 'no unit'}" for key, c in columns.items() if isinstance(key, Sensor))
+def _role(key: str | Sensor) -> str:
+    return key.motion if isinstance(key, Sensor) else "force"
+
+
+def _unit_text(key: str | Sensor, column: Column, options: ReadOptions) -> str:
+    """Unit of a column as the user or the file gives it; empty if nobody does."""
+    said = {_key(name): unit for name, unit in options.units.items()}
+    return said.get(str(key).lower()) or said.get(_role(key)) or column.unit
+
+
+def _same_kind(columns: Mapping[str | Sensor, Column], volts: set[bool], options: ReadOptions) -> None:
+    """Refuse sensors whose motions cannot be compared, or of which some have a unit and others none."""
+    texts = {key: _unit_text(key, c, options) for key, c in columns.items() if isinstance(key, Sensor)}
+    names = ", ".join(f"{key} in {text or 'no unit'}" for key, text in texts.items())
     expect(len(volts) < 2, f"{names}: sensors in volts and in metres cannot be compared; expected all of one kind")
+    bare = next((key for key, text in texts.items() if not text), None)
+    if bare is not None and any(texts.values()):
+        like = f"--unit {bare.coordinate}.{bare.motion}=UNIT"
+        raise StudyError(f"{names}; expected a unit of every sensor, such as {like}, or of none, for SI units")
 
 
 def _sampling(path: Path, table: Table, options: ReadOptions, cut: slice) -> tuple[float, float]:

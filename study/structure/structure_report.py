@@ -8,7 +8,7 @@ import numpy as np
 from study.equations.place import Place
 from study.equations.place import in_words as placed
 from study.figures.labels import term_names
-from study.structure.modes import modes_of, modes_table
+from study.structure.modes import modes_table
 from study.structure.placed_ranking import PlacedRanked
 from study.structure.structure_comparison import document, mode_rows
 from study.structure.structure_record import Sensor
@@ -136,7 +136,7 @@ def fields(diagnosis: StructureDiagnosis) -> dict[str, Any]:
     comparison = diagnosis.comparison
     whole = document(comparison)
     rows = {r.name: r for r in diagnosis.candidates}
-    first = diagnosis.candidates[0] if diagnosis.verdict == MISSING else None
+    after = diagnosis.modes_after
     return {
         "verdict": diagnosis.verdict,
         "record": whole["record"],
@@ -148,7 +148,7 @@ def fields(diagnosis: StructureDiagnosis) -> dict[str, Any]:
         "depends_on": [
             {**f.place.plain(), "on": f.family, "explained": f.gain.explained} for f in diagnosis.families[:SHOWN]
         ],
-        "modes": {"before": whole["modes"], "after": mode_rows(modes_of(first.fit.model)) if first else None},
+        "modes": {"before": whole["modes"], "after": mode_rows(after) if after is not None else None},
         "where": whole["where"],
         "converged": comparison.fit.converged,
         "says": in_words(diagnosis),
@@ -179,8 +179,7 @@ def _plain(row: PlacedRanked) -> dict[str, Any]:
 def modes_before_and_after(diagnosis: StructureDiagnosis) -> str:
     """The modes of the structure as given, and with the first candidate."""
     comparison = diagnosis.comparison
-    before = modes_table(comparison.modes, comparison.model.coordinates)
-    if diagnosis.verdict != MISSING:
+    before, after = modes_table(comparison.modes, comparison.model.coordinates), diagnosis.modes_after
+    if after is None:
         return f"modes\n{before}"
-    after = modes_table(modes_of(diagnosis.candidates[0].fit.model), comparison.model.coordinates)
-    return f"modes of the model as given\n{before}\n\nmodes with it\n{after}"
+    return f"modes of the model as given\n{before}\n\nmodes with it\n{modes_table(after, comparison.model.coordinates)}"

@@ -9,7 +9,7 @@ import numpy as np
 from study.equations.model import Model
 from study.structure.free_decay import decay_start
 from study.structure.linear_start import linear_start
-from study.structure.mass_matrix import linear_keys
+from study.structure.mass_matrix import linear_keys, loose_motions
 from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_fit import StructureFit, fit_structure
 from study.support.errors import DivergenceError, expect
@@ -56,5 +56,15 @@ def _fitted(model: Model, prepared: PreparedStructure, linear: Mapping[str, floa
         try:
             fits.append(fit_structure(model, prepared, model.held_keys, calm))
         except DivergenceError:
-            expect(fits, f"{model.name!r} has no finite motion under the forces of {prepared.record.name!r}")
+            expect(fits, _endless(model, prepared))
     return min(fits, key=lambda fit: float(np.mean((fit.residual / prepared.scale) ** 2)))
+
+
+def _endless(model: Model, prepared: PreparedStructure) -> str:
+    """Why no fit begins."""
+    said = f"{model.name!r} has no finite motion under the forces of {prepared.record.name!r}"
+    loose = loose_motions(model)
+    if not loose:
+        return said
+    tied = f"nothing ties it down in {loose} of its {len(model.coordinates)} motions, in which it drifts away"
+    return f"{said}: {tied}; expected a term between 'ground' and a coordinate, if the structure stands on something"

@@ -2,17 +2,27 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from study.diagnose.credibility import credible
 from study.equations.model import ModelTerm
 from study.equations.term import Term
-from study.structure.placed_candidates import candidate_entries, promising, screened, try_all, with_best_settled
+from study.structure.modes import Modes, modes_of
+from study.structure.placed_candidates import (
+    candidate_entries,
+    elsewhere,
+    one_side,
+    promising,
+    screened,
+    try_all,
+    with_best_settled,
+)
 from study.structure.placed_ranking import PlacedRanked, rank_placed
 from study.structure.placed_search import PlacedBaseline, placed_baseline, with_placed_term
 from study.structure.structure_comparison import StructureComparison, compare_structure
-from study.structure.structure_fit import fit_structure, settled, sized
+from study.structure.structure_fit import covariance_of, fit_structure, linearise, settled, sized
 from study.structure.structure_leftover import Leftover, left_over
 from study.structure.structure_prediction import StructurePrediction
 from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE
@@ -33,6 +43,15 @@ class StructureDiagnosis:
     left: float  # rms of the structure that remains beside the best explanation, over the rms response
     families: tuple[Leftover, ...]  # for an unknown effect: what general shapes at each place explain, best first
 
+    @cached_property
+    def modes_after(self) -> Modes | None:
+        """Modes with the first candidate, with their standard errors; None where no effect is named."""
+        if self.verdict != MISSING:
+            return None
+        fit, prepared = self.candidates[0].fit, self.comparison.prepared
+        covariance = covariance_of(fit, prepared, linearise(fit, prepared))
+        return modes_of(fit.model, fit.keys, covariance[: len(fit.keys), : len(fit.keys)])
+
 
 def diagnose_structure(
     comparison: StructureComparison,
@@ -47,8 +66,10 @@ def diagnose_structure(
     """
     base = search_base(comparison)
     entries = candidate_entries(comparison.fit.model, extra, without)
-    chosen = promising(screened(entries, base))
-    tried = try_all(chosen, base, progress or (lambda _: None))
+    report: Callable[[str], None] = progress or (lambda _: None)
+    ordered = screened(entries, base)
+    tried = try_all(promising(ordered), base, report)
+    tried = one_side([*tried, *try_all(elsewhere(tried, ordered), base, report)])
     settled_ones = with_best_settled(tried, comparison.prepared)
     rows = rank_placed(settled_ones, comparison.fit, comparison.prediction, len(entries))
     return _decide(rows, comparison, len(entries))
@@ -82,18 +103,19 @@ def _decide(rows: list[PlacedRanked], comparison: StructureComparison, asked: in
     prediction = comparison.prediction
     believed = [r for r in rows if credible(prediction, r.prediction, r.interval, r.p_value)]
     if not believed:
-        families = left_over(prediction)
+        families = comparison.leftovers
         left = _left(prediction, families)
-        verdict = UNKNOWN if left > TOLERANCE else NOTHING
+        hopeless = prediction.error >= 1.0  # worse than to predict no motion at all, whatever it depends on
+        verdict = UNKNOWN if hopeless or left > TOLERANCE else NOTHING
         return StructureDiagnosis(verdict, comparison, tuple(rows), asked, left, _ordered(families))
     first = believed[0]
-    families = left_over(first.prediction)
+    families = tuple(left_over(first.prediction))
     left = _left(first.prediction, families)
     rows = [first] + [r for r in rows if r is not first]
     enough = first.gain.explained >= ENOUGH or left <= GOOD
     verdict = MISSING if enough and not first.wanders(asked) else UNKNOWN
     if verdict == UNKNOWN:
-        families = left_over(prediction)
+        families = comparison.leftovers
     return StructureDiagnosis(verdict, comparison, tuple(rows), asked, left, _ordered(families))
 
 

@@ -4,31 +4,43 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from study.diagnose.credibility import credible
-from study.diagnose.verdict import MISSING, NOTHING, diagnose
+from scipy.special import ndtri
+
+from study.compare.comparison import Comparison
+from study.diagnose.held_out import held_out_of
+from study.diagnose.verdict import MISSING, NOTHING, believed, diagnose
 from study.faults.kinds_of_tests import accounted_test
 from study.support.errors import StudyError
+from study.support.thresholds import ALPHA
 from study.trials.draw import Trial
 from study.trials.findings import intervals, tie_set
 from study.trials.kinds import make_test
 
 Row = dict[str, Any]
 COLUMNS: tuple[str, ...] = (
-    "test", "seed", "noise", "hidden", "verdict", "first", "tied", "right", "error_before", "error_after", "held",
-    "asked", "seconds", "trouble",
+    "test", "seed", "noise", "hidden", "verdict", "first", "tied", "right", "shown", "error_before", "error_after",
+    "held", "asked", "seconds", "trouble",
 )  # fmt: skip
+FIRST_SEED = 620_001
+CANDIDATES = 20  # about as many are asked for
+VISIBLE = float(-ndtri(ALPHA / CANDIDATES) + ndtri(0.95))  # standard errors at which 19 of 20 tests find an effect
 
 
 def run_test(test: str, seed: int, hidden: Sequence[str] | None = None, noise: float | None = None) -> Row:
-    """One trial of a kind of test. ``right``: the true effect first or tied with the first, or nothing where none is.
+    """One trial of a kind of test.
 
-    A trial that cannot be drawn or diagnosed says so under ``trouble``.
+    ``right`` is whether the true effect came first or is tied with the first, or nothing was found where none is.
+    ``shown`` is the coefficient of the hidden effect over its standard error, in the fit of the true model: what is
+    there but less than ``VISIBLE`` of these no test of that many candidates finds for certain; without noise it is
+    left out. A trial that cannot be drawn or diagnosed says so under ``trouble``.
     """
     row: Row = dict.fromkeys(COLUMNS, "") | {"test": test, "seed": seed}
     begun = time.perf_counter()
     try:
         trial = make_test(test, seed, hidden, noise)
-        row |= {"noise": trial.noise, "hidden": "+".join(trial.hidden) or "none"} | _diagnosed(trial)
+        row |= {"noise": trial.noise, "hidden": "+".join(trial.hidden) or "none"}
+        row |= _diagnosed(trial)
+        row |= _true_model(trial)
     except StudyError as error:
         row["trouble"] = str(error)
     return row | {"seconds": round(time.perf_counter() - begun, 1)}
@@ -39,15 +51,31 @@ def _diagnosed(trial: Trial) -> Row:
     diagnosis = diagnose(found.comparison)
     named = tie_set(diagnosis)
     first = diagnosis.candidates[0] if diagnosis.candidates else None
-    # Without noise an interval is as wide as rounding: nothing is asked of those.
-    right = diagnosis.verdict == NOTHING if not trial.hidden else set(named) >= set(trial.hidden)
-    seen = first is not None and credible(found.comparison.prediction, first.prediction, first.interval, first.p_value)
-    row: Row = {
+    right = diagnosis.verdict == NOTHING
+    if trial.hidden:
+        right = diagnosis.verdict == MISSING and set(named) >= set(trial.hidden)
+    seen = first is not None and believed(first, found.comparison.prediction, held_out_of(found.comparison))
+    return {
         "verdict": diagnosis.verdict, "first": named[0] if named else "", "tied": "+".join(named[1:]),
         "right": int(right), "error_before": round(found.comparison.prediction.error, 6),
         "error_after": round(first.response_error, 6) if first is not None and seen else "",
     }  # fmt: skip
-    if trial.noise > 0.0 and diagnosis.verdict == MISSING and named[0] in trial.hidden:
-        again = accounted_test([trial.record], trial.completed.with_values(dict.fromkeys(trial.completed.values)))
-        row |= intervals(again.comparison, trial.truth)
-    return row
+
+
+def _true_model(trial: Trial) -> Row:
+    """Whether its intervals hold, and how far the hidden effect stands out; nothing of a record without noise.
+
+    There an interval is as wide as rounding.
+    """
+    if trial.noise == 0.0:
+        return {}
+    true = trial.completed.with_values(dict.fromkeys(trial.completed.values))
+    comparison = accounted_test([trial.record], true).comparison
+    shown = {"shown": round(_standing(comparison, trial.hidden[0]), 1)} if trial.hidden else {}
+    return shown | intervals(comparison, trial.truth)
+
+
+def _standing(comparison: Comparison, name: str) -> float:
+    """The coefficient of a term over its standard error."""
+    one = next(c for c in comparison.coefficients if c.term == name)
+    return abs(one.value) / one.error if one.error else 0.0

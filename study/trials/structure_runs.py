@@ -2,7 +2,6 @@
 
 import math
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +11,6 @@ from study.structure.placed_ranking import PlacedRanked
 from study.structure.prepared_structure import PreparedStructure, prepare_structure
 from study.structure.structure_comparison import compare_structure
 from study.structure.structure_fit import fit_structure, settled
-from study.structure.structure_prediction import predict_structure
 from study.structure.structure_verdict import MISSING, NOTHING, StructureDiagnosis, diagnose_structure
 from study.support.errors import StudyError
 from study.trials.structure_draw import HIDDEN, NOISES, StructureTrial, make_structure_trial
@@ -22,8 +20,13 @@ FIRST_SEED, NONE_EVERY = 20_000, 6  # one trial out of so many hides nothing
 COLUMNS = (
     "seed", "coordinates", "hidden", "place", "noise", "response", "share", "verdict", "first", "first_place",
     "effect_first", "place_first", "tie_set", "tie_holds", "error_before", "error_after", "error_true", "noise_floor",
-    "left", "asked", "p_value", "seconds", "trouble",
+    "left", "asked", "p_value", "true_inside", "true_keys", "seconds", "trouble",
 )  # fmt: skip
+WORDS = (
+    "hidden", "place", "response", "verdict", "first", "first_place", "effect_first", "place_first", "tie_set",
+    "tie_holds", "trouble",
+)  # fmt: skip
+LOOSE = ("left", "p_value", "error_true")  # they change with rounding
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ def run_structure(order: StructureOrder) -> Row:
         diagnosis = diagnose_structure(compare_structure(trial.believed, prepared))
     except StudyError as error:
         return row | {"trouble": str(error), "seconds": time.perf_counter() - begun}
-    row |= _found(trial, diagnosis) | {"error_true": _true_error(trial, prepared)}
+    row |= _found(trial, diagnosis) | _true(trial, prepared)
     return row | {"seconds": time.perf_counter() - begun, "trouble": ""}
 
 
@@ -92,45 +95,18 @@ def _there(row: PlacedRanked, hidden: ModelTerm) -> bool:
     return row.entry.place is not None and hidden.place is not None and row.entry.place.path == hidden.place.path
 
 
-def _true_error(trial: StructureTrial, prepared: PreparedStructure) -> float:
-    """Error of the true model, fitted from its true values."""
-    model = trial.completed
-    try:
-        fit = fit_structure(model, prepared, (), trial.truth.numbers())
-        return predict_structure(settled(fit, prepared), prepared).error
-    except StudyError:
-        return math.nan
+def _true(trial: StructureTrial, prepared: PreparedStructure) -> Row:
+    """Error of the true model, fitted from its true values, and how many of these its 95 % intervals hold.
 
-
-def rates(rows: Sequence[Row]) -> list[Row]:
-    """How often effect and place come first, ties hold the truth, and nothing is found where nothing is.
-
-    ``rows`` are as :func:`run_structure` gives them, or as a table of them reads back.
+    Without noise nothing is asked of intervals: what is left is the integration's.
     """
-    hidden = [r for r in rows if r["hidden"] != "none"]
-    none = [r for r in rows if r["hidden"] == "none"]
-    first = [(float(str(r["noise"])), _yes(r, "effect_first") and _yes(r, "place_first")) for r in hidden]
-    near = [_number(r, "error_after") <= 1.05 * _number(r, "error_true") for r in hidden]
-    return [
-        _rate("effect and place first, noise to 1 %", [holds for noise, holds in first if noise <= NOISES[1]]),
-        _rate("effect and place first, noise of 5 %", [holds for noise, holds in first if noise > NOISES[1]]),
-        _rate("place first", [_yes(r, "place_first") for r in hidden]),
-        _rate("tie set holds the truth", [_yes(r, "tie_holds") for r in hidden]),
-        _rate("nothing missing where nothing is", [r.get("verdict") == NOTHING for r in none]),
-        _rate("error after adding within 5 % of the true model's", near),
-    ]
-
-
-def _yes(row: Row, key: str) -> bool:
-    return str(row.get(key)) == "True"
-
-
-def _number(row: Row, key: str) -> float:
+    model, true = trial.completed, trial.truth.numbers()
     try:
-        return float(str(row.get(key)))
-    except ValueError:
-        return math.nan
-
-
-def _rate(what: str, holds: Sequence[bool]) -> Row:
-    return {"what": what, "of": len(holds), "holds": sum(holds), "share": sum(holds) / max(len(holds), 1)}
+        fit = settled(fit_structure(model, prepared, (), true), prepared)
+        comparison = compare_structure(model, prepared, fit)
+    except StudyError:
+        return {"error_true": math.nan}
+    spans = [(true[c.key], c.interval) for c in comparison.coefficients if c.interval is not None]
+    inside = sum(low <= value <= high for value, (low, high) in spans)
+    row: Row = {"error_true": comparison.prediction.error}
+    return row | {"true_inside": inside, "true_keys": len(spans)} if trial.noise > 0.0 else row

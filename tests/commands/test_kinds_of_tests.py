@@ -119,6 +119,16 @@ def test_a_component_test_predicts_the_force(hidden):
     assert hidden in (first["term"], *first["tied_with"])
 
 
+@pytest.mark.parametrize("seed", [4, 600100])
+def test_a_line_in_the_noise_of_a_component_is_not_called_a_force(seed):
+    """Both called a harmonic force, that noise alone had put where it was found, missing before."""
+    Path("part.yaml").write_text("name: part\nterms: [linear_damping, linear_stiffness]\n")
+    drawn("component", seed, ())
+    found = verdict("record.csv", "--model", "part.yaml")
+    assert found["candidates"][0]["term"] == "harmonic_force"
+    assert found["verdict"] == "nothing_missing"
+
+
 def test_a_component_has_loops_and_takes_terms_with_a_memory():
     drawn("component", 4, ("hysteresis",))
     Path("part.yaml").write_text("name: part\nterms: [linear_damping, linear_stiffness, hysteresis]\n")

@@ -6,12 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from study.equations.model import free
 from study.equations.model_file import parse_model
+from study.equations.place import Place
+from study.equations.terms import LIBRARY, get
 from study.structure.placed_candidates import candidate_entries, screened
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure
 from study.structure.structure_reader import read_structure
-from study.structure.structure_verdict import search_base
+from study.structure.structure_verdict import UNKNOWN, diagnose_structure, search_base
 from study.support.errors import StudyError
 
 DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parents[3] / "shared" / "data"))
@@ -58,6 +61,38 @@ def test_stiffness_is_found_and_what_is_missing_is_in_pitch(name):
     assert not any(
         e.place and len(e.place.moving) > 1 for e, _ in ordered
     )  # one body: nothing lies between its motions
+
+
+def test_heave_of_the_second_wing_has_dry_friction():
+    """With friction and a stiffness of second and third order in pitch; about 2.7 N, as it comes to rest."""
+    model = wing("model_2")
+    for effect, where in (
+        ("quadratic_stiffness", "pitch"), ("cubic_stiffness", "pitch"), ("coulomb_friction", "heave"),
+        ("coulomb_friction", "pitch"),
+    ):  # fmt: skip
+        model = model.with_term(free(get(effect), Place("between", ("ground", where))))
+    record = read_structure(DATA / "wing" / "model_2.csv", model)
+    comparison = compare_structure(model, prepare_structure(record, model, (0, 2400), (2400, 4000)))
+    found = {c.key: c for c in comparison.coefficients}
+    friction = found["fc[ground-heave]"]
+    assert friction.value == pytest.approx(2.7, rel=0.1)
+    assert friction.error is not None
+    assert friction.value > 3.0 * friction.error
+    _, _, heave, pitch = AUTHORS["model_2"]
+    assert found["k[ground-heave]"].value == pytest.approx(heave, rel=0.15)
+    assert found["k[ground-pitch]"].value == pytest.approx(pitch, rel=0.15)
+    left = np.sqrt(np.mean(comparison.fit.residual**2, axis=0)) / comparison.prepared.scale
+    assert left[1] < 0.2, "of pitch; linear terms alone leave 0.43"
+
+
+def test_a_prediction_worse_than_none_is_never_said_to_lack_nothing():
+    """Pitch is at rest in the judged part, and linear terms alone let it swing on."""
+    model = wing("model_2")
+    record = read_structure(DATA / "wing" / "model_2.csv", model)
+    comparison = compare_structure(model, prepare_structure(record, model, (0, 2500), (2500, 4000)))
+    assert comparison.prediction.error > 1.0
+    others = [name for name in LIBRARY if name != "constant_force"]
+    assert diagnose_structure(comparison, without=others).verdict == UNKNOWN
 
 
 def test_without_a_force_masses_must_be_given():

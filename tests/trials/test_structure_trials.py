@@ -1,14 +1,26 @@
 """Trials of structures: what is drawn, written, and counted."""
 
+import importlib.util
+import io
+from pathlib import Path
+
 import numpy as np
+import pandas as pd
 import pytest
+from scipy.stats import binomtest
 
 from study.cli import main
 from study.equations.model_file import read_model
 from study.structure.modes import modes_of
 from study.support.errors import StudyError
+from study.trials import kept
 from study.trials.structure_draw import HIDDEN, SHARE, make_structure_trial, structure
-from study.trials.structure_runs import rates, structure_orders
+from study.trials.structure_rates import confusion_of_effects, confusion_of_places, rates
+from study.trials.structure_runs import COLUMNS, LOOSE, WORDS, run_structure, structure_orders
+
+ROOT = Path(__file__).parents[2]
+KEPT = ROOT / "docs" / "trials_of_structures.csv"
+AGAIN = 8  # of the first trials, those of two coordinates are run again
 
 
 def test_a_trial_is_the_same_for_the_same_seed():
@@ -52,17 +64,78 @@ def test_orders_cover_effects_sizes_noises():
     assert sum(o.hidden == "none" for o in orders) == 20
 
 
+GOOD = {
+    "seed": 1, "coordinates": 3, "hidden": "cubic_stiffness", "place": "mass2-mass1", "first": "cubic_stiffness",
+    "first_place": "mass1-mass2", "noise": 0.0, "verdict": "missing_effect", "effect_first": True, "place_first": True,
+    "tie_holds": True, "error_after": 0.1, "error_true": 0.1, "trouble": "",
+}  # fmt: skip
+
+
 def test_rates_count_what_holds():
-    good = {
-        "hidden": "a", "noise": 0.0, "effect_first": True, "place_first": True, "tie_holds": True,
-        "error_after": 0.1, "error_true": 0.1,
+    bad = {
+        **GOOD, "effect_first": "False", "error_after": "", "noise": "0.05", "true_inside": "6", "true_keys": "8",
     }  # fmt: skip
-    bad = {**good, "effect_first": "False", "error_after": "", "noise": "0.05"}
-    found = {
-        r["what"]: (r["holds"], r["of"]) for r in rates([good, bad, {"hidden": "none", "verdict": "unknown_effect"}])
-    }
-    assert found["effect and place first, noise to 1 %"] == (1, 1)
-    assert found["effect and place first, noise of 5 %"] == (0, 1)
-    assert found["place first"] == (2, 2)
-    assert found["nothing missing where nothing is"] == (0, 1)
-    assert found["error after adding within 5 % of the true model's"] == (1, 2)
+    none = {**GOOD, "hidden": "none", "verdict": "unknown_effect"}
+    found = {str(r["what"]): r for r in rates([GOOD, bad, none])}
+    shares = {what: (row["share"], row["trials"]) for what, row in found.items()}
+    assert shares["effect and place first, noise to 1 %"] == (1.0, 1)
+    assert shares["effect and place first, noise of 5 %"] == (0.0, 1)
+    assert shares["effect first"] == (0.5, 2)
+    assert shares["place first"] == (1.0, 2)
+    assert shares["nothing missing where nothing is"] == (0.0, 1)
+    assert shares["error after adding within 5 % of the true model's"] == (0.5, 2)
+    assert shares["95 % intervals of the true model that hold its values"] == (0.75, 1)
+    low, high = (float(str(found["place first"][key])) for key in ("low", "high"))
+    assert (low, high) == pytest.approx(tuple(binomtest(2, 2).proportion_ci(0.95, method="wilson")))
+
+
+def test_confusions_count_effects_and_places():
+    rows = [
+        GOOD, {**GOOD, "first": "dead_band", "first_place": "mass2-mass3"},
+        {**GOOD, "place": "mass1", "first_place": "ground-mass1"},
+        {**GOOD, "verdict": "unknown_effect", "first": "", "first_place": ""},
+        {**GOOD, "hidden": "none", "place": "", "verdict": "nothing_missing", "first": "", "first_place": ""},
+        {**GOOD, "first_place": "ground-mass3"},
+    ]  # fmt: skip
+    effects = confusion_of_effects(rows).set_index("hidden")
+    assert effects.loc["cubic_stiffness"].to_dict() == {
+        "cubic_stiffness": 3, "dead_band": 1, "unknown effect": 1, "nothing missing": 0,
+    }  # fmt: skip
+    assert effects.loc["none", "nothing missing"] == 1
+    places = confusion_of_places(rows).set_index("hidden")
+    assert places.loc["between two, 3 coordinates"].to_dict() == {
+        "the same place": 1, "a place with an end in common": 1, "another place": 1, "unknown effect": 1,
+        "nothing missing": 0,
+    }  # fmt: skip
+    assert places.loc["to the ground, or a force on it, 3 coordinates", "the same place"] == 1
+
+
+def test_the_kept_table_is_what_this_code_gives():
+    """Its first trials again; where this fails, `make structure_trials` is due."""
+    table = pd.read_csv(KEPT, keep_default_na=False, na_values=["nan", ""])
+    assert list(table.columns) == list(COLUMNS)
+    orders = {order.seed: order for order in structure_orders(120)}
+    assert list(table["seed"]) == list(orders)[: len(table)], "the first of the run, none left out"
+    quick = [order for order in list(orders.values())[:AGAIN] if order.coordinates == 2]
+    assert len(quick) == 2
+    buffer = io.StringIO()
+    pd.DataFrame([run_structure(order) for order in quick], columns=list(COLUMNS)).to_csv(buffer, index=False)
+    buffer.seek(0)
+    own = pd.read_csv(buffer, keep_default_na=False, na_values=["nan", ""])
+    assert kept.differing(own, table, COLUMNS, WORDS, LOOSE) == []
+    other = own.assign(first_place="ground-mass9")
+    assert len(kept.differing(other, table, COLUMNS, WORDS, LOOSE)) == 2
+
+
+def test_the_page_holds_the_numbers_of_the_kept_table(tmp_path):
+    spec = importlib.util.spec_from_file_location("structure_trial_docs", ROOT / "scripts" / "structure_trial_docs.py")
+    assert spec is not None
+    assert spec.loader is not None
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    for name in ("structures.md", KEPT.name):
+        (tmp_path / name).write_bytes((ROOT / "docs" / name).read_bytes())
+    script.main(tmp_path / "structures.md")
+    assert (tmp_path / "structures.md").read_text() == (ROOT / "docs" / "structures.md").read_text()
+    with pytest.raises(StudyError, match="there is no such file"):
+        script.main(tmp_path / "structures.md", [tmp_path / "none.csv"])

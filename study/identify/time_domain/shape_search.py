@@ -5,6 +5,7 @@ would add (the exact sensitivity at a zero coefficient), less all that the model
 could do. Each point takes one free run; the best few points start a fit of everything.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,6 +26,7 @@ from study.support.least_squares import least_squares
 SEARCHED = 4096  # samples that a search for open shape parameters looks at, if they show anything
 PEAKS = 6  # lines of a spectrum that are tried as the frequency of a periodic effect
 SHARP = (15.0, 40.0, 100.0, 250.0)  # per amplitude: loops that close within a small part of a stroke
+MODULATION = "lines of the modulation"  # of the two kinds of spectra whose lines are tried
 STARTS = 4  # points of the search that start a fit
 SPREAD = 5  # points that start a fit where the search is blunt, from one end of the range to the other
 
@@ -170,28 +172,43 @@ def grid(term: Term, base: Baseline) -> list[tuple[float, ...]]:
 
 def _places(parameter: Parameter, point: tuple[float, ...], base: Baseline) -> list[float]:
     """Values of one shape parameter to try beside those of the parameters before it."""
-    places, u = np.array(parameter.search.places), base.displacement
+
+    def lines(kind: str, shifts: Floats) -> Floats:
+        found = modulation_lines(base) if kind == MODULATION else residual_lines(base)
+        return _around(found, shifts, base)
+
+    # a prescribed stroke may be many times the slip that closes a loop
+    return values_to_try(parameter, point, base.displacement, base.dt, lines, SHARP if base.row is None else ())
+
+
+def values_to_try(
+    parameter: Parameter, point: tuple[float, ...], u: Floats, dt: float, lines: Callable[[str, Floats], Floats],
+    sharp: Sequence[float] = (),
+) -> list[float]:  # fmt: skip
+    """Values of one shape parameter for a motion u beside those of the parameters before it, ``point``.
+
+    ``lines`` gives, for a kind of spectrum, frequencies in hertz so many lines to either side of those that stand out;
+    ``sharp`` are further places of what goes with the amplitude.
+    """
+    places = np.array(parameter.search.places)
     match parameter.search.kind:
         case "quantiles of |u|":
             tried = np.quantile(np.abs(u), places)
         case "quantiles of u":
             tried = np.quantile(u, places)
         case "times of the motion":
-            tried = places / float(np.std(np.gradient(u, base.dt)) / np.std(u))
+            tried = places / float(np.std(np.gradient(u, dt)) / np.std(u))
         case "per amplitude":
-            if base.row is None:  # a prescribed stroke may be many times the slip that closes a loop
-                places = np.concatenate([places, SHARP])
-            tried = places * (1.0 / float(np.std(u)))
+            tried = np.concatenate([places, sharp]) * (1.0 / float(np.std(u)))
         case "shares of the one before":
             tried = places * point[-1]
-        case "lines of the modulation":
-            tried = _around(modulation_lines(base), places, base)
-        case "lines of the residual":
-            tried = _around(residual_lines(base), places, base)
+        case kind:
+            tried = lines(kind, places)
     return [float(x) for x in tried]
 
 
-def _windowed(values: Floats) -> Complexes:
+def windowed(values: Floats) -> Complexes:
+    """Lines of a history under a Hann window."""
     return np.asarray(rfft(values * np.hanning(len(values))), dtype=np.complex128)
 
 
@@ -205,7 +222,7 @@ def modulation_lines(base: Baseline) -> list[float]:
     receptance = base.transfer(np.asarray(2j * np.pi * rfftfreq(n, base.dt), dtype=np.complex128))
     receptance[0] = receptance[1] if not np.isfinite(receptance[0]) else receptance[0]
     matched = irfft(np.conj(receptance) * rfft(base.fit.residual), n)
-    numerator = np.abs(_windowed(matched * base.displacement)) ** 2
+    numerator = np.abs(windowed(matched * base.displacement)) ** 2
     passband = irfft(np.abs(receptance) ** 2, n)
     spread = irfft(np.abs(rfft(base.displacement)) ** 2, n)
     denominator = np.abs(rfft(passband * spread))
@@ -214,7 +231,7 @@ def modulation_lines(base: Baseline) -> list[float]:
 
 def residual_lines(base: Baseline) -> list[float]:
     """Lines that stand out of the residual's own spectrum."""
-    return highest_lines(np.abs(_windowed(base.fit.residual)) ** 2)
+    return highest_lines(np.abs(windowed(base.fit.residual)) ** 2)
 
 
 def highest_lines(spectrum: Floats) -> list[float]:

@@ -19,6 +19,7 @@ from study.support.units import ROLES, is_unit, parse_unit, role_unit
 
 Floats = NDArray[np.float64]
 LONGEST_NAME = 120  # characters of a record's name: names of files have 255 bytes, and more is put to it
+ROUNDING = 1e-9  # of a unit's factor
 AGREE = 0.01  # share by which a given interval may differ from that of the times
 AGAIN = 0.7  # of its rms: a force that changes by more after a period does not repeat (a random one changes by 1.4)
 
@@ -77,12 +78,27 @@ def _units(path: Path, roles: Mapping[str, Column], options: ReadOptions) -> dic
     units: dict[str, str] = {}
     for role, column in roles.items():
         text = options.units.get(role) or own_unit(column, role)
+        _refuse_contradiction(path, column, role, options)
         if text and role in ROLES:
             with at(f"{path}: column {column.name!r}"):
                 units[role] = role_unit(role, text).text
         elif text:
             units[role] = parse_unit(text).text if is_unit(text) else text
     return units
+
+
+def _refuse_contradiction(path: Path, column: Column, role: str, options: ReadOptions) -> None:
+    """Refuse a unit that is given where the file says another: one is a factor wrong, and nobody knows which."""
+    given, own = options.units.get(role, ""), own_unit(column, role)
+    if not (is_unit(given) and is_unit(own)):
+        return
+    one, other = parse_unit(given), parse_unit(own)
+    same = one.powers == other.powers and abs(one.factor / other.factor - 1.0) < ROUNDING
+    expect(
+        same,
+        f"{path}: column {column.name!r} is in {other.text} by the file and a unit of {one.text} is given; "
+        "leave the unit out, or correct it in the file",
+    )
 
 
 def _range(path: Path, length: int, options: ReadOptions) -> tuple[int, int]:

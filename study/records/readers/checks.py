@@ -68,9 +68,24 @@ def saturated(values: Floats) -> str | None:
             continue
         near = (different > 0.0) & (different <= NEAR / SAME)
         usual = float(np.mean(times[near])) if near.any() else float(np.median(times))
-        if count > CLIPPED_RATIO * usual:
+        if count > CLIPPED_RATIO * usual and not _comes_to_rest(values, extreme):
             return (
                 f"rests at its {side} value {extreme:g} for {count} of {len(values)} samples, as a saturated channel "
                 "does; expected a wider measuring range (or 'accept_saturated: true' if the signal is like that)"
             )
     return None
+
+
+def _comes_to_rest(values: Floats, extreme: float) -> bool:
+    """Whether a digitised motion slows down to rest at its extreme, as an axis does at the end of its moves.
+
+    It comes there and leaves by the smallest step of its converter every time. What is clipped is cut off at the speed
+    that it has, of many steps a sample; where the whole motion has no more than a step or two nothing can be told.
+    """
+    change = np.abs(np.diff(values))
+    moving = change[change > SAME * float(np.ptp(values))]
+    there = values == extreme
+    edges = change[there[1:] != there[:-1]]
+    step = float(np.min(moving, initial=np.inf))
+    fast = float(np.mean(moving)) > CLIPPED_RATIO * step if len(moving) else False
+    return bool(fast and len(edges) and np.all(edges < 1.5 * step))

@@ -1,0 +1,191 @@
+"""The pictures of a structure's comparison and diagnosis, as the bytes of files."""
+
+# Matplotlib leaves the **kwargs of its methods untyped.
+# pyright: reportUnknownMemberType=false
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from study.compare import panels
+from study.diagnose import diagnosis_pages
+from study.equations.place import in_words
+from study.figures import page
+from study.figures.sheet import in_style
+from study.records.record import SI_UNITS
+from study.structure import structure_panels
+from study.structure.modes import Modes
+from study.structure.sketch import Sketch, sketch
+from study.structure.sketch_drawing import structure_sketch
+from study.structure.structure_comparison import StructureComparison
+from study.structure.structure_leftover import explained_by_place
+from study.structure.structure_verdict import MISSING, StructureDiagnosis
+from study.support.arrays import Floats
+from study.support.numbers import percent
+
+WIDE = 7.2  # inches
+MAPS, SENSORS, MODES = 9, 6, 6  # panels on one page at most: the first connections, the worst sensors, slowest modes
+
+
+def pictures(comparison: StructureComparison) -> dict[str, bytes]:
+    """Every picture of a comparison by file name."""
+    with in_style():
+        return page.files(
+            {
+                "structure": structure(comparison, sketch_of(comparison)),
+                "sensors": sensors(comparison),
+                "response": response(comparison),
+                "shared_force": shared_force(comparison),
+                "modes": modes(comparison, [("fitted", comparison.modes)]),
+                **restoring_forces(comparison),
+            }
+        )
+
+
+def diagnosis_pictures(diagnosis: StructureDiagnosis) -> dict[str, bytes]:
+    """The pictures of a diagnosis besides those of its comparison."""
+    comparison = diagnosis.comparison
+    sets = [("as given", comparison.modes)]
+    sets += [("with the first candidate", diagnosis.modes_after)] if diagnosis.modes_after is not None else []
+    with in_style():
+        found = {"structure": structure(comparison, sketch_of_diagnosis(diagnosis)), "modes": modes(comparison, sets)}
+        if diagnosis.candidates:
+            found |= diagnosis_pages.pages(diagnosis, comparison.prepared.record.name)
+            found["candidates"].set_size_inches(1.4 * page.WIDTH, found["candidates"].get_figheight())
+        return page.files(found)
+
+
+def sketch_of(comparison: StructureComparison) -> Sketch:
+    """The sketch of a structure.
+
+    A connection glows with the held-out share of what is left that general functions of its own motion explain.
+    """
+    return sketch(comparison.model, comparison.forces.coordinates, explained_by_place(comparison.leftovers))
+
+
+def sketch_of_diagnosis(diagnosis: StructureDiagnosis) -> Sketch:
+    """The same, glowing where an effect that is found, or tied with it, explains what is left."""
+    comparison = diagnosis.comparison
+    if diagnosis.verdict != MISSING:
+        return sketch_of(comparison)
+    first = diagnosis.candidates[0]
+    shares: dict[frozenset[str], float] = {}
+    for row in diagnosis.candidates:
+        if row.entry.place is not None and row.name in (first.name, *first.tied_with):
+            shares.setdefault(row.entry.place.path, float(np.clip(row.gain.explained, 0.0, 1.0)))
+    return sketch(comparison.model, comparison.forces.coordinates, shares)
+
+
+def structure(comparison: StructureComparison, drawn: Sketch) -> Figure:
+    """The sketch on a page."""
+    places = [link for link in drawn.links if link.share > 0.0]
+    most = max(places, key=lambda link: link.share, default=None)
+    about, width = "nothing that is left depends on the motion anywhere", max(WIDE, drawn.width)
+    if most is not None:
+        about = f"glowing most: {in_words(most.place)}, explains {percent(most.share)} of what is left"
+    figure, (axes,) = page.page(
+        f"{comparison.prepared.record.name}: where a force is missing", f"model {comparison.model.name}; {about}",
+        width=width, panel=(width - 1.04) * drawn.height / drawn.width, legend_rows=0, headed=False,
+    )  # fmt: skip
+    structure_sketch(axes, drawn)
+    return figure
+
+
+def sensors(comparison: StructureComparison) -> Figure:
+    """Errors by sensor, and the force left at each coordinate."""
+    prediction, count = comparison.prediction, len(comparison.prediction.prepared.sensors)
+    figure, axes = page.page(
+        f"{comparison.prepared.record.name}: error by sensor",
+        f"model {comparison.model.name}; all sensors {percent(prediction.error)}, noise {percent(prediction.floor)}",
+        columns=2, width=page.width(2), panel=max(1.4, 0.48 * count), share=False,
+    )  # fmt: skip
+    figure.subplots_adjust(left=0.13, wspace=0.3)
+    structure_panels.sensor_errors(axes[0], prediction)
+    structure_panels.coordinate_forces(axes[1], comparison.forces)
+    page.letter(axes, ("motions", "equations of motion"))
+    page.legend(figure, axes, columns=4)
+    return figure
+
+
+def response(comparison: StructureComparison) -> Figure:
+    """Measured and predicted motion of the sensors that are predicted worst, where the difference is largest."""
+    prediction = comparison.prediction
+    order = np.argsort(-prediction.errors)[:SENSORS]
+    figure, axes = page.page(
+        f"{comparison.prepared.record.name}: motions", f"model {comparison.model.name}; close-up where it fails most",
+        rows=len(order), width=WIDE, panel=1.5, share=False,
+    )  # fmt: skip
+    time = prediction.prepared.record.time[slice(*prediction.prepared.judge)]
+    names: list[str] = []
+    for panel, i in zip(axes, order, strict=True):
+        sensor, near = prediction.prepared.sensors[int(i)], _closeup(prediction.residual[:, int(i)])
+        panels.response(
+            panel, time[near], prediction.measured[near, int(i)], prediction.predicted[near, int(i)],
+            SI_UNITS[sensor.motion],
+        )  # fmt: skip
+        panel.set_ylabel(panel.get_ylabel().replace("response", sensor.motion))
+        names.append(f"{sensor}: error {percent(float(prediction.errors[int(i)]))}")
+    page.letter(axes, names)
+    page.legend(figure, axes, columns=2)
+    return figure
+
+
+def _closeup(residual: Floats, samples: int = 300) -> slice:
+    """The stretch with the largest mean square."""
+    if len(residual) <= samples:
+        return slice(0, len(residual))
+    power = np.cumsum(np.concatenate([[0.0], residual**2]))
+    begin = int(np.argmax(power[samples:] - power[:-samples]))
+    return slice(begin, begin + samples)
+
+
+def shared_force(comparison: StructureComparison) -> Figure:
+    """The matrix of shared residual force between places."""
+    count = len(comparison.forces.coordinates)
+    figure, (axes,) = page.page(
+        f"{comparison.prepared.record.name}: shared residual force",
+        "off the diagonal it acts between two coordinates, on it from outside or the ground",
+        panel=max(1.8, 0.5 * count), width=max(WIDE, 2.6 + 0.8 * count), legend_rows=0, headed=False,
+    )  # fmt: skip
+    figure.subplots_adjust(left=0.2, right=0.8)
+    structure_panels.shared_force(axes, comparison.forces)
+    return figure
+
+
+def restoring_forces(comparison: StructureComparison) -> Mapping[str, Figure]:
+    """Missing force of each connection against its relative displacement; nothing where the difference is noise."""
+    labels = [n for n in comparison.forces.curves if len(comparison.forces.curves[n].at)][:MAPS]
+    if not labels:
+        return {}
+    columns = min(2, len(labels))
+    figure, axes = page.page(
+        f"{comparison.prepared.record.name}: force that each connection lacks",
+        f"model {comparison.model.name}; as both equations have it, those first where a force explains most",
+        rows=-(-len(labels) // columns), columns=columns, width=page.width(columns), panel=1.9, share=False,
+    )  # fmt: skip
+    for panel, label in zip(axes, labels, strict=False):
+        structure_panels.restoring_force(panel, comparison.forces, label)
+        share = next((s for p, s in comparison.forces.aligned if p.label == label), 0.0)
+        panel.set_title(f"{label} ({percent(share)})")
+    for panel in axes[len(labels) :]:
+        panel.set_visible(False)
+    page.legend(figure, axes[:1])
+    return {"restoring_forces": figure}
+
+
+def modes(comparison: StructureComparison, sets: list[tuple[str, Modes]]) -> Figure:
+    """Natural frequencies, damping ratios and shapes with 95 % intervals, before and after."""
+    names, count = comparison.model.coordinates, min(MODES, len(comparison.modes.frequency))
+    figure, axes = page.page(
+        f"{comparison.prepared.record.name}: modes of the underlying linear system",
+        f"model {comparison.model.name}; bars are 95 % intervals",
+        rows=-(-(count + 1) // 2), columns=2, width=page.width(2), panel=1.8, share=False,
+    )  # fmt: skip
+    structure_panels.mode_frequencies(axes[0], sets)
+    for number in range(count):
+        structure_panels.mode_shapes(axes[1 + number], sets, number, names)
+    for panel in axes[1 + count :]:
+        panel.set_visible(False)
+    page.legend(figure, axes[:1])
+    return figure

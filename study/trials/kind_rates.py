@@ -1,0 +1,59 @@
+"""Of trials by kind of test: how often the true effect came first, nothing was invented, and intervals held."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from study.support import document
+from study.support.document import Block, Text, table
+from study.support.numbers import percent
+from study.trials.kind_runs import VISIBLE
+from study.trials.kinds import TESTS
+from study.trials.rates import Rate, proportion
+
+HEADING = (
+    "test", "true effect first", "first or tied", "of those that the record shows", "nothing missing where nothing is",
+    "coefficients in their 95 % intervals",
+)  # fmt: skip
+EXACT = ("test", "seed", "noise", "hidden", "verdict", "first", "tied", "right")  # the same on every machine
+
+
+def put(page: Path, trials: pd.DataFrame) -> None:
+    """Write the rates into a page."""
+    document.put(page, "trials", blocks(trials))
+
+
+def blocks(trials: pd.DataFrame) -> list[Block]:
+    """The rates by kind of test, and what they are of."""
+    kinds = [kind for kind in TESTS if kind in set(trials["test"])]
+    failed, noisy = int(trials["trouble"].notna().sum()), f"{100.0 * float(trials['noise'].max()):g} %"
+    about = (
+        f"{len(trials)} trials, seeds {int(trials['seed'].min())} to {int(trials['seed'].max())}, noise of 0 to "
+        f"{noisy} of the response's mean square; {failed} could not be diagnosed and count as failed. In brackets 95 % "
+        "intervals (Wilson, 1927) and the number of trials. An effect is shown by a record without noise, and by one "
+        f"with noise if its coefficient in the fit of the true model stands {VISIBLE:.1f} standard errors from zero: "
+        "of less, a test that asks for so many candidates finds fewer than 19 of 20, however it is made."
+    )
+    return [Text(about), table(HEADING, [[kind, *_cells(trials[trials["test"] == kind])] for kind in kinds])]
+
+
+def _cells(rows: pd.DataFrame) -> list[str]:
+    right = pd.to_numeric(rows["right"]).fillna(0.0)
+    hidden = rows["hidden"] != "none"
+    shown = hidden & ((rows["noise"] == 0.0) | (pd.to_numeric(rows["shown"]) >= VISIBLE) | rows["trouble"].notna())
+    asked = pd.to_numeric(rows["asked"]).fillna(0.0)
+    held = pd.to_numeric(rows["held"])[asked > 0.0]
+    first = (right * (rows["first"] == rows["hidden"]))[hidden]
+    rates: Sequence[Rate] = (
+        proportion(first.tolist()),
+        proportion(right[hidden].tolist()), proportion(right[shown].tolist()), proportion(right[~hidden].tolist()),
+        proportion(held.tolist(), asked[asked > 0.0].tolist()),
+    )  # fmt: skip
+    return [_cell(rate) for rate in rates]
+
+
+def _cell(rate: Rate) -> str:
+    if not rate.trials:
+        return "-"
+    return f"{percent(rate.value, '.0f')} ({percent(rate.low, '.0f')} to {percent(rate.high, '.0f')}; {rate.trials})"
