@@ -24,6 +24,7 @@ include: "rules/summary.smk"
 include: "rules/trials.smk"
 include: "rules/cases.smk"
 include: "rules/measured.smk"
+include: "rules/campaign.smk"
 
 
 rule all:

@@ -134,14 +134,14 @@ def test_touched_identification_runs_again_without_simulation(built):
     os.utime(module, ns=(times.st_atime_ns, times.st_mtime_ns))
     assert jobs["identify"] == 2
     assert {"draw.duffing", "draw.noisy", "claims", "parameters", "summary"} <= set(jobs)
-    assert not {"record", "draw_preliminary.duffing"} & set(jobs)
+    assert "record" not in jobs
 
 
 def test_touched_style_draws_again_and_nothing_else(built):
     with edited(built / "study" / "figures" / "study.mplstyle", "font.size: 10", "font.size: 11"):
         jobs = planned(built)
     assert set(jobs) == {
-        "draw.duffing", "draw.noisy", "draw_preliminary.duffing", "draw_estimators", "summary", "all"
+        "draw.duffing", "draw.noisy", "draw_estimators", "summary", "all"
     }  # fmt: skip
 
 
@@ -155,7 +155,7 @@ def test_a_changed_seed_or_row_runs_its_case_alone(built, file, old, new):
     assert {name: jobs[name] for name in ("record", "identify", "draw.noisy")} == {
         "record": 1, "identify": 1, "draw.noisy": 1
     }  # fmt: skip
-    assert not {"draw.duffing", "draw_preliminary.duffing", "claims", "excitation_reading"} & set(jobs)
+    assert not {"draw.duffing", "claims", "excitation_reading"} & set(jobs)
     assert ("estimator_errors" in jobs) == (file == "cases.tsv"), "ensembles have seeds of their own"
 
 

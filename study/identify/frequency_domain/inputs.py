@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from study.equations import formulas, kernels
+from study.equations import formulas
 from study.equations.graph import Graph
 from study.equations.model import Model, ModelTerm, with_registers
 from study.records.interpolation import between_samples
@@ -111,6 +111,8 @@ def history(item: Input, record: Record) -> Floats:
     StudyError
         If a formula needs a channel that the record lacks, or has no finite value somewhere along it.
     """
+    from study.equations import kernels  # slow to load; who counts inputs or checks settings needs none
+
     formula = item.shape if item.state is None else item.state
     own = (*dict(item.parameters), *(("z",) if item.state is not None else ()))  # without a state, z is a channel
     wanted = [n for n in formulas.names(formula) if n not in own]
