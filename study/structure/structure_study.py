@@ -21,7 +21,6 @@ from study.reproduction.settings import (
     Limits,
     LocalPolynomialSettings,
     Names,
-    NotNegative,
     Positive,
     Sampling,
     Seed,
@@ -37,6 +36,11 @@ from study.support.config_files import Row, Section, Text, read_rows, read_yaml
 from study.support.errors import StudyError, at, expect
 
 
+def _words(cell: object) -> object:
+    """Words of a cell; a job's plain data has them apart already."""
+    return cell.split() if isinstance(cell, str) else cell
+
+
 class MeasuredTolerances(Section):
     """What a structure with a measured linear part may be off: its coefficients, and its free run over the noise."""
 
@@ -45,7 +49,7 @@ class MeasuredTolerances(Section):
 
 
 class StructureTolerances(Section):
-    """What an estimate may be off, by the symbol of the coefficient: relative, absolute where the true value is zero."""
+    """What an estimate may be off, by its symbol: relative, absolute where the true value is zero."""
 
     relative: Limits
     absolute: Limits
@@ -90,7 +94,7 @@ class StructureCase(Row):
     cutoff: Positive  # hertz, of the force
     level: Positive  # mean square of the force, N^2
     noise: Annotated[float, Field(ge=0.0, lt=1.0)]  # mean square on each sensor over that of its motion
-    sensors: Annotated[tuple[str, ...], BeforeValidator(str.split)]  # coordinates whose displacement is measured
+    sensors: Annotated[tuple[str, ...], BeforeValidator(_words)]  # coordinates whose displacement is measured
     also_assumed: str  # a term that the identification assumes at every connection that has none
     measured: Annotated[Literal["", "yes"], Field(description="yes or nothing")]  # the linear part is as measured
     title: Text
