@@ -6,18 +6,23 @@ with one_sentence():
 
 CODE["structure"] = rests_on(Path("scripts/structure_case.py"))
 CODE["structure_summary"] = rests_on(Path("scripts/structure_summary.py"))
+# What is made of a case: in reverse, equation by equation, or by its modes where the linear part is as measured.
 STRUCTURE_TABLES = {
-    "record": "record", "responses": "frequency_response", "coherences": "coherence", "parameters": "parameters",
-    "reactions": "reactions", "claims": "claims",
+    "": {
+        "record": "record", "responses": "frequency_response", "coherences": "coherence", "parameters": "parameters",
+        "reactions": "reactions", "claims": "claims",
+    },
+    "yes": {"record": "record", "responses": "frequency_response", "parameters": "parameters", "claims": "claims"},
 }  # fmt: skip
-STRUCTURE_FIGURES = ("connections", "coherence")
+STRUCTURE_FIGURES = {"": ("connections", "coherence"), "yes": ("measured",)}
 STRUCTURE_RESULTS = [f"results/structures.{ending}" for ending in ("csv", "md")]
 
 
 def structure_products(case):
     """Everything that is made of a case of structures."""
-    stems = [f"{case}_{kind}" for kind in STRUCTURE_FIGURES]
-    return [f"results/{case}/{name}.csv" for name in STRUCTURE_TABLES.values()] + [p for s in stems for p in pictures(s)]
+    way = STRUCTURES.cases[case].measured
+    tables = [f"results/{case}/{name}.csv" for name in STRUCTURE_TABLES[way].values()]
+    return tables + [path for kind in STRUCTURE_FIGURES[way] for path in pictures(f"{case}_{kind}")]
 
 
 for _name, _case in STRUCTURES.cases.items():
@@ -30,10 +35,10 @@ for _name, _case in STRUCTURES.cases.items():
             style=STYLE,
             code=CODE["structure"],
         output:
-            **{kind: f"results/{_name}/{name}.csv" for kind, name in STRUCTURE_TABLES.items()},
+            **{kind: f"results/{_name}/{name}.csv" for kind, name in STRUCTURE_TABLES[_case.measured].items()},
             **{
                 f"{kind}_{ending}": f"figures/{_name}_{kind}.{ending}"
-                for kind in STRUCTURE_FIGURES
+                for kind in STRUCTURE_FIGURES[_case.measured]
                 for ending in ENDINGS
             },
         params:

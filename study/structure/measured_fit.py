@@ -18,7 +18,7 @@ from study.records.record import MOTIONS
 from study.structure.measured_start import modal_starts
 from study.structure.modal_program import ModalKeys, modal_program
 from study.structure.prepared_structure import PreparedStructure
-from study.structure.structure_fit import MOST_STEPS, ROUGH
+from study.structure.structure_fit import MOST_STEPS, ROUGH, SHIFT
 from study.structure.structure_record import Sensor
 from study.structure.structure_run import StructureRun
 from study.support.arrays import Floats
@@ -181,12 +181,28 @@ def fit_measured(model: Model, prepared: PreparedStructure) -> MeasuredFit:
             continue
         if best is not None and _criterion(fit, prepared) >= _criterion(best, prepared):
             continue
-        if not fit.converged:
-            fit = _fitted(model, modal, prepared, fit.values, tuple(held), steps, TRIALS, fit.initial)
-        best, worse = fit, 0
+        best, worse = _settled(fit, model, prepared, tuple(held)), 0
     if best is None:
         raise StudyError(f"forces and motions of {prepared.record.name!r} show no mode in the band that is driven")
     return best
+
+
+def _settled(fit: MeasuredFit, model: Model, prepared: PreparedStructure, held: tuple[str, ...]) -> MeasuredFit:
+    """The fit at its minimum, with as many steps that halving them moves no coefficient by what its error notices.
+
+    What too coarse an integration leaves would else be taken for a mode.
+    """
+    while True:
+        if not fit.converged:
+            fit = _fitted(model, fit.modal, prepared, fit.values, held, fit.steps, TRIALS, fit.initial)
+        if 2 * fit.steps > MOST_STEPS:
+            return fit
+        finer = _fitted(model, fit.modal, prepared, fit.values, held, 2 * fit.steps, TRIALS, fit.initial)
+        moved = np.array([finer.values[key] - fit.values[key] for key in model.values if key not in held])
+        errors = np.array([fit.error(key) for key in model.values if key not in held])
+        if np.all(np.abs(moved) <= SHIFT * errors) and _criterion(finer, prepared) > _criterion(fit, prepared) - 2.0:
+            return fit
+        fit = finer
 
 
 def _steps(modal: ModalKeys, values: Mapping[str, float], dt: float) -> int:

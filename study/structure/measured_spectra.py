@@ -104,10 +104,9 @@ def coefficient_spectra(fit: MeasuredFit, prepared: PreparedStructure) -> tuple[
     keep = _driven(forces[at], prepared.dt, cut)
     found, row = list[CoefficientSpectrum](), len(forces)
     for place, inputs in groups:
-        along = _along(place, model, by_sensor, at)
         for item in inputs:
-            own = _entry(by_sensor[model.forces[at][1]], row)
-            found.append(_spectrum(item, place, own, along, by_sensor[model.forces[at][1]].frequency, keep, cut))
+            answers = _answers(model, place, by_sensor, at, row)
+            found.append(_spectrum(item, place, answers, by_sensor[model.forces[at][1]].frequency, keep, cut))
             row += 1
     return tuple(found)
 
@@ -148,17 +147,27 @@ def _responses(sensor: Sensor, channels: Sequence[Floats], dt: float, cut: Segme
     return replace(found, response=found.response / order, covariance=found.covariance / size)
 
 
-def _entry(found: Responses, row: int) -> tuple[Complexes, Floats]:
-    """One input's function and its variance."""
-    return found.response[row], found.covariance[:, row, row].real
+@dataclass(frozen=True, eq=False)
+class _Answers:
+    """What the sensor of a force shows of a term's force, and how a place moves under the measured one; by line."""
+
+    own: Complexes
+    along: Complexes
+    own_variance: Floats
+    along_variance: Floats
+    shared: Complexes  # E[d own d along*]: noises of two sensors are taken as independent
 
 
-def _along(place: Place, model: Model, by_sensor: dict[str, Responses], at: int) -> tuple[Complexes, Floats]:
-    """Motion along a place by one of the forces, and its variance: noises of two sensors are taken as independent."""
-    pairs = zip(model.coordinates, place.direction(model.coordinates), strict=True)
-    parts = [(w, *_entry(by_sensor[c], at)) for c, w in pairs if w != 0.0]
-    total = np.sum([w * values for w, values, _ in parts], axis=0)
-    return np.asarray(total, dtype=np.complex128), np.sum([variance for *_, variance in parts], axis=0)
+def _answers(model: Model, place: Place, by_sensor: dict[str, Responses], at: int, row: int) -> _Answers:
+    driven = model.forces[at][1]
+    own, lines = by_sensor[driven], len(by_sensor[driven].frequency)
+    along, variance, shared = np.zeros(lines, np.complex128), np.zeros(lines), np.zeros(lines, np.complex128)
+    for c, w in zip(model.coordinates, place.direction(model.coordinates), strict=True):
+        if w != 0.0:
+            along += w * by_sensor[c].response[at]
+            variance += by_sensor[c].covariance[:, at, at].real
+            shared += w * own.covariance[:, row, at] if c == driven else 0.0
+    return _Answers(own.response[row], along, own.covariance[:, row, row].real, variance, shared)
 
 
 def _driven(force: Floats, dt: float, cut: Segments) -> Floats:
@@ -169,13 +178,18 @@ def _driven(force: Floats, dt: float, cut: Segments) -> Floats:
 
 
 def _spectrum(
-    item: Input, place: Place, own: tuple[Complexes, Floats], along: tuple[Complexes, Floats], frequency: Floats,
-    keep: Floats, cut: Segments,
-) -> CoefficientSpectrum:  # fmt: skip
-    f = frequency[keep]
-    part = item.parts[0]
+    item: Input, place: Place, answers: _Answers, frequency: Floats, keep: Floats, cut: Segments
+) -> CoefficientSpectrum:
+    """The ratio line by line, less what the errors of both sides that go together add to it."""
+    f, part = frequency[keep], item.parts[0]
     power = part.factor * (2j * np.pi * f) ** part.order if len(item.parts) == 1 else np.ones(len(f), np.complex128)
-    values = -own[0][keep] / (along[0][keep] * power)
-    relative = own[1][keep] / np.abs(own[0][keep]) ** 2 + along[1][keep] / np.abs(along[0][keep]) ** 2
+    own, along, shared = -answers.own[keep], answers.along[keep], -answers.shared[keep]
+    variance, moved = answers.own_variance[keep], answers.along_variance[keep]
+    product, square = own * along.conj() - shared, np.abs(along) ** 2 - moved
+    weight = 1.0 / variance
+    size = np.sum(weight * (product * power.conj()).real) / np.sum(weight * square * np.abs(power) ** 2)
+    square = np.maximum(square, 0.5 * np.abs(along) ** 2)  # where noise is half of it nothing is known anyway
+    spread = variance + np.abs(size * power) ** 2 * moved - 2.0 * (size * power.conj() * shared).real
+    error = np.sqrt(np.maximum(spread, 0.0) / np.maximum(square, np.finfo(float).tiny)) / np.abs(power)
     key = " + ".join(f"{p.symbol}[{place.label}]" for p in item.parts)
-    return CoefficientSpectrum(key, place, f, values, np.abs(values) * np.sqrt(relative), cut.line_inflation())
+    return CoefficientSpectrum(key, place, f, product / square / power, error, cut.line_inflation())

@@ -10,6 +10,7 @@ from study.records.record import MOTIONS
 from study.records.spectra import cross_spectra
 from study.reproduction.claims.judgement import SEPARATOR, Condition
 from study.structure.mass_matrix import matrices
+from study.structure.measured_comparison import MeasuredComparison
 from study.structure.places import transfer
 from study.structure.reverse_tables import structure_parameters
 from study.structure.structure_record import Sensor, StructureRecord
@@ -19,6 +20,7 @@ from study.support.numbers import percent
 STATEMENTS = {
     "transfer_functions": "SI/SO: one nonlinear connection changes the transfer function to every coordinate",
     "placed": "MI/SO finds every coefficient, and nothing where nothing nonlinear is",
+    "measured": "The linear part as measured: modes of its own and the nonlinear terms run free as the structure does",
     "reaction": "Two equations agree on what they share in MI/SO, and do not in SI/SO",
 }
 
@@ -32,6 +34,33 @@ def structure_claims(
         "placed": list(_placed(case, result, settings)),
         "reaction": list(_reaction(result.found, settings)),
     }
+    return _table(case, conditions)
+
+
+def measured_claims(
+    case: StructureCase, truth: Model, comparison: MeasuredComparison, settings: StructureSettings
+) -> pd.DataFrame:
+    """The same of a case whose linear part is as measured."""
+    return _table(case, {"measured": list(_measured(case, truth, comparison, settings))})
+
+
+def _measured(
+    case: StructureCase, truth: Model, comparison: MeasuredComparison, settings: StructureSettings
+) -> Iterable[Condition]:
+    allowed, fit = settings.tolerances.measured, comparison.fit
+    for key in comparison.model.values:
+        true, off = truth.numbers()[key], fit.values[key] / truth.numbers()[key] - 1.0
+        met = abs(off) <= allowed.coefficient
+        yield Condition(
+            f"{key} within {percent(allowed.coefficient)} of {true:.6g}", f"{key} {percent(off, '+.2g')}", met
+        )
+    noise = float(np.sqrt(case.noise / (1.0 + case.noise)))
+    error = comparison.prediction.error
+    criterion = f"error of the free run at most {allowed.error:g} times the noise of {percent(noise)}"
+    yield Condition(criterion, f"error {percent(error)}", error <= allowed.error * noise)
+
+
+def _table(case: StructureCase, conditions: Mapping[str, list[Condition]]) -> pd.DataFrame:
     rows = [
         {
             "case": case.case, "claim": STATEMENTS[name], "criterion": SEPARATOR.join(c.criterion for c in held),

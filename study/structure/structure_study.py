@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field
 
+from study.equations.layout import LINEAR
 from study.equations.model import Model, ModelTerm, free
 from study.equations.model_file import read_model
 from study.equations.terms import get
@@ -151,6 +152,12 @@ def _check(case: StructureCase, models: Path) -> None:
     expect(len(model.forces) == 1, f"{case.model!r} has {len(model.forces)} forces; expected one")
     if case.also_assumed:
         get(case.also_assumed)
+    if case.measured:
+        kept = [t for t in model.terms if t.place is not None and t.term.name not in LINEAR]
+        ends = [c for t in kept if t.place is not None for c in t.place.moving]
+        needed = dict.fromkeys([*(where for _, where in model.forces), *ends])
+        blind = [name for name in needed if name not in case.sensors]
+        expect(not blind, f"sensors lack {', '.join(blind)}, where the force or a nonlinear term acts; expected one")
 
 
 def make_structure_record(model: Model, case: StructureCase, settings: StructureSettings) -> StructureRecord:
@@ -211,3 +218,10 @@ def identify_structure(
         except StudyError as error:
             raise StudyError(f"{case.case}, {name}: {error}") from None
     return CaseResult(assumed, equations, found)
+
+
+def measured_model(model: Model, sensors: Sequence[str]) -> Model:
+    """The nonlinear terms of a structure alone, their coefficients open, between its sensors; all else as measured."""
+    kept = tuple(t for t in model.terms if t.term.name not in LINEAR)
+    opened = tuple(t.with_values(dict.fromkeys(t.symbols)) for t in kept)
+    return Model(f"{model.name} as measured", opened, tuple(sensors), model.forces, measured=True)

@@ -107,6 +107,26 @@ def test_derivatives_of_the_free_run_are_exact(comparison):
     np.testing.assert_allclose(run.respond(fit.values, fit.initial, free=False)[0], motion, rtol=1e-12)
 
 
+@pytest.mark.parametrize(("noise", "relative"), [(0.0, 1e-5), (0.0025, 0.01)])
+def test_the_reports_duffing_system_is_a_structure_of_one_mode(noise, relative):
+    """Its mass, damping and stiffness follow from the mode; 5 % of the rms as noise is what the peer was given."""
+    true = read_model(ROOT / "models" / "duffing.yaml").numbers()
+    drive = force(Excitation(level=1.0, cutoff=12.5), 4096, 0.02, 1990)
+    placed = (ROOT / "models" / "duffing.yaml").read_text().replace("value", "at: x, value")
+    whole = parse_model(placed.replace("terms:", "coordinates: [x]\nforces: {shaker: x}\nterms:"), Path("whole.yaml"))
+    record = simulate_structure(whole, {"shaker": drive}, 0.02, steps_per_sample=16)
+    u = record.motions[Sensor("x", "displacement")]
+    noisy = u + np.sqrt(noise) * np.std(u) * np.random.default_rng(3).standard_normal(len(u))
+    model = measured("coordinates: [x]\nforces: {shaker: x}\nlinear: measured\nterms: [{term: cubic_stiffness, at: x}]")
+    own = StructureRecord(record.dt, record.forces, {Sensor("x", "displacement"): noisy})
+    fit = compare_measured(model, prepare_structure(own, model)).fit
+    assert fit.modal.modes == 1
+    mass = fit.values["phi[x,1]"] ** -2
+    found = {"m": mass, "c": fit.values["g[1,1]"] * mass, "k": fit.values["w2[1]"] * mass, "k3": fit.values["k3[x]"]}
+    for key, value in found.items():
+        assert value == pytest.approx(true[key], rel=relative), key
+
+
 def test_poles_from_a_subspace_are_exact_without_noise():
     """Any rational function through the bilinear transformation."""
     poles = np.array([-0.4 + 9.0j, -1.0 + 31.0j])

@@ -3,15 +3,25 @@
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from study.equations.model_file import read_model
 from study.reproduction.tables import judge
+from study.structure.measured_comparison import compare_measured
+from study.structure.measured_tables import measured_figure, measured_parameters, measured_responses
+from study.structure.prepared_structure import prepare_structure
 from study.structure.reverse_figures import coherence_figure, connections_figure
 from study.structure.reverse_tables import structure_coherences, structure_parameters, structure_responses
-from study.structure.structure_claims import structure_claims
-from study.structure.structure_study import assumed_structure, identify_structure, load, make_structure_record
+from study.structure.structure_claims import measured_claims, structure_claims
+from study.structure.structure_study import (
+    assumed_structure,
+    identify_structure,
+    load,
+    make_structure_record,
+    measured_model,
+)
 from study.support.errors import StudyError
 
 ROOT = Path(__file__).parents[2]
@@ -80,6 +90,7 @@ def test_pictures_show_every_input_once_and_every_equation(two_masses):
         ("structures/two_masses", "duffing", "has no 'coordinates'"),
         ("\t\tcubic_stiffness", "\tthird\tcubic_stiffness", r"sensors name \['third'\]"),
         ("three_masses\tstructures", "two_masses\tstructures", "stands twice"),
+        ("p4 p7 p10", "p4 p7", "sensors lack p10"),
     ],
 )
 def test_a_bad_row_is_named(tmp_path, old, new, said):
@@ -91,3 +102,25 @@ def test_a_bad_row_is_named(tmp_path, old, new, said):
     table.write_text(text.replace(old, new, 1))
     with pytest.raises(StudyError, match=said):
         load(tmp_path / "config")
+
+
+def test_the_beam_is_found_by_its_own_modes():
+    study = load(ROOT / "config")
+    case = study.cases["beam"]
+    sampling = study.settings.sampling.model_copy(update={"samples": 8192})
+    settings = study.settings.model_copy(update={"sampling": sampling})
+    structure = read_model(ROOT / case.model_file)
+    record, model = make_structure_record(structure, case, settings), measured_model(structure, case.sensors)
+    assert [str(s) for s in record.sensors] == [f"{p} displacement" for p in case.sensors]
+    assert model.values == {"k3[ground-p10]": None}
+    comparison = compare_measured(model, prepare_structure(record, model))
+    (claim,) = measured_claims(case, structure, comparison, settings).to_dict("records")
+    assert claim["verdict"] == "holds", claim["measured"]
+    table = measured_parameters(case, structure, comparison, settings)
+    assert list(table["parameter"][:3]) == ["k3[ground-p10]", "f_n[1]", "zeta[1]"]
+    responses = measured_responses(case, structure, comparison, settings)
+    linear = responses[(responses["estimator"] == "output_error") & (responses["place"] == "p10")]
+    size = np.hypot(linear["exact_real"], linear["exact_imag"])
+    off = np.hypot(linear["real"] - linear["exact_real"], linear["imag"] - linear["exact_imag"])
+    assert np.sqrt(np.mean(off**2) / np.mean(size**2)) < 0.02
+    assert len(measured_figure(responses, case.title).axes) == 2 * 4
