@@ -9,7 +9,8 @@ import numpy as np
 from study.equations import model_file
 from study.equations.model import Model
 from study.equations.place import in_words
-from study.structure.measured_fit import MeasuredFit, MeasuredPrediction, fit_measured, predict_measured
+from study.structure.measured_fit import MeasuredFit, fit_measured
+from study.structure.measured_prediction import MeasuredPrediction, predict_measured
 from study.structure.measured_spectra import CoefficientSpectrum, coefficient_spectra
 from study.structure.prepared_structure import PreparedStructure
 from study.support.arrays import Floats

@@ -7,12 +7,10 @@ exact; damping may couple the modes.
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
-from study.equations.model import Model
-from study.records import noise_floor
+from study.equations.model import Model, with_registers
 from study.records.interpolation import between_samples
 from study.records.record import MOTIONS
 from study.structure.measured_start import modal_starts
@@ -26,7 +24,7 @@ from study.support.errors import DivergenceError, StudyError
 from study.support.levenberg_marquardt import Point, minimise, point_at
 from study.support.statistics import clustered_covariance
 
-TRIALS, TRIED = 60, 6  # free runs of a search; of one with more modes, before it has to be the better
+TRIALS, TRIED = 30, 6  # free runs of a search; of one with more modes, before it has to be the better
 PATIENCE = 2  # numbers of modes in turn that are no better: more are not tried
 
 
@@ -51,59 +49,52 @@ class ModalRun:
     run: StructureRun
     sensors: tuple[Sensor, ...]
 
-    @property
-    def keys(self) -> tuple[str, ...]:
-        """Every number of it."""
-        return self.run.keys
+    def respond(self, values: Mapping[str, float], initial: Floats) -> tuple[Floats, Floats]:
+        """Motions at the sensors, shape (samples, sensors), and their derivatives by the keys and the initial state.
 
-    def respond(self, values: Mapping[str, float], initial: Floats, free: bool = True) -> tuple[Floats, Floats]:
-        """Motions at the sensors, shape (samples, sensors), and their derivatives by all keys and the initial state.
-
-        Without ``free`` there are none.
+        Where it has no keys there are no derivatives.
 
         Raises
         ------
         DivergenceError
             If a motion leaves the range of finite numbers.
         """
+        keys, n = self.run.keys, self.modal.modes
+        own, slopes = self.run.respond(values, initial, range(len(initial)) if keys else ())
         kinds = list(dict.fromkeys(s.motion for s in self.sensors))
-        run = self.run if free else replace(self.run, keys=())
-        if not free:
-            registers = self.run.program.program.registers.copy()
-            for key in self.keys:
-                registers[self.run.program.program.inputs[key]] = values[key]
-            program = replace(self.run.program.program, registers=registers)
-            run = replace(run, program=replace(self.run.program, program=program, by_key=self.run.program.by_key[:0]))
-        own, slopes = run.respond(values, initial, range(len(initial)) if free else ())
-        n = self.modal.modes
-        motion, change = np.empty((self.run.samples, len(self.sensors))), list[Floats]()
+        motion = np.empty((self.run.samples, len(self.sensors)))
+        change = np.empty((self.run.samples, len(self.sensors), slopes.shape[2]))
         for i, sensor in enumerate(self.sensors):
             rows = slice(kinds.index(sensor.motion) * n, (kinds.index(sensor.motion) + 1) * n)
-            shape = np.array([values[key] for key in self.modal.shape(sensor.coordinate)])
+            names = self.modal.shape(sensor.coordinate)
+            shape = np.array([values[key] for key in names])
             motion[:, i] = shape @ own[rows]
-            if free:
-                slope = np.einsum("r,rsk->sk", shape, slopes[rows])
-                slope[:, [self.keys.index(key) for key in self.modal.shape(sensor.coordinate)]] += own[rows].T
-                change.append(slope)
-        return motion, np.stack(change, axis=1) if free else np.zeros((*motion.shape, 0))
+            change[:, i] = np.einsum("r,rsk->sk", shape, slopes[rows])
+            for r, key in enumerate(names):
+                if key in keys:
+                    change[:, i, keys.index(key)] += own[rows][r]
+        return motion, change
 
 
 def modal_run(
     model: Model, modal: ModalKeys, prepared: PreparedStructure, sensors: tuple[Sensor, ...], steps: int,
-    span: tuple[int, int],
+    span: tuple[int, int], values: Mapping[str, float], keys: tuple[str, ...] = (),
 ) -> ModalRun:  # fmt: skip
-    """A structure by modes ready to run along a stretch of its record, ``steps`` Runge-Kutta steps a sample."""
+    """A structure by modes ready to run along a stretch of its record, ``steps`` Runge-Kutta steps a sample.
+
+    What is not in ``keys`` keeps its value.
+    """
     record, (first, last) = prepared.record, span
     columns = [record.forces[name] for name, _ in model.forces] + [record.extra[name] for name in model.channels]
     part = slice(2 * steps * first, 2 * steps * (last - 1) + 1)
-    drive = np.stack([between_samples(values, 2 * steps)[part] for values in columns], axis=1)
-    program = modal_program(model, modal, tuple(record.extra))
+    drive = np.stack([between_samples(x, 2 * steps)[part] for x in columns], axis=1)
+    made = modal_program(model, modal, keys, tuple(record.extra))
+    named = {key: values[key] for key in (*model.values, *modal.all)}
+    program = replace(made, program=with_registers(made.program, named))
     kinds = list(dict.fromkeys(s.motion for s in sensors))
     rows = [MOTIONS.index(kind) * modal.modes + r for kind in kinds for r in range(modal.modes)]
     start = record.start + first * record.dt
-    run = StructureRun(
-        program, (*model.values, *modal.all), drive, record.dt, steps, start, last - first, np.array(rows, np.int64)
-    )
+    run = StructureRun(program, keys, drive, record.dt, steps, start, last - first, np.array(rows, np.int64))
     return ModalRun(model, modal, run, sensors)
 
 
@@ -157,7 +148,8 @@ class MeasuredFit:
 def fit_measured(model: Model, prepared: PreparedStructure) -> MeasuredFit:
     """Modes and coefficients from the fitting part; values that the model gives are held.
 
-    There are as many modes as the Bayesian information criterion of the free run asks for, from one on.
+    There are as many modes as the Bayesian information criterion of the free run asks for, from one on; damping couples
+    them where it asks for that.
 
     Raises
     ------
@@ -166,43 +158,64 @@ def fit_measured(model: Model, prepared: PreparedStructure) -> MeasuredFit:
     DivergenceError
         If the structure diverges with the starting values.
     """
-    held = {key: value for key, value in model.values.items() if value is not None}
+    given = {key: value for key, value in model.values.items() if value is not None}
     best: MeasuredFit | None = None
     worse = 0
     for modal, start in modal_starts(model, prepared):
         worse += 1
         if worse > PATIENCE:
             break
-        values = {**start, **held}
+        values, held = {**start, **given}, (*given, *modal.coupling)
         steps = _steps(modal, values, prepared.dt)
         try:
-            fit = _fitted(model, modal, prepared, values, tuple(held), steps, TRIED)
+            fit = _fitted(model, modal, prepared, values, held, steps, TRIED)
         except DivergenceError:
             continue
         if best is not None and _criterion(fit, prepared) >= _criterion(best, prepared):
             continue
-        best, worse = _settled(fit, model, prepared, tuple(held)), 0
+        best, worse = _settled(fit, model, prepared, held, TRIED), 0
     if best is None:
         raise StudyError(f"forces and motions of {prepared.record.name!r} show no mode in the band that is driven")
-    return best
+    best = _settled(best, model, prepared, (*given, *best.modal.coupling), TRIALS)
+    if best.modal.modes == 1:
+        return best
+    coupled = _fitted(model, best.modal, prepared, best.values, tuple(given), best.steps, TRIALS, best.initial)
+    return coupled if _criterion(coupled, prepared) < _criterion(best, prepared) else best
 
 
-def _settled(fit: MeasuredFit, model: Model, prepared: PreparedStructure, held: tuple[str, ...]) -> MeasuredFit:
-    """The fit at its minimum, with as many steps that halving them moves no coefficient by what its error notices.
+def _settled(
+    fit: MeasuredFit, model: Model, prepared: PreparedStructure, held: tuple[str, ...], trials: int
+) -> MeasuredFit:
+    """The fit at its minimum, or so many trials nearer, with enough steps.
 
-    What too coarse an integration leaves would else be taken for a mode.
+    Halving them then moves no coefficient by what its error notices: what too coarse an integration leaves would else
+    be taken for a mode.
     """
     while True:
         if not fit.converged:
-            fit = _fitted(model, fit.modal, prepared, fit.values, held, fit.steps, TRIALS, fit.initial)
-        if 2 * fit.steps > MOST_STEPS:
+            fit = _fitted(model, fit.modal, prepared, fit.values, held, fit.steps, trials, fit.initial)
+        if 2 * fit.steps > MOST_STEPS or _fine(fit, prepared):
             return fit
-        finer = _fitted(model, fit.modal, prepared, fit.values, held, 2 * fit.steps, TRIALS, fit.initial)
+        finer = _fitted(model, fit.modal, prepared, fit.values, held, 2 * fit.steps, trials, fit.initial)
         moved = np.array([finer.values[key] - fit.values[key] for key in model.values if key not in held])
         errors = np.array([fit.error(key) for key in model.values if key not in held])
         if np.all(np.abs(moved) <= SHIFT * errors) and _criterion(finer, prepared) > _criterion(fit, prepared) - 2.0:
             return fit
         fit = finer
+        if trials < TRIALS and not fit.converged:
+            return fit
+
+
+def _fine(fit: MeasuredFit, prepared: PreparedStructure) -> bool:
+    """Whether halving the steps changes the motions by too little to move any estimate by what its error notices."""
+    coarse, fine = (
+        modal_run(fit.model, fit.modal, prepared, prepared.sensors, k * fit.steps, prepared.fit, fit.values).respond(
+            fit.values, fit.initial
+        )[0]
+        for k in (1, 2)
+    )
+    moved, left = ((x / prepared.scale).ravel() for x in (fine - coarse, fit.residual))
+    return float(np.linalg.norm(moved)) <= SHIFT * float(np.std(left))
 
 
 def _steps(modal: ModalKeys, values: Mapping[str, float], dt: float) -> int:
@@ -221,22 +234,21 @@ def _fitted(
     model: Model, modal: ModalKeys, prepared: PreparedStructure, start: Mapping[str, float], held: Collection[str],
     steps: int, trials: int, initial: Floats | None = None,
 ) -> MeasuredFit:  # fmt: skip
-    runs = modal_run(model, modal, prepared, prepared.sensors, steps, prepared.fit)
+    known = dict(start)
+    keys = tuple(key for key in (*model.values, *modal.all) if key not in held)
+    runs = modal_run(model, modal, prepared, prepared.sensors, steps, prepared.fit, known, keys)
     measured, scale = prepared.measured[slice(*prepared.fit)], prepared.scale
-    keys = tuple(key for key in runs.keys if key not in held)
-    columns = [runs.keys.index(key) for key in keys]
-    states, known = runs.run.program.states, dict(start)
+    begin = np.zeros(runs.run.program.states) if initial is None else initial
 
     def point(x: Floats) -> Point | None:
-        values = known | dict(zip(keys, x.tolist(), strict=False))
         try:
-            motion, slopes = runs.respond(values, x[len(keys) :])
+            motion, slopes = runs.respond(known | dict(zip(keys, x.tolist(), strict=False)), x[len(keys) :])
         except DivergenceError:
             return None
-        own = slopes[:, :, [*columns, *range(len(runs.keys), slopes.shape[2])]] / scale[:, None]
-        return point_at(x, ((measured - motion) / scale).ravel(), own.reshape(measured.size, -1), len(keys), (0,))
+        own = (slopes / scale[:, None]).reshape(measured.size, -1)
+        return point_at(x, ((measured - motion) / scale).ravel(), own, len(keys), (0,))
 
-    first = point(np.array([*(known[key] for key in keys), *(np.zeros(states) if initial is None else initial)]))
+    first = point(np.array([*(known[key] for key in keys), *begin]))
     if first is None:
         raise DivergenceError(f"the free run of {model.name!r} diverges with the starting values", runs.run.start)
     end = minimise(point, first, float(np.linalg.norm(measured / scale)), trials)
@@ -244,59 +256,10 @@ def _fitted(
     values = known | dict(zip(keys, x.tolist(), strict=False))
     motion, slopes = runs.respond(values, x[len(keys) :])
     residual = measured - motion
-    own = slopes[:, :, [*columns, *range(len(runs.keys), slopes.shape[2])]] / scale[:, None]
-    covariance = clustered_covariance(own.reshape(measured.size, -1), (residual / scale).ravel())
+    own = (slopes / scale[:, None]).reshape(measured.size, -1)
+    covariance = clustered_covariance(own, (residual / scale).ravel())
     estimates = {key: values[key] for key in model.values}
     return MeasuredFit(
         model.with_values(estimates), modal, values, x[len(keys) :], keys, covariance[: len(keys), : len(keys)],
         residual, end.converged, end.message, steps,
     )  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class MeasuredPrediction:
-    """The free run of such a structure along the judging part; n samples, s sensors."""
-
-    fit: MeasuredFit
-    prepared: PreparedStructure
-    predicted: Floats  # shape (n, s)
-
-    @cached_property
-    def residual(self) -> Floats:
-        """Measured minus predicted, shape (n, s)."""
-        return self.prepared.measured[slice(*self.prepared.judge)] - self.predicted
-
-    @cached_property
-    def size(self) -> Floats:
-        """Rms of each measured motion about its mean, shape (s,)."""
-        return np.std(self.prepared.measured[slice(*self.prepared.judge)], axis=0)
-
-    @cached_property
-    def errors(self) -> Floats:
-        """Rms of the residual over that of the motion, shape (s,)."""
-        return np.sqrt(np.mean(self.residual**2, axis=0)) / self.size
-
-    @property
-    def error(self) -> float:
-        """Root mean square of the sensors' errors."""
-        return float(np.sqrt(np.mean(self.errors**2)))
-
-    @cached_property
-    def floors(self) -> Floats:
-        """White noise in what is left of each sensor, over the rms of its motion, shape (s,)."""
-        return np.array([noise_floor.floor(x, self.prepared.dt).noise for x in self.residual.T]) / self.size
-
-    @property
-    def floor(self) -> float:
-        """Root mean square of the sensors' floors."""
-        return float(np.sqrt(np.mean(self.floors**2)))
-
-
-def predict_measured(fit: MeasuredFit, prepared: PreparedStructure) -> MeasuredPrediction:
-    """Run a fitted structure along the judging part, on from the fitting part or from rest where that is elsewhere."""
-    follows = prepared.judge[0] == prepared.fit[1]
-    begin = prepared.fit[0] if follows else prepared.judge[0]
-    runs = modal_run(fit.model, fit.modal, prepared, prepared.sensors, fit.steps, (begin, prepared.judge[1]))
-    initial = fit.initial if follows else np.zeros_like(fit.initial)
-    motion, _ = runs.respond(fit.values, initial, free=False)
-    return MeasuredPrediction(fit, prepared, motion[prepared.judge[0] - begin :])

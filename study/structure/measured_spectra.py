@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from study.equations.model import Model
 from study.equations.place import Place
@@ -25,6 +26,7 @@ from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_record import Sensor
 from study.support.arrays import Complexes, Floats
 
+Bools = NDArray[np.bool_]
 LONGEST, SHARE = 2048, 6  # samples in a segment at most, and parts of the record
 FAINT = 1e-3  # of the strongest line's force
 
@@ -114,8 +116,8 @@ def coefficient_spectra(fit: MeasuredFit, prepared: PreparedStructure) -> tuple[
 def _free_motion(fit: MeasuredFit, prepared: PreparedStructure) -> dict[str, Floats]:
     """Displacement and velocity of each measured coordinate in the free run, shape (2, samples)."""
     wanted = tuple(Sensor(c, m) for c in prepared.complete for m in MOTIONS[:2])
-    run = modal_run(fit.model, fit.modal, prepared, wanted, fit.steps, prepared.fit)
-    motion, _ = run.respond(fit.values, fit.initial, free=False)
+    run = modal_run(fit.model, fit.modal, prepared, wanted, fit.steps, prepared.fit, fit.values)
+    motion, _ = run.respond(fit.values, fit.initial)
     return {c: motion[:, 2 * i : 2 * i + 2].T for i, c in enumerate(prepared.complete)}
 
 
@@ -170,7 +172,7 @@ def _answers(model: Model, place: Place, by_sensor: dict[str, Responses], at: in
     return _Answers(own.response[row], along, own.covariance[:, row, row].real, variance, shared)
 
 
-def _driven(force: Floats, dt: float, cut: Segments) -> Floats:
+def _driven(force: Floats, dt: float, cut: Segments) -> Bools:
     _, power = spectra.autospectrum(force - np.mean(force), dt, cut)
     driven = power > FAINT * float(np.max(power))
     driven[[0, -1]] = False
@@ -178,7 +180,7 @@ def _driven(force: Floats, dt: float, cut: Segments) -> Floats:
 
 
 def _spectrum(
-    item: Input, place: Place, answers: _Answers, frequency: Floats, keep: Floats, cut: Segments
+    item: Input, place: Place, answers: _Answers, frequency: Floats, keep: Bools, cut: Segments
 ) -> CoefficientSpectrum:
     """The ratio line by line, less what the errors of both sides that go together add to it."""
     f, part = frequency[keep], item.parts[0]

@@ -80,7 +80,7 @@ def lines_of(model: Model, prepared: PreparedStructure) -> Lines:
     expect(len(driven) > 4 * BLOCKS, f"the forces of {prepared.record.name!r} drive {len(driven)} lines; expected more")
     keep = driven[:: max(1, len(driven) // LINES)]
     unit = [spectrum(x)[keep] for x in unit_histories(model, prepared)]
-    s = 1j * omega[keep]
+    s = (1j * omega[keep]).astype(np.complex128)
     order = np.stack([s ** MOTIONS.index(x.motion) for x in prepared.sensors], axis=1) / prepared.scale
     outputs = np.stack([spectrum(x)[keep] for x in prepared.measured.T], axis=1) / prepared.scale
     columns = np.stack(unit, axis=1) if unit else np.zeros((len(keep), 0), dtype=np.complex128)

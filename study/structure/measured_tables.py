@@ -9,9 +9,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from study.equations import dimensions
 from study.equations.model import Model
-from study.figures import frequency_response, labels, page
+from study.figures import frequency_response, page
 from study.figures.curves import Curve, InputResponse
 from study.records.record import MOTIONS
 from study.records.spectra import cross_spectra
@@ -26,7 +25,18 @@ from study.structure.structure_study import StructureCase, StructureSettings
 from study.support.arrays import Complexes, Floats
 
 ESTIMATOR = "output_error"
-COLUMNS = ["quantity", "place", "frequency", "estimator", "real", "imag", "standard_error", "exact_real", "exact_imag"]
+COLUMNS = [
+    "quantity",
+    "place",
+    "unit",
+    "frequency",
+    "estimator",
+    "real",
+    "imag",
+    "standard_error",
+    "exact_real",
+    "exact_imag",
+]
 LEAKED = 3  # lines of a window, next to the end of the band that is driven
 COEFFICIENT, TRANSFER = "coefficient", "transfer function"
 
@@ -59,11 +69,14 @@ def measured_responses(
 ) -> pd.DataFrame:  # fmt: skip
     """Coefficients line by line, and transfer functions of the linear part: SI/SO, the modes', and the exact ones."""
     parts: list[tuple[Any, ...]] = []
+    units = {
+        key: t.term.unit(s, "N", "m") for t in truth.terms for key, s in zip(t.symbols, t.term.symbols, strict=True)
+    }
     for spectrum in comparison.spectra:
         values, true = spectrum.values, truth.numbers()[spectrum.key]
         parts.append(
-            (COEFFICIENT, spectrum.key, spectrum.frequency, "instrumental", values.real, values.imag, spectrum.error,
-             true, 0.0)
+            (COEFFICIENT, spectrum.key, units[spectrum.key], spectrum.frequency, "instrumental", values.real,
+             values.imag, spectrum.error, true, 0.0)
         )  # fmt: skip
     prepared, cut = comparison.prepared, settings.segments.segments()
     (name, where), *_ = truth.forces
@@ -79,8 +92,9 @@ def measured_responses(
         for estimator, values in (("siso", found[:, k]), (ESTIMATOR, modal[:, k])):
             own, true = values[inside], exact[inside, k]
             parts.append(
-                (TRANSFER, sensor.coordinate, f[inside], estimator, own.real, own.imag, np.nan, true.real, true.imag)
-            )
+                (TRANSFER, sensor.coordinate, "m/N", f[inside], estimator, own.real, own.imag, np.nan, true.real,
+                 true.imag)
+            )  # fmt: skip
     return stacked(COLUMNS, parts)
 
 
@@ -100,16 +114,17 @@ def modal_transfer(fit: MeasuredFit, places: list[str], where: str, frequency: F
 
 def measured_figure(table: pd.DataFrame, title: str) -> Figure:
     """Every coefficient by frequency, which must be real and flat, and the linear part at every sensor."""
-    groups = list(table.groupby(["quantity", "place"], sort=False))
+    groups = list(dict.fromkeys(zip(table["quantity"], table["place"], strict=True)))
     figure, axes = page.page(
         title, "Coefficients line by line, and transfer functions of the linear part", rows=len(groups), columns=2,
         width=page.width(2), legend_rows=page.rows_for(5), share=False,
     )  # fmt: skip
     names: list[str] = []
-    for k, ((quantity, place), rows) in enumerate(groups):
+    for k, (quantity, place) in enumerate(groups):
+        rows = table[(table["quantity"] == quantity) & (table["place"] == place)]
         item, (left, right) = _item(rows, k + 1), axes[2 * k : 2 * k + 2]
         if quantity == COEFFICIENT:
-            unit = dimensions.compose("N", "m", (3, 0)) if place.startswith("k3[") else labels.response_unit("u")
+            unit = str(rows["unit"].iloc[0])
             frequency_response.real_and_imaginary(left, right, item, unit, frequency_response.common_span([item]))
             names += [f"{place}: real part", "imaginary part"]
         else:
@@ -127,10 +142,18 @@ def measured_figure(table: pd.DataFrame, title: str) -> Figure:
 
 def _item(rows: pd.DataFrame, number: int) -> InputResponse:
     curves: list[Curve] = []
-    for name, own in rows.groupby("estimator", sort=False):
-        values = own["real"].to_numpy() + 1j * own["imag"].to_numpy()
-        error = np.nan_to_num(own["standard_error"].to_numpy(dtype=np.float64))
-        curves.append(Curve(str(name), own["frequency"].to_numpy(), values, error))
+    for name in dict.fromkeys(rows["estimator"]):
+        own = rows[rows["estimator"] == name]
+        curves.append(
+            Curve(str(name), _of(own, "frequency"), _pair(own, ""), np.nan_to_num(_of(own, "standard_error")))
+        )
     first = rows[rows["estimator"] == rows["estimator"].iloc[0]]
-    exact = first["exact_real"].to_numpy() + 1j * first["exact_imag"].to_numpy()
-    return InputResponse(number, "u", tuple(curves), first["frequency"].to_numpy(), exact)
+    return InputResponse(number, "u", tuple(curves), _of(first, "frequency"), _pair(first, "exact_"))
+
+
+def _of(rows: pd.DataFrame, name: str) -> Floats:
+    return rows[name].to_numpy(dtype=np.float64)
+
+
+def _pair(rows: pd.DataFrame, prefix: str) -> Complexes:
+    return (_of(rows, f"{prefix}real") + 1j * _of(rows, f"{prefix}imag")).astype(np.complex128)

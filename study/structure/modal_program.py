@@ -47,6 +47,11 @@ class ModalKeys:
         """Elements of the modal damping matrix, ``g[1,2]``."""
         return tuple(f"g[{r + 1},{s + 1}]" for r, s in self.pairs)
 
+    @property
+    def coupling(self) -> tuple[str, ...]:
+        """Those off its diagonal."""
+        return tuple(key for (r, s), key in zip(self.pairs, self.damping, strict=True) if r != s)
+
     def shape(self, point: str) -> tuple[str, ...]:
         """Amplitudes of the modes at a point, ``phi[tip,1]``."""
         return tuple(f"phi[{point},{r}]" for r in range(1, self.modes + 1))
@@ -79,10 +84,12 @@ class _ModalBuilder(Builder):
         return total
 
 
-def modal_program(model: Model, modal: ModalKeys, available: Sequence[str] = ()) -> MotionProgram:
+def modal_program(
+    model: Model, modal: ModalKeys, keys: Sequence[str], available: Sequence[str] = ()
+) -> MotionProgram:  # fmt: skip
     """The program of a structure by modes: displacements of its state are the modal ones.
 
-    Its keys are those of the model and of ``modal``, in this order; every one is differentiated by.
+    ``keys`` are those of the model and of ``modal`` to differentiate by; registers hold the values of all.
     """
     named_channels(model, available)
     graph, n = Graph(), modal.modes
@@ -91,8 +98,7 @@ def modal_program(model: Model, modal: ModalKeys, available: Sequence[str] = ())
     forces = [graph.input(f"force:{name}") for name, _ in model.forces]
     channels = {name: graph.input(f"channel:{name}") for name in model.channels}
     states = {t.name: graph.input(f"z:{t.name}") for t in model.states}
-    keys = (*model.values, *modal.all)
-    values = {key: graph.input(key) for key in keys}
+    values = {key: graph.input(key) for key in (*model.values, *modal.all)}
     builder = _ModalBuilder(model, graph, (q, rate, time), channels, states, values)
     loads = _linear(graph, values, modal, q, rate)
     for (_, where), force in zip(model.forces, forces, strict=True):

@@ -3,6 +3,7 @@
 # Matplotlib leaves the **kwargs of its methods untyped.
 # pyright: reportUnknownMemberType=false
 
+import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
@@ -40,14 +41,21 @@ def _chosen(table: pd.DataFrame, highest: float) -> list[tuple[str, curves.Input
     """
     inside = table[(table["frequency"] > 0.0) & (table["frequency"] <= highest)]
     miso = inside[inside["estimator"] == "miso"]
-    shares = miso.groupby(["place", "shape", "equation"], sort=False)["independent"].median().reset_index()
+    keys = [str(p) + str(s) + str(e) for p, s, e in zip(miso["place"], miso["shape"], miso["equation"], strict=True)]
+    rows = miso.assign(key=keys)
+    best: dict[tuple[str, str], tuple[float, str, str]] = {}
+    for key in dict.fromkeys(keys):
+        own = rows[rows["key"] == key]
+        place, shape, equation = (str(own[name].iloc[0]) for name in ("place", "shape", "equation"))
+        share = float(np.median(own["independent"].to_numpy(dtype=np.float64)))
+        where = (_both_ways(place), shape)
+        if where not in best or share > best[where][0]:
+            best[where] = share, place, equation
     found: list[tuple[str, curves.InputResponse, float]] = []
-    for _, rows in shares.groupby([shares["place"].map(_both_ways), "shape"], sort=False):
-        best = rows.loc[rows["independent"].idxmax()]
-        own = inside[(inside["equation"] == best["equation"]) & (inside["place"] == best["place"])]
-        own = own[own["shape"] == best["shape"]].assign(input=len(found) + 1)
-        words = f"{labels.formula(str(best['shape']))} of {best['place']}: equation of {best['equation']}"
-        found.append((words, curves.responses(own, highest)[0], float(best["independent"])))
+    for (_, shape), (share, place, equation) in best.items():
+        own = inside[(inside["equation"] == equation) & (inside["place"] == place) & (inside["shape"] == shape)]
+        item = curves.responses(own.assign(input=len(found) + 1), highest)[0]
+        found.append((f"{labels.formula(shape)} of {place}: equation of {equation}", item, share))
     return found
 
 

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from study.identify.frequency_domain.coefficients import Estimate, floored
 from study.identify.frequency_domain.conditioned import MisoResult
@@ -97,7 +98,7 @@ def independent_share(result: MisoResult, matrix: SpectralMatrix) -> Floats:
     return np.where(scaled > 0.0, 1.0 / np.maximum(scaled, 1.0), 0.0)
 
 
-def _inside(matrix: SpectralMatrix, band: tuple[float, float]) -> Floats:
+def _inside(matrix: SpectralMatrix, band: tuple[float, float]) -> NDArray[np.bool_]:
     return (matrix.frequency >= band[0]) & (matrix.frequency <= band[1])
 
 
