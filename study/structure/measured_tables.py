@@ -114,7 +114,7 @@ def modal_transfer(fit: MeasuredFit, places: list[str], where: str, frequency: F
 
 def measured_figure(table: pd.DataFrame, title: str) -> Figure:
     """Every coefficient by frequency, which must be real and flat, and the linear part at every sensor."""
-    groups = list(dict.fromkeys(zip(table["quantity"], table["place"], strict=True)))
+    groups = dict.fromkeys((str(q), str(p)) for q, p in zip(table["quantity"], table["place"], strict=True))
     figure, axes = page.page(
         title, "Coefficients line by line, and transfer functions of the linear part", rows=len(groups), columns=2,
         width=page.width(2), legend_rows=page.rows_for(5), share=False,
@@ -142,12 +142,10 @@ def measured_figure(table: pd.DataFrame, title: str) -> Figure:
 
 def _item(rows: pd.DataFrame, number: int) -> InputResponse:
     curves: list[Curve] = []
-    for name in dict.fromkeys(rows["estimator"]):
+    for name in dict.fromkeys(str(e) for e in rows["estimator"]):
         own = rows[rows["estimator"] == name]
-        curves.append(
-            Curve(str(name), _of(own, "frequency"), _pair(own, ""), np.nan_to_num(_of(own, "standard_error")))
-        )
-    first = rows[rows["estimator"] == rows["estimator"].iloc[0]]
+        curves.append(Curve(name, _of(own, "frequency"), _pair(own, ""), np.nan_to_num(_of(own, "standard_error"))))
+    first = rows[rows["estimator"] == str(rows["estimator"].iloc[0])]
     return InputResponse(number, "u", tuple(curves), _of(first, "frequency"), _pair(first, "exact_"))
 
 

@@ -66,14 +66,15 @@ def _both_ways(place: str) -> str:
 
 def coherence_figure(table: pd.DataFrame, title: str, highest: float = HIGHEST) -> Figure:
     """Cumulative coherences of MI/SO, a panel an equation."""
-    equations, table = list(dict.fromkeys(table["equation"])), table.assign(terms=table["place"])
+    equations, table = list(dict.fromkeys(str(e) for e in table["equation"])), table.assign(terms=table["place"])
     figure, axes = page.page(
         title, "Cumulative coherence of each equation of motion", rows=len(equations), width=page.WIDTH + ROOM,
         legend_rows=0,
     )  # fmt: skip
     figure.subplots_adjust(right=1.0 - ROOM / (page.WIDTH + ROOM))
     for panel, equation in zip(axes, equations, strict=True):
-        coherence.cumulative(panel, curves.coherences(table[table["equation"] == equation], highest))
+        own = table[table["equation"] == equation]
+        coherence.cumulative(panel, curves.coherences(own, highest))
         panel.set_xlabel("frequency (Hz)" if equation == equations[-1] else "")
         panel.set_ylabel("cumulative coherence")
         panel.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8, borderaxespad=0.0)

@@ -16,6 +16,7 @@ from study.identify.estimators.base import Settings
 from study.identify.frequency_domain.local_polynomial_method import LocalPolynomial
 from study.records.excitation import Excitation, force
 from study.records.record import MOTIONS
+from study.reproduction.case_names import rules
 from study.reproduction.config import Name
 from study.reproduction.settings import (
     Band,
@@ -136,6 +137,7 @@ def load(folder: Path, taken: Sequence[str] = ()) -> StructureCases:
     for where, case in read_rows(folder / "structures.tsv", StructureCase):
         with at(where):
             expect(case.case not in (*taken, *cases), "the case stands twice; expected each name once")
+            expect(case.case not in rules(folder.parent), f"{case.case!r} is the name of a rule; give the case another")
             _check(case, models)
         cases[case.case] = case
     return StructureCases(settings, cases)

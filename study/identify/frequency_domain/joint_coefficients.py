@@ -9,6 +9,7 @@ inputs' spectra.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ from study.identify.frequency_domain.conditioned import MisoResult
 from study.identify.frequency_domain.inputs import Input
 from study.records.spectra import SpectralMatrix
 from study.support.arrays import Complexes, Floats
+
+_pinv = cast(Any, np.linalg.pinv)  # its annotation leaves the element type open
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +65,9 @@ def fit_jointly(
     normal = np.einsum("f,fjp,fjk,fkq->pq", weight, powers.conj(), density[:, :-1, :-1], powers, optimize=True).real
     size = np.sqrt(np.diag(normal))
     size = np.where(size > 0.0, size, np.inf)
-    inverse: Floats = np.linalg.pinv(normal / np.outer(size, size), rcond=1e-13, hermitian=True) / np.outer(size, size)
-    influence = weight[:, None, None] * (inverse @ powers.conj().transpose(0, 2, 1))
+    scale = np.outer(size, size)
+    inverse: Floats = np.asarray(_pinv(normal / scale, rcond=1e-13, hermitian=True), dtype=np.float64) / scale
+    influence = np.asarray(weight[:, None, None] * (inverse @ powers.conj().transpose(0, 2, 1)), dtype=np.complex128)
     values = np.einsum("fpj,fj->p", influence, density[:, :-1, -1]).real
     rest = np.concatenate([-(powers @ values), np.ones((len(powers), 1))], axis=1)
     symbols = tuple(p.symbol for item in inputs for p in item.parts)

@@ -62,7 +62,7 @@ def observability(omega: Floats, inputs: Complexes, outputs: Complexes, blocks: 
     rows = [_stack(driven, turn, blocks), _stack(_unit(outputs), turn, blocks)]
     data = np.concatenate(rows)
     real = np.concatenate([data.real, data.imag], axis=1)
-    triangle = np.linalg.qr(real.T, mode="r").T
+    triangle = np.asarray(np.linalg.qr(real.T)[1], dtype=np.float64).T
     first = len(rows[0])
     basis, singular, _ = np.linalg.svd(triangle[first:, first:])
     return Observability(basis, singular, outputs.shape[1], period)
