@@ -5,6 +5,7 @@ import math
 import re
 from collections.abc import Generator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +26,16 @@ RANGE = re.compile(r"([0-9]{0,15}):([0-9]{0,15})")
 MOTIONS = ("displacement", "velocity", "acceleration")
 RESULTS = Path("results")
 ALTERNATE = "every-other-block"
-GIVEN = ("dt", "fs", "group", "period", "accept_saturated", "accept_swapped", "free")  # as ``ReadOptions`` calls them
+GIVEN = (
+    "dt",
+    "fs",
+    "group",
+    "period",
+    "accept_saturated",
+    "accept_swapped",
+    "free",
+    "as_sampled",
+)  # as ``ReadOptions`` calls them
 DIGITS = 10  # of the number of a column; more are a name
 Span = tuple[int, int | None]
 
@@ -66,6 +76,9 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     )
     reading.add_argument(
         "--absolute", action="store_true", help="on a moving base (column base_acceleration): the response is absolute"
+    )  # fmt: skip
+    reading.add_argument(
+        "--as-sampled", action="store_true", help="use all samples, though the motion asks for fewer"
     )  # fmt: skip
     reading.add_argument("--free", action="store_true", help="a free decay: no force acts, a column of it is left out")
     reading.add_argument(
@@ -168,11 +181,18 @@ def accounted_together(
     from study.faults.kinds_of_tests import accounted_test
 
     with naming(path, arguments.model):
-        settings = NOTHING_ASKED if arguments.no_measurement else settings_beside(path)
+        beside = settings_beside(path)
+        settings = NOTHING_ASKED if arguments.no_measurement else beside
+        layout = replace(layout_of(arguments, records[0]), as_sampled=arguments.as_sampled or beside.as_sampled)
         return accounted_test(
-            records, model, layout_of(arguments, records[0]), absolute=arguments.absolute, held=settings.held,
-            switched_off=settings.switched_off, **options,
-        )  # fmt: skip
+            records,
+            model,
+            layout,
+            absolute=arguments.absolute,
+            held=settings.held,
+            switched_off=settings.switched_off,
+            **options,
+        )
 
 
 @contextmanager

@@ -64,6 +64,12 @@ class Comparison:
         return self.prepared.plan
 
     @property
+    def spans(self) -> tuple[tuple[int, int], tuple[int, int]]:
+        """First sample of the parts to fit and to judge, and the one after the last, as the record was sampled."""
+        plan = (self.prepared.as_sampled or self.prepared).plan
+        return plan.fit, plan.judge
+
+    @property
     def level(self) -> float:
         """Rms force of the fitting part."""
         return float(np.std(self.record["force"][slice(*self.plan.fit)]))

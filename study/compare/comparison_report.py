@@ -69,7 +69,8 @@ def _of_record(comparison: Comparison) -> Row:
         "above_noise": {"response": prediction.structure, "standard_errors": prediction.noise.significance},
         "coefficients": [coefficient_row(c) for c in comparison.coefficients],
         "fit": {
-            "samples": list(comparison.plan.fit), "judged": list(comparison.plan.judge),
+            "samples": list(comparison.spans[0]), "judged": list(comparison.spans[1]),
+            "every_sample": comparison.prepared.every,
             "response": comparison.plan.response,
             "estimator": comparison.estimator, "converged": comparison.fit.converged, "message": comparison.fit.message,
         },
@@ -268,9 +269,10 @@ def _in_units(comparison: Comparison) -> str:
 def _headline(comparison: Comparison) -> str:
     low, high = comparison.force.frequency[comparison.force.band][[0, -1]]
     by = "" if comparison.estimator == FREE_RUN else f" by {comparison.estimator}"
+    fit, judge = comparison.spans
     return (
-        f"model {comparison.model.name}: fitted to samples {comparison.plan.fit[0]} to {comparison.plan.fit[1]}{by}, "
-        f"judged on {comparison.plan.judge[0]} to {comparison.plan.judge[1]}\n"
+        f"model {comparison.model.name}: fitted to samples {fit[0]} to {fit[1]}{by}, judged on {judge[0]} to "
+        f"{judge[1]}\n"
         f"response: free run, rms difference over rms {comparison.plan.response}; "
         f"force: share of power unexplained, {low:.3g} to {high:.3g} Hz"
     )

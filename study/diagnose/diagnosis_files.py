@@ -18,8 +18,14 @@ def in_words(diagnosis: Diagnosis) -> str:
     said = sentences(diagnosis)
     if diagnosis.verdict == MISSING:
         said.append(advice(diagnosis.candidates, diagnosis.comparison.prepared))
+    said += [f"{note[0].upper()}{note[1:]}." for note in chosen(diagnosis.comparison.notes)]
     said.append(reading_in_words(diagnosis.comparison))
     return " ".join(s for s in said if s)
+
+
+def chosen(notes: Sequence[str]) -> list[str]:
+    """What was chosen for the user, who may choose else, and a sampling that is too coarse: said beside the verdict."""
+    return [note for note in notes if "(--" in note or "too coarsely" in note]
 
 
 def unneeded_in_words(found: Sequence[Needless], diagnosis: Diagnosis) -> str:
@@ -41,5 +47,6 @@ def files(
     content |= {"record": comparison.record.name, "where": where(comparison), "says": words}
     content["not_needed"] = fields(unneeded)
     content["not_fitted"] = dict(unfitted or {})
+    content |= {"notes": list(comparison.notes), "every_sample": comparison.prepared.every}
     content |= {"measurement": [fault.fields(f) for f in faults]}
     return {"diagnosis.json": as_json(content)} | diagnosis_pages.files(diagnosis, comparison.record.name)

@@ -17,6 +17,7 @@ from study.equations.terms import Term
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.rivals import larger
 from study.records.interpolation import READINGS
+from study.records.oversampling import without_spare_samples
 from study.records.prepared import Prepared
 from study.support.errors import StudyError
 from study.support.numbers import percent
@@ -53,10 +54,11 @@ def _better_read(comparison: Comparison, best: float) -> Iterator[Prepared]:
     A reading that moves the response by less than what is unexplained cannot explain it, and is not fitted. The fit
     begins from nothing: what was fitted under a wrong reading may be far from the truth.
     """
-    prepared, now = comparison.prepared, comparison.prediction
-    for reading in (name for name in READINGS if name != prepared.record.between):
-        record = replace(prepared.record, between=reading)
-        other = replace(prepared, record=record, notes=(*prepared.notes, _note(reading, comparison)))
+    now, sampled = comparison.prediction, _sampled(comparison)
+    for reading in (name for name in READINGS if name != sampled.record.between):
+        record = replace(sampled.record, between=reading)
+        other = replace(sampled, record=record, notes=(*sampled.notes, _note(reading, comparison)))
+        other = without_spare_samples(other) if comparison.prepared.as_sampled else other
         try:
             moved = predict(comparison.fit, other).residual - now.residual
             if np.std(moved) < np.std(now.residual):
@@ -68,6 +70,11 @@ def _better_read(comparison: Comparison, best: float) -> Iterator[Prepared]:
             yield other
 
 
+def _sampled(comparison: Comparison) -> Prepared:
+    """The record with all of its samples: what the force does between those that are kept, a filter has seen to."""
+    return comparison.prepared.as_sampled or comparison.prepared
+
+
 def _note(reading: str, comparison: Comparison) -> str:
     error = percent(comparison.prediction.error)
     return f"the force {WORDS[reading]}: read as band-limited, as a measured one is, it leaves {error} of the response"
@@ -75,6 +82,6 @@ def _note(reading: str, comparison: Comparison) -> str:
 
 def reading_in_words(comparison: Comparison) -> str:
     """A sentence on how the force is read, empty where it is band-limited."""
-    said = WORDS.get(comparison.record.between, "")
+    said = WORDS.get(_sampled(comparison).record.between, "")
     note = next((note for note in comparison.notes if said and said in note), "")
     return f"{note[0].upper()}{note[1:]}." if note else ""

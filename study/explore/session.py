@@ -24,6 +24,7 @@ from study.diagnose.verdict import Diagnosis, search_base, search_part
 from study.equations import formulas
 from study.equations.model import Model
 from study.equations.terms import LIBRARY, Term, custom
+from study.records.oversampling import without_spare_samples
 from study.records.prepared import Prepared
 from study.support.errors import StudyError, expect
 
@@ -84,8 +85,8 @@ class Session:
 def begin(
     model: Model, prepared: Prepared, *, earlier: Sequence[Step] = (), progress: Progress | None = None
 ) -> Session:
-    """A session with the model as given."""
-    return begin_with(compare(model, prepared, progress=progress), earlier=earlier)
+    """A session with the model as given, on the samples that the record's motion asks for."""
+    return begin_with(compare(model, without_spare_samples(prepared), progress=progress), earlier=earlier)
 
 
 def begin_with(comparison: Comparison, *, earlier: Sequence[Step] = ()) -> Session:

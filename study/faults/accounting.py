@@ -15,6 +15,8 @@ from study.faults.search import first_faults, search
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.settling import settled
+from study.records.coarse_sampling import too_coarse
+from study.records.oversampling import without_spare_samples
 from study.records.prepared import FORCE, Prepared
 from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE
@@ -38,8 +40,12 @@ def accounted(
     switched_off: Sequence[str] = (),
     estimator: str = FREE_RUN,
     progress: Callable[[str], None] | None = None,
+    as_sampled: bool = False,
 ) -> Accounted:
     """Compare a model with a record, the faults of the measurement accounted for.
+
+    Faults are looked for in the record as it was sampled, and the corrected record is then compared without the samples
+    that its motion does not ask for (:mod:`study.records.oversampling`).
 
     Parameters
     ----------
@@ -49,6 +55,8 @@ def accounted(
         Values of faults (of ``HOLDABLE``) that are known; they are corrected and not searched for.
     switched_off : sequence of str
         Faults that are not looked for.
+    as_sampled : bool
+        Whether all samples are used, whether the motion asks for them or not.
 
     Returns
     -------
@@ -64,15 +72,33 @@ def accounted(
     asked = tuple(name for name in FAULTS if name not in switched_off and name not in known)
     if asked and not _may_be_asked(prepared):
         asked, prepared = (), replace(prepared, notes=(*prepared.notes, NOT_ASKED))
+    coarse = too_coarse(prepared)
+    prepared = replace(prepared, notes=(*prepared.notes, coarse)) if coarse else prepared
+    needed = _all_samples if as_sampled else without_spare_samples
     faults = first_faults(prepared, known, asked)
     first = corrected(prepared, faults)
+    fewer = needed(first)
     if not asked:
-        return _compared(model, first, faults, None, estimator, progress)
-    fit = fit_model(model, first)
-    found, near = search(prepared, fit, faults, asked)
-    final = first if found == faults else corrected(prepared, found)
-    best = fit if final is first else _fitted(model, final, near)
-    return _compared(model, final, found, best, estimator, progress)
+        return _compared(model, fewer, faults, None, estimator, progress)
+    fit = fit_model(model, fewer)
+    found, near = search(prepared, fit if fewer is first else _on_all(fit, first), faults, asked)
+    if found == faults:
+        return _compared(model, fewer, found, fit, estimator, progress)
+    final = corrected(prepared, found)
+    kept = needed(final)
+    best = _fitted(model, kept, near if kept is final else _on_all(near, kept))
+    return _compared(model, kept, found, best, estimator, progress)
+
+
+def _all_samples(prepared: Prepared) -> Prepared:
+    return prepared
+
+
+def _on_all(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
+    """A fit to a record with other samples of the same motion, from the values where it stands."""
+    values = fit.model.numbers()
+    again = fit_model(fit.model.with_values(dict.fromkeys(fit.keys)), prepared, {key: values[key] for key in fit.keys})
+    return replace(again, elsewhere=())
 
 
 def _may_be_asked(prepared: Prepared) -> bool:

@@ -11,14 +11,19 @@ from scipy.fft import rfft, rfftfreq
 
 from study.faults.fault import FORCE_NOISE, Fault
 from study.faults.leftover import Leftover
+from study.identify.time_domain.part_fit import run_of
 from study.identify.time_domain.shape_search import baseline
-from study.support.arrays import Complexes, Floats
+from study.records.prepared import FORCE, Prepared
+from study.support.arrays import Floats
 from study.support.least_squares import least_squares
 from study.support.thresholds import ALPHA, TOLERANCE
 
 MEMORIES = (0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.9)  # correlation of neighbouring samples
 ROUNDS = 100  # of Fisher's scoring, at most
 HALVINGS = 14  # of one step, at most
+RUNS = 32  # of a nonlinear model with a little noise on its force
+LITTLE = 0.01  # of the force: what measured ones have; where a force switches, less would find no switch moved
+LINES = 5  # of a spectrum, over which the mean of these runs is taken
 SHRINKING = 1e-3  # to which share of itself an amount may fall in one step
 LINEAR = {"m": "inertia", "c": "linear_damping", "k": "linear_stiffness"}
 
@@ -38,7 +43,7 @@ def force_noise(left: Leftover, asked: int) -> Fault | None:
     n, prepared = len(residual), left.prepared
     frequency = np.asarray(rfftfreq(n, prepared.dt))[1:-1]
     power = np.abs(np.asarray(rfft(residual)))[1:-1] ** 2 / n
-    passed = np.abs(_transfer(left, np.asarray(2j * np.pi * frequency, dtype=np.complex128))) ** 2
+    passed = _passed(left, frequency)
     level = float(np.mean(passed))
     colours = [_first_order(memory, 2.0 * np.pi * frequency * prepared.dt) for memory in MEMORIES]
     on_response = min(_likely(power, colour).cost for colour in colours)
@@ -62,13 +67,33 @@ def _rms(found: list[_Noise], level: float) -> tuple[float, float]:
     return value, float(np.sqrt(weights @ (np.where(weights > 1e-6, errors, 0.0) ** 2 + (sizes - value) ** 2)))
 
 
-def _transfer(left: Leftover, omega: Complexes) -> Complexes:
-    """From a small force to the response: of the model itself where it is linear, else of what is nearest to it."""
-    base = baseline(left.fit, left.prepared)
+def _passed(left: Leftover, frequency: Floats) -> Floats:
+    """Spectrum of the response to white noise of unit mean square on the force, shape (lines,).
+
+    That of a linear model is known. A nonlinear one answers a small force along each motion in another way: there it is
+    the mean over runs with a little noise on the force, of some neighbouring lines.
+    """
+    own = left.fit.model.numbers()
     if all(entry.name in LINEAR.values() for entry in left.fit.model.terms):
-        own = left.fit.model.numbers()
+        base = baseline(left.fit, left.prepared)
         base = replace(base, approximation={symbol: own.get(symbol, 0.0) for symbol in LINEAR})
-    return base.transfer(omega)
+        return np.abs(base.transfer(np.asarray(2j * np.pi * frequency, dtype=np.complex128))) ** 2
+    rng, record = np.random.default_rng(0), left.prepared.record
+    quiet, size = np.concatenate(left.predicted), LITTLE * float(np.std(record[FORCE]))
+    power = np.zeros(len(frequency))
+    for _ in range(RUNS):
+        noisy = record.with_channels({FORCE: record[FORCE] + size * rng.standard_normal(len(record))})
+        added = (_response(left, replace(left.prepared, record=noisy)) - quiet) / size
+        power += np.abs(np.asarray(rfft(added)))[1:-1] ** 2 / len(added)
+    smooth = np.convolve(power, np.ones(LINES), "same") / np.convolve(np.ones(len(power)), np.ones(LINES), "same")
+    return smooth / RUNS
+
+
+def _response(left: Leftover, prepared: Prepared) -> Floats:
+    """Response of the fitted model on both parts of a record, shape (n + m,)."""
+    fitted = run_of(left.fit, prepared).respond({}, left.fit.initial)[0]
+    assert left.prediction.run is not None, "what does not run leaves nothing to look at"
+    return np.concatenate([fitted, replace(left.prediction.run, prepared=prepared).motion(prepared.response)])
 
 
 def _likely(power: Floats, shape: Floats) -> _Noise:

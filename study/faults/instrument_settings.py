@@ -1,7 +1,7 @@
 """What the user says of the instruments: which faults are held at a value, and which are not looked for."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from study.faults.fault import HOLDABLE, NAMES
@@ -11,10 +11,11 @@ from study.support.errors import at, expect
 
 @dataclass(frozen=True)
 class Settings:
-    """Faults with a value that is known, and faults that are not looked for."""
+    """Faults with a value that is known, faults that are not looked for, and whether all samples are used."""
 
     held: Mapping[str, float] = field(default_factory=dict[str, float])
     switched_off: tuple[str, ...] = ()
+    as_sampled: bool = False
 
 
 NOTHING_ASKED = Settings(switched_off=NAMES)
@@ -31,11 +32,11 @@ def settings_beside(record: Path) -> Settings:
     path = beside(record)
     if not path.is_file():
         return Settings()
-    given = read_options(path).measurement
-    if given is None:
-        return Settings()
+    options = read_options(path)
     with at(path):
-        return NOTHING_ASKED if given == {} else settings_of(given)
+        asked = settings_of(options.measurement) if options.measurement else Settings()
+    asked = NOTHING_ASKED if options.measurement == {} else asked
+    return replace(asked, as_sampled=options.as_sampled)
 
 
 def settings_of(given: Mapping[str, float | None]) -> Settings:

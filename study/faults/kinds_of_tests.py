@@ -62,7 +62,9 @@ def accounted_test(
     every few periods. Parameters are those of :func:`made_ready`, ``options`` those of
     :func:`study.faults.accounting.accounted`; it raises as both do.
     """
-    model, prepared = made_ready(records, model, layout or Layout(), absolute)
+    layout = layout or Layout()
+    model, prepared = made_ready(records, model, layout, absolute)
+    options["as_sampled"] = layout.as_sampled
     found = accounted(model, prepared, **options)
     if runs_on(prepared):
         anew = apart(prepared)

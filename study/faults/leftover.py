@@ -85,7 +85,7 @@ class Share:
     covariance: Floats  # shape (k, k), clustered
     p_value: float  # of such amounts, or the first of them, if they were zero
     gain: Gain  # on the judging part, of the amounts of the fitting part
-    power: float  # by which the mean square falls there, over that of the response
+    power: float  # mean square on both parts of what the amounts from both add beside the model's own, over the response's
 
     def significant(self, asked: int) -> bool:
         """Whether that is no chance, of so many that were asked for, and more than integration resolves."""
@@ -109,17 +109,23 @@ def share(left: Leftover, columns: tuple[Floats, Floats], leading: bool = False)
     or, where ``leading``, of the first alone: the others stand for what is unknown beside it.
     """
     fitted, judged = left.known(columns)
-    taken = np.column_stack([least_squares(left.own[0], c, 1e-9) for c in fitted.T])
+    taken = _taken(left.own[0], fitted)
     alone = fitted - left.own[0] @ taken
     if np.any(np.linalg.norm(alone, axis=0) <= INDISTINCT * np.linalg.norm(fitted, axis=0)):
         return None
     change = (judged - left.own[1] @ taken) @ least_squares(alone, left.residual[0], 1e-9)
-    before = left.residual[1]
-    power = float(np.mean(before**2) - np.mean((before - change) ** 2)) / left.size**2
     whole, covariance = amounts_on_both(left, columns)
+    both = np.vstack(left.own)
+    apart = np.vstack([fitted, judged]) - both @ _taken(both, np.vstack([fitted, judged]))
+    power = float(np.mean((apart @ whole) ** 2)) / left.size**2
     tested = slice(1) if leading else slice(None)
     return Share(whole, covariance, _p_value(whole[tested], covariance[tested, tested]),
-                 beside(before, change, left.beside_own), power)  # fmt: skip
+                 beside(left.residual[1], change, left.beside_own), power)  # fmt: skip
+
+
+def _taken(own: Floats, columns: Floats) -> Floats:
+    """Amounts of the model's own sensitivities that come nearest to each column, shape (p, k)."""
+    return np.column_stack([least_squares(own, column, 1e-9) for column in columns.T])
 
 
 def _p_value(amounts: Floats, covariance: Floats) -> float:

@@ -84,9 +84,12 @@ def _simplest_of_the_best(tried: Sequence[Leftover]) -> Leftover | None:
 
 
 def refitted(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit | None:
-    """A fit again, on a record that was corrected, from where it stands; None where that does not run."""
+    """A fit again, on a record that was corrected, from where it stands; None where that is no single free run."""
+    if fit.restarts:
+        return None
+    initial = np.atleast_2d(fit.initial) if fit.first == prepared.plan.fit[0] else None
     try:
-        return fit_part(fit.model, prepared, fit.held, steps=fit.steps_per_sample, initial=np.atleast_2d(fit.initial))
+        return fit_part(fit.model, prepared, fit.held, steps=fit.steps_per_sample, initial=initial)
     except StudyError:
         return None
 

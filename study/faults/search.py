@@ -64,7 +64,23 @@ def search(
     left, rich = (physics.refitted(one.fit, corrected(given, known)) for one in (part.left, part.rich))
     plain = tuple(name for name in asked if name in PLAIN)
     stage = None if left is None or rich is None else _searched(given, left, rich, known, plain)
-    return (tuple(faults), fit) if stage is None else (stage.faults, stage.left.fit)
+    if stage is None:
+        return tuple(faults), fit
+    stage = _values_again(stage)
+    return stage.faults, stage.left.fit
+
+
+def _values_again(stage: Stage) -> Stage:
+    """The stage with the values of its faults found again, beside the effects and the other faults known by now."""
+    for fault in stage.faults:
+        if fault.fault in adjustable.ADJUSTABLE and fault.corrected and not fault.held:
+            others = tuple(f for f in stage.faults if f is not fault)
+            again = refined(fault.fault, stage.given, others, stage.rich, fault.value)
+            following = None if again is None else replace(stage, faults=others).without(
+                replace(again.fault, explained=fault.explained)
+            )  # fmt: skip
+            stage = following or stage
+    return stage
 
 
 def _searched(
@@ -153,11 +169,20 @@ def _contested(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
     return _accepted(stage, one)
 
 
+def _no_effect(effect: Leftover, stage: Stage) -> bool:
+    """Whether what the record asks for most lies outside of what makes it physical."""
+    return physics.unphysical(effect.fit, _added(effect, stage))
+
+
+def _added(effect: Leftover, stage: Stage) -> list[str]:
+    return [e.name for e in effect.fit.model.terms if e.name not in stage.rich.fit.model]
+
+
 def _noisy_force(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
     """The stage with noise on the force, which is said of what no effect explains; None if it is not seen or known."""
-    if FORCE_NOISE not in names or len(stage.effects) >= EFFECTS or force_noise(stage.rich, asked) is None:
+    if FORCE_NOISE not in names or force_noise(stage.rich, asked) is None:
         return None
-    effect = physics.missing(stage.rich)
+    effect = physics.missing(stage.rich) if len(stage.effects) < EFFECTS else None
     if effect is not None:
         return _beside(effect, stage)
     # What an integration in few steps leaves is shaped by the structure too.
@@ -211,16 +236,7 @@ def _accepted(stage: Stage, one: Refined) -> Stage | None:
 
 def _beside(effect: Leftover, stage: Stage) -> Stage:
     """The stage with an effect more, and the values of its faults found again beside it: its lack has moved them."""
-    stage = replace(stage, rich=effect)
-    for fault in stage.faults:
-        if fault.fault in adjustable.ADJUSTABLE and fault.corrected and not fault.held:
-            others = tuple(f for f in stage.faults if f is not fault)
-            again = refined(fault.fault, stage.given, others, stage.rich, fault.value)
-            following = None if again is None else replace(stage, faults=others).without(
-                replace(again.fault, explained=fault.explained)
-            )  # fmt: skip
-            stage = following or stage
-    return stage
+    return _values_again(replace(stage, rich=effect))
 
 
 def _explaining(fault: Fault, before: Leftover, after: Leftover) -> Fault:
@@ -232,8 +248,8 @@ def _tied(stage: Stage, one: Refined, effect: Leftover) -> Stage | None:
 
     Not so beside an effect that is none, as a Maxwell element of negative stiffness, which hastens what is late.
     """
-    names = [e.name for e in effect.fit.model.terms if e.name not in stage.rich.fit.model]
-    if physics.unphysical(effect.fit, names) or (one.fault.fault == HUM and _beyond_reason(stage, effect)):
+    names = _added(effect, stage)
+    if _no_effect(effect, stage) or (one.fault.fault == HUM and _beyond_reason(stage, effect)):
         return _accepted(stage, one)
     fault = _explaining(one.fault, stage.rich, one.left).with_rivals(*names)
     return replace(stage, faults=(*stage.faults, fault), rich=effect)

@@ -103,7 +103,7 @@ def drop_outs(left: Leftover, asked: int) -> Fault | None:
         return None
     noisy = _noise(np.concatenate(left.residual)) > TOLERANCE * left.size
     if _at_rest(prepared.response, values[mask]):
-        mask = _moving(mask, places, power, ALPHA / (asked * runs))
+        mask = _moving(mask, places, power, ALPHA / (asked * runs), noisy)
     there = mask[places]
     if not np.any(there):
         return None
@@ -123,14 +123,19 @@ def _at_rest(response: str, standing: Floats) -> bool:
     return response != "displacement" and not np.any(standing)
 
 
-def _moving(mask: NDArray[np.bool_], places: Ints, power: Floats, level: float) -> NDArray[np.bool_]:
-    """The runs of a mask in which more is left than elsewhere, by the F test of each as a single number, shape (n,)."""
+def _moving(mask: NDArray[np.bool_], places: Ints, power: Floats, level: float, noisy: bool) -> NDArray[np.bool_]:
+    """The runs of a mask in which more is left than elsewhere, by the F test of each as a single number, shape (n,).
+
+    All of them, if there is any, where noise lies on the channel: what is at rest under noise does not stand still.
+    """
     left = np.full(len(mask), np.nan)
     left[places] = power
     elsewhere = max(float(np.nanmean(left[~mask])), np.finfo(float).tiny)
+    runs = _runs(mask & ~np.isnan(left))
+    sure = [float(fdtrc(1, len(power), np.mean(left[first:last]) / elsewhere)) < level for first, last in runs]
     kept = np.zeros_like(mask)
-    for first, last in _runs(mask & ~np.isnan(left)):
-        kept[first:last] = float(fdtrc(1, len(power), np.mean(left[first:last]) / elsewhere)) < level
+    for (first, last), lost in zip(runs, sure, strict=True):
+        kept[first:last] = lost or (noisy and any(sure))
     return kept
 
 
@@ -152,13 +157,14 @@ def widened(fault: Fault, given: Prepared, left: Leftover) -> Fault:
     have zero mean, and the coefficients a bias. What was read far from the limit was not clipped, wherever the free run
     of a model that lacks something goes.
     """
-    if fault.lost is None:
-        return fault
-    prepared, lost = left.prepared, fault.lost.copy()
     values = given.record[given.response]
+    clipped = at_the_limits(values, converter_step(values))
+    if clipped is None:
+        return fault
+    prepared, lost = left.prepared, clipped.copy()
     # Either is the noise and more: what is left by edges of what is lost, and the measured motion by its own bends.
     margin = MARGIN * min(_noise(np.concatenate(left.residual)), _noise(values))
-    for limit in np.unique(values[fault.lost]).tolist():
+    for limit in np.unique(values[clipped]).tolist():
         sign = 1.0 if limit > float(np.mean(values)) else -1.0
         for span, predicted in zip((left.fit.span, prepared.plan.judge), left.predicted, strict=True):
             near = sign * (values[slice(*span)] - limit) > -3.0 * margin

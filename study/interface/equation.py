@@ -202,7 +202,7 @@ class Model:
     def fit(
         self, record: Record, *, fit: tuple[int, int] | None = None, judge: tuple[int, int] | None = None,
         response: str | None = None, cutoff: float | None = None, estimator: str = "output_error",
-        measurement: Mapping[str, float | None] | bool | None = None,
+        measurement: Mapping[str, float | None] | bool | None = None, as_sampled: bool = False,
     ) -> "Fit":  # fmt: skip
         """Fit what the model leaves open to one part of a record, and judge it on the other.
 
@@ -222,6 +222,8 @@ class Model:
         measurement : mapping, or False
             Faults of the measurement: False to look for none; by name a value that is known, or None for one that is
             not to be looked for. If left out, what stands beside the record's file.
+        as_sampled : bool
+            Use all samples, though the motion asks for fewer.
 
         Raises
         ------
@@ -232,7 +234,7 @@ class Model:
 
         return fitted(
             self, record, fit=fit, judge=judge, response=response, cutoff=cutoff, estimator=estimator,
-            measurement=measurement,
+            measurement=measurement, as_sampled=as_sampled,
         )  # fmt: skip
 
     def __repr__(self) -> str:

@@ -269,13 +269,18 @@ class Fit(FitPictures):
 
 def fitted(
     model: Model, record: Record, *, fit: Span | None, judge: Span | None, response: str | None, cutoff: float | None,
-    estimator: str, measurement: Mapping[str, float | None] | bool | None,
+    estimator: str, measurement: Mapping[str, float | None] | bool | None, as_sampled: bool,
 ) -> Fit:  # fmt: skip
     """What :meth:`Model.fit` does; its arguments."""
     settings = _settings(record, measurement)
     prepared = prepared_part(record, fit, judge, response, cutoff)
     found = accounted(
-        model.equation, prepared, held=settings.held, switched_off=settings.switched_off, estimator=estimator
+        model.equation,
+        prepared,
+        held=settings.held,
+        switched_off=settings.switched_off,
+        estimator=estimator,
+        as_sampled=as_sampled or settings.as_sampled,
     )
     return Fit(found.comparison, found.faults)
 

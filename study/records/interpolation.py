@@ -39,13 +39,27 @@ def between_samples(values: Floats, factor: int, reading: str = BAND_LIMITED) ->
         fine[factor:-1:factor] = 0.5 * (values[:-2] + values[1:-1])
         return fine
     edge = min(EDGE, n - 1)
+    longer = _reflected(values, edge)
+    if _closes(values, longer):
+        return _periodic(values, factor)[: factor * (n - 1) + 1]
+    return _periodic(longer, factor)[factor * edge : factor * (edge + n - 1) + 1]
+
+
+def closes(values: Floats) -> bool:
+    """Whether a record goes on from its last sample to its first without a jump, as a period of a force does."""
+    return _closes(values, _reflected(values, min(EDGE, len(values) - 1)))
+
+
+def _closes(values: Floats, longer: Floats) -> bool:
+    return _top_energy(values) <= CLOSES * _top_energy(longer)
+
+
+def _reflected(values: Floats, edge: int) -> Floats:
+    """A record continued at both ends by point reflection that is faded out, shape (n + 2 edge,)."""
     fade = 0.5 - 0.5 * np.cos(np.pi * np.arange(edge) / edge)
     before = (2.0 * values[0] - values[edge:0:-1]) * fade
     after = (2.0 * values[-1] - values[-2 : -edge - 2 : -1]) * fade[::-1]
-    continued = np.concatenate([before, values, after])
-    if _top_energy(values) <= CLOSES * _top_energy(continued):
-        return _periodic(values, factor)[: factor * (n - 1) + 1]
-    return _periodic(continued, factor)[factor * edge : factor * (edge + n - 1) + 1]
+    return np.concatenate([before, values, after])
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,6 +39,11 @@ class Prepared:
         The motions that were measured; the others are derivatives and integrals of them.
     lost : bool array, shape (n,), optional
         Samples of the response that say nothing, such as clipped ones: they are neither fitted nor judged.
+    every : int
+        How many samples of the record, as it was sampled, there are to one of this
+        (:mod:`study.records.oversampling`).
+    as_sampled : Prepared, optional
+        The record with all of its samples, where this has fewer.
     """
 
     record: Record
@@ -49,6 +54,8 @@ class Prepared:
     low: float = 0.0
     measured: tuple[str, ...] = ()
     lost: NDArray[np.bool_] | None = None
+    every: int = 1
+    as_sampled: "Prepared | None" = None
 
     @property
     def response(self) -> str:

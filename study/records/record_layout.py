@@ -7,12 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from study.records.completion import CompletedRecord, complete
-from study.records.plan import make_plan
+from study.records.oversampling import completed_without_spare
+from study.records.plan import Plan, make_plan
 from study.records.prepared import FORCE, Prepared, prepare_record
 from study.records.prescribed import with_prescribed_motion
 from study.records.record import MOTIONS, Record, Stretch
+from study.records.shared_frequencies import differ, shared
 from study.records.stretches import alternating, strung_together, sure, within_the_horizon
 from study.support.errors import StudyError, at, expect
+from study.support.numbers import percent
 
 Span = tuple[int, int]
 
@@ -33,6 +36,8 @@ class Layout:
         The measured motion that free runs are held against.
     cutoff : float, optional
         Frequency in hertz above which a measured acceleration is integrated.
+    as_sampled : bool
+        Whether all samples are used, though the motion asks for fewer.
     """
 
     use: tuple[tuple[float, float | None], ...] = ()
@@ -41,6 +46,7 @@ class Layout:
     alternate: bool = False
     response: str | None = None
     cutoff: float | None = None
+    as_sampled: bool = False
 
 
 def laid_out(records: Sequence[Record], layout: Layout, *, prescribed: bool = False, drifts: bool = False) -> Prepared:
@@ -48,7 +54,7 @@ def laid_out(records: Sequence[Record], layout: Layout, *, prescribed: bool = Fa
 
     A single stretch under a force is fitted in its first half and judged in its second. Every other block is judged of
     several stretches, of a free decay, whose second half is quiet, of a prescribed motion, which is often a program of
-    amplitudes and frequencies, and where the user says so.
+    amplitudes and frequencies, of a sweep or dwells, whose halves have other frequencies, and where the user says so.
 
     Parameters
     ----------
@@ -77,10 +83,17 @@ def laid_out(records: Sequence[Record], layout: Layout, *, prescribed: bool = Fa
     free = not prescribed and all(_unforced(r, layout) for r in records)
     several = len(records) > 1 or len(layout.use) > 1
     turns = several or layout.alternate or ((free or prescribed) and not explicit)
+    notes, every = [n for _, said in readied for n in said], 1
     if not (turns or layout.use or drifts):
-        return _plain(records[0], layout, response, [n for _, notes in readied for n in notes])
+        plan = _plan(records[0], layout, response)
+        if explicit or not differ(records[0], plan.fit, plan.judge):
+            return _plain(records[0], plan, layout, notes)
+        turns = True
+        notes.append(_why(records[0], plan))
     completed = [complete(record, layout.cutoff) for record in records]
-    notes = [n for _, said in readied for n in said]
+    if turns and not (layout.use or layout.as_sampled or free or prescribed or drifts):
+        shortest = sum(len(record) for record in records) // 2
+        completed, every = completed_without_spare(completed, _measured(records), shortest)
     if explicit:
         plan = make_plan(records[0], layout.fit, layout.judge, response)
         fit, judge = [sure(completed[0], *plan.fit)], [sure(completed[0], *plan.judge)]
@@ -98,14 +111,29 @@ def laid_out(records: Sequence[Record], layout: Layout, *, prescribed: bool = Fa
             f"of {horizon:.3g} s, from {len(fit)} and {len(judge)} states of its own"
         )
     prepared = strung_together(fit, judge, response, completed, notes)
-    measured = tuple(m for m in MOTIONS if m in records[0])
-    return replace(prepared, low=layout.cutoff or 0.0, measured=measured)
+    return replace(prepared, low=layout.cutoff or 0.0, measured=_measured(records), every=every)
 
 
-def _plain(record: Record, layout: Layout, response: str, notes: list[str]) -> Prepared:
-    """A single stretch: halves, or the samples that are named."""
+def _measured(records: Sequence[Record]) -> tuple[str, ...]:
+    return tuple(m for m in MOTIONS if all(m in record for record in records))
+
+
+def _plan(record: Record, layout: Layout, response: str) -> Plan:
+    """Of a single stretch: halves, or the samples that are named."""
     with at(record.name):
-        plan = make_plan(record, layout.fit, layout.judge, response)
+        return make_plan(record, layout.fit, layout.judge, response)
+
+
+def _why(record: Record, plan: Plan) -> str:
+    share = percent(shared(record, plan.fit, plan.judge), ".0f")
+    return (
+        f"the halves of the record share {share} of the force's power at the same frequencies, as those of a sweep or "
+        "of dwells do, so that every other block is judged in place of a half (--fit and --judge A:B choose parts)"
+    )
+
+
+def _plain(record: Record, plan: Plan, layout: Layout, notes: list[str]) -> Prepared:
+    """A single stretch in two parts."""
     prepared = prepare_record(record, plan, layout.cutoff)
     return replace(prepared, notes=(*notes, *prepared.notes)) if notes else prepared
 

@@ -14,6 +14,7 @@ from scipy.fft import rfftfreq
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
+KAISER = 20.0  # side lobes at -150 dB
 CHUNK = 64  # segments transformed at a time: they stay in the cache, and memory does not grow with the record
 
 
@@ -28,7 +29,8 @@ class Segments:
     overlap : float
         Fraction that neighbours share (the report: a half).
     window : str
-        Any window ``scipy.signal.get_window`` knows (the report: Hanning).
+        Any window ``scipy.signal.get_window`` knows (the report: Hanning), or ``kaiser``, whose side lobes lie at the
+        rounding of what a converter, or a simulation, gives.
     """
 
     length: int = 512
@@ -55,6 +57,8 @@ class Segments:
         """The window's samples, shape (length,)."""
         if self.window == "hann":  # SciPy's signal package takes longer to load than most steps of the study to run
             return np.hanning(self.length + 1)[:-1]
+        if self.window == "kaiser":
+            return np.kaiser(self.length + 1, KAISER)[:-1]
         from scipy.signal import get_window
 
         return np.asarray(get_window(self.window, self.length), dtype=np.float64)

@@ -1,5 +1,6 @@
 """A trial: an experiment, a hidden effect (or none, or two), a sensor and its fault, all drawn from one seed."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -140,6 +141,8 @@ def _attempt(rng: np.random.Generator, wanted: _Wanted) -> Trial | None:
         record = _simulated(truth, drive, experiment, 8)
         if not _of_this_size(record, quiet) or not _forgets(truth, drive, experiment):
             return None
+        if _drowned(truth, drive, wanted.ranges.drowned):
+            return None
     except DivergenceError:
         return None
     shares = tuple(share_of(truth, name, record) for name in wanted.hidden)
@@ -177,6 +180,17 @@ def _unseen(base: Model, hidden: tuple[str, ...], response: str) -> bool:
     if response == "displacement" or not any(term.steady for term in effects):
         return False
     return all(term.placeless for term in (*effects, *(entry.term for entry in base.terms)))
+
+
+def _drowned(truth: Model, drive: Floats, most: float) -> bool:
+    """Whether a hidden harmonic force is more than so many times as large (rms) as the measured one.
+
+    On a resonance it would have to be many times larger to be the wanted share of the restoring force, and what the
+    measured force does then lies below the noise.
+    """
+    values = truth.values
+    amplitude = math.hypot(values.get("fh_cos") or 0.0, values.get("fh_sin") or 0.0)
+    return amplitude > most * math.sqrt(2.0) * float(np.std(drive))
 
 
 def _measured(truth: Model, record: Record, experiment: Experiment, wanted: _Wanted) -> Floats | None:

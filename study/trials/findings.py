@@ -70,7 +70,10 @@ def intervals(comparison: Comparison, truth: Model) -> Row:
 
 def measurement(found: Sequence[Found], imposed: Found) -> Row:
     """The faults found, and of the one that was imposed (the first, if it was not found) value and interval."""
-    row: Row = {"faults_found": "+".join(str(f["fault"]) for f in found)}
+    row: Row = {
+        "faults_found": "+".join(str(f["fault"]) for f in found),
+        "fault_rivals": "+".join(str(name) for f in found for name in f["rivals"]),
+    }
     match = (f for f in found if (f["fault"], f["channel"]) == (imposed.get("fault"), imposed.get("channel")))
     shown = next(match, found[0] if found else None)
     if shown is None:

@@ -20,7 +20,7 @@ from study.trials.runs import COMPLETED, NONE, PAIR, REMOVED, SINGLE, WITH, WITH
 VERY_LITTLE, LITTLE = 0.01, 0.05  # noise up to which ties are to be short, and the true effect has to come first
 WITHIN = 1.05  # held-out error after adding, over that of the true model
 WORDS = (
-    "kind", "hidden", "faults", "fault", "fault_channel", "faults_found", "found", "found_channel", "verdict", "first",
+    "kind", "hidden", "response", "known", "faults", "fault", "fault_channel", "faults_found", "fault_rivals", "found", "found_channel", "verdict", "first",
     "tie_set", "second_verdict", "second_tie_set", "whole_tie_set", "pair", "trouble",
 )  # fmt: skip
 Wanted = Mapping[str, Sequence[float]]
@@ -35,8 +35,18 @@ def rows_of(table: pd.DataFrame) -> list[Row]:
 
 
 def first_score(row: Row) -> float:
-    """One if the hidden effect is called missing and stands first."""
-    return float(row["verdict"] == MISSING and row["first"] == row["hidden"])
+    """One if the hidden effect is called missing and stands first, or its other form in the same equation does."""
+    return float(row["verdict"] == MISSING and (row["first"] == row["hidden"] or _in_another_form(row)))
+
+
+def _in_another_form(row: Row) -> bool:
+    """Whether what stands first is the hidden effect with the displacement counted from another place.
+
+    With ``u = w + a`` a cubic spring gives ``k3 u^3 = k3 w^3 + 3 k3 a w^2 + ...``: a quadratic stiffness beside one is
+    a constant force in disguise, and only a measured displacement could tell.
+    """
+    shifted = row["response"] != "displacement" and "cubic_stiffness" in row["known"].split("+")
+    return shifted and {row["first"], row["hidden"]} == {"quadratic_stiffness", "constant_force"}
 
 
 def tied_score(row: Row) -> float:
@@ -45,8 +55,12 @@ def tied_score(row: Row) -> float:
 
 
 def nothing_score(row: Row) -> float:
-    """One if it is said that nothing is missing."""
-    return float(row["verdict"] == NOTHING)
+    """One if it is said that nothing is missing, or nothing but what the fault that was found may be instead.
+
+    An offset of the displacement and a constant force are one equation where all else is linear.
+    """
+    or_the_fault = row["found"] == row["fault"] and row["first"] in row["fault_rivals"].split("+")
+    return float(row["verdict"] == NOTHING or (row["verdict"] == MISSING and or_the_fault))
 
 
 def pair_score(row: Row) -> float:
@@ -61,6 +75,11 @@ def removed_score(row: Row) -> float:
         return 1.0
     whole = row["whole_tie_set"].split("+")
     return float(row["verdict"] == MISSING and row["first"] in whole and row["hidden"] in whole)
+
+
+def removed_or_as_good(row: Row) -> float:
+    """The same, or what is said leaves no more than the true model: then nothing in the record speaks against it."""
+    return max(removed_score(row), as_good_as_truth(row))
 
 
 def fault_score(row: Row) -> float:
@@ -101,6 +120,7 @@ RATES: tuple[tuple[str, Member, Score, str], ...] = (
     ("... of completed models", _kinds(COMPLETED), nothing_score, ""),
     ("both of two, by diagnose and add", _kinds(PAIR), pair_score, "both"),
     ("out of the library: unknown, or in the tie set", _kinds(REMOVED), removed_score, "removed"),
+    ("... or what is said leaves as little as the true model", _kinds(REMOVED), removed_or_as_good, ""),
     ("the fault named, its value within its interval", _faulty, fault_score, "fault"),
     ("no fault named where there is none", lambda r: not _faulty(r), no_fault_score, ""),
     ("error after adding within 5 % of the true model's", _single(), as_good_as_truth, ""),

@@ -33,7 +33,7 @@ WITHOUT, WITH = "without", "with"  # a fault of the measurement
 COLUMNS = (
     "kind", "seed", "hidden", "noise", "faults", "response", "samples_a_period", "samples", "damping", "excitation",
     "known", "share", "fault", "fault_channel", "fault_value", "fault_unit",
-    "faults_found", "found", "found_channel", "found_value", "found_low", "found_high",
+    "faults_found", "fault_rivals", "found", "found_channel", "found_value", "found_low", "found_high",
     "verdict", "first", "tie_set", "tie_size", "pair", "second_verdict", "second_tie_set", "whole_tie_set",
     "error_before", "error_after", "error_after_two", "error_true", "noise_floor", "left", "held", "asked",
     "smallest_p", "true_p", "distance", "rivals", "seconds", "trouble",

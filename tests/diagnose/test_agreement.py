@@ -13,16 +13,20 @@ from study.records.prepared import prepare_record
 from study.records.readers import read_record
 from study.support.numbers import percent
 from study.trials import make_trial
+from study.trials.experiment import REPORT_LIKE, WIDE
 from study.trials.sealed import write
 
 ALIKE = 1e-9  # relative: the same computation, whoever asks for it
 TRIALS = [(31, "cubic_stiffness", 0.0, "displacement"), (32, "quadratic_damping", 0.01, "acceleration")]
 TRIALS += [(33, "dead_band", 0.05, "velocity")]
+OVERSAMPLED = 520001, "quadratic_damping", 0.05, "velocity"
 
 
-@pytest.mark.parametrize(("seed", "hidden", "noise", "response"), TRIALS)
+@pytest.mark.parametrize(("seed", "hidden", "noise", "response"), [*TRIALS, OVERSAMPLED])
 def test_one_error_and_one_floor(seed, hidden, noise, response, tmp_path, capsys):
-    data, model, _ = write(make_trial(seed, (hidden,), noise, response), tmp_path)
+    fine = seed == OVERSAMPLED[0]
+    ranges = WIDE if fine else REPORT_LIKE
+    data, model, _ = write(make_trial(seed, (hidden,), noise, response, ranges=ranges), tmp_path)
 
     def told(*words):
         assert cli.main([str(w) for w in words]) == 0
@@ -35,6 +39,7 @@ def test_one_error_and_one_floor(seed, hidden, noise, response, tmp_path, capsys
     told("diagnose", data, "--model", model, "--out", tmp_path / "diagnosed")
     compared, diagnosed = read("compared", "comparison.json"), read("diagnosed", "diagnosis.json")
     assert_same(compared, diagnosed)
+    assert (diagnosed["every_sample"] > 1) == (compared["fit"]["every_sample"] > 1) == fine
     first = diagnosed["candidates"][0]
     assert first["term"] == hidden
 

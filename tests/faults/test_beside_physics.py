@@ -41,10 +41,38 @@ def test_an_effect_whose_linear_share_is_too_much_of_it_is_tried_from_nothing():
 
 
 def test_a_mass_that_friction_holds_has_not_dropped_out_and_its_reversals_are_no_spikes():
-    value, faults = found(520277, "coulomb_friction", 0.0, "acceleration", "force_noise", completed=True)
-    (noise,) = faults
+    """What the noise on the force leaves of an acceleration is nearly that of noise on the response."""
+    _, faults = found(520277, "coulomb_friction", 0.0, "acceleration", "force_noise", completed=True)
+    assert {fault.fault for fault in faults} <= {"force_noise"}
+
+
+def test_noise_on_the_force_of_a_nonlinear_system_is_measured_as_its_motion_passes_it_on():
+    """Passed through the nearest linear system it would be 9 % larger, six of its standard errors."""
+    made = trials.make_trial(520321, ("cubic_damping", "bilinear_stiffness"), 0.0, "acceleration", "force_noise", WIDE)
+    (noise,) = accounted(made.completed, prepare_record(made.record)).faults
     assert noise.fault == "force_noise"
-    assert abs(noise.value - value) < 3.0 * noise.error
+    assert noise.value == pytest.approx(made.fault["value"], rel=0.03)
+
+
+def test_a_fault_found_in_a_stretch_has_the_value_that_the_whole_record_tells():
+    """In 8,192 samples of either part, 113 periods of a structure that remembers 65, the delay is -0.64 samples."""
+    made = trials.make_trial(520303, (), 0.01, "velocity", "delay", WIDE)
+    (delay,) = accounted(made.believed, prepare_record(made.record)).faults
+    assert abs(delay.value - made.fault["value"]) < 3.0 * delay.error < 0.03
+
+
+def test_drop_outs_beside_noise_are_counted_where_the_motion_passes_through_zero_too():
+    made = trials.make_trial(520339, ("signed_quadratic_stiffness",), 0.01, "velocity", "drop_outs", WIDE)
+    (fault,) = accounted(made.completed, prepare_record(made.record)).faults
+    assert fault.value == pytest.approx(made.fault["value"], rel=1e-9)
+
+
+def test_a_clipped_record_that_is_looked_at_in_part_first_keeps_what_was_read_within_the_limits():
+    """All that the first look had left out was taken for limits in the second, and nothing was left to judge."""
+    made = trials.make_trial(520340, ("van_der_pol_damping",), 0.1, "velocity", "clipping", WIDE)
+    (fault,) = accounted(made.believed, prepare_record(made.record)).faults
+    assert fault.fault == "clipping"
+    assert 0.02 < np.mean(fault.lost) < 0.2
 
 
 @pytest.mark.parametrize("fault", ["spikes", "drop_outs"])

@@ -176,6 +176,8 @@ def reverse_start(model: Model, prepared: Prepared) -> dict[str, float]:
     if driven.size < len(inputs):
         raise StudyError(f"the force of {part.name!r} drives too few frequencies for {len(inputs)} inputs")
     band = (max(float(driven[0]), prepared.band[0]), min(float(driven[-1]), prepared.band[1]))
+    if not np.any((matrix.frequency >= band[0]) & (matrix.frequency <= band[1])):
+        raise StudyError(f"no frequency that the force of {part.name!r} drives is one at which all motions are valid")
     estimate = coefficients.fit(conditioned.analyse(matrix), inputs, band, cut.line_inflation())
     if not np.all(np.isfinite(estimate.values)) or not (prepared.free or estimate["m"] > 0.0):
         raise StudyError(f"the reverse system of {model.name!r} and {part.name!r} has no solution")

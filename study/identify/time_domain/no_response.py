@@ -4,6 +4,7 @@ import numpy as np
 
 from study.equations.model import Model
 from study.identify.frequency_domain.starting_values import coherent_lines, solved
+from study.records.coarse_sampling import too_coarse
 from study.records.prepared import FORCE, Prepared
 from study.support.errors import StudyError
 
@@ -36,6 +37,9 @@ def unfit(model: Model, prepared: Prepared) -> str:
         return f"the model holds {' and '.join(held)}, {grows}"
     if prepared.free or prepared.response == FORCE or prepared.record.stretches:
         return ""  # no force, a prescribed motion, or stretches too short to ask: the fit has starts of its own there
+    coarse = too_coarse(prepared)
+    if coarse:
+        return coarse
     try:
         lines = coherent_lines(prepared)
     except StudyError as error:

@@ -18,7 +18,8 @@ from study.support.errors import DivergenceError, StudyError
 
 PERIODS = 50.0  # of the motion, in the stretch that multiple shooting starts a search from
 SHORTEST, LONGEST = 512, 2048  # samples in that stretch
-SHIFT = 0.3  # standard errors by which the integration may shift a coefficient
+SHIFT = 0.3  # standard errors by which the integration may shift a coefficient ...
+FINE = 0.05  # ... and where samples were left out: leaving them out is to shift nothing
 ORDER = 4  # of the integrator: what it shifts falls with this power of the steps
 FAR = 1e6  # times the shift that would matter: more asks for no more steps than this
 MOST_STEPS = 8  # in a sampling interval, unless the model's own rates ask for more
@@ -84,12 +85,13 @@ def _stands(fit: FreeRunFit, prepared: Prepared) -> bool:
 def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit with so many steps per sample that halving them shifts no coefficient by what its error shows."""
     most = max(MOST_STEPS, needed_steps(fit.model, prepared.record, prepared.response))
+    allowed = SHIFT if prepared.every == 1 else FINE
     while fit.keys and fit.steps_per_sample < most:
         jacobian = linearise(fit, prepared)
         moved = integration_shift(fit, prepared, jacobian)
         deviations = np.sqrt(np.diag(covariance_of(fit, jacobian)))
         with np.errstate(over="ignore"):  # where nothing is left, any shift is beyond all measure
-            excess = float(np.max(np.abs(moved) / np.maximum(SHIFT * deviations, np.finfo(float).tiny)))
+            excess = float(np.max(np.abs(moved) / np.maximum(allowed * deviations, np.finfo(float).tiny)))
         if excess <= 1.0:
             break
         times = 2 ** max(1, math.ceil(math.log2(min(excess, FAR)) / ORDER))

@@ -34,6 +34,7 @@ class ReadOptions:
     # Faults of the measurement by name: a value that is known, None for one not to be looked for; empty for none.
     measurement: Mapping[str, float | None] | None = None
     free: bool = False  # no force acts: a free decay
+    as_sampled: bool = False  # all samples are used, though the motion asks for fewer
 
     def __post_init__(self) -> None:
         """Refuse what contradicts itself or no record can have."""
@@ -62,7 +63,7 @@ class ReadOptions:
             self.period if self.period is not None else other.period,
             self.accept_saturated or other.accept_saturated, self.accept_swapped or other.accept_swapped,
             self.measurement if self.measurement is not None else other.measurement,
-            self.free or other.free,
+            self.free or other.free, self.as_sampled or other.as_sampled,
         )  # fmt: skip
 
 
@@ -116,6 +117,7 @@ def _options(content: object) -> ReadOptions:
         accept_swapped=_flag("accept_swapped", given),
         measurement=_measurement(given),
         free=_flag("free", given),
+        as_sampled=_flag("as_sampled", given),
     )
 
 

@@ -1,0 +1,247 @@
+"""Records sampled more finely than their motion asks for: some of the samples, behind a low-pass filter.
+
+What lies above the highest frequency at which the measured motion stands above its noise is noise. A filter whose power
+and that of its image add up to one leaves white noise white, so that the samples that are kept hold as much of every
+coefficient as all of them did, with standard errors that are as true.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from scipy.fft import irfft, rfft, rfftfreq
+from scipy.special import gammaincc
+
+from study.records.completion import CompletedRecord, continued
+from study.records.interpolation import BAND_LIMITED, closes
+from study.records.plan import Plan
+from study.records.prepared import FORCE, Prepared
+from study.records.record import MOTIONS, Record
+from study.records.spectra import Segments, autospectrum
+from study.support.arrays import Floats
+from study.support.thresholds import ALPHA
+
+ORDER = 3  # products of the motion up to this order do not fold into its band: those of most library terms' forces
+BIAS = 0.1  # standard errors by which what is left out may shift a coefficient
+JUMP = 2.0  # power of the frequency with which the density of an acceleration that jumps falls
+LEAST = 512  # samples in either part: what a segment of the spectra takes
+LINES = 8192  # samples in a segment of the spectrum, at most
+PARTS = 4  # segments that a record holds side by side, at least
+EDGE = 8  # samples at each end that the filter takes from what the record is continued by
+PASSED = 2.0 / 3.0  # of the new Nyquist frequency, and its mirror image 4/3: where the filter falls
+
+
+def without_spare_samples(prepared: Prepared) -> Prepared:
+    """The record without the samples that its motion does not ask for; itself where it asks for all.
+
+    A record of stretches is left as it is (:func:`completed_without_spare` comes before these are strung together), as
+    are one with lost samples, which a filter would spread, a prescribed motion, whose kinks count, and a free decay,
+    which tells most at its very beginning.
+    """
+    if prepared.record.stretches or prepared.lost is not None or prepared.response == FORCE or prepared.free:
+        return prepared
+    parts = prepared.plan.fit, prepared.plan.judge
+    factor = spare_factor([prepared.record], prepared.measured, min(b - a for a, b in parts))
+    if factor == 1:
+        return prepared
+    record = decimated(prepared.record, factor)
+    fit, judge = ((-(-a // factor), -(-b // factor)) for a, b in parts)
+    lost = np.ones(len(record), dtype=np.bool_)
+    lost[EDGE:-EDGE] = False
+    return replace(
+        prepared, record=record, plan=Plan(prepared.plan.response, fit, judge), band=_band(prepared.band, record),
+        edge=max(-(-prepared.edge // factor), EDGE), notes=(*prepared.notes, _said(prepared.record, factor, parts[0])),
+        lost=lost, every=factor, as_sampled=prepared,
+    )  # fmt: skip
+
+
+def completed_without_spare(
+    completed: Sequence[CompletedRecord], measured: Sequence[str], shortest: int
+) -> tuple[list[CompletedRecord], int]:  # fmt: skip
+    """The same of driven records that are to be cut into stretches, and how many of their samples there are to one.
+
+    ``measured`` and ``shortest`` as for :func:`spare_factor`.
+    """
+    factor = spare_factor([c.record for c in completed], measured, shortest)
+    return [_fewer(c, factor) if factor > 1 else c for c in completed], factor
+
+
+def _fewer(completed: CompletedRecord, factor: int) -> CompletedRecord:
+    record = decimated(completed.record, factor)
+    edge = max(-(-completed.edge // factor), EDGE)
+    notes = (*completed.notes, _said(completed.record, factor, (0, len(completed.record))))
+    return replace(completed, record=record, band=_band(completed.band, record), edge=edge, notes=notes)
+
+
+def spare_factor(records: Sequence[Record], measured: Sequence[str], shortest: int) -> int:
+    """The largest whole number by which the sampling may be divided without loss; 1 if none.
+
+    Each measured motion allows a new Nyquist frequency (:meth:`Content.enough`). A force that closes on itself, and the
+    period of the excitation, still hold whole numbers of samples, and either part is long enough for spectra.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        With completed motions.
+    measured : sequence of str
+        Those that were measured: the others are louder at high frequencies, not more telling.
+    shortest : int
+        Samples in the shorter of both parts.
+    """
+    most = shortest // LEAST
+    if most < 2:
+        return 1
+    needed = max(content(record[name], record.dt).enough for record in records for name in measured)
+    most = min(most, int(0.5 / records[0].dt / needed))
+    whole = [record.period for record in records if record.period]
+    whole += [len(record) for record in records if _goes_round(record[FORCE])]
+    return next((k for k in range(most, 1, -1) if not any(n % k for n in whole)), 1)
+
+
+@dataclass(frozen=True)
+class Content:
+    """What a channel holds above its noise.
+
+    Attributes
+    ----------
+    highest : float
+        Highest frequency in hertz at which it stands above its noise.
+    fall : float
+        Power of the frequency with which its density falls there: 2 for an acceleration that jumps, as dry friction
+        makes it, or more.
+    energy : float
+        Of what is assumed to lie above, in mean squares of the noise at a sample: that of a density which equals that
+        of the noise at ``highest`` and falls on from there.
+    signal : float
+        Energy of the whole channel in the same measure.
+    """
+
+    highest: float
+    fall: float
+    energy: float
+    signal: float
+
+    @property
+    def enough(self) -> float:
+        """The Nyquist frequency in hertz that suffices.
+
+        First, ``(ORDER + 1) / 2`` times ``highest``: products of so many factors fold to frequencies above that.
+        Second, what lies above folds too, or is lost, and shifts coefficients: by as many standard errors, at most, as
+        its energy over the root of the signal's, if a coefficient moves it as it moves the whole.
+        """
+        excess = self.energy / (BIAS * math.sqrt(self.signal)) if self.signal > 0.0 else 1.0
+        return self.highest * max(0.5 * (ORDER + 1), excess ** (1.0 / (self.fall - 1.0)))
+
+
+def content(values: Floats, dt: float) -> Content:
+    """What a channel of shape (n,) holds above its noise; up to the Nyquist frequency where no noise is seen.
+
+    The noise is the median of the spectrum: of an oversampled channel most lines hold nothing else. A line stands above
+    it if chance gives one so high among all in less than ``ALPHA`` of the records, alone or with a third of an octave.
+    """
+    length = 2 ** int(math.log2(min(len(values) // PARTS, LINES)))
+    cut = Segments(length, 0.75, "kaiser")
+    frequency, power = autospectrum(values - np.mean(values), dt, cut)
+    averages = cut.effective_averages(len(values))
+    inner, nyquist = power[1:-1], 0.5 / dt
+    noise = float(np.median(inner)) / (1.0 - 1.0 / (9.0 * averages)) ** 3  # median of chi square (Wilson, Hilferty)
+    if not noise > 0.0:
+        return Content(nyquist, JUMP, 0.0, 0.0)
+    last = _last_above(inner / noise, averages, cut.line_inflation())
+    highest, samples = float(frequency[last + 1]), len(values)
+    fall = _fall(inner / noise - 1.0, last + 1, averages / cut.line_inflation())
+    energy = samples * highest / ((fall - 1.0) * nyquist)
+    return Content(highest, fall, energy, samples * max(float(np.mean(inner)) / noise - 1.0, 0.0))
+
+
+def _last_above(share: Floats, averages: float, inflation: float) -> int:
+    """The last line whose density, in that of the noise, stands above it; 0 if there is none."""
+    above = gammaincc(averages, averages * share) * len(share) < 0.5 * ALPHA
+    edges = np.unique(np.round(2.0 ** np.arange(0.0, math.log2(len(share)), 1.0 / 3.0)).astype(int)).tolist()
+    bands = list(pairwise([*edges, len(share)]))
+    for a, b in bands:
+        together = averages * max((b - a) / inflation, 1.0)
+        if gammaincc(together, together * float(np.mean(share[a:b]))) * len(bands) < 0.5 * ALPHA:
+            above[b - 1] = True
+    return int(np.max(np.flatnonzero(above), initial=0))
+
+
+def _fall(excess: Floats, last: int, averages: float) -> float:
+    """The power of the frequency with which a density falls over the octave up to a line, by its two halves.
+
+    Less what chance may have added; at least ``JUMP``: no motion of a mass falls more slowly.
+    """
+    lower, middle = last // 2, round(last / math.sqrt(2.0))
+    if middle - lower < 1 or last - middle < 1:
+        return JUMP
+    (one, sure), (other, unsure) = (
+        (float(np.mean(part)), float(np.mean(part + 1.0)) / math.sqrt(max(averages * len(part), 1.0)))
+        for part in (excess[lower:middle], excess[middle:last])
+    )
+    ratio = (one - 2.0 * sure) / max(other + 2.0 * unsure, 1e-300)
+    return max(2.0 * math.log2(ratio), JUMP) if ratio > 0.0 else JUMP
+
+
+def decimated(record: Record, factor: int) -> Record:
+    """Every ``factor``-th sample of a record behind a low-pass filter without phase, the same on every channel.
+
+    A force that is straight or held between its samples is filtered as such.
+    """
+    channels = {
+        name: _filtered(values, factor, record.between if name == FORCE else BAND_LIMITED)
+        for name, values in record.channels.items()
+    }
+    period = None if record.period is None else record.period // factor
+    return replace(record, dt=record.dt * factor, channels=channels, period=period, between=BAND_LIMITED)
+
+
+def _filtered(values: Floats, factor: int, between: str) -> Floats:
+    mean = float(np.mean(values))
+    reach = 0 if _goes_round(values) else min(4 * EDGE * factor, len(values) // 2)
+    longer = values - mean if reach == 0 else continued(values - mean, reach)
+    cycles = np.asarray(rfftfreq(len(longer)))  # of a sample
+    low = irfft(np.asarray(rfft(longer)) * _gain(2.0 * factor * cycles) * _held(cycles, between), len(longer))
+    return np.asarray(low[reach : reach + len(values)][::factor] + mean)
+
+
+def _goes_round(values: Floats) -> bool:
+    """Whether a channel closes on itself, by no larger a step than it takes elsewhere: noise may hide a jump."""
+    return closes(values) and abs(float(values[0] - values[-1])) <= float(np.max(np.abs(np.diff(values))))
+
+
+def _gain(relative: Floats) -> Floats:
+    """Gain over frequency in new Nyquist frequencies: that of Meyer's scaling function (Daubechies, 1992, (4.2.1)).
+
+    Its square and that of its mirror image about 1 add up to 1, so that folded white noise is white.
+    """
+    x = np.clip((relative - PASSED) / (2.0 - 2.0 * PASSED), 0.0, 1.0)
+    return np.cos(0.5 * np.pi * x**4 * (35.0 - 84.0 * x + 70.0 * x**2 - 20.0 * x**3))
+
+
+def _held(cycles: Floats, between: str) -> Floats:
+    """What a hold, or straight lines, between the samples make of each frequency; complex for the delay of a hold."""
+    if between == BAND_LIMITED:
+        return np.ones_like(cycles)
+    return np.sinc(cycles) ** 2 if between == "straight" else np.sinc(cycles) * np.exp(-1j * np.pi * cycles)
+
+
+def _band(band: tuple[float, float], record: Record) -> tuple[float, float]:
+    return band[0], min(band[1], PASSED * 0.5 / record.dt)
+
+
+def _said(record: Record, factor: int, span: tuple[int, int]) -> str:
+    """A sentence on what was done, by the period of the strongest line of the motion."""
+    values = record[MOTIONS[0]][slice(*span)]
+    power = np.abs(np.asarray(rfft(values - np.mean(values))))
+    a_period = len(values) / max(int(np.argmax(power)), 1)
+    return (
+        f"the record {record.name} is sampled {a_period:.0f} times a period of its strongest motion, more finely than "
+        f"anything but noise in it asks for: every {_ordinal(factor)} sample is used after a low-pass filter, which "
+        "loses nothing (--as-sampled uses all)"
+    )
+
+
+def _ordinal(number: int) -> str:
+    return {2: "second", 3: "third"}.get(number, f"{number}th")
