@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from study.equations.model_file import parse_model
 from study.identify import estimators
@@ -199,3 +200,30 @@ def test_what_no_equation_tells_is_said(one_force):
         equations(structure, blind)
     with pytest.raises(StudyError, match="known are siso"):
         reverse_system("guess", equations(structure, motions), DT, SETTINGS)
+
+
+def test_the_joint_estimate_is_the_nearest_one(one_force):
+    """Minimum distance by a general solver, whose derivatives are differences."""
+    structure, motions = one_force
+    rng = np.random.default_rng(2)
+    noisy_force = motions.forces["first"] + 0.3 * rng.standard_normal(SAMPLES)
+    shaken = {s: x * (1.0 + 1e-3 * rng.standard_normal(SAMPLES)) for s, x in motions.motions.items()}
+    system = reverse_system(
+        "miso", equations(structure, StructureRecord(DT, {"first": noisy_force}, shaken)), DT, SETTINGS
+    )
+    joint = joint_estimate(system).estimate
+    own = [(r.mass, r.found.estimate) for r in system.results]
+    size = np.array([structure.values[key] for key in joint.symbols])
+
+    def distance(x):
+        theta, parts = dict(zip(joint.symbols, x * size, strict=True)), []
+        for mass, e in own:
+            expected = np.array([theta[s] for s in e.symbols]) / (1.0 if mass is None else theta[mass])
+            deviation = np.sqrt(np.diag(e.covariance))
+            correlation = e.covariance / np.outer(deviation, deviation)
+            parts.append(np.linalg.solve(np.linalg.cholesky(correlation), (e.values - expected) / deviation))
+        return np.concatenate(parts)
+
+    direct = least_squares(distance, np.ones(len(size)), xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    np.testing.assert_allclose(joint.values / size, direct.x, rtol=1e-5)
+    assert np.sum(distance(joint.values / size) ** 2) < 1.0001 * np.sum(direct.fun**2)
