@@ -79,7 +79,7 @@ rule trials_mdof:
 
 # Trials of each kind of test: `snakemake -j2 trials_kinds`, not part of `all`; scripts/kind_docs.py puts them in docs.
 KINDS_OF_TESTS, FIRST_OF_KINDS, TRIALS_OF_A_KIND = ("free_decay", "blows", "base", "component", "axis"), 620001, 50
-KIND_CODE = rests_on(Path("scripts/kind_trials.py"))
+KIND_CODE = modules("kind_trials")
 
 
 rule trials_of_a_kind:
