@@ -51,7 +51,7 @@ def left(found: Found) -> str:
     floor = percent(step["noise_floor"]["response"])
     if step["error"]["response"] >= 1.0:
         return (
-            f"{size} (noise floor {floor}): more than the response itself, so the model predicts nothing of this part."
+            f"{size} (noise floor {floor}): more than the response itself, so the model predicts none of it."
         )
     if last["verdict"] == NOTHING:
         return (
