@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: study report test test-cluster checks lint picture fault_pictures notebooks docs readme estimators trials structure_trials clean
+.PHONY: study report test test-cluster checks lint picture fault_pictures notebooks docs gallery readme estimators trials structure_trials clean
 
 study: $(READY)
 	$(BIN)/snakemake -j2
@@ -15,9 +15,10 @@ report: study
 test: $(READY)
 	$(MAKE) --no-print-directory -j2 lint checks
 
-# A one-node SLURM on this machine (Debian, as root), and the same bytes on it as without.
+# A one-node SLURM on this machine (Debian, as root), then a store of results on it: the same bytes as without.
 test-cluster: $(READY)
 	scripts/test_cluster.sh
+	scripts/test_store.sh
 
 # As many workers as cores: more threads would only wait for each other.
 checks: $(READY)
@@ -41,6 +42,10 @@ notebooks: $(READY)
 docs: $(READY)
 	$(BIN)/mkdocs build --strict --quiet
 	@echo "open site/index.html"
+
+gallery: $(READY)
+	$(BIN)/snakemake -j2 gallery
+	PYTHONPATH=. $(BIN)/python scripts/gallery_docs.py
 
 readme: study
 	$(BIN)/python scripts/readme.py

@@ -2,7 +2,8 @@
 #   snakemake -j2 results/silverbox/comparison.json    how good is the model, and where does it fail
 #   snakemake -j2 results/silverbox/diagnosis.json     which effect is missing
 #   snakemake -j2 silverbox_climb                      diagnose, add, and again; the history, and climb.html to step through it
-#   snakemake -j2 gallery                              all of that, with pictures, for every record
+#   snakemake -j2 damper                               all of that, with pictures, for every row of an entry
+#   snakemake -j2 gallery                              every entry, and results/gallery.html, a page of all of them
 from study.commands import measurements
 
 with one_sentence():
@@ -10,6 +11,9 @@ with one_sentence():
 
 CODE["measured"] = rests_on(Path("scripts/measured.py"))
 CODE["measured"] += [f"study/explore/page.{ending}" for ending in ("html", "css", "js")]
+CODE["gallery"] = rests_on(Path("scripts/gallery.py"))
+STRUCTURES = {name for name, row in MEASUREMENTS.items() if measurements.is_structure(row)}
+ENTRIES = dict.fromkeys(row.entry for row in MEASUREMENTS.values())
 SEEN = {
     "comparison": ("response", "force_error", "missing_force", "error_in_time"),
     "diagnosis": ("candidates", "constancy"),
@@ -17,8 +21,20 @@ SEEN = {
 
 
 def climbed(name):
-    """What a climb leaves beside its steps."""
-    return [f"results/{name}/{file}" for file in ("history.json", "history.png", "history.svg", "reached.yaml", "climb.html")]
+    """What a climb leaves beside its steps; that of a structure has no page."""
+    page = [] if name in STRUCTURES else ["climb.html"]
+    return [f"results/{name}/{file}" for file in ("history.json", "history.png", "history.svg", "reached.yaml", *page)]
+
+
+def drawn(name, file):
+    """Pictures that every comparison or diagnosis makes of one record; of several, each has its own names."""
+    alone = name not in STRUCTURES and (file == "diagnosis" or len(MEASUREMENTS[name].paths) == 1)
+    return [f"results/{name}/{stem}.{ending}" for stem in SEEN[file] for ending in ENDINGS] if alone else []
+
+
+def made_of(names):
+    """Everything that is made of rows."""
+    return [path for name in names for path in [*climbed(name), *(f"results/{name}/{file}.json" for file in SEEN)]]
 
 
 for _name, _row in MEASUREMENTS.items():
@@ -32,7 +48,7 @@ for _name, _row in MEASUREMENTS.items():
                 code=CODE["measured"],
             output:
                 f"results/{_name}/{_file}.json",
-                [f"results/{_name}/{stem}.{ending}" for stem in SEEN[_file] for ending in ENDINGS],
+                drawn(_name, _file),
             params:
                 what=_what,
                 row=_row.plain(),
@@ -52,7 +68,7 @@ for _name, _row in MEASUREMENTS.items():
             history=f"results/{_name}/history.json",
             pictures=[f"results/{_name}/history.{ending}" for ending in ENDINGS],
             reached=f"results/{_name}/reached.yaml",
-            page=f"results/{_name}/climb.html",
+            page=climbed(_name)[4:],
         params:
             what="climb",
             row=_row.plain(),
@@ -69,7 +85,30 @@ for _name, _row in MEASUREMENTS.items():
             climbed(_name),
 
 
+for _entry in ENTRIES:
+
+    rule:
+        name:
+            _entry
+        input:
+            made_of([name for name, row in MEASUREMENTS.items() if row.entry == _entry]),
+
+
 rule gallery:
     input:
+        made_of(MEASUREMENTS),
+        "results/gallery.html",
+
+
+rule gallery_page:
+    input:
         [path for name in MEASUREMENTS for path in climbed(name)],
-        [f"results/{name}/{file}.json" for name in MEASUREMENTS for file in SEEN],
+        known=[f"config/{name}.tsv" for name in ("literature", "published")],
+        style=[f"study/support/picture_page.{ending}" for ending in ("css", "js")],
+        code=CODE["gallery"],
+    output:
+        page="results/gallery.html",
+    params:
+        records={entry: [name for name, row in MEASUREMENTS.items() if row.entry == entry] for entry in ENTRIES},
+    script:
+        "../scripts/gallery.py"

@@ -1,4 +1,4 @@
-"""Snakemake step: a measured record and a model -> comparison, diagnosis, or a climb from model to model."""
+"""Snakemake step: measured records and a model -> comparison, diagnosis, or a climb from model to model."""
 
 import sys
 from pathlib import Path
@@ -7,23 +7,21 @@ from typing import Any
 from study import cli
 from study.commands.climb import climb
 from study.commands.measurements import Measurement, check_present
-from study.support.errors import StudyError
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
 
 
 def main(what: str, row: Measurement, output: Any) -> None:
-    record, model = Path(row.path), Path(row.model)
-    check_present(record)
+    records, model = [Path(path) for path in row.paths], Path(row.model)
+    for record in records:
+        check_present(record)
     if what != "climb":
-        words = (what, str(record), "--model", str(model), *row.options, "--out", str(Path(output[0]).parent))
+        words = (what, *map(str, records), "--model", str(model), *row.options, "--out", str(Path(output[0]).parent))
         if code := cli.main(words):  # which has said why
             sys.exit(code)
         return
     target = Path(output.history)
-    steps = climb(record, model, row.options, row.steps, target.parent)
-    if len(steps) < 2:
-        raise StudyError(f"{row.record}: nothing was added to {model}; {target.parent}/climb/step_0 says why")
+    climb(records, model, row.options, row.steps, target.parent)
     replace_file(Path(output.reached), (target.parent / "climb" / model.name).read_bytes())
 
 

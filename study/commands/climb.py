@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from study.commands.parser import parser
-from study.commands.record_arguments import accounted_for, read_records
+from study.commands.record_arguments import accounted_together, read_records
+from study.commands.structure_climb import structure_climb
 from study.compare import history
 from study.compare.history_picture import files as history_pictures
 from study.diagnose import diagnosis_report
@@ -22,23 +23,28 @@ from study.support.files import read_text
 SAVED = "climb.html"  # the whole climb as one page
 
 
-def climb(record: Path, model: Path, options: Sequence[str], steps: int, folder: Path) -> list[history.Step]:
+def climb(
+    records: Sequence[Path], model: Path, options: Sequence[str], steps: int, folder: Path
+) -> list[history.Step]:  # fmt: skip
     """Begin with a model and add the first candidate of each diagnosis to it, as a user of ``study explore`` would.
 
     The model file stays as it is. The folder gets ``climb/`` (the model reached, its history and pictures, and a folder
     for each diagnosis), ``climb.html``, ``history.json`` and the history's picture; what an earlier climb left there is
     removed. The options are those of the command line: how the record is read, fitted and judged. At most ``steps``
-    effects are added.
+    effects are added. One model is fitted to all ``records``.
 
     What the model does not need any more after an addition is taken out again. So that the climb ends, a term that was
     taken out comes back only where the error falls below all that was reached.
     """
-    arguments = parser().parse_args(["explore", str(record), "--model", str(model), *options])
+    arguments = parser().parse_args(["diagnose", *map(str, records), "--model", str(model), *options])
     text = read_text(model, WANTED)
-    (data,) = read_records(arguments)
+    first = parse_model(text, model)
     work = folder / "climb"
     shutil.rmtree(work, ignore_errors=True)
-    session = sessions.begin_with(accounted_for(arguments, parse_model(text, model), data, record).comparison)
+    if first.coordinates:
+        return structure_climb(arguments, first, steps, folder)
+    together = accounted_together(arguments, first, read_records(arguments), records[0])
+    session = sessions.begin_with(together.comparison)
     for number in range(steps + 1):
         session, diagnosis = _diagnosed(session, work / f"step_{number}")
         if diagnosis.verdict != MISSING or number == steps or _in_a_circle(session, diagnosis.candidates[0]):

@@ -9,6 +9,7 @@ from typing import Annotated
 from pydantic import BeforeValidator, Field
 
 from study.commands.parser import parser
+from study.equations.model_file import read_model
 from study.support.config_files import Row, Text, read_rows
 from study.support.errors import StudyError, at, expect
 
@@ -17,14 +18,23 @@ NAME = "up to 64 of a to z, 0 to 9 and _, a letter first"  # targets and folders
 TAKEN = ("--out", "--model", "-h", "--help")
 
 
+def _files(text: object) -> object:
+    """One file or several; a name that holds a space stands in quotes."""
+    return tuple(_split(text, "paths")) if isinstance(text, str) else text
+
+
+def _split(text: str, what: str) -> list[str]:
+    try:
+        return shlex.split(text)
+    except ValueError as error:
+        raise StudyError(f"{what} {text!r} cannot be split into words: {error}") from None
+
+
 def _words(text: object) -> object:
     """The words of the options, read once by the command's own parser so that no job has to refuse them."""
     if not isinstance(text, str):
         return text
-    try:
-        words = tuple(shlex.split(text))
-    except ValueError as error:
-        raise StudyError(f"options {text!r} cannot be split into words: {error}") from None
+    words = tuple(_split(text, "options"))
     for word in words:
         expect(word.partition("=")[0] not in TAKEN, f"options name {word}, which the workflow gives; leave it out")
     with at("options"):
@@ -32,11 +42,15 @@ def _words(text: object) -> object:
     return words
 
 
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*\Z", max_length=64, description=NAME)]
+
+
 class Measurement(Row):
     """One row of ``config/measurements.tsv``."""
 
-    record: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*\Z", max_length=64, description=NAME)]
-    path: Text
+    record: Name
+    entry: Name  # of the gallery, and the target that makes it: rows of one structure share it
+    paths: Annotated[tuple[Text, ...], BeforeValidator(_files), Field(min_length=1)]  # one model is fitted to all
     model: Text  # that is compared, and from which a climb begins: its name below ``models/``, or its file
     steps: Annotated[int, Field(ge=1, le=20)]  # effects that a climb may add
     options: Annotated[tuple[str, ...], BeforeValidator(_words)]  # of ``study compare``
@@ -59,13 +73,19 @@ def load(folder: Path, cases: Collection[str] = ()) -> Mapping[str, Measurement]
         model = models / f"{row.model}.yaml"
         with at(where):
             expect(row.record not in measurements, "the record stands twice; expected each name once")
-            for name in (row.record, f"{row.record}_climb"):
+            for name in (row.record, f"{row.record}_climb", row.entry):
                 case = f"{name!r} is a case of cases.tsv; give the record or the case another name"
                 expect(name not in cases, case)
             expect(model.is_file(), f"there is no model {row.model!r}; models/ holds {known}")
-        path = row.path.replace(VARIABLE, os.environ.get(VARIABLE[1:]) or VARIABLE, 1)
-        measurements[row.record] = row.model_copy(update={"path": path, "model": str(model)})
+        folder_named = os.environ.get(VARIABLE[1:]) or VARIABLE
+        paths = tuple(path.replace(VARIABLE, folder_named, 1) for path in row.paths)
+        measurements[row.record] = row.model_copy(update={"paths": paths, "model": str(model)})
     return measurements
+
+
+def is_structure(row: Measurement) -> bool:
+    """Whether the model of a row has coordinates; it was read by :func:`load`."""
+    return bool(read_model(Path(row.model)).coordinates)
 
 
 def check_present(path: Path) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from study.compare import panels
 from study.compare.across_levels import Level
 from study.compare.comparison import Comparison
-from study.compare.decay import decays
+from study.compare.decay import decays_of
 from study.compare.force_map import curve, surface
 from study.compare.loops import loops
 from study.figures import coherence, page
@@ -42,7 +42,7 @@ def _of_its_kind(comparison: Comparison) -> dict[str, Figure]:
     prepared, prediction = comparison.prepared, comparison.prediction
     if prepared.response == FORCE:
         return {"loops": kind_pictures.loops(comparison, loops(prediction))}
-    found = decays(comparison.fit, prepared, prediction.noise.rms) if prepared.free else None
+    found = decays_of(comparison)
     return {} if found is None else {"decay": kind_pictures.decay(comparison, found)}
 
 

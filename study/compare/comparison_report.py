@@ -14,6 +14,7 @@ from study.compare.across_levels import Level
 from study.compare.by_estimator import FREE_RUN
 from study.compare.comparison import Comparison
 from study.compare.comparison_sentences import says, says_of_all
+from study.compare.decay import decays_of
 from study.compare.fitted_coefficients import Coefficient
 from study.compare.force_map import curve, surface
 from study.equations import model_file
@@ -83,6 +84,7 @@ def _of_record(comparison: Comparison) -> Row:
         },
         "notes": list(comparison.notes),
         "says": says(comparison),
+        **({"decay": found.plain()} if (found := decays_of(comparison)) else {}),
     }  # fmt: skip
 
 

@@ -2,7 +2,8 @@
 
 The analytic signal of the response (D. Gabor, 1946; M. Feldman, Mechanical Systems and Signal Processing 25, 2011) has
 an amplitude and a phase at each instant. Over windows of some periods straight lines through its phase and through the
-logarithm of its amplitude give the frequency, and the rate at which the motion decays.
+logarithm of its amplitude give the frequency, and the rate at which the motion decays; where the decay begins, they
+are read by :mod:`study.compare.release`.
 """
 
 from dataclasses import dataclass, replace
@@ -10,6 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.fft import fft, fftfreq, ifft
 
+from study.compare.comparison import Comparison
+from study.compare.release import at_the_release
 from study.equations.free_run import prepare
 from study.identify.frequency_domain.decay_start import frequency_and_rate
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -42,6 +45,17 @@ class Decays:
 
     measured: Decay
     predicted: Decay | None
+
+    def plain(self) -> dict[str, dict[str, list[float]] | None]:
+        """As plain rows of numbers."""
+        parts = {"measured": self.measured, "predicted": self.predicted}
+        return {k: d and {n: np.asarray(x).tolist() for n, x in vars(d).items()} for k, d in parts.items()}
+
+
+def decays_of(comparison: Comparison) -> Decays | None:
+    """Those of a comparison; None where it is no free decay, or too short a one."""
+    prepared = comparison.prediction.prepared
+    return decays(comparison.fit, prepared, comparison.prediction.noise.rms) if prepared.free else None
 
 
 def decays(fit: FreeRunFit, prepared: Prepared, floor: float) -> Decays | None:
@@ -101,6 +115,8 @@ def _decay(values: Floats, dt: float, omega: float, least: float) -> Decay:
         part = signal[begin : begin + width]
         if float(np.median(np.abs(part))) > least:
             rows.append(_window(part, dt))
+    if rows and rows[0][0] > least:  # where it begins, which no window of an analytic signal reaches
+        rows.insert(0, at_the_release(values[:width], dt, 2.0 * np.pi * rows[0][1], 2.0 * WINDOW))
     return Decay(*np.array(rows).reshape(-1, 5).T)
 
 

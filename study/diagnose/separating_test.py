@@ -7,7 +7,10 @@ import numpy as np
 from study.diagnose.ranked import Ranked
 from study.equations.free_run import prepare
 from study.figures.labels import term_names
-from study.records.prepared import Prepared
+from study.records.prepared import FORCE, Prepared
+from study.records.record import MOTIONS, Record, Stretch
+from study.records.states import starting_states
+from study.support.arrays import Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 
@@ -17,20 +20,25 @@ LONGEST = 16384  # samples simulated
 
 
 def separating_level(one: Ranked, other: Ranked, prepared: Prepared) -> float | None:
-    """The first factor on the force at which the two models would be told apart by a record of this length.
+    """The first factor on the excitation at which the two models would be told apart by a record of this length.
+
+    That is the force, the prescribed motion of a component, or the state from which a decay is let go.
 
     The second model may adjust all of its coefficients to what the first one does; what it still cannot
     follow is held against the noise of this record, taken as white. None where no tried level separates.
     """
     noise = float(np.mean(one.residual**2))
-    record, response, span = prepared.record, prepared.response, prepared.shortened(LONGEST).plan.fit
+    values = dict(zip(other.fit.keys, (float(v) for v in other.fit.values), strict=True))
     for level in LEVELS:
-        louder = record.with_channels({"force": level * record["force"]})
+        louder, span, begin = _at_level(prepared, level)
+        known = {"response": prepared.response, "span": span}
+        if prepared.free or prepared.response == FORCE:
+            known["steps_per_sample"] = max(one.fit.steps_per_sample, other.fit.steps_per_sample)
         try:
-            target = prepare(one.fit.model, louder, response=response, span=span).respond({}, (0.0, 0.0))[0]
-            run = prepare(other.fit.model, louder, other.fit.keys, response=response, span=span)
-            values = dict(zip(other.fit.keys, (float(v) for v in other.fit.values), strict=True))
-            nearest, jacobian = run.respond(values, (0.0, 0.0))
+            ahead = prepare(one.fit.model, louder, **known)
+            initial = np.zeros((len(ahead.cuts) + 1, ahead.moving)) if begin is None else begin
+            target = ahead.respond({}, initial)[0]
+            nearest, jacobian = prepare(other.fit.model, louder, other.fit.keys, **known).respond(values, initial)
         except StudyError:
             continue
         gap = target - nearest
@@ -39,6 +47,22 @@ def separating_level(one: Ranked, other: Ranked, prepared: Prepared) -> float | 
         if np.sum(gap**2) > (2.0 * DISTINCT) ** 2 * noise:
             return level
     return None
+
+
+def _at_level(prepared: Prepared, level: float) -> tuple[Record, tuple[int, int], Floats | None]:
+    """A record of the same test with more of what excites it, the samples to run along, and the state to begin from.
+
+    That state is None where each of the record's stretches begins from rest.
+    """
+    record, response, span = prepared.record, prepared.response, prepared.shortened(LONGEST).plan.fit
+    if response == FORCE:
+        return record.with_channels({m: level * record[m] for m in MOTIONS if m in record}), span, None
+    if prepared.free:
+        stretch = (*record.stretches, Stretch(record, *span))[0]
+        last = min(len(stretch.source), stretch.first + LONGEST)
+        begin = starting_states(stretch.source, response, (stretch.first,))
+        return stretch.source, (stretch.first, last), level * begin
+    return record.with_channels({FORCE: level * record[FORCE]}), span, None
 
 
 def advice(rows: Sequence[Ranked], prepared: Prepared) -> str:
@@ -53,4 +77,5 @@ def advice(rows: Sequence[Ranked], prepared: Prepared) -> str:
         whole = prepared.response == "displacement"
         other = "another kind of test" if whole else "the displacement, its mean included,"
         return f"No level from a quarter to five times this one would tell {names} apart; {other} is needed."
-    return f"To tell {names} apart, excite at {level:g} times this level."
+    how = "move it by" if prepared.response == FORCE else "let it go at" if prepared.free else "excite at"
+    return f"To tell {names} apart, {how} {level:g} times this level."

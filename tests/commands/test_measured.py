@@ -80,12 +80,12 @@ def test_the_bouc_wen_benchmark_is_hysteresis_and_no_cubic_stiffness():
 def test_data_come_from_the_folder_that_the_variable_names(monkeypatch):
     monkeypatch.setenv("STUDY_DATA", "/data")
     row = measurements.load(ROOT / "config")["silverbox"]
-    assert row.path == "/data/silverbox/SNLS80mV.mat"
+    assert row.paths == ("/data/silverbox/SNLS80mV.mat",)
     assert row.model == str(ROOT / "models" / "believed" / "oscillator.yaml")
     assert row.options[:2] == ("--column", "force=V1")
     assert measurements.Measurement.model_validate(row.plain()) == row
     with pytest.raises(StudyError, match=r"/data/silverbox/SNLS80mV\.mat is not there; the project holds no data: set"):
-        measurements.check_present(Path(row.path))
+        measurements.check_present(Path(row.paths[0]))
 
 
 def test_without_the_variable_a_job_says_what_to_set(monkeypatch):
@@ -94,13 +94,17 @@ def test_without_the_variable_a_job_says_what_to_set(monkeypatch):
     row = measurements.load(ROOT / "config")["silverbox"]
     says = r"STUDY_DATA is not set; expected the folder that holds silverbox/SNLS80mV\.mat"
     with pytest.raises(StudyError, match=says):
-        measurements.check_present(Path(row.path))
+        measurements.check_present(Path(row.paths[0]))
 
 
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("silverbox\t$", "Silverbox\t$", "record is 'Silverbox'; expected up to 64 of a to z, 0 to 9 and _, a letter"),
+        (
+            "\nsilverbox\t",
+            "\nSilverbox\t",
+            "record is 'Silverbox'; expected up to 64 of a to z, 0 to 9 and _,",
+        ),
         ("oscillator\t6", "oscillator\t21", "(record 'silverbox'): steps is '21'; expected 20 or less"),
         ("oscillator\t6", "oscillator\tsix", "(record 'silverbox'): steps is 'six'; expected a whole number"),
         ("believed/oscillator\t6", "oscilator\t6", "there is no model 'oscilator'; models/ holds dead_band, duffing"),

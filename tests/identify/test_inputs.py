@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from study.equations.model import Model
+from study.equations.model import Model, free
 from study.equations.terms import custom, get
-from study.identify.frequency_domain.inputs import Part, histories, reverse_inputs
+from study.identify.frequency_domain.inputs import Part, histories, history, reverse_inputs
 from study.records.record import Record
 from study.support.errors import StudyError
 
@@ -112,3 +112,21 @@ def test_a_state_that_overflows_is_refused(systems: dict[str, Model], record: Re
     model = systems["linear"].with_term(get("hysteresis")).with_values(wild)
     with pytest.raises(StudyError, match="no finite value"):
         histories(reverse_inputs(model), record)
+
+
+def test_a_memory_that_is_short_beside_the_sampling_is_integrated_all_the_same():
+    """Dahl's element is exact in displacement: z = (s - (s - beta z0) exp(-beta |u - u0|)) / beta, s the direction.
+
+    With beta |v| dt = 12 the first steps that are tried are unstable.
+    """
+    dt, beta = 0.01, 24.0
+    t = dt * np.arange(750)
+    u, v = -10.0 * np.cos(5.0 * t), 50.0 * np.sin(5.0 * t)
+    model = Model("dahl", (free(get("hysteresis")),)).with_values({"hysteresis.beta": beta, "hysteresis.gamma": 0.0})
+    (item,) = reverse_inputs(model)
+    found = history(item, Record(dt, {"force": 0.0 * u, "displacement": u, "velocity": v}))
+    exact = np.zeros_like(u)
+    for i in range(1, len(u)):
+        direction, way = np.sign(u[i] - u[i - 1]), abs(u[i] - u[i - 1])
+        exact[i] = (direction - (direction - beta * exact[i - 1]) * np.exp(-beta * way)) / beta
+    assert np.sqrt(np.mean((found - exact) ** 2)) < 0.02 / beta

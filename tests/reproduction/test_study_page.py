@@ -10,6 +10,7 @@ from study.reproduction import study_page, summary
 from study.reproduction.claims import claims_table
 from study.reproduction.claims.claim_pages import LONGEST, conditions, shortened
 from study.support import document
+from study.support.picture_page import Picture
 from tests.reproduction.test_summary import CLAIMS, ERRORS, PARAMETERS, READING, TIMES
 
 PNG = bytes.fromhex("89504e470d0a1a0a") + b"picture"
@@ -28,9 +29,9 @@ def page():
     claims = pd.concat([CLAIMS, LONG], ignore_index=True)
     tables = summary.Tables(PARAMETERS, claims, READING, ERRORS, TIMES, {"quiet": 0.0, "noisy": 0.05}, "raw")
     pictures = [
-        study_page.Picture("A <system>", "Figure 21", "its path", PNG),
-        study_page.Picture("Another", "Figure 22", "its other path", PNG),
-        study_page.Picture("A <system>", "Figure 23", "its coherence", PNG),
+        Picture("A <system>", "Figure 21", "its path", PNG),
+        Picture("Another", "Figure 22", "its other path", PNG),
+        Picture("A <system>", "Figure 23", "its coherence", PNG),
     ]
     return study_page.page(tables, pictures).decode()
 

@@ -1,16 +1,17 @@
 """From a model and a record to the inputs of the reverse system (the report's Figure 14).
 
 Components with the same shape are one input: u carries stiffness, damping and mass, u^3 carries the
-cubic stiffness and Van der Pol's damping. The output is always the force.
+cubic stiffness and Van der Pol's damping. The output is always the force. In a structure each coordinate's equation is
+such a system; its inputs are shapes of the relative motions at the places of its terms.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from study.equations import formulas, kernels
+from study.equations import formulas
 from study.equations.graph import Graph
 from study.equations.model import Model, ModelTerm, with_registers
 from study.records.interpolation import between_samples
@@ -20,7 +21,9 @@ from study.support.errors import StudyError
 
 INERTIA = 2  # order of its time derivative
 LARGEST = 1e150  # of an input: the square of one beyond may be no number
-STATE_STEPS = 4  # Runge-Kutta steps a sample for a term's own state
+STATE_STEPS = 4  # Runge-Kutta steps a sample for a term's own state ...
+MOST_STEPS = 64  # ... and at most
+AGREED = 0.01  # of a state's rms: what other steps may change
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,8 @@ class Input:
         Shape parameters in the formula.
     state : str or None
         dz/dt, where the shape is a state z with a memory.
+    direction : tuple of float
+        Weights of a structure's coordinates in the motion u that the shape is of; empty for a single mass.
     """
 
     shape: str
@@ -55,6 +60,7 @@ class Input:
     terms: tuple[str, ...]
     parameters: tuple[tuple[str, float], ...]
     state: str | None = None
+    direction: tuple[float, ...] = ()
 
     def powers(self, frequency: Floats) -> Complexes:
         """``factor (j 2 pi f)^order`` of each part, shape (lines, parts)."""
@@ -67,15 +73,44 @@ class Input:
 
 
 def reverse_inputs(model: Model) -> tuple[Input, ...]:
-    """Inputs of a model, in the order in which its terms first need them."""
-    inputs: dict[tuple[object, ...], Input] = {}
+    """Inputs of a model of a single mass, in the order in which its terms first need them."""
+    return _collected((entry, (), 1.0) for entry in model.terms)
+
+
+def equation_inputs(model: Model, coordinate: str) -> tuple[Input, ...]:
+    """Inputs of one coordinate's equation of motion, in the order in which its terms first need them.
+
+    Coefficients go by the keys of the whole structure: one that stands in two equations has one name, and what acts
+    there with the opposite sign has the factor -1.
+    """
+    i = model.coordinates.index(coordinate)
+    acting: list[tuple[ModelTerm, tuple[float, ...], float]] = []
     for entry in model.terms:
+        place = entry.place
+        if place is None or coordinate not in place.ends:
+            continue
+        if place.kind == "couples":
+            other = place.ends[1 - place.ends.index(coordinate)]
+            acting.append((entry, tuple(float(c == other) for c in model.coordinates), 1.0))
+        else:
+            direction = place.direction(model.coordinates)
+            acting.append((entry, direction, direction[i]))
+    return _collected(acting)
+
+
+def _collected(acting: Iterable[tuple[ModelTerm, tuple[float, ...], float]]) -> tuple[Input, ...]:
+    """Inputs of terms that act on a coordinate, each with the direction of its motion and the sign of its force."""
+    inputs: dict[tuple[object, ...], Input] = {}
+    for entry, direction, sign in acting:
         parameters = _known_parameters(entry)
-        for component in entry.term.components:
+        for component, symbol in zip(entry.term.components, entry.symbols, strict=True):
             state = entry.term.state if component.shape == "z" else None
-            key = (component.shape, parameters, state)
-            known = inputs.get(key, Input(component.shape, (), (), parameters, state))
-            part = Part(component.symbol, component.order, component.factor)
+            motion, weight = direction, sign
+            if component.shape == "u" and sign < 0.0:  # -u of the opposite motion: one input with all linear terms
+                motion, weight = tuple(0.0 - w for w in direction), 1.0
+            key = (component.shape, parameters, state, motion)
+            known = inputs.get(key, Input(component.shape, (), (), parameters, state, motion))
+            part = Part(symbol, component.order, weight * component.factor)
             terms = tuple(dict.fromkeys((*known.terms, entry.name)))
             inputs[key] = replace(known, parts=(*known.parts, part), terms=terms)
     return tuple(inputs.values())
@@ -109,6 +144,8 @@ def history(item: Input, record: Record) -> Floats:
     StudyError
         If a formula needs a channel that the record lacks, or has no finite value somewhere along it.
     """
+    from study.equations import kernels  # slow to load; who counts inputs or checks settings needs none
+
     formula = item.shape if item.state is None else item.state
     own = (*dict(item.parameters), *(("z",) if item.state is not None else ()))  # without a state, z is a channel
     wanted = [n for n in formulas.names(formula) if n not in own]
@@ -122,20 +159,37 @@ def history(item: Input, record: Record) -> Floats:
         bounds = pairwise((0, *record.joints, len(record)))
         return np.concatenate([history(item, _alone(record.part(a, b))) for a, b in bounds])
     if item.state is not None:
-        states = np.empty(len(record))
-        for steps in (STATE_STEPS, 4 * STATE_STEPS, 16 * STATE_STEPS):  # loops that close sharply ask for more
+
+        def integrated(steps: int) -> Floats:
+            states = np.empty(len(record))
             fine = np.column_stack([between_samples(x, 2 * steps) for x in data])
             kernels.integrate_state(
                 program.code, program.first, registers, positions, program.inputs["z"], int(output[0]),
                 record.dt / steps, steps, fine, states,
             )  # fmt: skip
-            if np.all(np.isfinite(states)):
-                break
-        return _finite(states, item, record)
+            return states
+
+        return _finite(_settled(integrated), item, record)
     table = np.column_stack(data) if data else np.zeros((len(record), 0))
     out = np.empty((len(record), 1))
     kernels.evaluate(program.code, program.first, registers, positions, table, output, out)
     return _finite(out[:, 0], item, record)
+
+
+def _settled(integrated: Callable[[int], Floats]) -> Floats:
+    """A term's state, in so many steps a sample that four times as many hardly change it.
+
+    Loops that close sharply, and motion that is fast beside the sampling, ask for more; steps that are too long for a
+    short memory make a state that grows without end, and may yet be finite.
+    """
+    states, steps = integrated(STATE_STEPS), STATE_STEPS
+    while steps < MOST_STEPS:
+        steps *= 4
+        coarse, states = states, integrated(steps)
+        with np.errstate(all="ignore"):
+            if np.sum((states - coarse) ** 2) <= AGREED**2 * np.sum(states**2):  # false where one is not finite
+                return coarse
+    return states
 
 
 def _alone(part: Record) -> Record:

@@ -1,4 +1,4 @@
-// Pictures open large, a click on a heading sorts its table, a word searches the claims.
+// Pictures open large, a click on a heading sorts its table, a word searches the claims of a page that has them.
 const large = document.getElementById("large")
 document.querySelectorAll(".thumb").forEach((thumb) => thumb.addEventListener("click", () => {
   const picture = thumb.querySelector("img")
@@ -30,7 +30,7 @@ document.querySelectorAll("table").forEach((table) => table.querySelectorAll("th
 }))
 
 const search = document.getElementById("search")
-search.addEventListener("input", () => {
+search?.addEventListener("input", () => {
   const word = search.value.toLowerCase()
   document.querySelectorAll("#claims details").forEach((claim) => { claim.hidden = !claim.textContent.toLowerCase().includes(word) })
 })
