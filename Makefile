@@ -15,9 +15,10 @@ report: study
 test: $(READY)
 	$(MAKE) --no-print-directory -j2 lint checks
 
-# A one-node SLURM on this machine (Debian, as root), and the same bytes on it as without.
+# A one-node SLURM on this machine (Debian, as root), then a store of results on it: the same bytes as without.
 test-cluster: $(READY)
 	scripts/test_cluster.sh
+	scripts/test_store.sh
 
 # As many workers as cores: more threads would only wait for each other.
 checks: $(READY)

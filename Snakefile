@@ -23,7 +23,9 @@ include: "rules/estimators.smk"
 include: "rules/summary.smk"
 include: "rules/trials.smk"
 include: "rules/cases.smk"
+include: "rules/structures.smk"
 include: "rules/measured.smk"
+include: "rules/campaign.smk"
 
 
 rule all:
@@ -33,3 +35,5 @@ rule all:
         CLAIM_RESULTS,
         ERROR_RESULTS,
         SUMMARY_RESULTS,
+        [structure_products(case) for case in STRUCTURES.cases],
+        STRUCTURE_RESULTS,

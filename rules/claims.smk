@@ -27,7 +27,7 @@ rule excitation_reading:
     input:
         statements=STATEMENTS,
         models=MODELS,
-        code=rests_on(Path("scripts/excitation_reading.py")),
+        code=modules("excitation_reading"),
     output:
         table=report(
             "results/excitation_reading.csv",
@@ -48,7 +48,7 @@ rule excitation_reading:
 rule integrator_steps:
     input:
         models=MODELS,
-        code=rests_on(Path("scripts/integrator_steps.py")),
+        code=modules("integrator_steps"),
     output:
         csv=report(
             "results/integrator_steps.csv",
@@ -72,7 +72,7 @@ rule claims:
         statements=STATEMENTS,
         steps="results/integrator_steps.csv",
         models=MODELS,
-        code=rests_on(Path("scripts/claims.py")),
+        code=modules("claims"),
     output:
         csv=report(
             "results/claims.csv",

@@ -1,22 +1,32 @@
 # What several rules share: the modules that each stage rests on, settings and files by case.
-from study.reproduction.config import PRELIMINARY
 from study.identify.estimators import ESTIMATORS
 from study.support.code_dependencies import rests_on
 
 # Touching study/identify/frequency_domain/conditioned.py re-runs identification and what follows, not simulation, though the two share
 # study/reproduction/make_record.py: what only identification uses is not followed from there.
 IDENTIFICATION_ONLY = ["study.identify.estimators", "study.identify.estimators.base", "study.records.spectra", "study.identify.frequency_domain.local_polynomial_method"]
+
+
+# Where results go to a store (profiles/kubernetes), jobs get the project's files with the job, as they were when the run
+# began; its modules are no inputs there, which each job would fetch one by one.
+STORED = workflow.storage_settings.default_storage_provider is not None
+
+
+def modules(script, **options):
+    """Modules that a script rests on."""
+    return [] if STORED else rests_on(Path(f"scripts/{script}.py"), **options)
+
+
 CODE = {
-    "record": rests_on(Path("scripts/make_record.py"), without=IDENTIFICATION_ONLY),
-    "identify": rests_on(Path("scripts/identify.py"), also=ESTIMATORS.values()),
-    "draw": rests_on(Path("scripts/draw_case.py")),
-    "draw_estimators": rests_on(Path("scripts/draw_estimators.py")),
-    "preliminary": rests_on(Path("scripts/draw_preliminary.py")),
-    "monte_carlo": rests_on(Path("scripts/monte_carlo.py"), also=ESTIMATORS.values()),
-    "rates": rests_on(Path("scripts/rates.py")),
-    "join": rests_on(Path("scripts/join.py")),
-    "table_page": rests_on(Path("scripts/table_page.py")),
-    "summary": rests_on(Path("scripts/summary.py")),
+    "record": modules("make_record", without=IDENTIFICATION_ONLY),
+    "identify": modules("identify", also=ESTIMATORS.values()),
+    "draw": modules("draw_case"),
+    "draw_estimators": modules("draw_estimators"),
+    "monte_carlo": modules("monte_carlo", also=ESTIMATORS.values()),
+    "rates": modules("rates"),
+    "join": modules("join"),
+    "table_page": modules("table_page"),
+    "summary": modules("summary"),
 }
 STYLE = "study/figures/study.mplstyle"
 ENDINGS = ("png", "svg")
@@ -68,23 +78,17 @@ def products(case):
     return tables + [path for stem in STUDY.cases[case].figures.values() for path in pictures(stem)]
 
 
-def draws_preliminary(case):
-    """Whether figures of the preliminary analysis are drawn of a case."""
-    return any(kind in case.figures for kind in PRELIMINARY)
-
-
-def figures_of(case, kinds, described):
-    """Outputs of a rule that draws: by kind the files, the PNG of each with its words in the report page."""
+def figures_of(case):
+    """Outputs of the rule that draws a case: by kind the files, the PNG of each with its words in the report page."""
     found = {}
     for kind, stem in STUDY.cases[case].figures.items():
-        if kind in kinds:
-            png, svg = pictures(stem)
-            number = stem.removeprefix("figure_").rjust(2) if stem.startswith("figure_") else "not in the report"
-            page = {
-                "caption": f"captions/{kind}.rst",
-                "category": "Figures",
-                "subcategory": STUDY.cases[case].title,
-                "labels": {"figure": number, "shows": described[kind]},
-            }
-            found[kind] = [report(png, **page), svg]
+        png, svg = pictures(stem)
+        number = stem.removeprefix("figure_").rjust(2) if stem.startswith("figure_") else "not in the report"
+        page = {
+            "caption": f"captions/{kind}.rst",
+            "category": "Figures",
+            "subcategory": STUDY.cases[case].title,
+            "labels": {"figure": number, "shows": DESCRIBED[kind]},
+        }
+        found[kind] = [report(png, **page), svg]
     return found

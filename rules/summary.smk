@@ -1,8 +1,5 @@
 # What all cases give together: one table of parameters, and the page that a reader opens first.
 BENCHMARKS = [f"results/benchmarks/{stage}.{case}.tsv" for stage in ("record", "identify", "draw") for case in STUDY.cases]
-BENCHMARKS += [
-    f"results/benchmarks/draw_preliminary.{name}.tsv" for name, case in STUDY.cases.items() if draws_preliminary(case)
-]
 BENCHMARKS += [f"results/benchmarks/{rule}.tsv" for rule in ("excitation_reading", "integrator_steps", "claims", "estimator_errors")]
 PAGES = {
     "claims": "Claims of the report",

@@ -1,7 +1,7 @@
 # Trials with hidden effects, the proof of diagnose: `snakemake -j2 trials`, not part of `all`;
 # `make trials` writes docs/trials.csv and the tables of docs/tool.md of them.
 TRIALS = STUDY.settings.trials
-TRIAL_CODE = {name: rests_on(Path(f"scripts/{name}.py")) for name in ("trials", "trial_summary")}
+TRIAL_CODE = {name: modules(name) for name in ("trials", "trial_summary")}
 
 
 rule trial_runs:
@@ -43,7 +43,7 @@ rule trials:
 # `make structure_trials` writes docs/trials_of_structures.csv and the table of docs/structures.md of them.
 STRUCTURE_TRIALS, STRUCTURE_JOBS = 120, 12
 STRUCTURE_CODE = {
-    name: rests_on(Path(f"scripts/{name}.py")) for name in ("structure_trials", "structure_trial_summary")
+    name: modules(name) for name in ("structure_trials", "structure_trial_summary")
 }
 
 
@@ -79,7 +79,7 @@ rule trials_mdof:
 
 # Trials of each kind of test: `snakemake -j2 trials_kinds`, not part of `all`; scripts/kind_docs.py puts them in docs.
 KINDS_OF_TESTS, FIRST_OF_KINDS, TRIALS_OF_A_KIND = ("free_decay", "blows", "base", "component", "axis"), 620001, 50
-KIND_CODE = rests_on(Path("scripts/kind_trials.py"))
+KIND_CODE = modules("kind_trials")
 
 
 rule trials_of_a_kind:

@@ -23,8 +23,8 @@ def run_times(paths: Sequence[str]) -> pd.DataFrame:
 
 
 def main(
-    parameters: Sequence[str], inputs: Mapping[str, str], benchmarks: Sequence[str], told: Mapping[str, Any],
-    outputs: Mapping[str, str],
+    parameters: Sequence[str], inputs: Mapping[str, str], benchmarks: Sequence[str], drawn: Sequence[str],
+    told: Mapping[str, Any], outputs: Mapping[str, str],
 ) -> None:  # fmt: skip
     tables = summary.Tables(
         parameters=pd.concat([pd.read_csv(path) for path in parameters], ignore_index=True),
@@ -39,7 +39,10 @@ def main(
     replace_file(Path(outputs["page"]), document.markdown(blocks).encode())
     replace_file(Path(outputs["html"]), document.page(study_page.TITLE, blocks).encode())
     replace_file(Path(outputs["estimators"]), document.markdown(summary.estimators(tables)).encode())
-    pictures = [Picture(p["system"], p["number"], p["shows"], Path(p["file"]).read_bytes()) for p in told["pictures"]]
+    pictures = [
+        Picture(p["system"], p["number"], p["shows"], Path(file).read_bytes())
+        for p, file in zip(told["pictures"], drawn, strict=True)
+    ]
     replace_file(Path(outputs["study"]), study_page.page(tables, pictures))
 
 
@@ -47,4 +50,11 @@ if "snakemake" in globals():
     step = globals()["snakemake"]
     tables = {name: getattr(step.input, name) for name in ("claims", "reading", "errors")}
     with one_sentence():
-        main(step.input.parameters, tables, step.input.benchmarks, step.params.told, dict(step.output.items()))
+        main(
+            step.input.parameters,
+            tables,
+            step.input.benchmarks,
+            step.input.pictures,
+            step.params.told,
+            dict(step.output.items()),
+        )

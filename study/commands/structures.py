@@ -44,6 +44,9 @@ def compare(arguments: argparse.Namespace, model: "Model") -> None:
 
     folder = out_folder(arguments)
     ready = prepared_structures(arguments, model)
+    if model.measured:
+        _compare_measured(arguments, model, ready)
+        return
     with progress("step", 3 * len(ready)) as step:
         comparisons = [compare_structure(model, prepared, progress=step) for prepared in ready]
     prefix = [f"{c.prepared.record.name}_" if len(ready) > 1 else "" for c in comparisons]
@@ -55,6 +58,30 @@ def compare(arguments: argparse.Namespace, model: "Model") -> None:
     write_files(folder, files, inputs_of(arguments))
     print("\n\n".join(summary(c) for c in comparisons))
     print(f"\n{folder}: {_listed(files)}")
+
+
+def _compare_measured(arguments: argparse.Namespace, model: "Model", ready: "list[PreparedStructure]") -> None:
+    """The same where the linear part is as measured."""
+    from study.compare.comparison_report import as_json
+    from study.structure.measured_comparison import compare_measured, measured_document, measured_summary
+    from study.support.file_sets import write_files
+
+    folder = out_folder(arguments)
+    with progress("step", 3 * len(ready)) as step:
+        comparisons = [compare_measured(model, prepared, step) for prepared in ready]
+    prefix = [f"{c.prepared.record.name}_" if len(ready) > 1 else "" for c in comparisons]
+    files = {f"{p}comparison.json": as_json(measured_document(c)) for p, c in zip(prefix, comparisons, strict=True)}
+    write_files(folder, files)
+    print("\n\n".join(measured_summary(c) for c in comparisons))
+    print(f"\n{folder}: {', '.join(files)}")
+
+
+def _refuse_measured(model: "Model", command: str) -> None:
+    """Say so where a command needs masses, stiffnesses and dampings."""
+    from study.support.errors import expect
+
+    like = "expected a model with inertia at every coordinate; 'study compare' takes this one"
+    expect(not model.measured, f"{command} knows no {model.name!r} with 'linear: measured' yet; {like}")
 
 
 def diagnose(arguments: argparse.Namespace, model: "Model") -> None:
@@ -69,6 +96,7 @@ def diagnose(arguments: argparse.Namespace, model: "Model") -> None:
     from study.structure.structure_verdict import diagnose_structure
     from study.support.file_sets import write_files
 
+    _refuse_measured(model, "diagnose")
     folder = out_folder(arguments)
     own = own_candidates(arguments.candidate, model)
     for name in arguments.without:
@@ -105,6 +133,7 @@ def add(arguments: argparse.Namespace, model: "Model") -> None:
     from study.support.errors import at
     from study.support.transaction import locked
 
+    _refuse_measured(model, "add")
     folder = out_folder(arguments)
     term = terms.get(arguments.term) if arguments.force is None else terms.custom(arguments.term, arguments.force)
     with at(arguments.model):

@@ -9,6 +9,9 @@
       - {term: linear_stiffness, between: [ground, floor1]}
       - {term: cubic_stiffness, between: [floor1, floor2]}    # on the second's motion minus the first's
       - {term: inertia, couples: [floor1, floor2]}            # off the diagonal of the mass matrix
+
+With ``linear: measured`` the coordinates are those with sensors, and the terms nonlinear alone: masses, stiffnesses and
+dampings of the structure are whatever its measured frequency response functions say.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,7 +25,9 @@ from study.equations.redundancy import repeated_force
 from study.support.errors import StudyError, expect
 from study.support.yaml_text import as_list, as_mapping, scalar, shown
 
-KEYS = ("coordinates", "forces")
+KEYS = ("coordinates", "forces", "linear")
+MEASURED = "measured"
+LINEAR = ("inertia", "linear_stiffness", "linear_damping")
 PLACES: tuple[Kind, ...] = ("at", "between", "couples")
 MOST = 40  # coordinates
 LONGEST = 40  # characters in a name
@@ -43,6 +48,17 @@ def coordinates_and_forces(top: Mapping[object, object]) -> tuple[tuple[str, ...
         expect(names.count(name) == 1, f"'coordinates' lists {name!r} twice; expected each once")
         expect(name != GROUND, f"'coordinates' lists {GROUND!r}, which never moves; expected names of what moves")
     return names, _forces(top.get("forces", {}), names)
+
+
+def linear_measured(top: Mapping[object, object]) -> bool:
+    """Whether a model leaves its linear part to the measurement."""
+    if "linear" not in top:
+        return False
+    given = top["linear"]
+    expect(given == MEASURED, f"'linear' is {shown(given)}; expected {MEASURED}, or no such key")
+    expect("coordinates" in top, "the model has 'linear' and no 'coordinates'; expected both")
+    expect(as_mapping(top.get("forces")), "'linear: measured' needs 'forces'; expected such as {shaker: tip}")
+    return True
 
 
 def _name(item: object, what: str) -> str:
@@ -119,8 +135,9 @@ def written(model: Model) -> str:
     if not model.coordinates:
         return ""
     forces = ", ".join(f"{scalar(name)}: {scalar(where)}" for name, where in model.forces)
+    measured = f"linear: {MEASURED}\n" if model.measured else ""
     return f"coordinates: [{', '.join(scalar(c) for c in model.coordinates)}]\n" + (
-        f"forces: {{{forces}}}\n" if forces else ""
+        f"forces: {{{forces}}}\n{measured}" if forces else ""
     )
 
 
@@ -132,6 +149,15 @@ def check(model: Model) -> None:
     StudyError
         If a coordinate has no inertia, or nothing acts on it; or two terms of one kind lie at the same place.
     """
+    if model.measured:
+        for entry in model.terms:
+            sentence = (
+                f"{entry.name} is linear, and 'linear: measured' holds it already; expected nonlinear terms alone"
+            )
+            expect(entry.term.name not in LINEAR, sentence)
+        for entries in _same_place(model):
+            _check_alike(model, entries)
+        return
     placed = [(entry, entry.place) for entry in model.terms if entry.place is not None]
     masses = {place.ends[0] for entry, place in placed if _is_mass(entry)}
     acted = {end for entry, place in placed if not _is_mass(entry) for end in place.moving}

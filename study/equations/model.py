@@ -87,12 +87,16 @@ class Model:
         Of a structure; empty for a single mass, whose terms have no place.
     forces : tuple of pairs of str
         Name of each measured force, and the coordinate of the structure on which it acts.
+    measured : bool
+        Whether the linear part of a structure is as it is measured: coordinates are those with sensors, terms what acts
+        between them beside it.
     """
 
     name: str
     terms: tuple[ModelTerm, ...]
     coordinates: tuple[str, ...] = ()
     forces: tuple[tuple[str, str], ...] = ()
+    measured: bool = False
 
     def __post_init__(self) -> None:
         """Refuse the same term twice."""

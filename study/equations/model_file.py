@@ -183,15 +183,16 @@ def _model(document: object, stem: str) -> Model:
     name = top.get("name", stem)
     if not isinstance(name, str) or not name.strip() or not name.isprintable() or len(name) > LONGEST_NAME:
         raise StudyError(f"the name is {shown(name)}; expected a short text on one line")
-    entries = as_list(top.get("terms"))
-    if not entries:
+    entries, measured = as_list(top.get("terms")), layout.linear_measured(top)
+    if not entries and not (measured and top.get("terms") == []):
         content = shown(top["terms"]) if "terms" in top else "missing"
         raise StudyError(f"'terms' is {content}; expected a list such as [inertia, linear_damping, linear_stiffness]")
+    entries = entries or []
     if len(entries) > MOST_TERMS:
         raise StudyError(f"'terms' has {len(entries)} entries; at most {MOST_TERMS} are read")
     coordinates, forces = layout.coordinates_and_forces(top)
     listed = tuple(_entry(item, number, coordinates) for number, item in enumerate(entries, 1))
-    model = Model(name, listed, coordinates, forces)
+    model = Model(name, listed, coordinates, forces, measured)
     if coordinates:
         layout.check(model)
     elif fault := repeated_force(model):

@@ -19,9 +19,9 @@ from study.explore.session import Session
 from study.explore.view import View
 
 GHOSTS: dict[str, Columns] = {
-    "ghost_time": {"t": [], "y": []}, "ghost_spectrum": {"f": [], "y": []}, "ghost_u": {"at": [], "y": []},
-    "ghost_v": {"at": [], "y": []}, "picked_spectrum": {"f": [], "y": []}, "picked_u": {"at": [], "y": []},
-    "picked_v": {"at": [], "y": []},
+    **{f"{kind}_{name}": {x: [], "y": []} for kind in ("ghost", "pinned")
+       for name, x in (("time", "t"), ("spectrum", "f"), ("u", "at"), ("v", "at"))},
+    "picked_spectrum": {"f": [], "y": []}, "picked_u": {"at": [], "y": []}, "picked_v": {"at": [], "y": []},
     "shown": {"f": [0.0, 1.0], "zero": [0.0, 0.0]} | {name: [np.nan, np.nan] for name in ("value", "low", "high")},
 }  # fmt: skip
 KINDS = {

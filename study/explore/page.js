@@ -22,36 +22,54 @@ window.study = (() => {
     far = null
     clear()
     kept = null
+    pins = []
     preview(null)
   }
 
-  // ---- what one candidate would leave
-  let kept = null
+  // ---- what one candidate would leave, or two: one that is pinned beside the one that is pointed at, or two pinned
+  let kept = null, pins = []
   function preview(i) {
-    const has = i !== null && model("would_time").get_column(String(i)) !== null
-    const ghost = (name, x, y) => {
-      if (has) put(name, {[x[0]]: column(x[1], x[2]), y: column(y, String(i))})
-      else empty(name, {[x[0]]: [], y: []})
-    }
-    ghost("ghost_time", ["t", "time", "t"], "would_time")
-    ghost("ghost_spectrum", ["f", "spectrum", "f"], "would_spectrum")
-    for (const of of ["u", "v"]) {
-      const [at, y] = has ? [column(`would_${of}`, `at${i}`), column(`would_${of}`, `y${i}`)] : [[], []]
-      put(`ghost_${of}`, {at, y})
-    }
+    const [first, second] = pins
+    const shown = second ?? i ?? first ?? null, beside = first !== undefined && first !== shown ? first : null
+    drawn("ghost", "candidate", shown)
+    drawn("pinned", "pinned", beside)
+    const has = known(shown)
     if (has && kept === null) kept = column("plane", "mean")
     if (kept !== null) {
-      const mean = has ? column("would_plane", String(i)) : kept
+      const mean = has ? column("would_plane", String(shown)) : kept
       put("plane", {...model("plane").data, mean, below: Float32Array.from(mean, (m) => (m < -1e-6 * model("mapper").high ? 5 : 0))})
       if (!has) kept = null
     }
-    for (const name of ["difference", "spectrum", "against_u", "against_v"]) entry(name, "candidate", has)
-    constancy(has ? i : 0)
+    constancy(has ? shown : 0, beside)
+  }
+
+  const known = (i) => i !== null && model("would_time").get_column(String(i)) !== null
+  function drawn(kind, label, i) {
+    const has = known(i)
+    const line = (name, x, y) => {
+      if (has) put(`${kind}_${name}`, {[x]: column(name, x), y: column(y, String(i))})
+      else empty(`${kind}_${name}`, {[x]: [], y: []})
+    }
+    line("time", "t", "would_time")
+    line("spectrum", "f", "would_spectrum")
+    for (const of of ["u", "v"]) {
+      const [at, y] = has ? [column(`would_${of}`, `at${i}`), column(`would_${of}`, `y${i}`)] : [[], []]
+      put(`${kind}_${of}`, {at, y})
+    }
+    for (const name of ["difference", "spectrum", "against_u", "against_v"]) entry(name, label, has)
+  }
+
+  // a click on a candidate pins it, another one lets it go; of three the first goes
+  function pin(i) {
+    pins = pins.includes(i) ? pins.filter((other) => other !== i) : [...pins, i].slice(-2)
+    for (const row of document.querySelectorAll("[data-candidate]"))
+      row.classList.toggle("pinned", pins.includes(Number(row.dataset.candidate)))
+    preview(hovered)
   }
 
   const entry = (name, label, on) => { const item = model(`panel_${name}_${label}`); if (item) item.visible = on }
 
-  function constancy(i) {
+  function constancy(i, beside) {
     const element = document.querySelector(`[data-candidate="${i}"]`)
     const rows = element ? column("constancy", "row") : [], shown = {f: [], value: [], low: [], high: []}
     for (let k = 0; k < rows.length; k++)
@@ -64,7 +82,8 @@ window.study = (() => {
     const card = place("constancy-card"), empty = place("constancy-none"), detail = place("detail")
     if (card) card.classList.toggle("none", !shown.f.length)
     if (empty) empty.hidden = !element || shown.f.length > 0
-    if (detail) detail.innerHTML = element ? element.querySelector("small").innerHTML : ""
+    const said = (row) => document.querySelector(`[data-candidate="${row}"] small`)?.innerHTML ?? ""
+    if (detail) detail.innerHTML = beside === null ? said(i) : `<div class="two"><p>${said(beside)}</p><p>${said(i)}</p></div>`
     for (const row of document.querySelectorAll("[data-candidate]")) row.classList.toggle("shown", row === element)
   }
 
@@ -276,7 +295,8 @@ window.study = (() => {
   const under = (event, key) => event.composedPath().find((e) => e.dataset && e.dataset[key] !== undefined)
   let hovered = null
   document.addEventListener("click", (event) => {
-    const element = under(event, "act")
+    const element = under(event, "act"), row = under(event, "candidate")
+    if (row && !element) pin(Number(row.dataset.candidate))
     if (element && !element.disabled)
       act(element.dataset.act, element.dataset.act === "try" ? place("formula").value : element.dataset.name ?? "")
   })
@@ -289,7 +309,12 @@ window.study = (() => {
     if (element) preview((hovered = Number(element.dataset.candidate)))
   })
   document.addEventListener("keydown", (event) => {
-    if (event.key === "Escape") { clear(); preview((hovered = null)) }
+    if (event.key === "Escape") { clear(); hovered = null; for (const i of pins) pin(i) }
+    if (event.key === "Escape") preview(null)
+    if ((event.key === "Enter" || event.key === " ") && event.target.dataset?.candidate !== undefined) {
+      event.preventDefault()
+      pin(Number(event.target.dataset.candidate))
+    }
     if (event.key === "Enter" && event.target.id === "formula") act("try", event.target.value)
   })
 

@@ -30,10 +30,12 @@ def difference(s: Sources, time: Any) -> Any:
     _blocks(drawn, s)
     line = drawn.line("t", "difference", source=s["time"], **theme.DIFFERENCE)
     would = drawn.line("t", "y", source=s["ghost_time"], **theme.WOULD)
+    pinned = drawn.line("t", "y", source=s["pinned_time"], **theme.PINNED)
     noise = drawn.multi_line("t", "level", source=s["noise"], **theme.NOISE)
     theme.chosen(drawn, "box_difference")
     theme.follows(drawn, [line, noise])
-    theme.legend(drawn, [("measured less predicted", [line]), ("± twice the noise", [noise]), ("candidate", [would])])
+    named = [("measured less predicted", [line]), ("± twice the noise", [noise])]
+    theme.legend(drawn, [*named, ("candidate", [would]), ("pinned", [pinned])])
     return drawn
 
 
@@ -86,6 +88,7 @@ def spectrum(s: Sources, frequency: Any) -> Any:
     line = drawn.line("f", "difference", source=s["spectrum"], line_color=theme.ORANGE, line_width=1.5)
     noise = drawn.line("f", "noise", source=s["spectrum"], **theme.NOISE)
     would = drawn.line("f", "y", source=s["ghost_spectrum"], **theme.WOULD)
+    drawn.line("f", "y", source=s["pinned_spectrum"], **theme.PINNED)
     picked = drawn.line("f", "y", source=s["picked_spectrum"], **theme.PICKED)
     theme.chosen(drawn, "box_spectrum")
     theme.follows(drawn, [line, noise])
@@ -132,6 +135,7 @@ def against(s: Sources, of: str) -> Any:
     dots = drawn.scatter("at", "mean", source=s[name], fill_color=theme.BLUE, line_color=None, size=4.5)
     bars = drawn.segment("at", "low", "at", "high", source=s[name], line_color=theme.BLUE, line_width=1.0)
     would = drawn.line("at", "y", source=s[f"ghost_{of}"], **theme.WOULD)
+    drawn.line("at", "y", source=s[f"pinned_{of}"], **theme.PINNED)
     picked = drawn.line("at", "y", source=s[f"picked_{of}"], **theme.PICKED)
     theme.chosen(drawn, f"box_{name}")
     reach = drawn.line("at", "reach", source=s[name], line_alpha=0.0)  # how near the axis may come

@@ -33,8 +33,9 @@ def saved(session: Session) -> bytes:
     values = html_page.variables(session, live=False)
     shown = html_page.placed(made, values["diagnosed"])
     document = Document()
-    for panel in shown:
-        document.add_root(panel)
+    with document.models.freeze():  # what belongs to the document is gathered once, not anew for each panel
+        for panel in shown:
+            document.add_root(panel)
     document.js_on_event("document_ready", CustomJS(code="window.study.begin()"))
     content, ids = _numbered(document.to_json(deferred=False))
     roots = {p.name: SimpleNamespace(id=ids[p.id], elementid=f"study-{p.name}") for p in shown}

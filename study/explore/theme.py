@@ -24,6 +24,7 @@ PREDICTED: dict[str, Any] = {"line_color": BLUE, "line_width": 1.2}
 DIFFERENCE: dict[str, Any] = {"line_color": ORANGE, "line_width": 1.0}
 NOISE: dict[str, Any] = {"line_color": "#000000", "line_width": 1.3, "line_dash": "dotted"}
 WOULD: dict[str, Any] = {"line_color": "#111111", "line_width": 1.3}
+PINNED: dict[str, Any] = {"line_color": "#1b6e3c", "line_width": 1.7, "line_dash": [7, 3]}
 PICKED: dict[str, Any] = {"line_color": "#7a1fa2", "line_width": 2.0, "line_dash": "dashed"}
 BAND = "#f5c04a"
 POWERS = """
@@ -32,7 +33,7 @@ if (power >= -2 && power <= 3) return String(Number(tick.toPrecision(3)))
 const raised = String(power).replace(/./g, (c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻")
 return (mantissa === 1 ? "10" : mantissa + "·10") + raised
 """
-PASSING = ("candidate", "selected")  # entries of legends
+PASSING = ("candidate", "pinned", "selected")  # entries of legends
 
 
 def panel(

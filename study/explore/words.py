@@ -132,7 +132,7 @@ def _row(place: int, row: Ranked, stage: Stage, live: bool) -> str:
     return (
         f"<li class='candidate' data-candidate='{place}' data-label='{escape(_label(row, unit))}' tabindex='0' "
         f"aria-label='{words}, explains {explained}'><span class='rank'>{_rank(place, row, stage)}</span>"
-        f"<span class='name' title='{words}'><b>{words}</b></span>{_ties(row)}"
+        f"<span class='name' title='{words}; a click pins it beside another'><b>{words}</b></span>{_ties(row)}"
         f"{_bar(row)}<span class='explained'>{explained}</span>{add}<small hidden>{detail}</small></li>"
     )
 

@@ -18,7 +18,7 @@ from study.records.record import MOTIONS, Record, Stretch
 from study.records.states import period
 from study.support.errors import StudyError, expect
 
-PERIODS = 5.0  # of the motion in a block, at least
+PERIODS = 5.0  # of the motion in a block, at least: its noise is then hardly that of its neighbours (docs/tool.md)
 BLOCKS = 24  # of a stretch, at most
 HORIZON = 4.0  # periods of its motion over which a mass without a spring is judged ...
 PIECES = 4  # ... and in how many pieces each part is cut at least

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pandas as pd
@@ -27,6 +27,20 @@ COHERENCE_COLUMNS = [
 NOISE_COLUMNS = ["frequency", "estimator", "noise"]
 
 
+class Judged(Protocol):
+    """What an estimate may be off by name: relative, absolute where the true value is zero."""
+
+    @property
+    def relative(self) -> Mapping[str, float]:
+        """Of the true value."""
+        ...
+
+    @property
+    def absolute(self) -> Mapping[str, float]:
+        """In the parameter's own unit."""
+        ...
+
+
 def parameters(
     case: str, model: Model, estimates: Mapping[str, Identified], settings: IdentificationSettings
 ) -> pd.DataFrame:
@@ -48,7 +62,7 @@ def parameters(
     return pd.DataFrame(rows, columns=PARAMETER_COLUMNS)
 
 
-def judge(name: str, true: float, estimate: float, settings: IdentificationSettings) -> dict[str, Any]:
+def judge(name: str, true: float, estimate: float, settings: Judged) -> dict[str, Any]:
     """Relative error, tolerance and verdict of one estimate."""
     relative = (estimate - true) / true if true else math.nan
     tolerance = (settings.relative if true else settings.absolute).get(name, math.nan)
@@ -71,7 +85,7 @@ def frequency_responses(model: Model, estimates: Mapping[str, Identified]) -> pd
                 (result.frequency, estimator, j + 1, item.shape, response.real, response.imag, error, exact.real,
                  exact.imag)
             )  # fmt: skip
-    return _stacked(RESPONSE_COLUMNS, parts)
+    return stacked(RESPONSE_COLUMNS, parts)
 
 
 def coherences(estimates: Mapping[str, Identified]) -> pd.DataFrame:
@@ -87,16 +101,16 @@ def coherences(estimates: Mapping[str, Identified]) -> pd.DataFrame:
                 (result.frequency, estimator, j + 1, item.shape, terms, result.ordinary[j], result.partial[j],
                  result.contribution[j], result.cumulative[j])
             )  # fmt: skip
-    return _stacked(COHERENCE_COLUMNS, parts)
+    return stacked(COHERENCE_COLUMNS, parts)
 
 
 def noise_spectra(estimates: Mapping[str, Identified]) -> pd.DataFrame:
     """G_nn (4.44), the autospectrum of the residual force of each estimator that has one, in N^2/Hz, in long form."""
     results = {estimator: identified.responses for estimator, identified in estimates.items()}
-    return _stacked(NOISE_COLUMNS, [(r.frequency, name, r.noise) for name, r in results.items() if r is not None])
+    return stacked(NOISE_COLUMNS, [(r.frequency, name, r.noise) for name, r in results.items() if r is not None])
 
 
-def _stacked(columns: list[str], parts: Sequence[Sequence[Any]]) -> pd.DataFrame:
+def stacked(columns: list[str], parts: Sequence[Sequence[Any]]) -> pd.DataFrame:
     """One table of all parts, each a value or an array per column; a heading alone where there is no part."""
     frames = [pd.DataFrame(dict(zip(columns, part, strict=True))) for part in parts]
     return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=columns)

@@ -72,8 +72,10 @@ def motion_program(model: Model, available: Sequence[str], keys: Sequence[str] =
     Raises
     ------
     StudyError
-        If a value is missing, or a key or channel unknown.
+        If a value is missing, a key or channel unknown, or the linear part as measured.
     """
+    if model.measured:
+        raise StudyError(f"model {model.name!r} has 'linear: measured', and no masses to run with; expected inertia")
     if unknown := [key for key in keys if key not in model.values]:
         raise StudyError(f"model {model.name!r} has no {', '.join(unknown)}; it has {', '.join(model.values)}")
     held = {key: value for key, value in model.values.items() if key not in keys}
@@ -95,7 +97,7 @@ def _compiled(model: Model, keys: tuple[str, ...]) -> MotionProgram:
     channels = {name: graph.input(f"channel:{name}") for name in model.channels}
     states = {t.name: graph.input(f"z:{t.name}") for t in model.states}
     values = {key: graph.input(key) for key in model.values}
-    builder = _Builder(model, graph, (u, v, time), channels, states, values)
+    builder = Builder(model, graph, (u, v, time), channels, states, values)
     loads = [graph.const(0.0)] * n
     for (_, where), node in zip(model.forces, forces, strict=True):
         i = model.coordinates.index(where)
@@ -104,20 +106,20 @@ def _compiled(model: Model, keys: tuple[str, ...]) -> MotionProgram:
     accelerations = _solved(graph, builder.masses(), loads)
     table, directions = _sides(model, graph, builder, [*accelerations, *rates])
     slopes = graph.substituted([*accelerations, *rates], dict(table))
-    by_state = _links(graph, slopes, [*u, *v, *states.values()])
-    by_key = _links(graph, slopes, [values[key] for key in keys])
+    by_state = links_of(graph, slopes, [*u, *v, *states.values()])
+    by_key = links_of(graph, slopes, [values[key] for key in keys])
     pushes = [graph.derivative(a, side) for _, side in table for a in slopes[:n]]
     links = [node for *_, node in (*by_state, *by_key)]
     program = graph.program([*slopes, *links, *pushes, *(side for _, side in table)])
     registers = program.outputs[len(slopes) :]
     return MotionProgram(
         program, n, len(forces) + len(channels), program.outputs[: len(slopes)],
-        _table(by_state, registers), _table(by_key, registers[len(by_state) :]),
+        link_table(by_state, registers), link_table(by_key, registers[len(by_state) :]),
         registers[len(links) + len(pushes) :], registers[len(links) :][: len(pushes)].reshape(-1, n), directions,
     )  # fmt: skip
 
 
-def _links(graph: Graph, slopes: Sequence[int], by: Sequence[int]) -> list[tuple[int, int, int]]:
+def links_of(graph: Graph, slopes: Sequence[int], by: Sequence[int]) -> list[tuple[int, int, int]]:
     """Slope, variable and node of each partial derivative that is not zero."""
     found: list[tuple[int, int, int]] = []
     for i, slope in enumerate(slopes):
@@ -128,13 +130,14 @@ def _links(graph: Graph, slopes: Sequence[int], by: Sequence[int]) -> list[tuple
     return found
 
 
-def _table(links: Sequence[tuple[int, int, int]], registers: Ints) -> Ints:
+def link_table(links: Sequence[tuple[int, int, int]], registers: Ints) -> Ints:
+    """Slope, variable and register of each, shape (links, 3)."""
     rows = [(i, j, int(register)) for (i, j, _), register in zip(links, registers, strict=False)]
     return np.array(rows, dtype=np.int64).reshape(-1, 3)
 
 
 @dataclass(frozen=True)
-class _Builder:
+class Builder:
     """The nodes that the terms of a structure are made of."""
 
     model: Model
@@ -159,7 +162,7 @@ class _Builder:
             force, rate = self.force(entry)
             if rate is not None:
                 rates.append(rate)
-            for i, weight in enumerate(_place(entry).direction(self.model.coordinates)):
+            for i, weight in enumerate(place_of(entry).direction(self.model.coordinates)):
                 if weight != 0.0 and entry.term.name != "inertia":
                     left[i] = (self.graph.sub if weight > 0.0 else self.graph.add)(left[i], force)
         return left, rates
@@ -167,7 +170,7 @@ class _Builder:
     def force(self, entry: ModelTerm) -> tuple[int, int | None]:
         """Force of a term on the second end of its place, and the rate of its own state."""
         u, v, time = self.motion
-        place = _place(entry)
+        place = place_of(entry)
         names = {"u": self.along(place, u), "v": self.along(place, v), "t": time}
         names |= {n: self.channels[n] for n in entry.term.channels}
         names |= {p.name: self.values[f"{entry.name}.{p.name}"] for p in entry.term.parameters}
@@ -198,7 +201,7 @@ def mass_entries(model: Model) -> list[tuple[int, int, float, str]]:
     for entry in model.terms:
         if entry.term.name != "inertia":
             continue
-        place, key = _place(entry), entry.symbols[0]
+        place, key = place_of(entry), entry.symbols[0]
         if place.kind == "couples":
             i, j = (model.coordinates.index(end) for end in place.ends)
             found += [(i, j, 1.0, key), (j, i, 1.0, key)]
@@ -209,7 +212,8 @@ def mass_entries(model: Model) -> list[tuple[int, int, float, str]]:
     return found
 
 
-def _place(entry: ModelTerm) -> Place:
+def place_of(entry: ModelTerm) -> Place:
+    """Where a term of a structure acts."""
     assert entry.place is not None, "every term of a structure has a place"
     return entry.place
 
@@ -232,14 +236,12 @@ def _solved(graph: Graph, matrix: list[list[int]], right: list[int]) -> list[int
     return f
 
 
-def _sides(
-    model: Model, graph: Graph, builder: _Builder, slopes: Sequence[int]
-) -> tuple[list[tuple[int, int]], Floats]:
+def _sides(model: Model, graph: Graph, builder: Builder, slopes: Sequence[int]) -> tuple[list[tuple[int, int]], Floats]:
     """Node of the sign of each relative velocity that a force jumps with, and the input that stands for it."""
     needed = graph.needed(slopes)
     table: list[tuple[int, int]] = []
     rows: list[tuple[float, ...]] = []
-    for place in dict.fromkeys(_place(t) for t in model.terms):
+    for place in dict.fromkeys(place_of(t) for t in model.terms):
         velocity = builder.along(place, builder.motion[1])
         sgn = next((n for n in needed if graph.nodes[n] == (Op.SGN, velocity, velocity)), None)
         if sgn is not None and all(sgn != known for known, _ in table):

@@ -19,6 +19,7 @@ from study.structure.structure_leftover import Leftover, explained_by_place, lef
 from study.structure.structure_prediction import StructurePrediction, predict_structure
 from study.structure.structure_start import first_fit
 from study.support.arrays import Floats
+from study.support.errors import expect
 from study.support.numbers import percent
 
 
@@ -75,6 +76,8 @@ def compare_structure(
         If the model cannot be fitted.
     """
     report: Callable[[str], None] = progress or (lambda _: None)
+    sentence = f"{model.name!r} has 'linear: measured'; expected a model with inertia at every coordinate here"
+    expect(not model.measured, f"{sentence}, as 'study compare' alone takes this one")
     report("fit")
     if fit is None:
         fit = settled(first_fit(model, prepared), prepared)

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from study.support.errors import StudyError
 
+BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")
+
 
 def rests_on(script: Path, *, also: Iterable[str] = (), without: Collection[str] = ()) -> list[str]:
     """Sorted paths of the files of the package that a script imports, directly or through one another.
@@ -22,11 +24,16 @@ def rests_on(script: Path, *, also: Iterable[str] = (), without: Collection[str]
         path = waiting.pop()
         if path not in reached and path not in skipped:
             reached.add(path)
-            waiting += [other for name in _imported(path) for other in _files(name, root)]
+            waiting += _next(path, root)
     return sorted(str(path) for path in reached - {script})
 
 
 @cache
+def _next(path: Path, root: Path) -> tuple[Path, ...]:
+    """Files of the package that a file imports itself."""
+    return tuple(dict.fromkeys(other for name in _imported(path) for other in _files(name, root)))
+
+
 def _imported(path: Path) -> tuple[str, ...]:
     """Names that a file imports, those inside functions included, those for the type checker alone not."""
     try:
@@ -36,8 +43,14 @@ def _imported(path: Path) -> tuple[str, ...]:
     return tuple(_names(tree))
 
 
+def _statements(tree: ast.AST) -> Iterator[ast.AST]:
+    """What stands in the blocks of a statement; no expression holds an import, and most of a file is expressions."""
+    for block in BLOCKS:
+        yield from getattr(tree, block, ())
+
+
 def _names(tree: ast.AST) -> Iterator[str]:
-    for node in ast.iter_child_nodes(tree):
+    for node in _statements(tree):
         match node:
             case ast.Import(names=names):
                 yield from (name.name for name in names)
@@ -50,7 +63,10 @@ def _names(tree: ast.AST) -> Iterator[str]:
                 yield from _names(node)
 
 
+@cache
 def _files(name: str, root: Path) -> list[Path]:
     """The file of a module of the package, or of a package in it."""
+    if not name.startswith("study."):
+        return []
     stem = root.joinpath(*name.split("."))
-    return [p for p in (stem.with_suffix(".py"), stem / "__init__.py") if name.startswith("study.") and p.is_file()]
+    return [p for p in (stem.with_suffix(".py"), stem / "__init__.py") if p.is_file()]

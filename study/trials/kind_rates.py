@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import cast
 
 import pandas as pd
 
 from study.support import document
 from study.support.document import Block, Text, table
 from study.support.numbers import percent
-from study.trials.kind_runs import VISIBLE
+from study.trials.kind_runs import VISIBLE, Row
 from study.trials.kinds import TESTS
 from study.trials.rates import Rate, proportion
 
@@ -16,7 +17,7 @@ HEADING = (
     "test", "true effect first", "first or tied", "of those that the record shows", "nothing missing where nothing is",
     "coefficients in their 95 % intervals",
 )  # fmt: skip
-EXACT = ("test", "seed", "noise", "hidden", "verdict", "first", "tied", "right")  # the same on every machine
+EXACT = ("test", "seed", "noise", "hidden", "verdict", "first", "right")  # whatever lies at the edge of a tie
 
 
 def put(page: Path, trials: pd.DataFrame) -> None:
@@ -38,19 +39,26 @@ def blocks(trials: pd.DataFrame) -> list[Block]:
     return [Text(about), table(HEADING, [[kind, *_cells(trials[trials["test"] == kind])] for kind in kinds])]
 
 
-def _cells(rows: pd.DataFrame) -> list[str]:
-    right = pd.to_numeric(rows["right"]).fillna(0.0)
-    hidden = rows["hidden"] != "none"
-    shown = hidden & ((rows["noise"] == 0.0) | (pd.to_numeric(rows["shown"]) >= VISIBLE) | rows["trouble"].notna())
-    asked = pd.to_numeric(rows["asked"]).fillna(0.0)
-    held = pd.to_numeric(rows["held"])[asked > 0.0]
-    first = (right * (rows["first"] == rows["hidden"]))[hidden]
+def _cells(trials: pd.DataFrame) -> list[str]:
+    rows = cast(list[Row], trials.to_dict("records"))
+    hidden, none = [r for r in rows if r["hidden"] != "none"], [r for r in rows if r["hidden"] == "none"]
+    asked = [r for r in rows if r["asked"] > 0]
     rates: Sequence[Rate] = (
-        proportion(first.tolist()),
-        proportion(right[hidden].tolist()), proportion(right[shown].tolist()), proportion(right[~hidden].tolist()),
-        proportion(held.tolist(), asked[asked > 0.0].tolist()),
+        proportion([_right(r) * (r["first"] == r["hidden"]) for r in hidden]), proportion([_right(r) for r in hidden]),
+        proportion([_right(r) for r in hidden if _shown(r)]), proportion([_right(r) for r in none]),
+        proportion([float(r["held"]) for r in asked], [float(r["asked"]) for r in asked]),
     )  # fmt: skip
     return [_cell(rate) for rate in rates]
+
+
+def _right(row: Row) -> float:
+    """One if the verdict is right; what could not be diagnosed is not."""
+    return float(row["right"] == 1)
+
+
+def _shown(row: Row) -> bool:
+    """Whether the record shows the hidden effect; what could not be diagnosed is taken to."""
+    return row["noise"] == 0.0 or row["shown"] >= VISIBLE or isinstance(row["trouble"], str)
 
 
 def _cell(rate: Rate) -> str:

@@ -119,6 +119,7 @@ def test_a_session_from_the_first_verdict_to_the_saved_page(page: Page, address:
     given = error(page)
     _read_the_verdict(page)
     _preview(page)
+    _pin(page)
     _select(page)
     page.click("[data-candidate='0'] button")
     until(page, f"parseFloat(document.querySelector('{ERROR}').textContent) < {0.5 * given}")
@@ -161,6 +162,28 @@ def _preview(page: Page) -> None:
     assert max(map(abs, source(page, "ghost_time", "y"))) < 0.5 * max(map(abs, source(page, "time", "difference")))
     page.mouse.move(5, 5)
     until(page, "Bokeh.documents[0].get_model_by_name('ghost_time').get_length() === 0")
+
+
+def _pin(page: Page) -> None:
+    """Two candidates stay side by side, whatever is pointed at, until they are let go."""
+    for place in (0, 1):
+        page.click(f"[data-candidate='{place}'] .name")
+    page.mouse.move(5, 5)
+    for name, place in (("pinned", 0), ("ghost", 1)):
+        until(page, f"Bokeh.documents[0].get_model_by_name('{name}_time').get_length() > 100")
+        assert source(page, f"{name}_time", "y") == source(page, "would_time", str(place))
+        assert source(page, f"{name}_spectrum", "y") == source(page, "would_spectrum", str(place))
+    detail = page.inner_text("#detail")
+    for place in (0, 1):
+        assert page.text_content(f"[data-candidate='{place}'] .name b") in detail
+    page.click("[data-candidate='0'] .name")
+    page.mouse.move(5, 5)
+    until(page, "Bokeh.documents[0].get_model_by_name('pinned_time').get_length() === 0")
+    assert source(page, "ghost_time", "y") == source(page, "would_time", "1")
+    page.keyboard.press("Escape")
+    page.mouse.move(5, 6)
+    until(page, "Bokeh.documents[0].get_model_by_name('ghost_time').get_length() === 0")
+    assert page.locator("li.pinned").count() == 0
 
 
 def _select(page: Page) -> None:
@@ -274,6 +297,7 @@ def _opened_without_a_network(page: Page, rig: Path, given: float, reached: floa
     assert saved.inner_text("#verdict h3") == "An effect is missing"
     assert saved.locator("button:has-text('Add')").count() == 0
     _preview(saved)
+    _pin(saved)
     _select(saved)
     assert not wrong
     assert [url for url in asked if not url.startswith(("file:", "data:"))] == []

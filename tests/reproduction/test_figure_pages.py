@@ -1,8 +1,6 @@
 """Whole pages of figures: nothing overlaps, the same bytes each time."""
 
-import importlib.util
 import itertools
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +14,7 @@ from matplotlib.figure import Figure
 from study.figures import curves, frequency_response, page, styles
 from study.records.record import Record, write_csv
 from study.records.spectra import Segments
+from study.reproduction.pictures import identified_figures, preliminary_figures
 from study.support.errors import StudyError
 
 ROOT = Path(__file__).parents[2]
@@ -31,24 +30,6 @@ SYSTEMS = {
 }
 COLUMNS = ("frequency", "estimator", "input", "shape", "real", "imag", "standard_error", "exact_real", "exact_imag")
 KINDS = ("linear", "nonlinear", "coherence", "histogram")
-
-
-def script(name):
-    spec = importlib.util.spec_from_file_location(name, ROOT / "scripts" / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
-
-
-@pytest.fixture(scope="module")
-def draw_case():
-    return script("draw_case")
-
-
-@pytest.fixture(scope="module")
-def draw_preliminary():
-    return script("draw_preliminary")
 
 
 @pytest.fixture(autouse=True)
@@ -145,36 +126,36 @@ def check_layout(figure):
 
 @pytest.mark.parametrize("system", SYSTEMS)
 @pytest.mark.parametrize("kind", KINDS)
-def test_nothing_overlaps_on_any_page(draw_case, products, system, kind, monkeypatch, tmp_path):
+def test_nothing_overlaps_on_any_page(products, system, kind, monkeypatch, tmp_path):
     seen = []
     monkeypatch.setattr(page, "rendered", lambda figure, _: seen.append(figure) or b"")
     title = "Extreme Duffing-Van der Pol system, input variance 0.2"
-    draw_case.draw(*products(system), {kind: [tmp_path / "a.png"]}, title=title, style=SHEET)
+    identified_figures.draw(*products(system), {kind: [tmp_path / "a.png"]}, title=title, style=SHEET)
     check_layout(seen[0])
 
 
-def test_there_is_room_for_many_estimators(draw_case, products, monkeypatch, tmp_path):
+def test_there_is_room_for_many_estimators(products, monkeypatch, tmp_path):
     seen = []
     monkeypatch.setattr(page, "rendered", lambda figure, _: seen.append(figure) or b"")
     names = (*styles.ESTIMATORS, "another_one")
     paths = products("duffing_van_der_pol", spread=0.5, estimators=names)
-    draw_case.draw(*paths, {k: [tmp_path / k] for k in ("linear", "nonlinear")}, title="Noise", style=SHEET)
+    identified_figures.draw(*paths, {k: [tmp_path / k] for k in ("linear", "nonlinear")}, title="Noise", style=SHEET)
     for figure in seen:
         check_layout(figure)
     assert {"local polynomial", "95 % band"} <= {t.get_text() for t in seen[0].legends[0].get_texts()}
 
 
-def test_draw_writes_each_kind_twice(draw_case, products, tmp_path):
+def test_draw_writes_each_kind_twice(products, tmp_path):
     outputs = {kind: [tmp_path / f"{kind}.{ending}" for ending in ("png", "svg")] for kind in KINDS}
-    draw_case.draw(*products("duffing"), outputs, title="Duffing system", style=SHEET)
+    identified_figures.draw(*products("duffing"), outputs, title="Duffing system", style=SHEET)
     for png, svg in outputs.values():
         assert png.read_bytes().startswith(b"\x89PNG")
         assert b"</svg>" in svg.read_bytes()
 
 
-def test_draw_refuses_an_unknown_kind(draw_case, products, tmp_path):
+def test_draw_refuses_an_unknown_kind(products, tmp_path):
     with pytest.raises(StudyError, match="no kind of figure 'other'; known are linear"):
-        draw_case.draw(*products("duffing"), {"other": [tmp_path / "a.png"]}, title="", style=SHEET)
+        identified_figures.draw(*products("duffing"), {"other": [tmp_path / "a.png"]}, title="", style=SHEET)
 
 
 @pytest.mark.parametrize(
@@ -182,24 +163,24 @@ def test_draw_refuses_an_unknown_kind(draw_case, products, tmp_path):
     [("duffing", "pattern"), ("mathieu", "pattern"), ("mathieu", "autospectrum"), ("linear", "force_history"),
      ("linear", "force_histogram")],
 )  # fmt: skip
-def test_preliminary_figures(draw_preliminary, products, tmp_path, system, kind, monkeypatch):
-    source = draw_preliminary.Source(products("plain")[0], ROOT / "models" / f"{system}.yaml", f"{system} system")
+def test_preliminary_figures(products, tmp_path, system, kind, monkeypatch):
+    source = preliminary_figures.Source(products("plain")[0], ROOT / "models" / f"{system}.yaml", f"{system} system")
     seen, real = [], page.rendered
     monkeypatch.setattr(page, "rendered", lambda figure, ending: seen.append(figure) or real(figure, ending))
     output = tmp_path / "a.svg"
-    draw_preliminary.draw(source, {kind: [output]}, style=SHEET, segments=Segments(256))
+    preliminary_figures.draw(source, {kind: [output]}, style=SHEET, segments=Segments(256))
     assert b"</svg>" in output.read_bytes()
     check_layout(seen[0])
 
 
 @pytest.mark.parametrize("length", [128, 256])
-def test_the_stretch_of_force_is_as_long_as_a_segment(draw_preliminary, products, length):
-    source = draw_preliminary.Source(products("plain")[0], ROOT / "models" / "linear.yaml", "")
-    figure = draw_preliminary.force_history(source, Segments(length))
+def test_the_stretch_of_force_is_as_long_as_a_segment(products, length):
+    source = preliminary_figures.Source(products("plain")[0], ROOT / "models" / "linear.yaml", "")
+    figure = preliminary_figures.force_history(source, Segments(length))
     assert len(figure.axes[0].lines[0].get_xdata()) == length
 
 
-def test_preliminary_refuses_an_unknown_kind(draw_preliminary, products, tmp_path):
-    source = draw_preliminary.Source(products("plain")[0], ROOT / "models" / "linear.yaml", "")
+def test_preliminary_refuses_an_unknown_kind(products, tmp_path):
+    source = preliminary_figures.Source(products("plain")[0], ROOT / "models" / "linear.yaml", "")
     with pytest.raises(StudyError, match="no kind of figure 'other'; known are pattern"):
-        draw_preliminary.draw(source, {"other": [tmp_path / "a.png"]}, style=SHEET, segments={})
+        preliminary_figures.draw(source, {"other": [tmp_path / "a.png"]}, style=SHEET, segments={})

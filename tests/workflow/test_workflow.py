@@ -24,6 +24,7 @@ SMALL = [
     (r"(?s)(ensembles:\n  seeds:) \d+", r"\1 2"),
     (r"\nexcitations:\n", "\nexcitations:\n  other: {kind: gaussian_lowpass, seed: 7}\n"),
 ]
+STRUCTURES = ("two_masses", "three_masses", "beam")
 DUFFING = "duffing\tduffing\treport\t1.0\t0\t\t21\t22\t23\t24\t3\t\t\t\tDuffing system"
 TAB = "\t"
 NOISY = "noisy\tduffing_van_der_pol\tother\t1.0\t0.05\t\t53\t54\t55\t\t\t\t\t\tCombined system with noise"
@@ -43,6 +44,8 @@ def project(folder, *rows):
         text, count = re.subn(pattern, put, text)
         assert count == 1, f"config.yaml no longer holds {pattern}"
     settings.write_text(text)
+    structures = folder / "config" / "structures.yaml"
+    structures.write_text(structures.read_text().replace("samples: 16384", "samples: 4096").replace("2048", "512"))
     heading = (ROOT / "config" / "cases.tsv").read_text().splitlines()[0]
     (folder / "config" / "cases.tsv").write_text("\n".join([heading, *rows]) + "\n")
     return folder
@@ -97,9 +100,9 @@ def test_a_row_of_the_table_gives_every_product(built):
             assert (built / "results" / case / name).stat().st_size > 100
     drawn = {path.name for path in (built / "figures").iterdir()}
     stems = ["figure_21", "figure_22", "figure_23", "figure_24", "figure_3", "figure_53", "figure_54", "figure_55"]
-    assert drawn == {
-        f"{stem}.{ending}" for stem in (*stems, "noisy_histogram", "estimators") for ending in ("png", "svg")
-    }
+    structures = [f"{case}_{kind}" for case in STRUCTURES[:2] for kind in ("connections", "coherence")]
+    others = ("noisy_histogram", "estimators", "beam_measured", *structures)
+    assert drawn == {f"{stem}.{ending}" for stem in (*stems, *others) for ending in ("png", "svg")}
     page = (built / "results" / "summary.md").read_text()
     assert "| duffing " in page
     assert "| noisy " in page
@@ -134,14 +137,15 @@ def test_touched_identification_runs_again_without_simulation(built):
     os.utime(module, ns=(times.st_atime_ns, times.st_mtime_ns))
     assert jobs["identify"] == 2
     assert {"draw.duffing", "draw.noisy", "claims", "parameters", "summary"} <= set(jobs)
-    assert not {"record", "draw_preliminary.duffing"} & set(jobs)
+    assert "record" not in jobs
 
 
 def test_touched_style_draws_again_and_nothing_else(built):
     with edited(built / "study" / "figures" / "study.mplstyle", "font.size: 10", "font.size: 11"):
         jobs = planned(built)
     assert set(jobs) == {
-        "draw.duffing", "draw.noisy", "draw_preliminary.duffing", "draw_estimators", "summary", "all"
+        "draw.duffing", "draw.noisy", "draw_estimators", "summary", "all",
+        *(f"structure.{case}" for case in STRUCTURES), "structures",
     }  # fmt: skip
 
 
@@ -155,7 +159,7 @@ def test_a_changed_seed_or_row_runs_its_case_alone(built, file, old, new):
     assert {name: jobs[name] for name in ("record", "identify", "draw.noisy")} == {
         "record": 1, "identify": 1, "draw.noisy": 1
     }  # fmt: skip
-    assert not {"draw.duffing", "draw_preliminary.duffing", "claims", "excitation_reading"} & set(jobs)
+    assert not {"draw.duffing", "claims", "excitation_reading"} & set(jobs)
     assert ("estimator_errors" in jobs) == (file == "cases.tsv"), "ensembles have seeds of their own"
 
 

@@ -2,15 +2,19 @@
 
 from study.equations.model import Model
 from study.identify.estimators.base import Identified, Settings, named_parameters
-from study.identify.frequency_domain.inputs import histories, reverse_inputs
+from study.identify.frequency_domain.inputs import Input, histories, reverse_inputs
 from study.identify.frequency_domain.local_polynomial_fit import fit
-from study.identify.frequency_domain.local_polynomial_method import responses, transform
+from study.identify.frequency_domain.local_polynomial_method import Lines, responses, transform
 from study.records.record import Record
 
 
 def identify(model: Model, record: Record, settings: Settings) -> Identified:
     """A_j(f) of every input in narrow bands, and coefficients from all lines of the band that is fitted."""
-    inputs, bands = reverse_inputs(model), settings.local_polynomial
-    lines = transform([*histories(inputs, record), record["force"]], record.dt)
-    estimate = fit(lines, inputs, settings.band, bands)
-    return Identified(inputs, responses(lines, bands), named_parameters(estimate), estimate)
+    inputs = reverse_inputs(model)
+    return identify_lines(inputs, transform([*histories(inputs, record), record["force"]], record.dt), settings)
+
+
+def identify_lines(inputs: tuple[Input, ...], lines: Lines, settings: Settings) -> Identified:
+    """The same for the transforms of any inputs and, last, of what they make up."""
+    estimate = fit(lines, inputs, settings.band, settings.local_polynomial)
+    return Identified(inputs, responses(lines, settings.local_polynomial), named_parameters(estimate), estimate)

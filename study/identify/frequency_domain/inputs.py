@@ -1,16 +1,17 @@
 """From a model and a record to the inputs of the reverse system (the report's Figure 14).
 
 Components with the same shape are one input: u carries stiffness, damping and mass, u^3 carries the
-cubic stiffness and Van der Pol's damping. The output is always the force.
+cubic stiffness and Van der Pol's damping. The output is always the force. In a structure each coordinate's equation is
+such a system; its inputs are shapes of the relative motions at the places of its terms.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from study.equations import formulas, kernels
+from study.equations import formulas
 from study.equations.graph import Graph
 from study.equations.model import Model, ModelTerm, with_registers
 from study.records.interpolation import between_samples
@@ -50,6 +51,8 @@ class Input:
         Shape parameters in the formula.
     state : str or None
         dz/dt, where the shape is a state z with a memory.
+    direction : tuple of float
+        Weights of a structure's coordinates in the motion u that the shape is of; empty for a single mass.
     """
 
     shape: str
@@ -57,6 +60,7 @@ class Input:
     terms: tuple[str, ...]
     parameters: tuple[tuple[str, float], ...]
     state: str | None = None
+    direction: tuple[float, ...] = ()
 
     def powers(self, frequency: Floats) -> Complexes:
         """``factor (j 2 pi f)^order`` of each part, shape (lines, parts)."""
@@ -69,15 +73,44 @@ class Input:
 
 
 def reverse_inputs(model: Model) -> tuple[Input, ...]:
-    """Inputs of a model, in the order in which its terms first need them."""
-    inputs: dict[tuple[object, ...], Input] = {}
+    """Inputs of a model of a single mass, in the order in which its terms first need them."""
+    return _collected((entry, (), 1.0) for entry in model.terms)
+
+
+def equation_inputs(model: Model, coordinate: str) -> tuple[Input, ...]:
+    """Inputs of one coordinate's equation of motion, in the order in which its terms first need them.
+
+    Coefficients go by the keys of the whole structure: one that stands in two equations has one name, and what acts
+    there with the opposite sign has the factor -1.
+    """
+    i = model.coordinates.index(coordinate)
+    acting: list[tuple[ModelTerm, tuple[float, ...], float]] = []
     for entry in model.terms:
+        place = entry.place
+        if place is None or coordinate not in place.ends:
+            continue
+        if place.kind == "couples":
+            other = place.ends[1 - place.ends.index(coordinate)]
+            acting.append((entry, tuple(float(c == other) for c in model.coordinates), 1.0))
+        else:
+            direction = place.direction(model.coordinates)
+            acting.append((entry, direction, direction[i]))
+    return _collected(acting)
+
+
+def _collected(acting: Iterable[tuple[ModelTerm, tuple[float, ...], float]]) -> tuple[Input, ...]:
+    """Inputs of terms that act on a coordinate, each with the direction of its motion and the sign of its force."""
+    inputs: dict[tuple[object, ...], Input] = {}
+    for entry, direction, sign in acting:
         parameters = _known_parameters(entry)
-        for component in entry.term.components:
+        for component, symbol in zip(entry.term.components, entry.symbols, strict=True):
             state = entry.term.state if component.shape == "z" else None
-            key = (component.shape, parameters, state)
-            known = inputs.get(key, Input(component.shape, (), (), parameters, state))
-            part = Part(component.symbol, component.order, component.factor)
+            motion, weight = direction, sign
+            if component.shape == "u" and sign < 0.0:  # -u of the opposite motion: one input with all linear terms
+                motion, weight = tuple(0.0 - w for w in direction), 1.0
+            key = (component.shape, parameters, state, motion)
+            known = inputs.get(key, Input(component.shape, (), (), parameters, state, motion))
+            part = Part(symbol, component.order, weight * component.factor)
             terms = tuple(dict.fromkeys((*known.terms, entry.name)))
             inputs[key] = replace(known, parts=(*known.parts, part), terms=terms)
     return tuple(inputs.values())
@@ -111,6 +144,8 @@ def history(item: Input, record: Record) -> Floats:
     StudyError
         If a formula needs a channel that the record lacks, or has no finite value somewhere along it.
     """
+    from study.equations import kernels  # slow to load; who counts inputs or checks settings needs none
+
     formula = item.shape if item.state is None else item.state
     own = (*dict(item.parameters), *(("z",) if item.state is not None else ()))  # without a state, z is a channel
     wanted = [n for n in formulas.names(formula) if n not in own]

@@ -37,6 +37,16 @@ def fit(lines: Lines, inputs: Sequence[Input], band: tuple[float, float], settin
 
     Local bands are widened until few lines are left over.
     """
+    return fit_with_shifts(lines, inputs, band, settings)[0]
+
+
+def fit_with_shifts(
+    lines: Lines, inputs: Sequence[Input], band: tuple[float, float], settings: LocalPolynomial
+) -> tuple[Estimate, Floats]:
+    """:func:`fit`, and how far the coefficients move when one stretch of time after the other is left out.
+
+    The shifts, shape (STRETCHES, coefficients), of two equations of one record give the covariance between them.
+    """
     settings.check(len(inputs))
     index = _bands(lines, band, settings)
     weight = 1.0 / np.sqrt(floored(noise_variance(lines, index, settings)))[:, None]
@@ -53,9 +63,15 @@ def fit(lines: Lines, inputs: Sequence[Input], band: tuple[float, float], settin
     values = (inverse.conj() @ target).real
     each = np.broadcast_to(weight, index.shape).ravel()
     residual = (target - design @ values) / each
-    covariance = _scatter(inverse * each, design.T / each, residual, index.ravel(), lines.samples)
+    shifts = _shifts(inverse * each, design.T / each, residual, index.ravel(), lines.samples)
     symbols = tuple(p.symbol for (_, p), known in zip(parts, driven, strict=True) if known)
-    return Estimate(symbols, values / size, covariance / np.outer(size, size), STRETCHES - 1.0)
+    covariance = covariance_between(shifts, shifts) / np.outer(size, size)
+    return Estimate(symbols, values / size, covariance, STRETCHES - 1.0), shifts / size
+
+
+def covariance_between(first: Floats, second: Floats) -> Floats:
+    """Covariance of two sets of coefficients from how far both move without each stretch of time (jackknife)."""
+    return first.T @ second * ((STRETCHES - 1.0) / STRETCHES)
 
 
 def _inverse(design: Complexes) -> Complexes:
@@ -84,10 +100,10 @@ def _clean(values: Complexes, basis: Floats) -> Complexes:
     return values - (values @ basis) @ basis.T
 
 
-def _scatter(
+def _shifts(
     influence: Complexes, design: Complexes, residual: Complexes, index: Ints, samples: int
 ) -> Floats:  # fmt: skip
-    """Covariance of ``Re(conj(influence) . noise)`` by leaving out one stretch of time after the other, (p, p).
+    """Shifts of ``Re(conj(influence) . noise)`` on leaving out one stretch of time after the other, (STRETCHES, p).
 
     Over a stretch, influence times residual sums to s and influence times design to H; all H sum to the
     identity. Without the stretch the coefficients would shift by ``(1 - H)^-1 s``: H is the share of the stretch's own
@@ -101,5 +117,4 @@ def _scatter(
     cut = histories[:, : STRETCHES * long].reshape(-1, STRETCHES, long).transpose(1, 0, 2) * np.sqrt(0.5 * samples)
     sums = cut[:, :count] @ cut[:, count:].transpose(0, 2, 1)
     remaining = np.eye(count) - sums[:, :, :count]
-    shifts: Floats = np.asarray(np.linalg.solve(remaining, sums[:, :, count:]), dtype=np.float64)[:, :, 0]
-    return shifts.T @ shifts * ((STRETCHES - 1.0) / STRETCHES)
+    return np.asarray(np.linalg.solve(remaining, sums[:, :, count:]), dtype=np.float64)[:, :, 0]

@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from study.support.numbers import percent
 
@@ -151,5 +151,5 @@ def departure(spectra: Floats) -> Departure:
     error: Floats = np.std(spectra, axis=0, ddof=1) / math.sqrt(seeds)
     score: Floats = away / error
     worst = int(np.argmax(score))
-    allowed = float(cast(float, student.isf(BY_CHANCE / (2.0 * lines), seeds - 1)))
+    allowed = -float(cast(float, stdtrit(seeds - 1, BY_CHANCE / (2.0 * lines))))
     return Departure(float(away[worst]) / average(mean), float(score[worst]), allowed)

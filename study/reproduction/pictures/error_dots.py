@@ -51,7 +51,7 @@ def errors(table: pd.DataFrame, cases: Sequence[str]) -> Figure:
 
 def _panel(panel: Axes, table: pd.DataFrame, cases: Sequence[str]) -> None:
     place = {case: index for index, case in enumerate(cases)}
-    for case in set(table["case"]):
+    for case in dict.fromkeys(table["case"]):
         panel.axhline(place[case], color="0.85", linewidth=0.7, zorder=1.0)
     for name in estimator_errors.estimators(table):
         own = table[table["estimator"] == name]

@@ -1,4 +1,4 @@
-"""Snakemake step: record and model of a case -> its figures of Section 3, and those of the force."""
+"""Figures of Section 3 of a case, and those of its force: from its record and model."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,10 +13,8 @@ from study.records import spectra
 from study.records.record import read_csv
 from study.reproduction import preliminary
 from study.reproduction.pictures import distribution, force_patterns
-from study.reproduction.settings import SegmentSettings
 from study.support.errors import StudyError
 from study.support.files import replace_file
-from study.support.workflow_step import one_sentence
 
 HIGHEST = 10.0  # hertz, as in the figures of A_j
 
@@ -114,13 +112,3 @@ def draw(source: Source, outputs: Mapping[str, Sequence[Path]], *, style: Path, 
             figure = kinds[kind]()
             for path in paths:
                 replace_file(path, page.rendered(figure, path.suffix[1:]))
-
-
-if "snakemake" in globals():
-    step = globals()["snakemake"]
-    with one_sentence():
-        draw(
-            Source(Path(step.input.record), Path(step.input.model), step.params.title),
-            {kind: [Path(p) for p in paths] for kind, paths in step.output.items()},
-            style=Path(step.input.style), segments=SegmentSettings.model_validate(step.params.segments).segments(),
-        )  # fmt: skip

@@ -1,0 +1,134 @@
+"""Many measured records on one page: the verdict of each, and every coefficient by record and level of response.
+
+The numbers are those of each record's ``comparison.json`` and ``diagnosis.json``. Records of one rig are held against
+each other: what is right has the same coefficients at all levels (the report's criterion, see ``across_levels``).
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from study.compare import across_levels
+from study.compare.fitted_coefficients import Coefficient
+from study.support import document
+from study.support.numbers import percent
+
+TITLE = "Measured records"
+VERDICTS = {
+    "missing_effect": "an effect is missing", "nothing_missing": "nothing is missing",
+    "unknown_effect": "something unknown is missing",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One record: its rig (records of one rig and one model are held against each other), and what was found."""
+
+    name: str
+    rig: str
+    comparison: Mapping[str, Any]
+    diagnosis: Mapping[str, Any]
+
+    @property
+    def level(self) -> float:
+        """Rms of the measured response, in the record's own unit; no number where there are several responses."""
+        return float(self.comparison.get("rms", {}).get("response", math.nan))
+
+    @property
+    def shown_level(self) -> str:
+        """With its unit."""
+        return "" if math.isnan(self.level) else f"{self.level:.4g} {self.unit}"
+
+    @property
+    def unit(self) -> str:
+        """Unit of the level."""
+        return str(self.comparison.get("rms", {}).get("unit", ""))
+
+    @property
+    def coefficients(self) -> tuple[Coefficient, ...]:
+        """As the comparison has them."""
+        return tuple(
+            Coefficient(c["key"], c["term"], c["value"], None if c["held"] else c["standard_error"], c["unit"])
+            for c in self.comparison.get("coefficients", ())
+        )
+
+
+def measured(name: str, rig: str, comparison: Mapping[str, Any], diagnosis: Mapping[str, Any]) -> list[Measured]:
+    """What the files of a row tell: one record, or each of several that were diagnosed together."""
+    parts: Sequence[Mapping[str, Any]] = comparison.get("records", ())
+    if not parts:
+        return [Measured(name, rig, comparison, diagnosis)]
+    return [
+        Measured(f"{name} {number}", rig, {**comparison, **part}, diagnosis) for number, part in enumerate(parts, 1)
+    ]
+
+
+def blocks(records: Iterable[Measured]) -> list[document.Block]:
+    """The page: a table of verdicts, then the coefficients of each rig, its records in the order of their level."""
+    rigs = _by_rig(records)
+    every = [record for rig in rigs.values() for record in rig]
+    counts = [f"{sum(r.diagnosis['verdict'] == key for r in every)}: {word}" for key, word in VERDICTS.items()]
+    heading = ("record", "level", "error", "noise floor", "verdict", "first effect", "explains", "error with it")
+    page: list[document.Block] = [
+        document.Heading(TITLE, 1),
+        document.Text(
+            f"{len(every)} records. {'; '.join(counts)}. Level: rms of the measured response. Error: of the free run on"
+            " the part that was not fitted, over that rms."
+        ),
+        document.table(heading, [_verdict(record) for record in every]),
+    ]
+    for (rig, model), rows in rigs.items():
+        page += [document.Heading(f"{rig}: coefficients of {model}"), *_coefficients(rows)]
+    return page
+
+
+def _by_rig(records: Iterable[Measured]) -> dict[tuple[str, str], list[Measured]]:
+    """Records of one rig, one model and one unit, by level."""
+    found: dict[tuple[str, str, str], list[Measured]] = {}
+    for record in records:
+        found.setdefault((record.rig, str(record.comparison["model"]["name"]), record.unit), []).append(record)
+    return {(rig, model): sorted(rows, key=lambda r: r.level) for (rig, model, _), rows in found.items()}
+
+
+def _verdict(record: Measured) -> tuple[str, ...]:
+    found = record.diagnosis
+    verdict = str(found["verdict"])
+    missing = verdict == "missing_effect"
+    first: Mapping[str, Any] = found["candidates"][0] if found["candidates"] and missing else {}
+    tied = ", ".join(["", *first.get("tied_with", ())])
+    return (
+        record.name, record.shown_level, percent(record.comparison["error"]["response"]),
+        percent(record.comparison["noise_floor"]["response"]), VERDICTS.get(verdict, verdict),
+        f"{first['term']}{tied}" if first else "", percent(first["explained"]) if first else "",
+        percent(first["response_error"]) if first else "",
+    )  # fmt: skip
+
+
+def _coefficients(rows: Sequence[Measured]) -> list[document.Block]:
+    """Values with standard errors, a column a record; of several records the chance of such differences."""
+    own = [record.coefficients for record in rows]
+    columns = [f"{record.name}, {record.level:.3g} {record.unit}" for record in rows]
+    if len(rows) == 1:
+        return [document.table(("coefficient", *columns, "unit"), [(c.key, _value(c), c.unit) for c in own[0]])]
+    judged = {level.key: level for level in across_levels.levels([record.level for record in rows], own)}
+    lines = [
+        (key[0].key, *map(_value, key), key[0].unit, *_judged(judged.get(key[0].key))) for key in zip(*own, strict=True)
+    ]
+    return [
+        document.table(("coefficient", *columns, "unit", "the same at all levels?", "p"), lines),
+        document.Text(
+            "p: the chance of such differences if the coefficient is the same in all records; the number of "
+            "coefficients is accounted for."
+        ),
+    ]
+
+
+def _value(found: Coefficient) -> str:
+    return f"{found.value:.5g} (given)" if found.error is None else f"{found.value:.5g} +- {found.error:.2g}"
+
+
+def _judged(level: across_levels.Level | None) -> tuple[str, str]:
+    if level is None:
+        return "", ""
+    return "moves" if level.moves else "yes", f"{level.p_value:.2g}"

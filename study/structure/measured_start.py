@@ -1,0 +1,237 @@
+"""Where the fit of a structure with a measured linear part begins: its modes from the lines of a record.
+
+Forces and the terms' forces along the measured motions are inputs, the sensors outputs (Adams and Allemang, Mechanical
+Systems and Signal Processing 14, 2000). Poles come from a subspace, amplitudes from least squares, and both are refined
+to the smallest error of the lines.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import rfft
+
+from study.equations.model import Model
+from study.identify.frequency_domain.inputs import history
+from study.identify.frequency_domain.subspace import observability
+from study.records.record import MOTIONS, Record
+from study.structure.missing_forces import placed_inputs
+from study.structure.modal_program import ModalKeys
+from study.structure.prepared_structure import PreparedStructure
+from study.support.arrays import Complexes, Floats
+from study.support.errors import expect
+from study.support.least_squares import least_squares
+from study.support.levenberg_marquardt import Point, minimise, point_at
+
+BLOCKS, MOST = 24, 8  # block rows of the subspace; modes at most
+SPARE = 4  # poles that may be real beside those of the modes: of the record's ends, and of what no mode is
+LINES = 1200  # at most
+FAINT = 1e-3  # of the strongest line's force: what is below drives nothing
+TRIALS = 60
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Lines of a record in the band that its forces drive.
+
+    Attributes
+    ----------
+    s : complex array, shape (lines,)
+        j 2 pi f.
+    forces : complex array, shape (lines, forces)
+        Measured forces.
+    unit : complex array, shape (lines, coefficients)
+        Force of each coefficient of the terms with value one, along the measured motion.
+    outputs : complex array, shape (lines, sensors)
+        Sensors in shares of their size, as displacements times ``order``.
+    order : complex array, shape (lines, sensors)
+        ``s^r / size`` of each sensor's motion.
+    """
+
+    s: Complexes
+    forces: Complexes
+    unit: Complexes
+    outputs: Complexes
+    order: Complexes
+
+
+def lines_of(model: Model, prepared: PreparedStructure) -> Lines:
+    """Lines of the fitting part, through a Hann window.
+
+    Raises
+    ------
+    StudyError
+        If no force drives the structure, or a term's place has no sensor.
+    """
+    first, last = prepared.fit
+    taper = np.hanning(last - first + 1)[:-1]
+    names = [name for name, _ in model.forces]
+    lines = (last - first) // 2
+    omega = 2.0 * np.pi * np.arange(1, lines) / ((last - first) * prepared.dt)
+
+    def spectrum(values: Floats) -> Complexes:
+        part = values[first:last]
+        return np.asarray(rfft((part - np.mean(part)) * taper)[1:lines], dtype=np.complex128)
+
+    forces = np.stack([spectrum(prepared.record.forces[n]) for n in names], axis=1)
+    power = np.sum(np.abs(forces) ** 2, axis=1)
+    smooth = np.convolve(power, np.ones(9) / 9.0, "same")
+    driven = np.flatnonzero(smooth > FAINT * float(np.max(smooth)))
+    expect(len(driven) > 4 * BLOCKS, f"the forces of {prepared.record.name!r} drive {len(driven)} lines; expected more")
+    keep = driven[:: max(1, len(driven) // LINES)]
+    unit = [spectrum(x)[keep] for x in unit_histories(model, prepared)]
+    s = (1j * omega[keep]).astype(np.complex128)
+    order = np.stack([s ** MOTIONS.index(x.motion) for x in prepared.sensors], axis=1) / prepared.scale
+    outputs = np.stack([spectrum(x)[keep] for x in prepared.measured.T], axis=1) / prepared.scale
+    columns = np.stack(unit, axis=1) if unit else np.zeros((len(keep), 0), dtype=np.complex128)
+    return Lines(s, forces[keep], columns, outputs.astype(np.complex128), order.astype(np.complex128))
+
+
+def unit_histories(model: Model, prepared: PreparedStructure) -> list[Floats]:
+    """Force of each coefficient with value one along the measured motion, in the order of the model's symbols.
+
+    Raises
+    ------
+    StudyError
+        If an end of a term has no sensor, or a shape parameter no value.
+    """
+    found: list[Floats] = []
+    for entry in model.terms:
+        assert entry.place is not None, "every term of a structure has a place"
+        blind = [c for c in entry.place.moving if c not in prepared.complete]
+        sentence = f"{entry.name} lies at {', '.join(blind)}, where no sensor is; expected terms between sensors"
+        expect(not blind, sentence)
+        e = entry.place.direction(model.coordinates)
+        motion = np.sum([w * prepared.complete[c] for c, w in zip(model.coordinates, e, strict=True) if w], axis=0)
+        record = prepared.record
+        channels = {"force": np.zeros(len(record)), **dict(zip(MOTIONS, motion, strict=True)), **record.extra}
+        relative = Record(record.dt, channels, name=record.name, start=record.start)
+        by_symbol: dict[str, Floats] = {}
+        for item in placed_inputs(entry):
+            values = history(item, relative)
+            for part in item.parts:
+                unit = part.factor * (np.gradient(values, record.dt) if part.order else values)
+                by_symbol[part.symbol] = by_symbol.get(part.symbol, 0.0) + unit
+        found += [by_symbol[symbol] for symbol in entry.term.symbols]
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Modal:
+    """The error of the lines for modes without coupling by damping.
+
+    Unknown are w2 and g of each mode, amplitudes by point, then coefficients.
+    """
+
+    lines: Lines
+    modal: ModalKeys
+    at: Floats  # (points, sensors): which point each sensor is at
+    drives: Floats  # (points, forces)
+    ways: Floats  # (points, coefficients): direction of each coefficient's place
+    fastest: float  # rad/s: a mode beyond stands for the stiffness of all that lie above the band
+
+    def split(self, x: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """w2, g, amplitudes (points, modes) and coefficients."""
+        n, points = self.modal.modes, len(self.modal.points)
+        return x[:n], x[n : 2 * n], x[2 * n : 2 * n + n * points].reshape(points, n), x[2 * n + n * points :]
+
+    def point(self, x: Floats) -> Point | None:
+        """Residual of all sensors and its derivatives."""
+        w2, g, shape, amount = self.split(x)
+        if np.any(w2 <= 0.0) or np.any(g <= 0.0) or np.any(np.maximum(np.sqrt(np.abs(w2)), 0.5 * g) > self.fastest):
+            return None
+        lines = self.lines
+        acting = lines.forces @ self.drives.T - (lines.unit * amount) @ self.ways.T  # (lines, points)
+        bend = 1.0 / (w2 + g * lines.s[:, None] + lines.s[:, None] ** 2)  # (lines, modes)
+        pushed, felt = acting @ shape, self.at.T @ shape  # (lines, modes), (sensors, modes)
+        residual = lines.outputs - lines.order * ((pushed * bend) @ felt.T)
+        moved = -(pushed * bend**2)[:, None, :] * felt * lines.order[:, :, None]  # by w2: (lines, sensors, modes)
+        columns = [moved, moved * lines.s[:, None, None]]
+        for p in range(len(self.modal.points)):
+            own = self.at[p][:, None] * (pushed * bend)[:, None, :] + felt * (acting[:, p : p + 1] * bend)[:, None, :]
+            columns.append(own * lines.order[:, :, None])
+        along = self.ways.T @ shape  # (coefficients, modes)
+        pulled = np.einsum("fc,cr,fr,sr->fsc", lines.unit, along, bend, felt, optimize=True)
+        columns.append(-pulled * lines.order[:, :, None])
+        jacobian = np.concatenate(columns, axis=2).reshape(-1, len(x))
+        return point_at(x, _real(residual.ravel()), _real(jacobian), len(x), (0,))
+
+    def from_poles(self, poles: Complexes) -> Floats:
+        """Amplitudes and coefficients for poles, by least squares of every sensor on what acts through each mode."""
+        w2, g = np.abs(poles) ** 2, -2.0 * poles.real
+        lines, n = self.lines, self.modal.modes
+        bend = 1.0 / (w2 + g * lines.s[:, None] + lines.s[:, None] ** 2)
+        inputs = np.concatenate([lines.forces, lines.unit], axis=1)
+        amounts = np.zeros((self.at.shape[1], n, inputs.shape[1]))
+        for k in range(self.at.shape[1]):
+            design = (bend[:, :, None] * inputs[:, None, :]).reshape(len(bend), -1) * lines.order[:, k : k + 1]
+            amounts[k] = least_squares(_real(design), _real(lines.outputs[:, k])).reshape(n, -1)
+        at = [int(np.flatnonzero(row)[0]) if np.any(row) else -1 for row in self.at]
+        (p, j), *_ = [
+            (p, j) for j in range(self.drives.shape[1]) for p in np.flatnonzero(self.drives[:, j]) if at[p] >= 0
+        ]
+        own = amounts[at[p], :, j]
+        driven = np.sqrt(np.maximum(np.abs(own), 1e-3 * float(np.max(np.abs(own)))))
+        shape = np.stack([amounts[k, :, j] / driven if k >= 0 else driven for k in at])
+        along, count = self.ways.T @ shape, lines.forces.shape[1]
+        pulled = -amounts[at[p], :, count:].T  # coefficient times amplitude along its place times that of the force
+        products = along * driven
+        amount = np.sum(pulled * products, axis=1) / np.sum(products**2, axis=1)
+        return np.concatenate([w2, g, shape.ravel(), amount])
+
+
+def _real(values: Complexes) -> Floats:
+    return np.concatenate([values.real, values.imag])
+
+
+def modal_starts(model: Model, prepared: PreparedStructure) -> Iterator[tuple[ModalKeys, dict[str, float]]]:
+    """For one mode, two and so on, a value of each of their keys and of the model's coefficients.
+
+    Raises
+    ------
+    StudyError
+        If no sensor is where a force acts, or a term's place has none.
+    """
+    lines, sensors = lines_of(model, prepared), [x.coordinate for x in prepared.sensors]
+    where = ", ".join(dict.fromkeys(w for _, w in model.forces))
+    driven = any(w in sensors for _, w in model.forces)
+    expect(driven, f"no sensor is at {where}, where the force acts; 'linear: measured' needs one there")
+    ends = [c for t in model.terms if t.place is not None for c in t.place.moving]
+    points = tuple(c for c in model.coordinates if c in (*sensors, *ends) or any(c == w for _, w in model.forces))
+    directions = [t.place.direction(model.coordinates) for t in model.terms if t.place for _ in t.term.symbols]
+    rows = [model.coordinates.index(c) for c in points]
+    ways = np.array(directions).reshape(-1, len(model.coordinates))[:, rows].T
+    at = np.array([[float(c == s) for s in sensors] for c in points])
+    drives = np.array([[float(c == w) for _, w in model.forces] for c in points])
+    inputs = np.concatenate([lines.forces, lines.unit], axis=1)
+    space = observability(lines.s.imag, inputs, lines.outputs / lines.order * np.abs(lines.order), BLOCKS)
+    for modes in range(1, MOST + 1):
+        modal = ModalKeys(points, modes)
+        problem = _Modal(lines, modal, at, drives, ways, np.pi / prepared.dt)
+        starts = (_searched(problem, space.poles(order), modes) for order in range(2 * modes, 2 * modes + SPARE + 1))
+        found = next((point for point in starts if point is not None), None)
+        if found is not None:
+            yield modal, _named(model, modal, problem.split(found.x))
+
+
+def _searched(problem: _Modal, poles: Complexes, modes: int) -> Point | None:
+    """The smallest error of the lines from the pairs of poles; None if there are too few."""
+    pairs = poles[poles.imag > 0.0]
+    if len(pairs) < modes:
+        return None
+    pairs = pairs[np.argsort(-pairs.real / np.abs(pairs))][:modes]
+    pairs = pairs * np.minimum(0.9 * problem.fastest / np.abs(pairs), 1.0)
+    point = problem.point(problem.from_poles(pairs))
+    if point is None:
+        return None
+    size = float(np.linalg.norm(problem.lines.outputs))
+    return minimise(problem.point, point, size, TRIALS, 1e-2).point
+
+
+def _named(model: Model, modal: ModalKeys, parts: Sequence[Floats]) -> dict[str, float]:
+    w2, g, shape, amount = parts
+    values = dict(zip(modal.stiffness, w2.tolist(), strict=True))
+    values |= {key: float(g[r]) if r == s else 0.0 for (r, s), key in zip(modal.pairs, modal.damping, strict=True)}
+    for point, row in zip(modal.points, shape, strict=True):
+        values |= dict(zip(modal.shape(point), row.tolist(), strict=True))
+    return values | dict(zip([s for t in model.terms for s in t.symbols], amount.tolist(), strict=True))

@@ -1,0 +1,67 @@
+"""A page of many records: verdicts, coefficients by level, and what is no rig's business of another."""
+
+import pytest
+
+from study.compare import campaign
+from study.support import document
+
+
+def measured(name, rig, level, stiffness, error=1.0, verdict="missing_effect"):
+    comparison = {
+        "model": {"name": "rig"}, "error": {"response": 0.2}, "noise_floor": {"response": 0.01},
+        "rms": {"response": level, "unit": "m"},
+        "coefficients": [
+            {"key": "m", "term": "inertia", "value": 1.0, "standard_error": None, "unit": "kg", "held": True},
+            {"key": "k", "term": "linear_stiffness", "value": stiffness, "standard_error": error, "unit": "N/m",
+             "held": False},
+        ],
+    }  # fmt: skip
+    first = {"term": "cubic_stiffness", "tied_with": ["quintic_stiffness"], "explained": 0.98, "response_error": 0.012}
+    return campaign.Measured(name, rig, comparison, {"verdict": verdict, "candidates": [first]})
+
+
+def told(*records):
+    tables = [b for b in campaign.blocks(records) if isinstance(b, document.Table)]
+    return tables[0], tables[1:]
+
+
+def test_records_of_a_rig_stand_in_the_order_of_their_level():
+    verdicts, (values,) = told(measured("loud", "beam", 2.0, 355.0), measured("quiet", "beam", 0.5, 355.5))
+    assert [row[0] for row in verdicts.rows] == ["quiet", "loud"]
+    assert values.heading[1:3] == ("quiet, 0.5 m", "loud, 2 m")
+    assert values.rows[0] == ("m", "1 (given)", "1 (given)", "kg", "", "")
+    assert values.rows[1][:5] == ("k", "355.5 +- 1", "355 +- 1", "N/m", "yes")
+
+
+@pytest.mark.parametrize(("stiffness", "said"), [(356.0, "yes"), (370.0, "moves")])
+def test_a_coefficient_that_differs_by_more_than_its_errors_moves(stiffness, said):
+    _, (values,) = told(measured("a", "beam", 1.0, 355.0), measured("b", "beam", 2.0, stiffness))
+    assert values.rows[1][4] == said
+
+
+def test_rigs_are_not_held_against_each_other():
+    _, values = told(measured("a", "beam", 1.0, 355.0), measured("b", "wing", 2.0, 900.0))
+    assert len(values) == 2
+    assert all("p" not in table.heading for table in values)
+
+
+def test_the_effect_is_named_with_its_ties_where_one_is_missing_and_nowhere_else():
+    verdicts, _ = told(measured("a", "beam", 1.0, 355.0), measured("b", "beam", 2.0, 355.0, 1.0, "nothing_missing"))
+    assert verdicts.rows[0][4:] == ("an effect is missing", "cubic_stiffness, quintic_stiffness", "98 %", "1.2 %")
+    assert verdicts.rows[1][4:] == ("nothing is missing", "", "", "")
+
+
+def test_records_that_were_diagnosed_together_are_levels_of_one_rig():
+    low, high = (measured("x", "beam", level, 355.0) for level in (1.0, 2.0))
+    both = {**low.comparison, "records": [high.comparison, low.comparison]}
+    verdicts, (values,) = told(*campaign.measured("beam", "hall", both, low.diagnosis))
+    assert [row[:2] for row in verdicts.rows] == [("beam 2", "1 m"), ("beam 1", "2 m")]
+    assert values.rows[1][4] == "yes"
+
+
+def test_a_comparison_without_one_response_has_no_level():
+    whole = measured("x", "frame", 1.0, 355.0)
+    comparison = {key: value for key, value in whole.comparison.items() if key not in ("rms", "coefficients")}
+    verdicts, values = told(*campaign.measured("frame", "hall", comparison, whole.diagnosis))
+    assert verdicts.rows[0][:3] == ("frame", "", "20 %")
+    assert not values

@@ -1,0 +1,186 @@
+"""Structures whose linear part is as measured: modes of their own, nonlinear terms between sensors."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study.cli import main
+from study.equations.model_file import format_model, parse_model, read_model
+from study.identify.frequency_domain.subspace import observability
+from study.records.excitation import Excitation, force
+from study.structure.measured_comparison import compare_measured, measured_document, measured_says
+from study.structure.measured_fit import modal_run
+from study.structure.modes import modes_of
+from study.structure.prepared_structure import prepare_structure
+from study.structure.structure_record import Sensor, StructureRecord, write_structure_csv
+from study.structure.structure_simulation import simulate_structure
+from study.support.errors import StudyError
+
+ROOT = Path(__file__).parents[2]
+DT, SAMPLES = 0.005, 8192
+MEASURED = """name: as measured
+coordinates: [p4, p7, p10]
+forces: {shaker: p4}
+linear: measured
+terms:
+  - {term: cubic_stiffness, between: [ground, p10]}
+"""
+
+
+def measured(text=MEASURED):
+    return parse_model(text, Path("measured.yaml"))
+
+
+@pytest.fixture(scope="module")
+def beam():
+    model = read_model(ROOT / "models" / "structures" / "beam.yaml")
+    drive = force(Excitation(level=1.0, reading="filtered", cutoff=30.0), SAMPLES, DT, 3)
+    return model, simulate_structure(model, {"shaker": drive}, DT, steps_per_sample=4)
+
+
+def at_sensors(
+    beam, motion="displacement", noise=0.01, places=("p4", "p7", "p10"), seed=4, samples=SAMPLES
+) -> StructureRecord:
+    rng, motions = np.random.default_rng(seed), {}
+    for place in places:
+        x = beam[1].motions[Sensor(place, motion)]
+        motions[Sensor(place, motion)] = x + np.sqrt(noise) * np.std(x) * rng.standard_normal(len(x))
+    forces = {name: x[:samples] for name, x in beam[1].forces.items()}
+    return StructureRecord(DT, forces, {s: x[:samples] for s, x in motions.items()})
+
+
+@pytest.fixture(scope="module")
+def comparison(beam):
+    return compare_measured(measured(), prepare_structure(at_sensors(beam), measured()))
+
+
+def test_the_cubic_spring_and_the_free_run_of_the_beam(comparison):
+    """The proof that the issue asks for: 2 % at 1 % noise, and the error within 1.2 times the noise."""
+    value, error = comparison.fit.values["k3[ground-p10]"], comparison.fit.error("k3[ground-p10]")
+    assert value == pytest.approx(1e5, rel=0.02)
+    assert abs(value - 1e5) < 4.0 * error
+    noise = np.sqrt(0.01 / 1.01)
+    assert comparison.prediction.error < 1.2 * noise
+    assert comparison.prediction.floor == pytest.approx(noise, rel=0.1)
+
+
+def test_modes_in_the_band_are_those_of_the_structure(beam, comparison):
+    exact, found = modes_of(beam[0]), comparison.modes
+    for k in range(3):
+        nearest = int(np.argmin(np.abs(found.frequency - exact.frequency[k])))
+        assert found.frequency[nearest] == pytest.approx(exact.frequency[k], rel=0.01)
+        assert found.damping[nearest] == pytest.approx(exact.damping[k], rel=0.1)
+
+
+def test_coefficients_line_by_line_are_real_and_flat(comparison):
+    (spectrum,) = comparison.spectra
+    mean, error = spectrum.mean
+    assert abs(mean - 1e5) < 4.0 * error < 0.5e5
+    for value, error in (spectrum.imaginary, spectrum.trend):
+        assert abs(value) < 4.0 * error
+    assert spectrum.frequency[0] < 1.0
+    assert spectrum.frequency[-1] == pytest.approx(30.0, abs=0.5)
+
+
+def test_a_term_at_the_wrong_place_leaves_the_error(beam):
+    wrong = measured(MEASURED.replace("[ground, p10]", "[p4, p7]"))
+    found = compare_measured(wrong, prepare_structure(at_sensors(beam, samples=4000), wrong))
+    assert found.prediction.error > 1.1 * np.sqrt(0.01)
+
+
+def test_derivatives_of_the_free_run_are_exact(comparison):
+    fit, prepared = comparison.fit, comparison.prepared
+    keys = (*fit.model.values, *fit.modal.all)
+    run = modal_run(fit.model, fit.modal, prepared, prepared.sensors, fit.steps, (0, 300), fit.values, keys)
+    motion, slopes = run.respond(fit.values, fit.initial)
+    for key in ("k3[ground-p10]", fit.modal.stiffness[0], fit.modal.damping[1], fit.modal.shape("p7")[0]):
+        step = 1e-5 * max(abs(fit.values[key]), 1e-3)
+        near = [run.respond(fit.values | {key: fit.values[key] + s * step}, fit.initial)[0] for s in (-1, 1)]
+        difference = (near[1] - near[0]) / (2.0 * step)
+        own = slopes[:, :, keys.index(key)]
+        assert np.max(np.abs(own - difference)) < 1e-4 * np.max(np.abs(own)), key
+    alone = modal_run(fit.model, fit.modal, prepared, prepared.sensors, fit.steps, (0, 300), fit.values)
+    np.testing.assert_allclose(alone.respond(fit.values, fit.initial)[0], motion, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("motion", "noise", "relative"),
+    [("displacement", 0.0, 1e-5), ("displacement", 0.0025, 0.01), ("acceleration", 0.0025, 0.02)],
+)
+def test_the_reports_duffing_system_is_a_structure_of_one_mode(motion, noise, relative):
+    """Its mass, damping and stiffness follow from the mode; 5 % of the rms as noise is what the peer was given."""
+    true = read_model(ROOT / "models" / "duffing.yaml").numbers()
+    drive = force(Excitation(level=1.0, cutoff=12.5), 4096, 0.02, 1990)
+    placed = (ROOT / "models" / "duffing.yaml").read_text().replace("value", "at: x, value")
+    whole = parse_model(placed.replace("terms:", "coordinates: [x]\nforces: {shaker: x}\nterms:"), Path("whole.yaml"))
+    record = simulate_structure(whole, {"shaker": drive}, 0.02, steps_per_sample=16)
+    u = record.motions[Sensor("x", motion)]
+    noisy = u + np.sqrt(noise) * np.std(u) * np.random.default_rng(3).standard_normal(len(u))
+    model = measured("coordinates: [x]\nforces: {shaker: x}\nlinear: measured\nterms: [{term: cubic_stiffness, at: x}]")
+    own = StructureRecord(record.dt, record.forces, {Sensor("x", motion): noisy})
+    fit = compare_measured(model, prepare_structure(own, model)).fit
+    assert fit.modal.modes == 1
+    mass = fit.values["phi[x,1]"] ** -2
+    found = {"m": mass, "c": fit.values["g[1,1]"] * mass, "k": fit.values["w2[1]"] * mass, "k3": fit.values["k3[x]"]}
+    for key, value in found.items():
+        assert value == pytest.approx(true[key], rel=relative), key
+
+
+def test_poles_from_a_subspace_are_exact_without_noise():
+    """Any rational function through the bilinear transformation."""
+    poles = np.array([-0.4 + 9.0j, -1.0 + 31.0j])
+    omega = np.linspace(1.0, 60.0, 400)
+    s = 1j * omega[:, None]
+    gains = np.array([[1.0, 2.0], [3.0, -1.0]])
+    response = np.stack([np.sum(g / ((s - poles) * (s - poles.conj())), axis=1) for g in gains], axis=1)
+    rng = np.random.default_rng(1)
+    drive = rng.standard_normal((400, 1)) + 1j * rng.standard_normal((400, 1))
+    found = observability(omega, drive, response * drive, 10)
+    assert found.singular[4] < 1e-10 * found.singular[0]
+    left = sorted(found.poles(4), key=lambda p: p.imag)[2:]
+    np.testing.assert_allclose(left, poles, rtol=1e-8)
+
+
+def test_the_model_file_holds_the_key():
+    model = measured()
+    assert model.measured
+    assert parse_model(format_model(model), Path("again.yaml")) == model
+    assert measured(MEASURED.split("  - ")[0].replace("terms:", "terms: []")).terms == ()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("linear: measured", "linear: guessed", "'linear' is 'guessed'; expected measured"),
+        ("forces: {shaker: p4}\n", "", "needs 'forces'"),
+        ("coordinates: [p4, p7, p10]\n", "", "no 'coordinates'"),
+        ("cubic_stiffness", "linear_stiffness", "is linear, and 'linear: measured' holds it already"),
+    ],
+)
+def test_a_bad_model_gets_its_sentence(old, new, said):
+    with pytest.raises(StudyError, match=said):
+        measured(MEASURED.replace(old, new, 1))
+
+
+def test_what_the_sensors_do_not_show_is_said(beam):
+    for places, said in (
+        (("p7", "p10"), "nothing measures the coordinate 'p4'"),
+        (("p4", "p7"), "nothing measures the coordinate 'p10'"),
+    ):
+        record = at_sensors(beam, places=places)
+        with pytest.raises(StudyError, match=said):
+            compare_measured(measured(), prepare_structure(record, measured()))
+
+
+def test_compare_on_the_command_line(tmp_path, beam, comparison, capsys):
+    write_structure_csv(at_sensors(beam), tmp_path / "beam.csv")
+    (tmp_path / "beam.yaml").write_text(MEASURED)
+    words = [str(tmp_path / "beam.csv"), "--model", str(tmp_path / "beam.yaml"), "--out", str(tmp_path / "out")]
+    assert main(["compare", *words]) == 0
+    assert "k3[ground-p10]" in capsys.readouterr().out
+    assert (tmp_path / "out" / "comparison.json").stat().st_size > 1000
+    assert measured_document(comparison)["model"]["linear"] == "measured"
+    assert "Line by line" in measured_says(comparison)
+    assert main(["diagnose", *words]) == 2
+    assert "linear: measured" in capsys.readouterr().err

@@ -1,0 +1,126 @@
+"""Structures as cases of the study: their table, their pictures, what is claimed of them."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from study.equations.model_file import read_model
+from study.reproduction.tables import judge
+from study.structure.measured_comparison import compare_measured
+from study.structure.measured_tables import measured_figure, measured_parameters, measured_responses
+from study.structure.prepared_structure import prepare_structure
+from study.structure.reverse_figures import coherence_figure, connections_figure
+from study.structure.reverse_tables import structure_coherences, structure_parameters, structure_responses
+from study.structure.structure_claims import measured_claims, structure_claims
+from study.structure.structure_study import (
+    assumed_structure,
+    identify_structure,
+    load,
+    make_structure_record,
+    measured_model,
+)
+from study.support.errors import StudyError
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def two_masses():
+    """The first case with a quarter of its samples."""
+    study = load(ROOT / "config")
+    case = study.cases["two_masses"]
+    sampling = study.settings.sampling.model_copy(update={"samples": 4096})
+    segments = study.settings.segments.model_copy(update={"length": 1024})
+    settings = study.settings.model_copy(update={"sampling": sampling, "segments": segments})
+    model = read_model(ROOT / case.model_file)
+    record = make_structure_record(model, case, settings)
+    return case, settings, record, identify_structure(model, record, case, settings)
+
+
+def test_the_assumed_term_stands_at_every_connection_that_lacks_it(two_masses):
+    model = read_model(ROOT / two_masses[0].model_file)
+    assumed = assumed_structure(model, "cubic_stiffness")
+    added = {t.name for t in assumed.terms} - {t.name for t in model.terms}
+    assert added == {"cubic_stiffness[ground-first]"}
+    assert assumed.values["k3[ground-first]"] == 0.0
+    assert assumed_structure(model, "") == model
+
+
+def test_tables_hold_every_estimator_and_the_truth(two_masses):
+    case, settings, _, result = two_masses
+    table = structure_parameters(case.case, result, settings.tolerances)
+    assert set(table["estimator"]) == set(settings.estimators)
+    true = dict(zip(table["parameter"], table["true"], strict=True))
+    assert true == {**result.model.values}
+    exact = table[(table["estimator"] == "local_polynomial") & (table["true"] != 0.0)]
+    assert (exact["relative_error"].abs() < 1e-4).all()
+    assert judge("k3", 0.0, 2e5, settings.tolerances)["within_tolerance"] is False
+
+
+def test_siso_changes_and_miso_places(two_masses):
+    case, settings, record, result = two_masses
+    claims = structure_claims(case, record, result, settings)
+    verdicts = dict(zip(claims["claim"].str.split(":").str[0], claims["verdict"], strict=True))
+    assert verdicts["SI/SO"] == "holds"  # every transfer function changes
+    measured = claims.loc[0, "measured"]
+    assert "first" in measured
+    assert "second" in measured
+
+
+def test_pictures_show_every_input_once_and_every_equation(two_masses):
+    case, _, _, result = two_masses
+    responses, coherences = structure_responses(result), structure_coherences(result)
+    figure = connections_figure(responses, case.title)
+    assert len(figure.axes) == 2 * 4  # u and u^3 at either connection
+    assert len(coherence_figure(coherences, case.title).axes) == 2
+    miso = responses[(responses["estimator"] == "miso") & (responses["shape"] == "u**3")]
+    flat = miso[(miso["place"] == "first-second") & (miso["equation"] == "second") & miso["frequency"].between(1, 8)]
+    assert flat["real"].median() == pytest.approx(1e7, rel=0.03)  # over the mass, times the true one
+    assert flat["exact_real"].to_numpy() == pytest.approx(1e7)
+    assert isinstance(coherences, pd.DataFrame)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("structures/two_masses", "structures/two", "there is no model 'structures/two'"),
+        ("structures/two_masses", "duffing", "has no 'coordinates'"),
+        ("\t\tcubic_stiffness", "\tthird\tcubic_stiffness", r"sensors name \['third'\]"),
+        ("three_masses\tstructures", "two_masses\tstructures", "stands twice"),
+        ("p4 p7 p10", "p4 p7", "sensors lack p10"),
+    ],
+)
+def test_a_bad_row_is_named(tmp_path, old, new, said):
+    shutil.copytree(ROOT / "config", tmp_path / "config")
+    shutil.copytree(ROOT / "models", tmp_path / "models")
+    table = tmp_path / "config" / "structures.tsv"
+    text = table.read_text()
+    assert old in text
+    table.write_text(text.replace(old, new, 1))
+    with pytest.raises(StudyError, match=said):
+        load(tmp_path / "config")
+
+
+def test_the_beam_is_found_by_its_own_modes():
+    study = load(ROOT / "config")
+    case = study.cases["beam"]
+    sampling = study.settings.sampling.model_copy(update={"samples": 8192})
+    settings = study.settings.model_copy(update={"sampling": sampling})
+    structure = read_model(ROOT / case.model_file)
+    record, model = make_structure_record(structure, case, settings), measured_model(structure, case.sensors)
+    assert [str(s) for s in record.sensors] == [f"{p} displacement" for p in case.sensors]
+    assert model.values == {"k3[ground-p10]": None}
+    comparison = compare_measured(model, prepare_structure(record, model))
+    (claim,) = measured_claims(case, structure, comparison, settings).to_dict("records")
+    assert claim["verdict"] == "holds", claim["measured"]
+    table = measured_parameters(case, structure, comparison, settings)
+    assert list(table["parameter"][:3]) == ["k3[ground-p10]", "f_n[1]", "zeta[1]"]
+    responses = measured_responses(case, structure, comparison, settings)
+    linear = responses[(responses["estimator"] == "output_error") & (responses["place"] == "p10")]
+    size = np.hypot(linear["exact_real"], linear["exact_imag"])
+    off = np.hypot(linear["real"] - linear["exact_real"], linear["imag"] - linear["exact_imag"])
+    assert np.sqrt(np.mean(off**2) / np.mean(size**2)) < 0.02
+    assert len(measured_figure(responses, case.title).axes) == 2 * 4
