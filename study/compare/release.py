@@ -30,11 +30,11 @@ def at_the_release(values: Floats, dt: float, omega: float, independent: float) 
     """
     t = dt * np.arange(len(values))
     turn = omega * t
-    slow: Floats = t[:, None] ** np.arange(DEGREE + 1)
+    slow = np.asarray(t[:, None] ** np.arange(DEGREE + 1), dtype=np.float64)
     around = [slow * np.cos(turn)[:, None], -slow * np.sin(turn)[:, None]]
     carrier: Floats = np.stack(around, axis=2).reshape(len(t), -1)
     beside: list[Floats] = [f(n * turn) for n in range(2, OVERTONES + 1) for f in (np.cos, np.sin)]
-    design: Floats = np.column_stack([carrier, *beside, np.ones_like(t)])
+    design = np.asarray(np.column_stack([carrier, *beside, np.ones_like(t)]), dtype=np.float64)
     size = np.asarray(np.linalg.norm(design, axis=0), dtype=np.float64)
     scaled: Floats = design / size
     inverse = np.asarray(np.linalg.pinv(scaled.T @ scaled), dtype=np.float64)

@@ -1,12 +1,14 @@
 """Which test would tell two tied candidates apart? Found by simulating both at other levels of excitation."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from study.diagnose.ranked import Ranked
 from study.equations.free_run import prepare
 from study.figures.labels import term_names
+from study.identify.time_domain.part_fit import STEPS
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record, Stretch
 from study.records.states import starting_states
@@ -31,14 +33,14 @@ def separating_level(one: Ranked, other: Ranked, prepared: Prepared) -> float | 
     values = dict(zip(other.fit.keys, (float(v) for v in other.fit.values), strict=True))
     for level in LEVELS:
         louder, span, begin = _at_level(prepared, level)
-        known = {"response": prepared.response, "span": span}
-        if prepared.free or prepared.response == FORCE:
-            known["steps_per_sample"] = max(one.fit.steps_per_sample, other.fit.steps_per_sample)
+        fine = prepared.free or prepared.response == FORCE
+        steps = max(one.fit.steps_per_sample, other.fit.steps_per_sample) if fine else STEPS
+        ready = partial(prepare, record=louder, response=prepared.response, span=span, steps_per_sample=steps)
         try:
-            ahead = prepare(one.fit.model, louder, **known)
+            ahead = ready(one.fit.model)
             initial = np.zeros((len(ahead.cuts) + 1, ahead.moving)) if begin is None else begin
             target = ahead.respond({}, initial)[0]
-            nearest, jacobian = prepare(other.fit.model, louder, other.fit.keys, **known).respond(values, initial)
+            nearest, jacobian = ready(other.fit.model, keys=other.fit.keys).respond(values, initial)
         except StudyError:
             continue
         gap = target - nearest
