@@ -112,7 +112,7 @@ COMMAND = Command(
     "  study diagnose roll.csv --free --model rig.yaml  # a free decay: no force acts\n"
     "  study diagnose blows.csv --use 2.0:9.5 --use 12.0:30.0 --model rig.yaml  # the stretches between blows\n"
     "  study diagnose damper.csv --model damper.yaml  # a component test: the model has no inertia\n"
-    "  study diagnose sweep.csv --judge every-other-block --model rig.yaml\n"
+    "  study diagnose sweep.csv --model rig.yaml  # judged in every other block, if its halves have other frequencies\n"
     "  study diagnose rig.csv --model rig.yaml --candidate \"bracket=u*abs(u) + 0.1*v**3\" --without hysteresis",
     _arguments, _run,
 )  # fmt: skip

@@ -93,7 +93,7 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     judging.add_argument(
         "--judge", type=judged, metavar="A:B",
         help=f"samples to judge (default: the second half), or '{ALTERNATE}': the default of free decays, "
-        "components and several stretches, and right for sweeps, whose halves have other frequencies",
+        "components, several stretches, and sweeps whose halves have other frequencies",
     )  # fmt: skip
     judging.add_argument(
         "--use", action="append", type=times, default=[], metavar="S:T",
