@@ -12,7 +12,7 @@ with one_sentence():
 CODE["measured"] = rests_on(Path("scripts/measured.py"))
 CODE["measured"] += [f"study/explore/page.{ending}" for ending in ("html", "css", "js")]
 CODE["gallery"] = rests_on(Path("scripts/gallery.py"))
-STRUCTURES = {name for name, row in MEASUREMENTS.items() if measurements.is_structure(row)}
+OF_STRUCTURES = {name for name, row in MEASUREMENTS.items() if measurements.is_structure(row)}
 ENTRIES = dict.fromkeys(row.entry for row in MEASUREMENTS.values())
 SEEN = {
     "comparison": ("response", "force_error", "missing_force", "error_in_time"),
@@ -22,13 +22,13 @@ SEEN = {
 
 def climbed(name):
     """What a climb leaves beside its steps; that of a structure has no page."""
-    page = [] if name in STRUCTURES else ["climb.html"]
+    page = [] if name in OF_STRUCTURES else ["climb.html"]
     return [f"results/{name}/{file}" for file in ("history.json", "history.png", "history.svg", "reached.yaml", *page)]
 
 
 def drawn(name, file):
     """Pictures that every comparison or diagnosis makes of one record; of several, each has its own names."""
-    alone = name not in STRUCTURES and (file == "diagnosis" or len(MEASUREMENTS[name].paths) == 1)
+    alone = name not in OF_STRUCTURES and (file == "diagnosis" or len(MEASUREMENTS[name].paths) == 1)
     return [f"results/{name}/{stem}.{ending}" for stem in SEEN[file] for ending in ENDINGS] if alone else []
 
 

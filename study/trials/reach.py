@@ -18,6 +18,7 @@ from study.trials.rates import Rate, mean, proportion
 from study.trials.runs import COMPLETED, NONE, PAIR, REMOVED, SINGLE, WITH, WITHOUT
 
 VERY_LITTLE, LITTLE = 0.01, 0.05  # noise up to which ties are to be short, and the true effect has to come first
+COUNTED = 1e-6  # relative: what is counted or read off has no interval, and no last bit either
 WITHIN = 1.05  # held-out error after adding, over that of the true model
 WORDS = (
     "kind", "hidden", "response", "known", "faults", "fault", "fault_channel", "faults_found", "fault_rivals",
@@ -87,7 +88,9 @@ def fault_score(row: Row) -> float:
     """One if the fault is named in its channel with an interval that holds its value."""
     if (row["found"], row["found_channel"]) != (row["fault"], row["fault_channel"]):
         return 0.0
-    return float(float(row["found_low"]) <= float(row["fault_value"]) <= float(row["found_high"]))
+    low, true, high = (float(row[column]) for column in ("found_low", "fault_value", "found_high"))
+    counted = low == high and math.isclose(low, true, rel_tol=COUNTED)
+    return float(counted or low <= true <= high)
 
 
 def no_fault_score(row: Row) -> float:
