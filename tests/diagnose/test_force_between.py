@@ -13,7 +13,7 @@ from study.equations.terms import get
 from study.records.prepared import prepare_record
 from study.records.record import Record
 
-DT, FINER, SAMPLES = 0.05, 32, 1024  # four samples in a period of the structure, whose force a program made
+DT, FINER, SAMPLES = 0.05, 32, 2048  # four samples in a period of the structure, whose force a program made
 TRUE = {"inertia": 2.0, "linear_damping": 3.0, "linear_stiffness": 2.0 * (2.0 * np.pi * 5.0) ** 2}
 
 
