@@ -107,6 +107,8 @@ def _spectra(model: Model, base: Baseline, prepared: Prepared) -> tuple[dict[str
     force = np.asarray(rfft(taper * part["force"]))
     loud = np.abs(force) ** 2 > FAINT * np.max(np.abs(force) ** 2)
     keep = (frequency >= prepared.band[0]) & (frequency <= frequency[loud][-1])
+    if not np.any(keep):
+        raise StudyError(f"no frequency that the force of {part.name!r} drives is one at which all motions are valid")
     omega = 2j * np.pi * frequency[keep]
     weight = base.transfer(np.where(omega == 0.0, omega[-1] / len(omega), omega))
     columns: dict[str, Floats] = {}
