@@ -9,6 +9,7 @@ its shape parameters are searched, how a trial draws it and when it is physical:
 To add an effect, add one entry to ``LIBRARY`` and one row to the parametrised tests.
 """
 
+from collections.abc import Collection
 from difflib import get_close_matches
 
 import numpy as np
@@ -241,3 +242,12 @@ def custom(name: str, force: str) -> Term:
     graph = Graph()
     formulas.build(graph, force, {n: graph.input(n) for n in formulas.names(force)})  # raises unless it is a formula
     return _single(name, f"q_{name}", force, meaning=f"the user's own force {force}", cause="as the user knows")
+
+
+def same_elsewhere(one: str, other: str, beside: Collection[str]) -> bool:
+    """Whether two terms are one beside others, the displacement being counted from another place.
+
+    With ``u = w + a`` a cubic spring gives ``k3 u^3 = k3 w^3 + 3 k3 a w^2 + ...``: a quadratic stiffness beside one is
+    a constant force, and only a measured displacement could tell.
+    """
+    return "cubic_stiffness" in beside and {one, other} == {"quadratic_stiffness", "constant_force"}

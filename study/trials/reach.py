@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
+from study.equations.terms import same_elsewhere
 from study.support.arrays import Floats
 from study.trials.draw import HIDDEN
 from study.trials.findings import Row
@@ -42,13 +43,10 @@ def first_score(row: Row) -> float:
 
 
 def _in_another_form(row: Row) -> bool:
-    """Whether what stands first is the hidden effect with the displacement counted from another place.
-
-    With ``u = w + a`` a cubic spring gives ``k3 u^3 = k3 w^3 + 3 k3 a w^2 + ...``: a quadratic stiffness beside one is
-    a constant force in disguise, and only a measured displacement could tell.
-    """
-    shifted = row["response"] != "displacement" and "cubic_stiffness" in row["known"].split("+")
-    return shifted and {row["first"], row["hidden"]} == {"quadratic_stiffness", "constant_force"}
+    """Whether what stands first is the hidden effect with the displacement counted from another place."""
+    if row["response"] == "displacement" or not row["first"]:
+        return False
+    return same_elsewhere(row["first"], row["hidden"], row["known"].split("+"))
 
 
 def tied_score(row: Row) -> float:

@@ -201,12 +201,14 @@ def test_evidence_and_intervals_are_those_of_the_diagnosis() -> None:
 
 def test_what_was_found_of_the_measurement_stands_beside_what_was_imposed() -> None:
     imposed = {"fault": "delay", "channel": "velocity", "value": 0.5, "unit": "samples"}
-    hum = {"fault": "hum", "channel": "velocity", "value": 1.0, "interval": (0.9, 1.1)}
-    delay = {"fault": "delay", "channel": "velocity", "value": 0.49, "interval": (0.4, 0.6)}
+    hum = {"fault": "hum", "channel": "velocity", "value": 1.0, "interval": (0.9, 1.1),
+           "rivals": ["harmonic_force"]}  # fmt: skip
+    delay = {"fault": "delay", "channel": "velocity", "value": 0.49, "interval": (0.4, 0.6), "rivals": []}
     shown = findings.measurement((hum, delay), imposed)
     assert (shown["faults_found"], shown["found"], shown["found_low"]) == ("hum+delay", "delay", 0.4)
+    assert shown["fault_rivals"] == "harmonic_force"
     assert findings.measurement((hum,), imposed)["found"] == "hum"
-    assert findings.measurement((), imposed) == {"faults_found": ""}
+    assert findings.measurement((), imposed) == {"faults_found": "", "fault_rivals": ""}
 
 
 def test_a_trial_that_cannot_be_made_is_a_row_with_its_trouble(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -237,7 +239,7 @@ def test_the_kept_table_is_what_this_code_gives(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("column", "value"), [("verdict", "other"), ("damping", 0.5), ("error_before", 9.0), ("hidden", "dead_band")]
+    ("column", "value"), [("verdict", "other"), ("damping", 0.5), ("error_before", 9.0), ("hidden", "another")]
 )
 def test_a_kept_table_of_another_run_shows(column: str, value: object) -> None:
     table = pd.read_csv(KEPT)

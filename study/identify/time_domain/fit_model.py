@@ -66,6 +66,8 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
     look = shape_search.stretch(known, prepared) if unknown else prepared
     fit = best_fit(known, look, first_starts(known, look))
+    if not fit.converged:
+        fit = better(fit, _built_up(known, look)) or fit
     for entry in unknown:
         fit = with_term(fit, entry, shape_search.baseline(fit, look), look)
     ordered = replace(model, terms=tuple(next(t for t in fit.model.terms if t.name == e.name) for e in model.terms))
@@ -86,6 +88,34 @@ def first_starts(model: Model, prepared: Prepared) -> list[dict[str, float]]:
     linear = linear_start(model, prepared)
     starts = [linear, linear | _reversed(model, prepared)]
     return [{key: value for key, value in start.items() if key not in model.held_keys} for start in starts]
+
+
+def _built_up(model: Model, prepared: Prepared) -> FreeRunFit | None:
+    """The fit of the first terms alone that comes to a minimum, the others added one by one; None without any.
+
+    Terms that do nearly the same, as three laws of damping of one decay, lead a fit of all of them astray from afar.
+    """
+    for count in range(len(model.terms) - 1, 0, -1):
+        fewer = replace(model, terms=model.terms[:count])
+        try:
+            fit = best_fit(fewer, prepared, first_starts(fewer, prepared))
+        except StudyError:
+            continue
+        if fit.converged:
+            return _with_the_others(fit, model, prepared)
+    return None
+
+
+def _with_the_others(fit: FreeRunFit, model: Model, prepared: Prepared) -> FreeRunFit | None:
+    for entry in model.terms[len(fit.model.terms) :]:
+        start = fit.model.numbers() | {key: value or 0.0 for key, value in entry.values.items()}
+        grown = fit.model.with_term(entry)
+        held = [key for key in model.held_keys if key in grown.values]
+        try:
+            fit = best_fit(grown, prepared, [start], held)
+        except StudyError:
+            return None
+    return fit
 
 
 def with_term(fit: FreeRunFit, entry: ModelTerm, base: Baseline, prepared: Prepared) -> FreeRunFit:
