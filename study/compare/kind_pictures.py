@@ -54,12 +54,13 @@ def loops(comparison: Comparison, found: Loops) -> Figure:
         rows=1, columns=3, width=1.45 * WIDE, panel=2.9, share=False,
     )  # fmt: skip
     for axis, against in zip(axes, ("displacement", "velocity"), strict=False):
-        axis.plot(part[against], prediction.measured, ".", markersize=1.6, color="0.62", label="measured")
-        axis.plot(part[against], prediction.predicted, ".", markersize=1.2, color="C0", label="model")
+        axis.plot(part[against], prediction.measured, ".", markersize=1.6, color="0.62")
+        axis.plot(part[against], prediction.predicted, ".", markersize=1.2, color="C0")
         axis.set_xlabel(f"{against} ({units[against]})")
     axes[0].set_ylabel(f"force ({units['force']})")
     axes[2].plot(found.stroke, found.measured, "o", markersize=3.5, color="0.45", label="measured")
     axes[2].plot(found.stroke, found.predicted, "x", markersize=4.5, color="C0", label="model")
+    axes[2].locator_params(axis="x", nbins=4)  # strokes that differ by little have long labels
     axes[2].set_xlabel(f"stroke of a cycle ({units['displacement']})")
     axes[2].set_ylabel(f"energy ({units['force']} {units['displacement']})")
     page.letter(axes, ("force over displacement", "over velocity", "dissipated in a cycle"))
