@@ -66,7 +66,7 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
     look = shape_search.stretch(known, prepared) if unknown else prepared
     fit = best_fit(known, look, first_starts(known, look))
-    if not fit.converged:
+    if not fit.converged and any(term.name not in LINEAR for term in known.terms):
         fit = better(fit, _built_up(known, look)) or fit
     for entry in unknown:
         fit = with_term(fit, entry, shape_search.baseline(fit, look), look)
