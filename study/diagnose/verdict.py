@@ -33,7 +33,7 @@ PERIODS = 100.0  # of the motion that a search uses, at least
 SHORT, LONG = 2048, 16384  # samples: it uses half of the fitting part if that is more, within these limits
 SETTLED = 4  # of the candidates, the best: fitted on the whole fitting part and with enough steps
 MOST = 0.5  # of what is unexplained: what an effect of a component, or of a decay, explains that is named first
-PAIRED = 1  # the best so many candidates are tried together with every other
+PAIRED = 3  # the best so many candidates are tried together with every other
 
 
 @dataclass(frozen=True, eq=False)
