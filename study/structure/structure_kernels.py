@@ -14,19 +14,11 @@ import math
 import numpy as np
 
 from study.equations.jit import compiled
-from study.equations.kernels import first_zero, run
+from study.equations.kernels import copy_state, first_zero, run
 from study.support.arrays import Floats, Ints
 
 CUTS = 6  # of a step, for each place with friction
 CLOSE = 1e-9  # to one: the sign of a held place at which it lets go
-
-
-@compiled
-def _copy(w: Floats, to: int) -> None:
-    """``w[0]`` into ``w[to]``; number by number, as an assignment of views takes Numba seconds to compile."""
-    for i in range(w.shape[1]):
-        for c in range(w.shape[2]):
-            w[to, i, c] = w[0, i, c]
 
 
 @compiled
@@ -382,7 +374,7 @@ def _switching_step(
     begin = 0.0
     early, fresh = np.zeros(len(sides)), np.zeros(len(sides), dtype=np.int64)
     for cut in range(CUTS * len(sides) + 1):
-        _copy(w, 4)
+        copy_state(w, 0, 4)
         for a in range(len(sides)):
             early[a] = r[sides[a]]
         _part(
@@ -421,7 +413,7 @@ def _set_sides(
         held[a] = 1 if v == 0.0 else 0
         r[sides[a]] = np.sign(v)
     for _ in range(len(sides)):
-        _copy(w, 1)
+        copy_state(w, 0, 1)
         _variation(code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, time, drive, 0, w, 1)
         for a in range(len(sides)):
             if held[a] != 0 and abs(r[sides[a]]) > 1.0:
@@ -450,7 +442,7 @@ def integrate_structure(
         _set_sides(code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, start, drive, w)
     for sample in range(out.shape[1]):
         j = 2 * steps * sample
-        _copy(w, 1)
+        copy_state(w, 0, 1)
         _variation(
             code,
             first,
