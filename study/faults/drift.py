@@ -10,7 +10,7 @@ from scipy.special import fdtrc
 
 from study.faults.fault import DRIFT, Fault
 from study.faults.leftover import Leftover
-from study.records.prepared import Prepared
+from study.records.prepared import FORCE, Prepared
 from study.support.arrays import Floats
 from study.support.thresholds import ALPHA, TOLERANCE
 
@@ -41,15 +41,15 @@ def drift(left: Leftover, asked: int) -> Fault | None:
 
 
 def slow_response(prepared: Prepared, asked: int) -> Fault | None:
-    """The slowest lines of the response itself, where they hold more than those beside them; None elsewhere.
+    """The slowest lines of the response itself, where they hold more than those beside them and the force's do not.
 
     A drift larger than the motion takes the coefficients with it: a mass almost without a spring follows any ramp. What
     is said of it here, the mean included, is no more than where a fit that does not follow it may begin.
     """
     spans = prepared.plan.fit, prepared.plan.judge
     places = np.unique(np.concatenate([np.arange(*span) for span in spans])).astype(np.float64)
-    values = prepared.record[prepared.response][places.astype(np.int64)]
-    if _slow_lines(values, asked) is None:
+    values, force = (prepared.record[name][places.astype(np.int64)] for name in (prepared.response, FORCE))
+    if _slow_lines(values, asked) is None or _slow_lines(force, asked) is not None:
         return None
     waveform = _slow(places, values, SLOWEST, len(prepared.record)) + np.mean(values)
     return Fault(DRIFT, prepared.response, float(np.std(waveform)), waveform=waveform)
