@@ -1,6 +1,6 @@
 """The free run of a fitted model along the part of the record that was not fitted, its error and its noise floor."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -107,6 +107,19 @@ class Prediction:
         length = int(np.clip(2 * CYCLES * len(centred) / crossings, 32, len(centred)))
         first = int(np.argmax(np.convolve(self.residual**2, np.ones(length), "valid")))
         return slice(first, first + length)
+
+    def along(self, part: Prepared) -> "Prediction":
+        """The same free run along a part of what is judged, at whose first sample the motion begins anew."""
+        if part.plan.judge == self.prepared.plan.judge:
+            return self
+        begin, (first, last) = self.prepared.plan.judge[0], part.plan.judge
+        run, predicted = self.run, self.predicted[first - begin : last - begin]
+        if run is None:
+            return replace(self, prepared=part, predicted=predicted)
+        starts = [begin, *(b for b in self.prepared.record.begins if b > begin)]
+        states = np.atleast_2d(run.initial)[starts.index(first) : np.searchsorted(starts, last)]
+        own = replace(run, prepared=part, first=first, initial=states)
+        return replace(self, prepared=part, run=own, predicted=predicted)
 
     def above(self, values: Floats) -> Floats:
         """Values of the judging or fitting part without what lies below ``low``, shape (n,)."""

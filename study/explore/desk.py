@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from study.equations.model import Model
 from study.explore import session as sessions
 from study.explore.saved_files import PAGE, files
 from study.explore.session import Session
@@ -124,6 +125,11 @@ class Desk:
             notice=f"Saved in {self.folder}: {self.model.name} {with_them} fitted values, {PAGE}, pictures and tables"
         )
 
+    def _still(self, model: Model) -> None:
+        """End what is done of a model that is no longer the present one."""
+        if self.session.now.model != model or self._rest.is_set():
+            raise OvertakenError
+
     def _examine(self, own: object = None) -> None:
         self._rest.wait(SETTLE)
         asked = self.session
@@ -132,11 +138,16 @@ class Desk:
             return
 
         def count(candidates: int) -> None:
-            if self.session.now.model != model or self._rest.is_set():
-                raise OvertakenError
+            self._still(model)
             self._tell(diagnosing=f"diagnosing: {candidates} candidates tried")
 
         try:
+            if asked.now.on_each and asked.now.by_record is None:
+                self._tell(diagnosing="fitting each record by itself")
+                asked = sessions.by_itself(asked)
+                self._still(model)
+                with self._lock:
+                    self._tell(sessions.with_stage(self.session, asked.now))
             self._tell(diagnosing="diagnosing")
             stage, _ = sessions.examined(asked, count)
             with self._lock:

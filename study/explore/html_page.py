@@ -34,6 +34,7 @@ CLOSE, SHORT, LONG, TICKS = (
     2.6,
     5.0,
 )  # decades of an axis with many, three or two ticks in each; ticks of one longer
+BEGINS, ENDS = ("start", "reset_start"), ("end", "reset_end")  # of a range, the second for the tool that resets it
 SELECTED = "if (cb_obj.final) window.study.selected(kind, cb_obj.geometry.x0, cb_obj.geometry.x1)"
 
 
@@ -124,6 +125,7 @@ def frame(seen: View) -> Columns:
         *((f"{name}_y", "axis_label", label) for name, label in labels.items()),
         *((f"{name}_x", "axis_label", label) for name, label in motions.items()),
         ("mapper", "low", -largest), ("mapper", "high", largest), ("range_frequency", "end", seen.highest),
+        *(("range_time", end, float(seen.columns["time"]["t"][i])) for i, ends in ((0, BEGINS), (-1, ENDS)) for end in ends),
         ("range_force", "start", seen.limits[0]), ("range_force", "end", seen.limits[1]),
         ("frequency_decades", "ticks", log_ticks(seen.highest / 300.0, seen.highest)),
         *((f"{name}_ticks", "ticks", log_ticks(*ends)) for name, ends in _log_axes(seen).items()),
@@ -164,6 +166,7 @@ def variables(session: Session, live: bool) -> dict[str, Any]:
         "record": session.prepared.record.name, "model": session.now.model.name, "live": live,
         "style": _text("page.css"), "script": _text("page.js"),
         "steps": [words.name(r, i) for i, r in enumerate(session.stages)],
+        "several": bool(session.now.on_each),
         "diagnosed": live or any(r.diagnosis is not None for r in session.stages),
     }  # fmt: skip
 

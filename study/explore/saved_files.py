@@ -1,7 +1,7 @@
 """What Save writes: the model file with its comments, the history, the pictures, and the session as one page."""
 
 from study.compare import history
-from study.compare.comparison_pictures import pictures
+from study.compare.comparison_pictures import level_pictures, pictures
 from study.compare.comparison_report import as_json, document, tables
 from study.compare.history_picture import files as history_pictures
 from study.diagnose.diagnosis_files import files as diagnosis_files
@@ -18,16 +18,22 @@ def files(session: Session, name: str, text: str, values: bool = False) -> dict[
     With ``values`` the model file gives what was fitted, and a fit of it holds that; otherwise what the session holds.
     """
     now, steps = session.now, session.steps
+    each = now.on_each or (now.comparison,)
+    levels = now.by_record.levels if now.by_record is not None and not session.several.separate else ()
     model = now.model.with_values(now.values) if values else now.model
     stem = name.rpartition(".")[0] or name
     contents = {
         name: model_file.revised(text, name, model).encode(),
         history.name_for(name): history.as_bytes(steps),
-        "comparison.json": as_json(document([now.comparison])),
-        **{f"{table}.csv": content for table, content in tables([now.comparison]).items()},
+        "comparison.json": as_json(document(each, levels)),
+        **{f"{table}.csv": content for table, content in tables(each, levels).items()},
         PAGE: saved(session),
     }
-    contents |= pictures(now.comparison) | history_pictures(steps, stem)
+    for comparison in each:
+        prefix = f"{comparison.record.name}_" if len(each) > 1 else ""
+        contents |= {prefix + name: content for name, content in pictures(comparison).items()}
+    contents |= level_pictures(levels, now.comparison.record.units.get("force", "N"))
+    contents |= history_pictures(steps, stem)
     if now.diagnosis is not None:
         contents |= diagnosis_files(now.diagnosis, now.said, now.unneeded or ())
     return contents
