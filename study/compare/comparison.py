@@ -108,7 +108,9 @@ def compare(
     report("free run")
     prediction = predict(fit, prepared)
     keys = (*fit.keys, *(known.symbols if known else ()))
-    judged = _judged(fit, keys, prediction, local_force_error if estimator == "local_polynomial" else force_error, report)
+    judged = _judged(
+        fit, keys, prediction, local_force_error if estimator == "local_polynomial" else force_error, report
+    )
     said = [CHAOTIC if fit.restarts else None, rivals_note(fit, alike, prediction)]
     return Comparison(
         model=model, prepared=prepared, fit=fit, coefficients=coefficients(fit, prepared, known),

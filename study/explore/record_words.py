@@ -5,7 +5,6 @@ from html import escape
 
 from study.compare.across_levels import Level
 from study.compare.comparison import Comparison
-from study.explore.by_record import ByRecord
 from study.explore.page_units import in_text, number
 from study.explore.session import Stage
 from study.support.numbers import percent
@@ -25,7 +24,7 @@ def words(stage: Stage, shown: str, live: bool) -> dict[str, str]:
 def _records(stage: Stage, shown: str) -> str:
     """A row a record, whose name is a button that turns the panels to it, and one for all."""
     unit = in_text(stage.comparison.record.units.get("force", ""))
-    heads = ("record", f"rms force / {escape(unit)}", "error", "noise floor", "error of force", "own fit")
+    heads = ("record", f"rms force / {escape(unit)}", "error", "noise floor", "of force", "own fit")
     head = "".join(f"<th{f' title={chr(34)}{OWN}{chr(34)}' if h == 'own fit' else ''}>{h}</th>" for h in heads)
     own = stage.by_record.errors if stage.by_record is not None else ()
     names = [c.record.name for c in stage.on_each]
@@ -75,15 +74,15 @@ def _levels(stage: Stage, live: bool) -> str:
     unit = in_text(stage.comparison.record.units.get("force", ""))
     head = "".join(f"<th>{escape(name)}<small>{force} {escape(unit)}</small></th>" for name, force in columns)
     rows = "".join(_level(level) for level in found.levels)
-    return f"<table><tr><th></th>{head}<th>unit</th><th>differs?</th></tr>{rows}</table>"
+    return f"<table><tr><th></th>{head}<th>differs?</th></tr>{rows}</table>"
 
 
 def _level(level: Level) -> str:
     values = _cells(level.value, level.error)
     answer = f"{'yes' if level.moves else 'no'}<small>p = {number(level.p_value, 1)}</small>"
     moves = " class='moves'" if level.moves else ""
-    symbol = f"<th><i>{escape(_symbol(level.key))}</i></th>"
-    return f"<tr{moves}>{symbol}{values}<td>{escape(in_text(level.unit))}</td><td>{answer}</td></tr>"
+    unit = f"<small>{escape(in_text(level.unit))}</small>"
+    return f"<tr{moves}><th><i>{escape(_symbol(level.key))}</i>{unit}</th>{values}<td>{answer}</td></tr>"
 
 
 def _symbol(key: str) -> str:

@@ -30,7 +30,7 @@ def saved(session: Session) -> bytes:
     stores: list[ColumnDataSource] = []
     for (number, record), seen in views.items() if len(views) > 1 else ():
         columns: dict[str, Columns] = {
-            **seen.columns, "frame": html_page.frame(seen), "history": _marked(history, number - many)
+            **seen.columns, "frame": html_page.frame(seen, history), "history": _marked(history, number - many)
         }  # fmt: skip
         stores += [ColumnDataSource(c, name=f"{name}@{number}.{record}") for name, c in columns.items()]
     made = html_page.build(views[first], history, stores)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -97,14 +98,14 @@ def over_time(comparison: Comparison, scales: Scales, span: tuple[float, float] 
 
 
 def _close(comparison: Comparison, scales: Scales) -> Columns:
-    """Every sample of the stretch where the model misses most."""
+    """Every sample of the stretch where the model misses most; of a time with gaps, between two of them."""
     judged, near, factor = comparison.prediction, comparison.prediction.closeup, scales.response.factor
     time = judged.time[near]
-    places = decimate.gaps(time, time, judged.dt)
-    lines = {"measured": judged.measured[near] / factor, "predicted": judged.predicted[near] / factor}
-    return {"t": np.insert(time, places, time[places - 1])} | {
-        name: decimate.broken(y, places) for name, y in lines.items()
-    }
+    ends = [0, *decimate.gaps(time, time, judged.dt), len(time)]
+    pieces = [slice(near.start + a, near.start + b) for a, b in pairwise(ends)]
+    near = max(pieces, key=lambda piece: float(np.sum(judged.residual[piece] ** 2)))
+    return {"t": judged.time[near], "measured": judged.measured[near] / factor,
+            "predicted": judged.predicted[near] / factor}  # fmt: skip
 
 
 def stretch(comparison: Comparison, span: tuple[float, float] | None) -> slice:

@@ -383,7 +383,7 @@ def test_what_gives_nothing_is_counted_and_not_offered(asked):
     stage = asked.now
     places = dict(zip(*words.words(stage, stage.shown, 0, True, "N").values(), strict=True))
     offered = re.findall(r"data-candidate='(\d+)'", places["candidates"])
-    assert [int(i) for i in offered] == [i for i, row in enumerate(stage.shown) if words.gives(row)]
+    assert [int(i) for i in offered] == [i for i, row in enumerate(stage.shown) if words.offers(stage.diagnosis, row)]
     assert 0 < len(offered) < len(stage.shown)
     assert f"{len(stage.diagnosis.candidates) - len(offered)} more explain no more than chance" in places["candidates"]
 
