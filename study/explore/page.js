@@ -83,7 +83,7 @@ window.study = (() => {
     put("shown", shown.f.length ? {...shown, zero: shown.f.map(() => 0)} : {f: [0, 1], value: none, low: none, high: none, zero: [0, 0]})
     if (element) model("constancy_y").axis_label = element.dataset.label
     const title = place("constancy-of")
-    if (title) title.textContent = element ? element.querySelector(".name b").textContent : "no candidate"
+    if (title) title.textContent = element ? `${element.querySelector(".name b").textContent}, 95 % intervals` : ""
     const card = place("constancy-card"), empty = place("constancy-none"), detail = place("detail")
     if (card) card.classList.toggle("none", !shown.f.length)
     if (empty) empty.hidden = !element || shown.f.length > 0

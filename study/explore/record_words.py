@@ -65,8 +65,11 @@ def _levels(stage: Stage, live: bool) -> str:
     if found is None:  # as many rows, so that nothing moves when they come
         if not live:
             return f"<p>{NOT_ASKED}</p>"
-        rows = "".join(f"<tr><th><i>{escape(_symbol(c.key))}</i></th><td></td></tr>" for c in fitted)
-        return f"<table><tr><th></th><th>{WAITING}</th></tr>{rows}</table>"
+        rows = "".join(
+            f"<tr><th><i>{escape(_symbol(c.key))}</i><small>{escape(in_text(c.unit))}</small></th><td>&nbsp;</td></tr>"
+            for c in fitted
+        )
+        return f"<table><tr><th></th><th>{WAITING}<small>&nbsp;</small></th></tr>{rows}</table>"
     if not found.levels:
         return "<p>every coefficient is held</p>"
     forces = [f"{force:.3g}" for force in found.levels[0].force]

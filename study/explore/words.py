@@ -28,6 +28,10 @@ NOT_ASKED = (
 PREDICTED = "The model runs free under the measured force, on the part of the record that it was not fitted to."
 FLOOR = "From the quietest bands of what is left, or from what differs between periods."
 FORCE = "The model in reverse: what its terms, computed from the measured motion, leave of the measured force."
+SCALE = "".join(f"<span style='left:{x}%'>{x}</span>" for x in (0, 50, 100))
+HEAD = (
+    f"<li class='scale'><span class='head'>share of the difference explained / %</span><i class='axis'>{SCALE}</i></li>"
+)
 ONLY_NOISE = "What is left is noise: there is no missing force to show over displacement and velocity."
 
 
@@ -100,14 +104,11 @@ def _verdict(stage: Stage, live: bool) -> str:
 def _candidates(stage: Stage, rows: Sequence[Ranked], live: bool) -> str:
     if stage.diagnosis is None:
         return ""
-    scale = "".join(f"<span style='left:{x}%'>{x}</span>" for x in (0, 50, 100))
-    heading = "share of the difference explained / %"
-    head = f"<li class='scale'><span class='head'>{heading}</span><i class='axis'>{scale}</i></li>"
     offered = [(i, row) for i, row in enumerate(rows) if offers(stage.diagnosis, row)]
     more = len(stage.diagnosis.candidates) - len(offered)
     others = f"{more} more explain no more than chance would" if offered else f"none of {more} explains any of it"
     rest = f"<li class='more'>{others}</li>" if more > 0 else ""
-    return f"<ol>{head}{''.join(_row(i, row, stage, live) for i, row in offered)}{rest}</ol>"
+    return f"<ol>{HEAD if offered else ''}{''.join(_row(i, row, stage, live) for i, row in offered)}{rest}</ol>"
 
 
 def offers(diagnosis: Diagnosis, row: Ranked) -> bool:
