@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,12 +102,15 @@ class Prediction:
 
     @property
     def closeup(self) -> slice:
-        """Some cycles of the response about the stretch where the residual is largest."""
+        """Some cycles of the response about the stretch where the residual is largest; no time is left out of them."""
         centred = self.measured - np.mean(self.measured)
         crossings = max(int(np.count_nonzero(np.diff(np.signbit(centred)))), 2)
         length = int(np.clip(2 * CYCLES * len(centred) / crossings, 32, len(centred)))
         first = int(np.argmax(np.convolve(self.residual**2, np.ones(length), "valid")))
-        return slice(first, first + length)
+        gaps = np.flatnonzero(np.abs(np.diff(self.time[first : first + length]) - self.dt) > 0.5 * self.dt)
+        ends = [first, *(first + 1 + gaps).tolist(), first + length]
+        pieces = [slice(a, b) for a, b in pairwise(ends)]
+        return max(pieces, key=lambda piece: float(np.sum(self.residual[piece] ** 2)))
 
     def along(self, part: Prepared) -> "Prediction":
         """The same free run along a part of what is judged, at whose first sample the motion begins anew."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -98,12 +97,8 @@ def over_time(comparison: Comparison, scales: Scales, span: tuple[float, float] 
 
 
 def _close(comparison: Comparison, scales: Scales) -> Columns:
-    """Every sample of the stretch where the model misses most; of a time with gaps, between two of them."""
+    """Every sample of the stretch where the model misses most."""
     judged, near, factor = comparison.prediction, comparison.prediction.closeup, scales.response.factor
-    time = judged.time[near]
-    ends = [0, *decimate.gaps(time, time, judged.dt), len(time)]
-    pieces = [slice(near.start + a, near.start + b) for a, b in pairwise(ends)]
-    near = max(pieces, key=lambda piece: float(np.sum(judged.residual[piece] ** 2)))
     return {"t": judged.time[near], "measured": judged.measured[near] / factor,
             "predicted": judged.predicted[near] / factor}  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Several records in a session: one model on all, a record at a time in the panels, coefficients of each record's own."""
+"""Several records in a session: one model on all, a record at a time in the panels, coefficients of each by itself."""
 
 import re
 from dataclasses import replace
@@ -7,10 +7,12 @@ from functools import partial
 import numpy as np
 import pytest
 
+from study.compare import panels
 from study.compare.comparison import across, compare, on_each_record
 from study.compare.each_record import separated
 from study.compare.prediction import predict
 from study.diagnose.force_between import diagnose_as_read
+from study.equations import model_file
 from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY, get
@@ -117,14 +119,23 @@ def test_a_line_breaks_where_time_is_left_out():
         assert np.nanmax(values[:gap]) < 51.0 + 40.0 * (buckets == 20)
         assert np.nanmin(values[gap:]) > 60.0
     assert len(decimate.gaps(np.arange(9.0), np.arange(9.0), 1.0)) == 0
+    drawn = panels.broken(time, time)
+    assert np.flatnonzero(np.isnan(drawn[1])).tolist() == [50]
+    assert np.all(np.isfinite(drawn[0]))
+
+
+def test_a_close_up_shows_one_stretch_of_time(begun):
+    for comparison in begun.now.on_each:
+        judged = comparison.prediction
+        assert np.any(np.diff(judged.time) > 1.5 * judged.dt)
+        assert np.all(np.diff(judged.time[judged.closeup]) < 1.5 * judged.dt)
+        assert len(judged.time[judged.closeup]) >= 16
 
 
 def test_the_saved_page_and_the_tables_hold_every_record(grown, monkeypatch):
     for drawn in ("pictures", "level_pictures", "history_pictures", "diagnosis_files"):  # by tests of their own
         monkeypatch.setattr(saved_files, drawn, lambda *_: {"response.png": b""})
-    contents = saved_files.files(
-        grown, "rig.yaml", "name: rig\nterms:\n  - inertia\n  - linear_damping\n  - linear_stiffness\n"
-    )
+    contents = saved_files.files(grown, "rig.yaml", model_file.format_model(BELIEVED))
     assert {"low_response.png", "high_response.png", "coefficients_by_level.csv"} <= set(contents)
     assert contents["comparison.csv"].decode().count("\n") == 1 + len(NAMES)
     text = contents["explore.html"].decode()
