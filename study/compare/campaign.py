@@ -11,6 +11,7 @@ from typing import Any
 
 from study.compare import across_levels
 from study.compare.fitted_coefficients import Coefficient
+from study.figures.labels import term_names
 from study.support import document
 from study.support.numbers import percent
 
@@ -60,7 +61,8 @@ def measured(name: str, rig: str, comparison: Mapping[str, Any], diagnosis: Mapp
     if not parts:
         return [Measured(name, rig, comparison, diagnosis)]
     return [
-        Measured(f"{name} {number}", rig, {**comparison, **part}, diagnosis) for number, part in enumerate(parts, 1)
+        Measured(f"{name} {part.get('record', number)}", rig, {**comparison, **part}, diagnosis)
+        for number, part in enumerate(parts, 1)
     ]
 
 
@@ -78,17 +80,17 @@ def blocks(records: Iterable[Measured]) -> list[document.Block]:
         ),
         document.table(heading, [_verdict(record) for record in every]),
     ]
-    for (rig, model), rows in rigs.items():
-        page += [document.Heading(f"{rig}: coefficients of {model}"), *_coefficients(rows)]
+    for (rig, model, _), rows in rigs.items():
+        page += [document.Heading(f"{rig}: coefficients of the model {model}, by level"), *_coefficients(rows)]
     return page
 
 
-def _by_rig(records: Iterable[Measured]) -> dict[tuple[str, str], list[Measured]]:
+def _by_rig(records: Iterable[Measured]) -> dict[tuple[str, str, str], list[Measured]]:
     """Records of one rig, one model and one unit, by level."""
     found: dict[tuple[str, str, str], list[Measured]] = {}
     for record in records:
         found.setdefault((record.rig, str(record.comparison["model"]["name"]), record.unit), []).append(record)
-    return {(rig, model): sorted(rows, key=lambda r: r.level) for (rig, model, _), rows in found.items()}
+    return {key: sorted(rows, key=lambda r: r.level) for key, rows in found.items()}
 
 
 def _verdict(record: Measured) -> tuple[str, ...]:
@@ -96,17 +98,17 @@ def _verdict(record: Measured) -> tuple[str, ...]:
     verdict = str(found["verdict"])
     missing = verdict == "missing_effect"
     first: Mapping[str, Any] = found["candidates"][0] if found["candidates"] and missing else {}
-    tied = ", ".join(["", *first.get("tied_with", ())])
+    effects = " or ".join(term_names(name) for name in (first["term"], *first.get("tied_with", ()))) if first else ""
     return (
         record.name, record.shown_level, percent(record.comparison["error"]["response"]),
         percent(record.comparison["noise_floor"]["response"]), VERDICTS.get(verdict, verdict),
-        f"{first['term']}{tied}" if first else "", percent(first["explained"]) if first else "",
+        effects, percent(first["explained"]) if first else "",
         percent(first["response_error"]) if first else "",
     )  # fmt: skip
 
 
 def _coefficients(rows: Sequence[Measured]) -> list[document.Block]:
-    """Values with standard errors, a column a record; of several records the chance of such differences."""
+    """Values with 95 % intervals, a column a record; of several records the chance of such differences."""
     own = [record.coefficients for record in rows]
     columns = [f"{record.name}, {record.level:.3g} {record.unit}" for record in rows]
     if len(rows) == 1:
@@ -118,17 +120,18 @@ def _coefficients(rows: Sequence[Measured]) -> list[document.Block]:
     return [
         document.table(("coefficient", *columns, "unit", "the same at all levels?", "p"), lines),
         document.Text(
-            "p: the chance of such differences if the coefficient is the same in all records; the number of "
-            "coefficients is accounted for."
+            "Each record is fitted by itself, values with 95 % intervals. p: the chance of such differences if the "
+            "coefficient is the same in all records; 'no' accounts for the number of coefficients. A model that lacks "
+            "nothing has the same coefficients at all levels."
         ),
     ]
 
 
 def _value(found: Coefficient) -> str:
-    return f"{found.value:.5g} (given)" if found.error is None else f"{found.value:.5g} +- {found.error:.2g}"
+    return f"{found.value:.5g} (given)" if found.error is None else f"{found.value:.5g} ± {1.96 * found.error:.2g}"
 
 
 def _judged(level: across_levels.Level | None) -> tuple[str, str]:
     if level is None:
         return "", ""
-    return "moves" if level.moves else "yes", f"{level.p_value:.2g}"
+    return "no" if level.moves else "yes", f"{level.p_value:.2g}"
