@@ -63,12 +63,15 @@ window.study = (() => {
     }
     for (const name of ["difference", "spectrum", "against_u", "against_v"]) entry(name, label, has)
   }
+  const title = (i) => document.querySelector(`[data-candidate="${i}"] .name b`)?.textContent ?? "candidate"
 
   // a click on a candidate pins it, another one lets it go; of three the first goes
   function pin(i) {
     pins = pins.includes(i) ? pins.filter((other) => other !== i) : [...pins, i].slice(-2)
-    for (const row of document.querySelectorAll("[data-candidate]"))
+    for (const row of document.querySelectorAll("[data-candidate]")) {
       row.classList.toggle("pinned", pins.includes(Number(row.dataset.candidate)))
+      row.classList.toggle("second", pins[1] === Number(row.dataset.candidate))
+    }
     preview(hovered)
   }
 
@@ -82,8 +85,8 @@ window.study = (() => {
     const none = [NaN, NaN]  // two points without a value: an axis needs some
     put("shown", shown.f.length ? {...shown, zero: shown.f.map(() => 0)} : {f: [0, 1], value: none, low: none, high: none, zero: [0, 0]})
     if (element) model("constancy_y").axis_label = element.dataset.label
-    const title = place("constancy-of")
-    if (title) title.textContent = element ? `${element.querySelector(".name b").textContent}, 95 % intervals` : ""
+    const heading = place("constancy-of")
+    if (heading) heading.textContent = element ? `${title(i)}, 95 % intervals` : ""
     const card = place("constancy-card"), empty = place("constancy-none"), detail = place("detail")
     if (card) card.classList.toggle("none", !shown.f.length)
     if (empty) empty.hidden = !element || shown.f.length > 0
