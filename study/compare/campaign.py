@@ -11,11 +11,12 @@ from typing import Any
 
 from study.compare import across_levels
 from study.compare.fitted_coefficients import Coefficient
-from study.figures.labels import term_names
+from study.figures.labels import prefixed, term_names
 from study.support import document
 from study.support.numbers import percent
 
 TITLE = "Measured records"
+TINY = 1e-9  # a chance that is not written out
 VERDICTS = {
     "missing_effect": "an effect is missing", "nothing_missing": "nothing is missing",
     "unknown_effect": "something unknown is missing",
@@ -39,7 +40,8 @@ class Measured:
     @property
     def shown_level(self) -> str:
         """With its unit."""
-        return "" if math.isnan(self.level) else f"{self.level:.4g} {self.unit}"
+        factor, unit = prefixed(self.unit, self.level)
+        return "" if math.isnan(self.level) else f"{self.level / factor:.3g} {unit}"
 
     @property
     def unit(self) -> str:
@@ -70,13 +72,16 @@ def blocks(records: Iterable[Measured]) -> list[document.Block]:
     """The page: a table of verdicts, then the coefficients of each rig, its records in the order of their level."""
     rigs = _by_rig(records)
     every = [record for rig in rigs.values() for record in rig]
-    counts = [f"{sum(r.diagnosis['verdict'] == key for r in every)}: {word}" for key, word in VERDICTS.items()]
+    counts = [(word, sum(r.diagnosis["verdict"] == key for r in every)) for key, word in VERDICTS.items()]
+    said = "; ".join(f"{word} in {count}" for word, count in counts if count)
     heading = ("record", "level", "error", "noise floor", "verdict", "first effect", "explains", "error with it")
     page: list[document.Block] = [
         document.Heading(TITLE, 1),
         document.Text(
-            f"{len(every)} records. {'; '.join(counts)}. Level: rms of the measured response. Error: of the free run on"
-            " the part that was not fitted, over that rms."
+            f"{len(every)} records: {said}. Level: rms of the measured response. Error: of the free run on the part "
+            "that was not fitted, over that rms. Each record is fitted by itself, its values stand with 95 % intervals; a "
+            "model that lacks nothing has the same coefficients at all levels. p: the chance of such differences if a "
+            "coefficient is the same in all records; 'no' accounts for the number of coefficients."
         ),
         document.table(heading, [_verdict(record) for record in every]),
     ]
@@ -110,21 +115,14 @@ def _verdict(record: Measured) -> tuple[str, ...]:
 def _coefficients(rows: Sequence[Measured]) -> list[document.Block]:
     """Values with 95 % intervals, a column a record; of several records the chance of such differences."""
     own = [record.coefficients for record in rows]
-    columns = [f"{record.name}, {record.level:.3g} {record.unit}" for record in rows]
+    columns = [", ".join(filter(None, (record.name, record.shown_level))) for record in rows]
     if len(rows) == 1:
         return [document.table(("coefficient", *columns, "unit"), [(c.key, _value(c), c.unit) for c in own[0]])]
     judged = {level.key: level for level in across_levels.levels([record.level for record in rows], own)}
     lines = [
         (key[0].key, *map(_value, key), key[0].unit, *_judged(judged.get(key[0].key))) for key in zip(*own, strict=True)
     ]
-    return [
-        document.table(("coefficient", *columns, "unit", "the same at all levels?", "p"), lines),
-        document.Text(
-            "Each record is fitted by itself, values with 95 % intervals. p: the chance of such differences if the "
-            "coefficient is the same in all records; 'no' accounts for the number of coefficients. A model that lacks "
-            "nothing has the same coefficients at all levels."
-        ),
-    ]
+    return [document.table(("coefficient", *columns, "unit", "the same at all levels?", "p"), lines)]
 
 
 def _value(found: Coefficient) -> str:
@@ -134,4 +132,4 @@ def _value(found: Coefficient) -> str:
 def _judged(level: across_levels.Level | None) -> tuple[str, str]:
     if level is None:
         return "", ""
-    return "no" if level.moves else "yes", f"{level.p_value:.2g}"
+    return "no" if level.moves else "yes", f"{level.p_value:.2g}" if level.p_value > TINY else f"< {TINY:g}"

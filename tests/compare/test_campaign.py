@@ -28,7 +28,7 @@ def told(*records):
 def test_records_of_a_rig_stand_in_the_order_of_their_level():
     verdicts, (values,) = told(measured("loud", "beam", 2.0, 355.0), measured("quiet", "beam", 0.5, 355.5))
     assert [row[0] for row in verdicts.rows] == ["quiet", "loud"]
-    assert values.heading[1:3] == ("quiet, 0.5 m", "loud, 2 m")
+    assert values.heading[1:3] == ("quiet, 500 mm", "loud, 2 m")
     assert values.rows[0] == ("m", "1 (given)", "1 (given)", "kg", "", "")
     assert values.rows[1][:5] == ("k", "355.5 ± 2", "355 ± 2", "N/m", "yes")
 
