@@ -79,8 +79,8 @@ def blocks(records: Iterable[Measured]) -> list[document.Block]:
         document.Heading(TITLE, 1),
         document.Text(
             f"{len(every)} records: {said}. Level: rms of the measured response. Error: of the free run on the part "
-            "that was not fitted, over that rms. Each record is fitted by itself, its values stand with 95 % intervals; a "
-            "model that lacks nothing has the same coefficients at all levels. p: the chance of such differences if a "
+            "that was not fitted, over that rms. Each record is fitted by itself, values with 95 % intervals; a model "
+            "that lacks nothing has the same coefficients at all levels. p: the chance of such differences if a "
             "coefficient is the same in all records; 'no' accounts for the number of coefficients."
         ),
         document.table(heading, [_verdict(record) for record in every]),
