@@ -55,3 +55,9 @@ def by_record(several: Several, together: Comparison) -> ByRecord:
         return of_own([compare(together.model, prepared, start=start) for prepared in several.apart])
     except StudyError as error:
         return ByRecord(why_not=str(error))
+
+
+def worst(each: Sequence[Comparison]) -> int:
+    """The place of the record of which the model misses most; 0 of one record, which has no comparison of its own."""
+    missed = [comparison.prediction.structure for comparison in each]
+    return missed.index(max(missed)) if missed else 0

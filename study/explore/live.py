@@ -9,8 +9,9 @@ from bokeh.models import ColumnDataSource, CustomJS
 
 from study.explore import decimate, html_page, preview
 from study.explore.axis_scales import scales_of
+from study.explore.by_record import worst
 from study.explore.desk import Desk
-from study.explore.session import Stage, on_record, worst
+from study.explore.session import Stage, on_record
 from study.explore.view import View, over_time, stretch, view
 
 HELLO = "hello"  # what a page says when it is there
@@ -23,7 +24,7 @@ class Watcher:
     def __init__(self, desk: Desk, document: Document) -> None:
         self.desk, self.document = desk, document
         self.shown = desk.session
-        self.record = worst(self.shown.now)
+        self.record = worst(self.shown.now.on_each)
         self.asked = ColumnDataSource({"act": [], "name": [], "count": []}, name="asked")
         self.state = ColumnDataSource(self._state(), name="state")
         self.page = html_page.build(self._view(), html_page.history_columns(self.shown), [self.asked, self.state])

@@ -12,7 +12,8 @@ from bokeh.resources import Resources
 from study.compare.comparison import Comparison
 from study.explore import html_page
 from study.explore.axis_scales import Columns
-from study.explore.session import Session, begin_with, worst
+from study.explore.by_record import worst
+from study.explore.session import Session, begin_with
 from study.explore.view import view
 
 EMBED = "Bokeh.safely(() => Bokeh.embed.embed_items({docs}, {items}))"
@@ -20,7 +21,7 @@ EMBED = "Bokeh.safely(() => Bokeh.embed.embed_items({docs}, {items}))"
 
 def saved(session: Session) -> bytes:
     """The whole session as a file that a browser opens; it shows the last model first, where that misses most."""
-    many, first = len(session.stages), (len(session.stages) - 1, worst(session.now))
+    many, first = len(session.stages), (len(session.stages) - 1, worst(session.now.on_each))
     views = {
         (number, record): view(stage, number, live=False, record=record)
         for number, stage in enumerate(session.stages)

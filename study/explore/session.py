@@ -4,6 +4,7 @@ Every function gives a new session; what was found of a model stays with its sta
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -120,7 +121,9 @@ def _named_after_all(comparison: Comparison) -> Comparison:
 
 def stage_of(comparison: Comparison, label: str, added: str | None, dropped: str | None = None) -> Stage:
     """A model as it was compared, which nobody has diagnosed."""
-    each = on_each_record(comparison)
+    each: tuple[Comparison, ...] = ()
+    with suppress(StudyError):  # one may be too short to be judged by itself: then all are shown as one
+        each = on_each_record(comparison)
     return Stage(comparison.model, label, added, comparison, dropped=dropped, on_each=each)
 
 
@@ -166,12 +169,6 @@ def on_record(stage: Stage, number: int) -> Stage:
         diagnosis = replace(diagnosis, candidates=tuple(rows))
     would = {name: (lacking[number],) for name, lacking in stage.would.items()}
     return replace(stage, comparison=comparison, diagnosis=diagnosis, would=would)
-
-
-def worst(stage: Stage) -> int:
-    """The record of which the model misses most, 0 of one record."""
-    missed = [c.prediction.structure for c in stage.on_each]
-    return missed.index(max(missed)) if missed else 0
 
 
 def by_itself(session: Session) -> Session:

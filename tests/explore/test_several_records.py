@@ -189,7 +189,7 @@ def test_the_saved_page_turns_to_a_record_and_a_step(grown, tmp_path):
         assert not wrong
 
 
-def test_a_coefficient_may_differ_within_the_one_fit(records):
+def test_a_coefficient_may_differ_within_the_one_fit(records, monkeypatch):
     model, marked, separate = separated(BELIEVED, records, ["linear_stiffness"])
     together = accounted_test(marked, model).comparison
     several = Several((), tuple(records), separate)
@@ -197,4 +197,11 @@ def test_a_coefficient_may_differ_within_the_one_fit(records):
     (level,) = session.now.by_record.levels
     assert (level.key, session.now.by_record.names) == ("k", NAMES)
     assert level.moves
+    for drawn in ("pictures", "history_pictures"):
+        monkeypatch.setattr(saved_files, drawn, lambda *_: {})
+    text = model_file.format_model(BELIEVED)
+    for values in (True, False):
+        written = saved_files.files(session, "rig.yaml", text, values=values)["rig.yaml"].decode()
+        assert "k_high" not in written
+        assert written.count("term: ") == (3 if values else 0)
     assert level.value[1] - level.value[0] == pytest.approx(together.fit.model.numbers()["k_high"], rel=1e-9)
