@@ -89,10 +89,11 @@ def diagnose(arguments: argparse.Namespace, model: "Model") -> None:
     from study.compare.comparison_report import as_json
     from study.diagnose.user_candidates import own_candidates
     from study.equations import terms
+    from study.structure.placed_needless import placed_needless
     from study.structure.structure_comparison import compare_structure
     from study.structure.structure_page import PAGE, structure_page
     from study.structure.structure_pictures import diagnosis_pictures
-    from study.structure.structure_report import fields, in_words, modes_before_and_after, table
+    from study.structure.structure_report import fields, in_words, modes_before_and_after, table, unneeded_in_words
     from study.structure.structure_verdict import diagnose_structure
     from study.support.file_sets import write_files
 
@@ -107,10 +108,13 @@ def diagnose(arguments: argparse.Namespace, model: "Model") -> None:
         with progress(" candidates", name=prepared.record.name) as step:
             comparison = compare_structure(model, prepared)
             diagnosis = diagnose_structure(comparison, own, arguments.without, progress=step)
+            unneeded = placed_needless(comparison)
         print(f"{prepared.record.name}: {diagnosis.verdict.replace('_', ' ')}")
         print(table(diagnosis) + "\n\n" + modes_before_and_after(diagnosis) + "\n\n" + in_words(diagnosis))
+        if unneeded:
+            print(f"\n{unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
         prefix = f"{prepared.record.name}_" if len(ready) > 1 else ""
-        made = {PAGE: structure_page(comparison, diagnosis), "diagnosis.json": as_json(fields(diagnosis))}
+        made = {PAGE: structure_page(comparison, diagnosis), "diagnosis.json": as_json(fields(diagnosis, unneeded))}
         made |= diagnosis_pictures(diagnosis)
         files |= {prefix + name: content for name, content in made.items()}
     write_files(folder, files, inputs_of(arguments))
