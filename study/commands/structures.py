@@ -1,7 +1,7 @@
 """What the commands do with a model of several coordinates."""
 
 import argparse
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from study.commands.command import progress
 from study.commands.record_arguments import inputs_of, out_folder, read_options, refuse_groups, written_together
@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from study.equations.model import Model
+    from study.explore.placed_session import PlacedSession
     from study.structure.prepared_structure import PreparedStructure
     from study.structure.structure_comparison import StructureComparison
 
@@ -177,27 +178,12 @@ def drop(arguments: argparse.Namespace, model: "Model", name: str, text: str) ->
     print("\n" + history.table(steps))
 
 
-def explore(arguments: argparse.Namespace) -> None:
-    """``study explore`` of a structure: its diagnosis as a page that stays as it is."""
-    from study.equations.model_file import read_model
+def session(arguments: argparse.Namespace, model: "Model", steps: "list[dict[str, Any]]") -> "PlacedSession":
+    """What ``study explore`` of a structure begins with."""
+    from study.explore.placed_session import begin_placed
     from study.structure.structure_comparison import compare_structure
-    from study.structure.structure_page import PAGE, structure_page
-    from study.structure.structure_verdict import diagnose_structure
-    from study.support.file_sets import write_files
 
-    folder, model = out_folder(arguments), read_model(arguments.model)
+    _refuse_measured(model, "explore")
     (prepared,) = prepared_structures(arguments, model)
-    with progress(" candidates", name=prepared.record.name) as step:
-        comparison = compare_structure(model, prepared)
-        diagnosis = diagnose_structure(comparison, progress=step)
-    write_files(folder, {PAGE: structure_page(comparison, diagnosis)}, inputs_of(arguments))
-    print(f"{folder / PAGE} shows the structure; 'study add' adds what is missing, and this command draws it again")
-    opened((folder / PAGE).resolve().as_uri(), not arguments.no_browser)
-
-
-def opened(address: str, browser: bool) -> None:
-    """Open a page in the browser, if that is wanted."""
-    import webbrowser
-
-    if browser:
-        webbrowser.open(address)
+    with progress("step", 3) as step:
+        return begin_placed(compare_structure(model, prepared, progress=step), steps)

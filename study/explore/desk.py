@@ -10,10 +10,11 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, Generic, TypeVar
 
 from study.explore import session as sessions
 from study.explore.saved_files import PAGE, files
-from study.explore.session import Session
+from study.explore.session import AnySession, Session
 from study.support.errors import StudyError
 from study.support.file_sets import write_files
 
@@ -36,11 +37,40 @@ class OvertakenError(Exception):
     """The model that is being diagnosed is no longer the present one."""
 
 
-class Desk:
+S = TypeVar("S", bound=AnySession)
+
+
+@dataclass(frozen=True)
+class Deeds(Generic[S]):
+    """What can be done with the sessions of one kind; every function gives a new session."""
+
+    added: Callable[[S, str], S]
+    dropped: Callable[[S, str], S]
+    undone: Callable[[S], S]
+    held: Callable[[S, str, bool], S]
+    tried: Callable[[S, str], S]
+    examined: Callable[[S, Callable[[int], None]], Any]  # the present stage, diagnosed; the number of candidates tried
+    with_stage: Callable[[S, Any], S]
+    files: Callable[[S, str, str, bool], dict[str, bytes]]  # by the model file's name and text; with values or without
+
+
+def _examined(session: Session, progress: Callable[[int], None]) -> sessions.Stage:
+    return sessions.examined(session, progress)[0]
+
+
+ALONE = Deeds(
+    sessions.with_added, sessions.dropped, sessions.undone, sessions.with_held, sessions.tried, _examined,
+    sessions.with_stage, files,
+)  # fmt: skip
+
+
+class Desk(Generic[S]):
     """One session and whoever looks at it."""
 
-    def __init__(self, session: Session, model: Path, text: str, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        self.session = session
+    def __init__(
+        self, session: S, model: Path, text: str, folder: Path, inputs: Sequence[Path] = (), deeds: Deeds[S] = ALONE
+    ) -> None:
+        self.session, self.deeds = session, deeds
         self.state = State()
         self.model, self.text, self.folder, self.inputs = model, text, folder, tuple(inputs)
         self.watchers: dict[object, Callable[[], None]] = {}
@@ -49,11 +79,11 @@ class Desk:
         self._hand = ThreadPoolExecutor(1, "change")
         self._behind = ThreadPoolExecutor(1, "diagnosis")
         self._actions: Mapping[str, tuple[str, Callable[[str], None]]] = {
-            "add": ("adding {}", lambda name: self._change(sessions.with_added(self.session, name))),
-            "drop": ("dropping {}", lambda name: self._change(sessions.dropped(self.session, name))),
-            "undo": ("undoing", lambda _: self._change(sessions.undone(self.session))),
-            "hold": ("holding {}", lambda key: self._change(sessions.with_held(self.session, key, True))),
-            "free": ("freeing {}", lambda key: self._change(sessions.with_held(self.session, key, False))),
+            "add": ("adding {}", lambda name: self._change(deeds.added(self.session, name))),
+            "drop": ("dropping {}", lambda name: self._change(deeds.dropped(self.session, name))),
+            "undo": ("undoing", lambda _: self._change(deeds.undone(self.session))),
+            "hold": ("holding {}", lambda key: self._change(deeds.held(self.session, key, True))),
+            "free": ("freeing {}", lambda key: self._change(deeds.held(self.session, key, False))),
             "try": ("trying {}", self._try),
             "save": ("writing files", self._save),
         }
@@ -87,7 +117,7 @@ class Desk:
         self._hand.shutdown(wait=False, cancel_futures=True)
         self._behind.shutdown(wait=False, cancel_futures=True)
 
-    def _tell(self, session: Session | None = None, **state: str) -> None:
+    def _tell(self, session: S | None = None, **state: str) -> None:
         """Change the state, perhaps the session, and call whoever watches."""
         with self._lock:
             self.state = replace(self.state, **state)
@@ -107,17 +137,17 @@ class Desk:
             self._tell(None, **{place: f"a fault in the program, not in your input ({type(error).__name__}: {error})"})
         self._tell(busy="")
 
-    def _change(self, session: Session) -> None:
+    def _change(self, session: S) -> None:
         self._tell(session)
         self.diagnose()
 
     def _try(self, text: str) -> None:
-        session = sessions.tried(self.session, text)
+        session = self.deeds.tried(self.session, text)
         self._tell(session, accepted=text)
         self._behind.submit(self._examine, session.own)
 
     def _save(self, how: str) -> None:
-        contents = files(self.session, self.model.name, self.text, values=how == VALUES)
+        contents = self.deeds.files(self.session, self.model.name, self.text, how == VALUES)
         write_files(self.folder, contents, self.inputs)
         with_them = "with" if how == VALUES else "without"
         self._tell(
@@ -138,9 +168,9 @@ class Desk:
 
         try:
             self._tell(diagnosing="diagnosing")
-            stage, _ = sessions.examined(asked, count)
+            stage = self.deeds.examined(asked, count)
             with self._lock:
-                self._tell(sessions.with_stage(self.session, stage), diagnosing="")
+                self._tell(self.deeds.with_stage(self.session, stage), diagnosing="")
         except OvertakenError:
             self._tell(diagnosing="")
         except StudyError as error:

@@ -1,7 +1,8 @@
-"""The live page: a document that follows the desk and passes on what is clicked."""
+"""The live page: a document that follows the desk and passes on what is clicked; a scene draws the sessions."""
 
 import math
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
 
 from bokeh.document import Document
 from bokeh.events import RangesUpdate
@@ -10,41 +11,88 @@ from bokeh.models import ColumnDataSource, CustomJS
 from study.explore import decimate, html_page, preview
 from study.explore.axis_scales import scales_of
 from study.explore.desk import Desk
+from study.explore.session import Session
 from study.explore.view import View, over_time, stretch, view
 
 HELLO = "hello"  # what a page says when it is there
 
 
-class Watcher:
-    """One document that shows the desk."""
+class Scene(Protocol):
+    """What a document draws of the sessions of one kind."""
 
-    def __init__(self, desk: Desk, document: Document) -> None:
-        self.desk, self.document = desk, document
-        self.shown = desk.session
-        self.asked = ColumnDataSource({"act": [], "name": [], "count": []}, name="asked")
-        self.state = ColumnDataSource(self._state(), name="state")
-        self.page = html_page.build(self._view(), html_page.history_columns(self.shown), [self.asked, self.state])
+    def lay(self, document: Document) -> None:
+        """Put panels, template and words into an empty document."""
+        ...
+
+    def show(self, session: Any) -> None:
+        """Draw another session."""
+        ...
+
+
+class AloneScene:
+    """A session of one coordinate in a document."""
+
+    def __init__(self, session: Session, stores: Sequence[ColumnDataSource]) -> None:
+        self.shown = session
+        self.page = html_page.build(self._view(), html_page.history_columns(session), stores)
         self.span: tuple[float, float] | None = None
-        with document.models.freeze():  # what belongs to the document is gathered once, not anew for each panel
-            self._lay()
-        desk.watch(self, self._changed)
-        document.on_session_destroyed(lambda _: desk.leave(self))
 
-    def _lay(self) -> None:
+    def lay(self, document: Document) -> None:
+        """Put panels, template and words into an empty document."""
         for panel in html_page.placed(self.page, diagnosed=True):
-            self.document.add_root(panel)
-        self.document.title = html_page.title(self.shown)
-        self.document.template = html_page.template()
-        self.document.template_variables.update(html_page.variables(self.shown, live=True))
-        self.document.js_on_event("document_ready", CustomJS(code="window.study.begin()"))
+            document.add_root(panel)
+        document.title = html_page.title(self.shown)
+        document.template = html_page.template()
+        document.template_variables.update(html_page.variables(self.shown, live=True))
         self.page.sources["words"].js_on_change("data", CustomJS(code="window.study.words()"))
-        self.state.js_on_change("data", CustomJS(code="window.study.state()"))
-        self.asked.on_change("data", self._passed_on)
         self.page.panels["response"].on_event(RangesUpdate, self._zoomed)
+
+    def show(self, session: Session) -> None:
+        """Draw another session."""
+        self.shown = session
+        self.page.show(self._view(), html_page.history_columns(session))
+        if self.span is not None:
+            self._refine(self.span)
 
     def _view(self) -> View:
         stages = self.shown.stages
         return view(stages[-1], len(stages) - 1)
+
+    def _zoomed(self, event: RangesUpdate) -> None:
+        """Draw a stretch of a long record with the samples that the screen has room for."""
+        first, last = event.x0, event.x1
+        if len(self.shown.now.comparison.prediction.time) <= 2 * decimate.BUCKETS:
+            return
+        if first is not None and last is not None and math.isfinite(last - first) and last > first:
+            self._refine((first, last))
+
+    def _refine(self, span: tuple[float, float]) -> None:
+        self.span = span
+        stage = self.shown.now
+        comparison, scales = stage.comparison, scales_of(stage.comparison)
+        part = stretch(comparison, span)
+        self.page.sources["would_time"].data = preview.difference(stage.shown, scales, part)
+        self.page.sources["time"].data = over_time(comparison, scales, span)
+
+
+class Watcher:
+    """One document that follows the desk and passes on what is clicked."""
+
+    def __init__(
+        self, desk: Desk[Any], document: Document, scene: Callable[[Any, Sequence[ColumnDataSource]], Scene]
+    ) -> None:
+        self.desk, self.document = desk, document
+        self.shown = desk.session
+        self.asked = ColumnDataSource({"act": [], "name": [], "count": []}, name="asked")
+        self.state = ColumnDataSource(self._state(), name="state")
+        self.scene = scene(self.shown, [self.asked, self.state])
+        with document.models.freeze():  # what belongs to the document is gathered once, not anew for each panel
+            self.scene.lay(document)
+            document.js_on_event("document_ready", CustomJS(code="window.study.begin()"))
+            self.state.js_on_change("data", CustomJS(code="window.study.state()"))
+            self.asked.on_change("data", self._passed_on)
+        desk.watch(self, self._changed)
+        document.on_session_destroyed(lambda _: desk.leave(self))
 
     def _state(self) -> dict[str, Any]:
         state, many = self.desk.state, len(self.shown.stages) > 1
@@ -62,9 +110,7 @@ class Watcher:
         self.document.hold("combine")
         if session is not self.shown:
             self.shown = session
-            self.page.show(self._view(), html_page.history_columns(session))
-            if self.span is not None:
-                self._refine(self.span)
+            self.scene.show(session)
         self.state.data = self._state()
         self.document.unhold()
 
@@ -74,19 +120,3 @@ class Watcher:
             self._show()
         elif isinstance(act, str) and isinstance(name, str):
             self.desk.ask(act, name)
-
-    def _zoomed(self, event: RangesUpdate) -> None:
-        """Draw a stretch of a long record with the samples that the screen has room for."""
-        first, last = event.x0, event.x1
-        if len(self.shown.now.comparison.prediction.time) <= 2 * decimate.BUCKETS:
-            return
-        if first is not None and last is not None and math.isfinite(last - first) and last > first:
-            self._refine((first, last))
-
-    def _refine(self, span: tuple[float, float]) -> None:
-        self.span = span
-        stage = self.shown.now
-        comparison, scales = stage.comparison, scales_of(stage.comparison)
-        part = stretch(comparison, span)
-        self.page.sources["would_time"].data = preview.difference(stage.shown, scales, part)
-        self.page.sources["time"].data = over_time(comparison, scales, span)
