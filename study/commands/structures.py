@@ -9,7 +9,8 @@ from study.commands.record_arguments import inputs_of, out_folder, read_options,
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from study.equations.model import Model
+    from study.equations.model import Model, ModelTerm
+    from study.equations.term import Term
     from study.explore.placed_session import PlacedSession
     from study.structure.prepared_structure import PreparedStructure
     from study.structure.structure_comparison import StructureComparison
@@ -81,7 +82,7 @@ def _refuse_measured(model: "Model", command: str) -> None:
     """Say so where a command needs masses, stiffnesses and dampings."""
     from study.support.errors import expect
 
-    like = "expected a model with inertia at every coordinate; 'study compare' takes this one"
+    like = "expected inertia at every coordinate; 'compare', 'diagnose' and 'add' take it"
     expect(not model.measured, f"{command} knows no {model.name!r} with 'linear: measured' yet; {like}")
 
 
@@ -98,13 +99,15 @@ def diagnose(arguments: argparse.Namespace, model: "Model") -> None:
     from study.structure.structure_verdict import diagnose_structure
     from study.support.file_sets import write_files
 
-    _refuse_measured(model, "diagnose")
     folder = out_folder(arguments)
     own = own_candidates(arguments.candidate, model)
     for name in arguments.without:
         terms.get(name)
     files: dict[str, bytes] = {}
     ready = prepared_structures(arguments, model)
+    if model.measured:
+        _diagnose_measured(arguments, model, ready, own)
+        return
     for prepared in ready:
         with progress(" candidates", name=prepared.record.name) as step:
             comparison = compare_structure(model, prepared)
@@ -118,6 +121,28 @@ def diagnose(arguments: argparse.Namespace, model: "Model") -> None:
         made = {PAGE: structure_page(comparison, diagnosis), "diagnosis.json": as_json(fields(diagnosis, unneeded))}
         made |= diagnosis_pictures(diagnosis)
         files |= {prefix + name: content for name, content in made.items()}
+    write_files(folder, files, inputs_of(arguments))
+    print(f"\n{folder}: {_listed(files)}")
+
+
+def _diagnose_measured(
+    arguments: argparse.Namespace, model: "Model", ready: "list[PreparedStructure]", own: "list[Term]"
+) -> None:
+    """The same where the linear part is as measured."""
+    from study.compare.comparison_report import as_json
+    from study.structure.measured_comparison import compare_measured
+    from study.structure.measured_diagnosis import diagnose_measured
+    from study.structure.measured_report import measured_fields, measured_in_words, measured_table
+    from study.support.file_sets import write_files
+
+    folder, files = out_folder(arguments), dict[str, bytes]()
+    for prepared in ready:
+        with progress(" candidates", name=prepared.record.name) as step:
+            diagnosis = diagnose_measured(compare_measured(model, prepared), own, arguments.without, progress=step)
+        print(f"{prepared.record.name}: {diagnosis.verdict.replace('_', ' ')}")
+        print(f"{measured_table(diagnosis)}\n\n{measured_in_words(diagnosis)}")
+        prefix = f"{prepared.record.name}_" if len(ready) > 1 else ""
+        files[f"{prefix}diagnosis.json"] = as_json(measured_fields(diagnosis))
     write_files(folder, files, inputs_of(arguments))
     print(f"\n{folder}: {_listed(files)}")
 
@@ -138,7 +163,6 @@ def add(arguments: argparse.Namespace, model: "Model") -> None:
     from study.support.errors import at
     from study.support.transaction import locked
 
-    _refuse_measured(model, "add")
     folder = out_folder(arguments)
     term = terms.get(arguments.term) if arguments.force is None else terms.custom(arguments.term, arguments.force)
     with at(arguments.model):
@@ -149,6 +173,9 @@ def add(arguments: argparse.Namespace, model: "Model") -> None:
         layout.check(model.with_term(entry))
     with locked(arguments.model):  # another run may have changed it meanwhile
         text, steps = text_with(arguments.model, entry), history.read(arguments.model)
+        if model.measured:
+            _add_measured(arguments, model, entry, text, steps)
+            return
         comparisons: list[StructureComparison] = []
         for prepared in prepared_structures(arguments, model):
             before = compare_structure(model, prepared)
@@ -157,6 +184,30 @@ def add(arguments: argparse.Namespace, model: "Model") -> None:
         page = as_json(document(comparisons[-1]))
         written_together(arguments, text, steps, page, folder)
     print("\n\n".join(summary(c) for c in comparisons))
+    print("\n" + history.table(steps))
+
+
+def _add_measured(
+    arguments: argparse.Namespace, model: "Model", entry: "ModelTerm", text: str, steps: "list[dict[str, Any]]"
+) -> None:
+    """The same where the linear part is as measured."""
+    from study.compare import history
+    from study.compare.comparison_report import as_json
+    from study.structure.measured_comparison import (
+        MeasuredComparison,
+        compare_measured,
+        measured_document,
+        measured_step,
+        measured_summary,
+    )
+
+    comparisons: list[MeasuredComparison] = []
+    for prepared in prepared_structures(arguments, model):
+        before = compare_measured(model, prepared)
+        comparisons.append(compare_measured(model.with_term(entry), prepared))
+        steps = history.climbed(steps, measured_step(before), measured_step(comparisons[-1], entry.name))
+    written_together(arguments, text, steps, as_json(measured_document(comparisons[-1])), out_folder(arguments))
+    print("\n\n".join(measured_summary(c) for c in comparisons))
     print("\n" + history.table(steps))
 
 

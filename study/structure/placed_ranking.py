@@ -154,12 +154,13 @@ def held_out_test(fit: StructureFit, before: StructurePrediction, noise: SensorN
         columns = [before.derivatives(fit), jacobian] if not before.diverged else []
     except DivergenceError:
         columns = []
-    bases = [_basis(noise.weighted(x)) for x in columns] or [np.zeros((part.size, 0)) for part in parts]
+    bases = [orthonormal(noise.weighted(x)) for x in columns] or [np.zeros((part.size, 0)) for part in parts]
     white = [noise.weighted(part).ravel() if len(part) else np.zeros(0) for part in parts]
     return HeldOutTest(noise, (white[0], white[1]), (bases[0], bases[1]))
 
 
-def _basis(columns: Floats) -> Floats:
+def orthonormal(columns: Floats) -> Floats:
+    """An orthonormal basis of derivatives (samples, sensors, keys), shape (samples sensors, keys)."""
     flat = columns.reshape(-1, columns.shape[2])
     length = np.linalg.norm(flat, axis=0)
     return np.linalg.qr(flat / np.where(length > 0.0, length, 1.0))[0]
