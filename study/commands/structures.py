@@ -78,7 +78,7 @@ def _compare_measured(arguments: argparse.Namespace, model: "Model", ready: "lis
     print(f"\n{folder}: {', '.join(files)}")
 
 
-def _refuse_measured(model: "Model", command: str) -> None:
+def refuse_measured(model: "Model", command: str) -> None:
     """Say so where a command needs masses, stiffnesses and dampings."""
     from study.support.errors import expect
 
@@ -234,7 +234,7 @@ def session(arguments: argparse.Namespace, model: "Model", steps: "list[dict[str
     from study.explore.placed_session import begin_placed
     from study.structure.structure_comparison import compare_structure
 
-    _refuse_measured(model, "explore")
+    refuse_measured(model, "explore")
     (prepared,) = prepared_structures(arguments, model)
     with progress("step", 3) as step:
         return begin_placed(compare_structure(model, prepared, progress=step), steps)
