@@ -19,7 +19,7 @@ from study.structure.structure_record import Sensor, StructureRecord, write_stru
 from study.structure.structure_simulation import simulate_structure
 
 ROOT = Path(__file__).parents[2]
-DT, SAMPLES = 0.005, 4000
+DT, SAMPLES = 0.005, 6000
 BARE = "name: bare\ncoordinates: [p4, p7, p10]\nforces: {shaker: p4}\nlinear: measured\nterms: []\n"
 ASKED = ("cubic_stiffness", "coulomb_friction")  # of all effects: the rest takes minutes
 OTHERS = tuple(name for name in LIBRARY if name not in ASKED)
