@@ -74,7 +74,17 @@ def _scales(comparison: StructureComparison) -> tuple[Scale, Scale]:
     curves = [c for c in comparison.forces.curves.values() if len(c.at)]
     far = max((float(np.max(np.abs(c.at))) for c in curves), default=1.0)
     most = max((float(np.max(np.abs(c.mean))) for c in curves), default=1.0)
-    return length("m", far), power("N", most)
+    return _length(comparison, far), power("N or N m" if _turns(comparison) else "N", most)
+
+
+def _turns(comparison: StructureComparison) -> bool:
+    """Whether a coordinate may be a rotation: two motions of one body are coupled by its inertia."""
+    return any(t.place is not None and t.place.kind == "couples" for t in comparison.model.terms)
+
+
+def _length(comparison: StructureComparison, largest: float) -> Scale:
+    """Metres become mm where that is easier to read; what may be an angle stays."""
+    return power("m or rad", largest) if _turns(comparison) else length("m", largest)
 
 
 def _sensors(comparison: StructureComparison) -> Columns:
@@ -102,6 +112,8 @@ def _motion_scale(comparison: StructureComparison, i: int) -> Scale:
     """Unit in which the motion of a sensor is easy to read."""
     unit = SI_UNITS[comparison.prediction.prepared.sensors[i].motion]
     most = float(np.max(np.abs(comparison.prediction.measured[:, i]), initial=0.0))
+    if _turns(comparison):
+        return power(unit.replace("m", "(m or rad)", 1) if "/" in unit else "m or rad", most)
     return length(unit, most) if unit == "m" else rate(unit, most)
 
 

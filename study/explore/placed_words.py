@@ -19,7 +19,7 @@ from study.structure.structure_comparison import PlacedCoefficient, StructureCom
 from study.structure.structure_leftover import explained_by_place
 from study.support.numbers import percent
 
-SHOWN = 12  # candidates
+SHOWN, TRIED = 12, 8  # candidates; those named of one place
 
 
 def placed_words(stage: PlacedStage, drawn: Sketch, step: int, live: bool) -> dict[str, Any]:
@@ -89,7 +89,8 @@ def _places(stage: PlacedStage, drawn: Sketch) -> str:
             )
         own = [r for r in rows if r.entry.place is not None and r.entry.place.path == path]
         if own:
-            known.append("<p>Tried there: " + "; ".join(_tried(r) for r in own) + ".</p>")
+            more = f"; {len(own) - TRIED} more" if len(own) > TRIED else ""
+            known.append("<p>Tried there: " + "; ".join(_tried(r) for r in own[:TRIED]) + f"{more}.</p>")
         elif stage.diagnosis is not None and path in shares:
             known.append("<p>No effect there explains enough to be fitted.</p>")
         label, ends = escape(link.place.label), escape(" ".join(link.place.moving))
