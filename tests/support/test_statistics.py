@@ -48,3 +48,11 @@ def test_errors_of_a_models_own_coefficients_are_no_evidence_for_a_change_that_r
         alarms["beside"] += statistics.beside(left[n:], change, freed[n:]).p_value < 0.02
     assert alarms["beside"] <= 14  # six are meant: more have a chance of 2 in a thousand
     assert alarms["gain"] > 30  # what is held against the residual as it stands
+
+
+@pytest.mark.parametrize("far", [1e3, 1e170])
+def test_what_runs_far_astray_is_worse_however_far(far):
+    residual = np.random.default_rng(3).standard_normal(4800)
+    astray = far * np.random.default_rng(4).standard_normal(4800)
+    assert statistics.worse(astray, residual) > 4.0
+    assert statistics.worse(residual, astray) < -4.0
