@@ -72,7 +72,7 @@ def along(forces: MissingForces, direction: Sequence[float]) -> Floats:
 
 
 def dynamic_stiffnesses(comparison: StructureComparison) -> dict[frozenset[str], DynamicStiffness]:
-    """The dynamic stiffness of every connection with a linear term; none where no equation can be written."""
+    """The dynamic stiffness of every connection with a linear term; none where no equation or line can be read."""
     model, prepared = comparison.fit.model, comparison.prepared
     try:
         equations, _ = equations_of(model, prepared)
@@ -85,7 +85,7 @@ def dynamic_stiffnesses(comparison: StructureComparison) -> dict[frozenset[str],
         found = conditioned.analyse(matrix)
         share = joint_coefficients.independent_share(found, matrix)
         inside = (found.frequency > 0.0) & (found.frequency <= highest_frequency(comparison))
-        for j, item in enumerate(equation.inputs):
+        for j, item in enumerate(equation.inputs if np.any(inside) else ()):  # segments may be too short for any line
             path = _path(item, paths)
             own = float(np.median(share[inside, j]))
             if path is not None and siso.is_linear(item) and own > best.get(path, (0.0, None))[0]:
