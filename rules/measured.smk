@@ -12,7 +12,7 @@ with one_sentence():
     )
 
 CODE["measured"] = rests_on(Path("scripts/measured.py"))
-CODE["measured"] += [f"study/explore/page.{ending}" for ending in ("html", "css", "js")]
+CODE["measured"] += [f"study/explore/{name}.{ending}" for name in ("page", "placed") for ending in ("html", "css", "js")]
 CODE["gallery"] = rests_on(Path("scripts/gallery.py"))
 OF_STRUCTURES = {name for name, row in MEASUREMENTS.items() if measurements.is_structure(row)}
 ENTRIES = dict.fromkeys(row.entry for row in MEASUREMENTS.values())
@@ -23,9 +23,9 @@ SEEN = {
 
 
 def climbed(name):
-    """What a climb leaves beside its steps; that of a structure has no page."""
-    page = [] if name in OF_STRUCTURES else ["climb.html"]
-    return [f"results/{name}/{file}" for file in ("history.json", "history.png", "history.svg", "reached.yaml", *page)]
+    """What a climb leaves beside its steps."""
+    files = ("history.json", "history.png", "history.svg", "reached.yaml", "climb.html")
+    return [f"results/{name}/{file}" for file in files]
 
 
 def drawn(name, file):

@@ -14,8 +14,18 @@ STRUCTURE_TABLES = {
     },
     "yes": {"record": "record", "responses": "frequency_response", "parameters": "parameters", "claims": "claims"},
 }  # fmt: skip
-STRUCTURE_FIGURES = {"": ("connections", "coherence"), "yes": ("measured",)}
-STRUCTURE_RESULTS = [f"results/structures.{ending}" for ending in ("csv", "md")]
+STRUCTURE_FIGURES = {
+    "": {"connections": "A_j(f) of every connection", "coherence": "cumulative coherence of each equation"},
+    "yes": {"measured": "coefficients and transfer functions line by line, the linear part as measured"},
+}
+STRUCTURE_RESULTS = [f"results/{name}" for name in ("structures.csv", "structure_claims.csv", "structures.md")]
+STRUCTURE_TITLES = {case.case: case.title for case in STRUCTURES.cases.values()}
+# Of results/study.html, after those of the report's systems.
+STRUCTURE_PICTURES = [
+    {"file": f"figures/{case.case}_{kind}.png", "system": case.title, "number": "Not in the report", "shows": shows}
+    for case in STRUCTURES.cases.values()
+    for kind, shows in STRUCTURE_FIGURES[case.measured].items()
+]
 
 
 def structure_products(case):
@@ -63,8 +73,9 @@ rule structures:
         code=CODE["structure_summary"],
     output:
         table=STRUCTURE_RESULTS[0],
-        page=STRUCTURE_RESULTS[1],
+        claims=STRUCTURE_RESULTS[1],
+        page=STRUCTURE_RESULTS[2],
     params:
-        titles={case.case: case.title for case in STRUCTURES.cases.values()},
+        titles=STRUCTURE_TITLES,
     script:
         "../scripts/structure_summary.py"

@@ -13,7 +13,7 @@ PICTURES = [
     {"file": f"figures/{stem}.png", "system": case.title, "number": stem.replace("_", " ").capitalize() if stem.startswith("figure_") else "Not in the report", "shows": DESCRIBED[kind]}
     for case in STUDY.cases.values()
     for kind, stem in case.figures.items()
-]
+] + STRUCTURE_PICTURES
 SUMMARY_RESULTS = [f"results/{name}" for name in ("parameters.csv", "summary.md", "estimators.md", "study.html")]
 SUMMARY_RESULTS += [f"results/pages/{name}.html" for name in PAGES]
 
@@ -41,6 +41,8 @@ rule summary:
         claims="results/claims.csv",
         reading="results/excitation_reading.csv",
         errors="results/estimators.csv",
+        structures=STRUCTURE_RESULTS[0],
+        structure_claims=STRUCTURE_RESULTS[1],
         benchmarks=BENCHMARKS,
         pictures=[picture["file"] for picture in PICTURES],
         style="study/support/picture_page.css",
@@ -57,7 +59,7 @@ rule summary:
             labels={"page": "The report, run again"},
         ),
     params:
-        told={"noise": STUDY.noise, "setting": STUDY.settings.excitations["report"].reading, "pictures": PICTURES},
+        told={"noise": STUDY.noise, "setting": STUDY.settings.excitations["report"].reading, "pictures": PICTURES, "structures": STRUCTURE_TITLES},
     script:
         "../scripts/summary.py"
 

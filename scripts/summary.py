@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from study.reproduction import study_page, summary
+from study.reproduction import structure_pages, study_page, summary
 from study.support import document
 from study.support.files import replace_file
 from study.support.picture_page import Picture
@@ -34,6 +34,11 @@ def main(
         times=run_times(benchmarks),
         noise=told["noise"],
         setting=told["setting"],
+        structures=structure_pages.Structures(
+            pd.read_csv(inputs["structures"]),
+            pd.read_csv(inputs["structure_claims"], keep_default_na=False),
+            told["structures"],
+        ),
     )
     blocks = summary.blocks(tables)
     replace_file(Path(outputs["page"]), document.markdown(blocks).encode())
@@ -46,9 +51,11 @@ def main(
     replace_file(Path(outputs["study"]), study_page.page(tables, pictures))
 
 
+NAMES = ("claims", "reading", "errors", "structures", "structure_claims")  # of inputs that are one table each
+
 if "snakemake" in globals():
     step = globals()["snakemake"]
-    tables = {name: getattr(step.input, name) for name in ("claims", "reading", "errors")}
+    tables = {name: getattr(step.input, name) for name in NAMES}
     with one_sentence():
         main(
             step.input.parameters,

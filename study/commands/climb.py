@@ -6,7 +6,7 @@ from pathlib import Path
 
 from study.commands.parser import parser
 from study.commands.record_arguments import accounted_together, read_records
-from study.commands.structure_climb import structure_climb
+from study.commands.structure_climb import SAVED, structure_climb
 from study.compare import history
 from study.compare.history_picture import files as history_pictures
 from study.diagnose import diagnosis_report
@@ -19,8 +19,6 @@ from study.explore.saved_files import PAGE, files
 from study.explore.session import Session
 from study.support.file_sets import write_files
 from study.support.files import read_text
-
-SAVED = "climb.html"  # the whole climb as one page
 
 
 def climb(

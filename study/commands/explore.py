@@ -1,7 +1,7 @@
 """``study explore``: the four steps on a page in the browser."""
 
 import argparse
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from study.commands import structures
 from study.commands.command import Command, progress, whole
@@ -31,28 +31,31 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    from study.equations.model_file import read_model
+    from study.equations.model_file import WANTED, parse_model
     from study.support.extras import needed
 
-    if read_model(arguments.model).coordinates:
-        structures.explore(arguments)
-        return
     needed("bokeh", "'study explore'", "explore")
     from study.compare import history
-    from study.equations.model_file import WANTED, parse_model
     from study.explore.desk import Desk
+    from study.explore.live import AloneScene
     from study.explore.server import serve
     from study.support.file_sets import keep
     from study.support.files import read_text
 
     folder = out_folder(arguments)
     keep([arguments.model], [folder / arguments.model.name])
-    steps = history.read(arguments.model)
-    text = read_text(arguments.model, WANTED)
-    session = _begun(arguments, parse_model(text, arguments.model), steps)
-    desk = Desk(session, arguments.model, text, folder, inputs_of(arguments))
+    text, steps = read_text(arguments.model, WANTED), history.read(arguments.model)
+    model = parse_model(text, arguments.model)
+    place = arguments.model, text, folder, inputs_of(arguments)
+    desk: Desk[Any]
+    if model.coordinates:
+        from study.explore.placed_page import PLACED, PlacedScene
+
+        desk, scene = Desk(structures.session(arguments, model, steps), *place, deeds=PLACED), PlacedScene
+    else:
+        desk, scene = Desk(_begun(arguments, model, steps), *place), AloneScene
     try:
-        serve(desk, arguments.port, lambda address: _ready(address, not arguments.no_browser))
+        serve(desk, arguments.port, lambda address: _ready(address, not arguments.no_browser), scene)
     except KeyboardInterrupt:
         print("\nended; what was not saved is gone")
 
@@ -80,7 +83,10 @@ def _begun(arguments: argparse.Namespace, model: "Model", steps: "list[Step]") -
 
 def _ready(address: str, browser: bool) -> None:
     print(f"{address} shows the session; Ctrl-C ends it", flush=True)
-    structures.opened(address, browser)
+    if browser:
+        import webbrowser
+
+        webbrowser.open(address)
 
 
 COMMAND = Command(

@@ -8,35 +8,43 @@ from study.commands.structures import prepared_structures
 from study.compare import history
 from study.compare.comparison_report import as_json
 from study.compare.history_picture import files as history_pictures
-from study.equations.model import Model, free
-from study.equations.model_file import format_model
+from study.equations.model import Model
+from study.equations.model_file import WANTED
+from study.explore import placed_session as sessions
+from study.explore.placed_page import structure_files
+from study.explore.saved_files import PAGE
 from study.structure import structure_report
-from study.structure.structure_comparison import compare_structure, document, history_step
-from study.structure.structure_verdict import MISSING, added_term, diagnose_structure
+from study.structure.structure_comparison import compare_structure
+from study.structure.structure_pictures import diagnosis_pictures
+from study.structure.structure_verdict import MISSING
 from study.support.file_sets import write_files
+from study.support.files import read_text
+
+SAVED = "climb.html"  # the whole climb as one page
 
 
 def structure_climb(arguments: argparse.Namespace, model: Model, steps: int, folder: Path) -> list[dict[str, Any]]:
     """Begin with a structure and add the first candidate of each diagnosis, at most ``steps``.
 
-    The folder gets ``climb/`` with the structure reached, its comparison and a folder for each diagnosis,
-    ``history.json`` and the history's picture. There is no page to step through it.
+    The folder gets ``climb/`` with the structure reached, its comparison, pictures and a folder for each diagnosis,
+    ``climb.html`` with all of it to step through, ``history.json`` and the history's picture.
     """
-    work = folder / "climb"
+    work, text = folder / "climb", read_text(arguments.model, WANTED)
     (prepared,) = prepared_structures(arguments, model)
-    comparison = compare_structure(model, prepared)
-    done = [history_step(comparison)]
+    session = sessions.begin_placed(compare_structure(model, prepared))
     for number in range(steps + 1):
-        diagnosis = diagnose_structure(comparison)
-        write_files(work / f"step_{number}", {"diagnosis.json": as_json(structure_report.fields(diagnosis))})
-        print(f"{structure_report.table(diagnosis)}\n\n{structure_report.in_words(diagnosis)}\n", flush=True)
-        first = diagnosis.candidates[0] if diagnosis.candidates else None
-        if diagnosis.verdict != MISSING or first is None or number == steps:
+        stage = sessions.examined(session)
+        session, diagnosis = sessions.with_stage(session, stage), stage.diagnosis
+        assert diagnosis is not None, "a stage that was examined has a diagnosis"
+        fields = as_json(structure_report.fields(diagnosis, stage.unneeded))
+        write_files(work / f"step_{number}", {"diagnosis.json": fields} | diagnosis_pictures(diagnosis))
+        print(f"{structure_report.table(diagnosis)}\n\n{stage.said}\n", flush=True)
+        if diagnosis.verdict != MISSING or number == steps:
             break
-        comparison = added_term(comparison, free(first.entry.term, first.entry.place))
-        done.append(history_step(comparison, first.name))
-    write_files(folder, {"history.json": history.as_bytes(done)} | history_pictures(done, model.name))
-    reached = {arguments.model.name: format_model(comparison.model).encode()}
-    write_files(work, reached | {"comparison.json": as_json(document(comparison))})
-    print(history.table(done))
-    return done
+        session = sessions.with_placed(session, diagnosis.candidates[0].name)
+    saved = structure_files(session, arguments.model.name, text)
+    write_files(folder, {SAVED: saved.pop(PAGE), "history.json": history.as_bytes(session.steps)})
+    write_files(folder, history_pictures(session.steps, model.name))
+    write_files(work, saved)
+    print(history.table(session.steps))
+    return session.steps

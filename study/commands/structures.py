@@ -1,7 +1,7 @@
 """What the commands do with a model of several coordinates."""
 
 import argparse
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from study.commands.command import progress
 from study.commands.record_arguments import inputs_of, out_folder, read_options, refuse_groups, written_together
@@ -9,7 +9,9 @@ from study.commands.record_arguments import inputs_of, out_folder, read_options,
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from study.equations.model import Model
+    from study.equations.model import Model, ModelTerm
+    from study.equations.term import Term
+    from study.explore.placed_session import PlacedSession
     from study.structure.prepared_structure import PreparedStructure
     from study.structure.structure_comparison import StructureComparison
 
@@ -76,11 +78,11 @@ def _compare_measured(arguments: argparse.Namespace, model: "Model", ready: "lis
     print(f"\n{folder}: {', '.join(files)}")
 
 
-def _refuse_measured(model: "Model", command: str) -> None:
+def refuse_measured(model: "Model", command: str) -> None:
     """Say so where a command needs masses, stiffnesses and dampings."""
     from study.support.errors import expect
 
-    like = "expected a model with inertia at every coordinate; 'study compare' takes this one"
+    like = "expected inertia at every coordinate; 'compare', 'diagnose' and 'add' take it"
     expect(not model.measured, f"{command} knows no {model.name!r} with 'linear: measured' yet; {like}")
 
 
@@ -89,30 +91,58 @@ def diagnose(arguments: argparse.Namespace, model: "Model") -> None:
     from study.compare.comparison_report import as_json
     from study.diagnose.user_candidates import own_candidates
     from study.equations import terms
+    from study.structure.placed_needless import placed_needless
     from study.structure.structure_comparison import compare_structure
     from study.structure.structure_page import PAGE, structure_page
     from study.structure.structure_pictures import diagnosis_pictures
-    from study.structure.structure_report import fields, in_words, modes_before_and_after, table
+    from study.structure.structure_report import fields, in_words, modes_before_and_after, table, unneeded_in_words
     from study.structure.structure_verdict import diagnose_structure
     from study.support.file_sets import write_files
 
-    _refuse_measured(model, "diagnose")
     folder = out_folder(arguments)
     own = own_candidates(arguments.candidate, model)
     for name in arguments.without:
         terms.get(name)
     files: dict[str, bytes] = {}
     ready = prepared_structures(arguments, model)
+    if model.measured:
+        _diagnose_measured(arguments, model, ready, own)
+        return
     for prepared in ready:
         with progress(" candidates", name=prepared.record.name) as step:
             comparison = compare_structure(model, prepared)
             diagnosis = diagnose_structure(comparison, own, arguments.without, progress=step)
+            unneeded = placed_needless(comparison)
         print(f"{prepared.record.name}: {diagnosis.verdict.replace('_', ' ')}")
         print(table(diagnosis) + "\n\n" + modes_before_and_after(diagnosis) + "\n\n" + in_words(diagnosis))
+        if unneeded:
+            print(f"\n{unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
         prefix = f"{prepared.record.name}_" if len(ready) > 1 else ""
-        made = {PAGE: structure_page(comparison, diagnosis), "diagnosis.json": as_json(fields(diagnosis))}
+        made = {PAGE: structure_page(comparison, diagnosis), "diagnosis.json": as_json(fields(diagnosis, unneeded))}
         made |= diagnosis_pictures(diagnosis)
         files |= {prefix + name: content for name, content in made.items()}
+    write_files(folder, files, inputs_of(arguments))
+    print(f"\n{folder}: {_listed(files)}")
+
+
+def _diagnose_measured(
+    arguments: argparse.Namespace, model: "Model", ready: "list[PreparedStructure]", own: "list[Term]"
+) -> None:
+    """The same where the linear part is as measured."""
+    from study.compare.comparison_report import as_json
+    from study.structure.measured_comparison import compare_measured
+    from study.structure.measured_diagnosis import diagnose_measured
+    from study.structure.measured_report import measured_fields, measured_in_words, measured_table
+    from study.support.file_sets import write_files
+
+    folder, files = out_folder(arguments), dict[str, bytes]()
+    for prepared in ready:
+        with progress(" candidates", name=prepared.record.name) as step:
+            diagnosis = diagnose_measured(compare_measured(model, prepared), own, arguments.without, progress=step)
+        print(f"{prepared.record.name}: {diagnosis.verdict.replace('_', ' ')}")
+        print(f"{measured_table(diagnosis)}\n\n{measured_in_words(diagnosis)}")
+        prefix = f"{prepared.record.name}_" if len(ready) > 1 else ""
+        files[f"{prefix}diagnosis.json"] = as_json(measured_fields(diagnosis))
     write_files(folder, files, inputs_of(arguments))
     print(f"\n{folder}: {_listed(files)}")
 
@@ -133,7 +163,6 @@ def add(arguments: argparse.Namespace, model: "Model") -> None:
     from study.support.errors import at
     from study.support.transaction import locked
 
-    _refuse_measured(model, "add")
     folder = out_folder(arguments)
     term = terms.get(arguments.term) if arguments.force is None else terms.custom(arguments.term, arguments.force)
     with at(arguments.model):
@@ -144,6 +173,9 @@ def add(arguments: argparse.Namespace, model: "Model") -> None:
         layout.check(model.with_term(entry))
     with locked(arguments.model):  # another run may have changed it meanwhile
         text, steps = text_with(arguments.model, entry), history.read(arguments.model)
+        if model.measured:
+            _add_measured(arguments, model, entry, text, steps)
+            return
         comparisons: list[StructureComparison] = []
         for prepared in prepared_structures(arguments, model):
             before = compare_structure(model, prepared)
@@ -152,6 +184,30 @@ def add(arguments: argparse.Namespace, model: "Model") -> None:
         page = as_json(document(comparisons[-1]))
         written_together(arguments, text, steps, page, folder)
     print("\n\n".join(summary(c) for c in comparisons))
+    print("\n" + history.table(steps))
+
+
+def _add_measured(
+    arguments: argparse.Namespace, model: "Model", entry: "ModelTerm", text: str, steps: "list[dict[str, Any]]"
+) -> None:
+    """The same where the linear part is as measured."""
+    from study.compare import history
+    from study.compare.comparison_report import as_json
+    from study.structure.measured_comparison import (
+        MeasuredComparison,
+        compare_measured,
+        measured_document,
+        measured_step,
+        measured_summary,
+    )
+
+    comparisons: list[MeasuredComparison] = []
+    for prepared in prepared_structures(arguments, model):
+        before = compare_measured(model, prepared)
+        comparisons.append(compare_measured(model.with_term(entry), prepared))
+        steps = history.climbed(steps, measured_step(before), measured_step(comparisons[-1], entry.name))
+    written_together(arguments, text, steps, as_json(measured_document(comparisons[-1])), out_folder(arguments))
+    print("\n\n".join(measured_summary(c) for c in comparisons))
     print("\n" + history.table(steps))
 
 
@@ -173,30 +229,15 @@ def drop(arguments: argparse.Namespace, model: "Model", name: str, text: str) ->
     print("\n" + history.table(steps))
 
 
-def explore(arguments: argparse.Namespace) -> None:
-    """``study explore`` of a structure: its diagnosis as a page that stays as it is."""
-    from study.equations.model_file import read_model
+def session(arguments: argparse.Namespace, model: "Model", steps: "list[dict[str, Any]]") -> "PlacedSession":
+    """What ``study explore`` of a structure begins with."""
+    from study.explore.placed_session import begin_placed
     from study.structure.structure_comparison import compare_structure
-    from study.structure.structure_page import PAGE, structure_page
-    from study.structure.structure_verdict import diagnose_structure
     from study.support.errors import expect
-    from study.support.file_sets import write_files
 
     several = arguments.records[1:] or arguments.each_record
     expect(not several, f"{several and several[0]}: the page of a structure shows one record; expected no more")
-    folder, model = out_folder(arguments), read_model(arguments.model)
+    refuse_measured(model, "explore")
     (prepared,) = prepared_structures(arguments, model)
-    with progress(" candidates", name=prepared.record.name) as step:
-        comparison = compare_structure(model, prepared)
-        diagnosis = diagnose_structure(comparison, progress=step)
-    write_files(folder, {PAGE: structure_page(comparison, diagnosis)}, inputs_of(arguments))
-    print(f"{folder / PAGE} shows the structure; 'study add' adds what is missing, and this command draws it again")
-    opened((folder / PAGE).resolve().as_uri(), not arguments.no_browser)
-
-
-def opened(address: str, browser: bool) -> None:
-    """Open a page in the browser, if that is wanted."""
-    import webbrowser
-
-    if browser:
-        webbrowser.open(address)
+    with progress("step", 3) as step:
+        return begin_placed(compare_structure(model, prepared, progress=step), steps)

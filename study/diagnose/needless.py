@@ -4,7 +4,7 @@ import math
 from collections.abc import Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.special import chdtri
@@ -40,11 +40,43 @@ class Needless:
 
     def sentence(self, any_more: bool = False) -> str:
         """What to tell the engineer; ``any_more`` if a term was added after it."""
-        words = term_names(self.name)
-        return (
-            f"{words[0].upper()}{words[1:]} is not needed{' any more' if any_more else ''}: without it the error is "
-            f"{percent(self.error_without)}, with it {percent(self.error_with)}."
-        )
+        return sentence(term_names(self.name), self.error_with, self.error_without, any_more)
+
+
+class Unneeded(Protocol):
+    """A term that a model does as well without, of whatever kind the model is."""
+
+    @property
+    def name(self) -> str:
+        """Of the term."""
+        ...
+
+    @property
+    def error_with(self) -> float:
+        """Held-out error of the model as it is."""
+        ...
+
+    @property
+    def error_without(self) -> float:
+        """The same without the term."""
+        ...
+
+    @property
+    def p_value(self) -> float:
+        """Of what the term gains, if it gains nothing."""
+        ...
+
+    def sentence(self, any_more: bool = False) -> str:
+        """What to tell the engineer."""
+        ...
+
+
+def sentence(words: str, error_with: float, error_without: float, any_more: bool = False) -> str:
+    """That a term, by its name in words, is not needed."""
+    return (
+        f"{words[0].upper()}{words[1:]} is not needed{' any more' if any_more else ''}: without it the error is "
+        f"{percent(error_without)}, with it {percent(error_with)}."
+    )
 
 
 def needless(comparison: Comparison, besides: Collection[str] = ()) -> tuple[Needless, ...]:
@@ -68,7 +100,7 @@ def needless(comparison: Comparison, besides: Collection[str] = ()) -> tuple[Nee
     """
     keys = comparison.fit.keys  # a term that another estimator than the fit in free run found has none there
     terms: list[ModelTerm] = [
-        t for t in comparison.model.terms if _open(t) and t.name not in besides and set(t.keys) <= set(keys)
+        t for t in comparison.model.terms if is_open(t) and t.name not in besides and set(t.keys) <= set(keys)
     ]
     stage, asked = _Stage(comparison.fit, comparison.prediction, comparison), len(terms)
     found: list[Needless] = []
@@ -84,7 +116,7 @@ def needless(comparison: Comparison, besides: Collection[str] = ()) -> tuple[Nee
     return tuple(found)
 
 
-def paragraph(found: Sequence[Needless], any_more: bool = False, complete: bool = True) -> str:
+def paragraph(found: Sequence[Unneeded], any_more: bool = False, complete: bool = True) -> str:
     """What to tell of all of them; empty if there are none. ``complete`` is false where an effect is missing."""
     said = [n.sentence(any_more) for n in found]
     if found and not complete:
@@ -109,7 +141,7 @@ def of_records(names: Sequence[str], found: Sequence[Sequence[Needless]], any_mo
     return " ".join([*said, "'study drop' takes a term out."])
 
 
-def fields(found: Sequence[Needless]) -> list[dict[str, Any]]:
+def fields(found: Sequence[Unneeded]) -> list[dict[str, Any]]:
     """The same for files, the one whose loss costs least first."""
     return [
         {"term": n.name, "error_with": n.error_with, "error_without": n.error_without, "p_value": n.p_value,
@@ -117,9 +149,9 @@ def fields(found: Sequence[Needless]) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _open(entry: ModelTerm) -> bool:
+def is_open(entry: ModelTerm) -> bool:
     """Whether a term may be asked for: the user holds nothing of it."""
-    return entry.name != "inertia" and all(value is None for value in entry.values.values())
+    return entry.term.name != "inertia" and all(value is None for value in entry.values.values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,14 +201,18 @@ class _Stage:
         return found if all(alike(found[0], e) for e in found) else [evidence_of(*model, False) for model in models]
 
     def _relative_interval(self, entry: ModelTerm, covariance: Floats) -> tuple[float, float]:
-        """95 % interval of the size of a term's coefficients, over that size: without zero where they are not zero.
-
-        That of one coefficient is the usual one. Several are zero together where their joint statistic (Wald, 1943)
-        is one of chance; what shape parameters leave open of them is in their covariance.
-        """
+        """95 % interval of the size of a term's coefficients, over that size (:func:`relative_interval`)."""
         place = [self.fit.keys.index(symbol) for symbol in entry.term.symbols]
-        size, block = self.fit.values[place], covariance[np.ix_(place, place)]
-        statistic = float(size @ np.linalg.pinv(block, hermitian=True) @ size)
-        quantile = float(np.asarray(chdtri(len(place), 0.05)))
-        half = math.sqrt(quantile / statistic) if statistic > 0.0 else math.inf
-        return 1.0 - half, 1.0 + half
+        return relative_interval(self.fit.values[place], covariance[np.ix_(place, place)])
+
+
+def relative_interval(size: Floats, covariance: Floats) -> tuple[float, float]:
+    """95 % interval of the size of coefficients, over that size: without zero where they are not zero.
+
+    That of one coefficient is the usual one. Several are zero together where their joint statistic (Wald, 1943) is one
+    of chance; what shape parameters leave open of them is in their covariance.
+    """
+    statistic = float(size @ np.linalg.pinv(covariance, hermitian=True) @ size)
+    quantile = float(np.asarray(chdtri(len(size), 0.05)))
+    half = math.sqrt(quantile / statistic) if statistic > 0.0 else math.inf
+    return 1.0 - half, 1.0 + half

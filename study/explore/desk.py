@@ -10,15 +10,17 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, Generic, TypeVar
 
 from study.equations.model import Model
 from study.explore import session as sessions
 from study.explore.saved_files import PAGE, files, of_stage
-from study.explore.session import Session, Stage
+from study.explore.session import AnySession, Session
 from study.support.errors import StudyError
 from study.support.file_sets import write_files
 
 VALUES = "values"  # how to save a model: with what was fitted
+Drawn = Mapping[str, bytes]
 SETTLE = 0.4  # seconds in which pages are drawn, before a diagnosis takes the processors
 
 
@@ -37,26 +39,66 @@ class OvertakenError(Exception):
     """The model that is being diagnosed is no longer the present one."""
 
 
-class Desk:
+S = TypeVar("S", bound=AnySession)
+
+
+@dataclass(frozen=True)
+class Deeds(Generic[S]):
+    """What can be done with the sessions of one kind; every function gives a new session."""
+
+    added: Callable[[S, str], S]
+    dropped: Callable[[S, str], S]
+    undone: Callable[[S], S]
+    held: Callable[[S, str, bool], S]
+    tried: Callable[[S, str], S]
+    examined: Callable[[S, Callable[[int], None]], Any]  # the present stage, diagnosed; the number of candidates tried
+    with_stage: Callable[[S, Any], S]
+    by_itself: Callable[[S], S]  # the model fitted to each of several records too; the same where nothing is to do
+    drawn: Callable[[S], Drawn]  # the files of the present stage that Save would write, which takes a while
+    files: Callable[[S, str, str, bool, Drawn | None], dict[str, bytes]]  # all, by the model file's name and text
+
+
+def _by_itself(session: Session) -> Session:
+    asked = session.now.on_each and session.now.by_record is None
+    return sessions.by_itself(session) if asked else session
+
+
+def _drawn(session: Session) -> Drawn:
+    return of_stage(session.now, by_level=not session.several.separate)
+
+
+def _examined(session: Session, progress: Callable[[int], None]) -> sessions.Stage:
+    return sessions.examined(session, progress)[0]
+
+
+ALONE = Deeds(
+    sessions.with_added, sessions.dropped, sessions.undone, sessions.with_held, sessions.tried, _examined,
+    sessions.with_stage, _by_itself, _drawn, files,
+)  # fmt: skip
+
+
+class Desk(Generic[S]):
     """One session and whoever looks at it."""
 
-    def __init__(self, session: Session, model: Path, text: str, folder: Path, inputs: Sequence[Path] = ()) -> None:
-        self.session = session
+    def __init__(
+        self, session: S, model: Path, text: str, folder: Path, inputs: Sequence[Path] = (), deeds: Deeds[S] = ALONE
+    ) -> None:
+        self.session, self.deeds = session, deeds
         self.state = State()
         self.model, self.text, self.folder, self.inputs = model, text, folder, tuple(inputs)
         self.watchers: dict[object, Callable[[], None]] = {}
-        self._drawn: tuple[Stage | None, Mapping[str, bytes]] = (None, {})
+        self._drawn: tuple[object, Drawn] = (None, {})
         self._pen = threading.Lock()  # what draws pictures has a style that all threads share
         self._lock = threading.RLock()
         self._rest = threading.Event()  # never set but to end
         self._hand = ThreadPoolExecutor(1, "change")
         self._behind = ThreadPoolExecutor(1, "diagnosis")
         self._actions: Mapping[str, tuple[str, Callable[[str], None]]] = {
-            "add": ("adding {}", lambda name: self._change(sessions.with_added(self.session, name))),
-            "drop": ("dropping {}", lambda name: self._change(sessions.dropped(self.session, name))),
-            "undo": ("undoing", lambda _: self._change(sessions.undone(self.session))),
-            "hold": ("holding {}", lambda key: self._change(sessions.with_held(self.session, key, True))),
-            "free": ("freeing {}", lambda key: self._change(sessions.with_held(self.session, key, False))),
+            "add": ("adding {}", lambda name: self._change(deeds.added(self.session, name))),
+            "drop": ("dropping {}", lambda name: self._change(deeds.dropped(self.session, name))),
+            "undo": ("undoing", lambda _: self._change(deeds.undone(self.session))),
+            "hold": ("holding {}", lambda key: self._change(deeds.held(self.session, key, True))),
+            "free": ("freeing {}", lambda key: self._change(deeds.held(self.session, key, False))),
             "try": ("trying {}", self._try),
             "save": ("writing files", self._save),
         }
@@ -91,7 +133,7 @@ class Desk:
         self._hand.shutdown(wait=False, cancel_futures=True)
         self._behind.shutdown(wait=False, cancel_futures=True)
 
-    def _tell(self, session: Session | None = None, **state: str) -> None:
+    def _tell(self, session: S | None = None, **state: str) -> None:
         """Change the state, perhaps the session, and call whoever watches."""
         with self._lock:
             self.state = replace(self.state, **state)
@@ -111,12 +153,12 @@ class Desk:
             self._tell(None, **{place: f"a fault in the program, not in your input ({type(error).__name__}: {error})"})
         self._tell(busy="")
 
-    def _change(self, session: Session) -> None:
+    def _change(self, session: S) -> None:
         self._tell(session)
         self.diagnose()
 
     def _try(self, text: str) -> None:
-        session = sessions.tried(self.session, text)
+        session = self.deeds.tried(self.session, text)
         self._tell(session, accepted=text)
         self._behind.submit(self._examine, session.own)
         self._behind.submit(self._draw)
@@ -125,7 +167,7 @@ class Desk:
         session = self.session
         with self._pen:
             ahead = self._drawn[1] if self._drawn[0] is session.now else None
-            contents = files(session, self.model.name, self.text, values=how == VALUES, drawn=ahead)
+            contents = self.deeds.files(session, self.model.name, self.text, how == VALUES, ahead)
         write_files(self.folder, contents, self.inputs)
         with_them = "with" if how == VALUES else "without"
         self._tell(
@@ -138,7 +180,7 @@ class Desk:
             session = self.session
             if session.now.diagnosis is None or self._rest.is_set() or self._drawn[0] is session.now:
                 return
-            self._drawn = session.now, of_stage(session.now, by_level=not session.several.separate)
+            self._drawn = session.now, self.deeds.drawn(session)
 
     def _still(self, model: Model) -> None:
         """End what is done of a model that is no longer the present one."""
@@ -157,16 +199,16 @@ class Desk:
             self._tell(diagnosing=f"diagnosing: {candidates} candidates tried")
 
         try:
-            if asked.now.on_each and asked.now.by_record is None:
-                self._tell(diagnosing="fitting each record by itself")
-                asked = sessions.by_itself(asked)
+            self._tell(diagnosing="diagnosing")
+            alone = self.deeds.by_itself(asked)
+            if alone is not asked:
                 self._still(model)
                 with self._lock:
-                    self._tell(sessions.with_stage(self.session, asked.now))
-            self._tell(diagnosing="diagnosing")
-            stage, _ = sessions.examined(asked, count)
+                    self._tell(self.deeds.with_stage(self.session, alone.now))
+            asked = alone
+            stage = self.deeds.examined(asked, count)
             with self._lock:
-                self._tell(sessions.with_stage(self.session, stage), diagnosing="")
+                self._tell(self.deeds.with_stage(self.session, stage), diagnosing="")
         except OvertakenError:
             self._tell(diagnosing="")
         except StudyError as error:

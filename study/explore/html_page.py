@@ -15,7 +15,7 @@ from study.compare.history import label
 from study.explore import check_plots, plots, theme, words
 from study.explore.axis_scales import Columns
 from study.explore.page_units import in_text
-from study.explore.session import Session
+from study.explore.session import AnySession, Session
 from study.explore.view import View
 
 GHOSTS: dict[str, Columns] = {
@@ -91,7 +91,7 @@ def history_height(steps: int) -> int:
     return 104 + 27 * max(steps, 2)
 
 
-def history_columns(session: Session) -> Columns:
+def history_columns(session: AnySession) -> Columns:
     """The history as columns: errors and noise floor in per cent by the name of the step."""
     steps = session.steps
     earlier = [label(step) for step in steps]

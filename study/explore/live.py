@@ -1,7 +1,8 @@
-"""The live page: a document that follows the desk and passes on what is clicked."""
+"""The live page: a document that follows the desk and passes on what is clicked; a scene draws the sessions."""
 
 import math
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
 
 from bokeh.document import Document
 from bokeh.events import RangesUpdate
@@ -11,40 +12,61 @@ from study.explore import decimate, html_page, preview
 from study.explore.axis_scales import scales_of
 from study.explore.by_record import worst
 from study.explore.desk import Desk
-from study.explore.session import Stage, on_record
+from study.explore.session import Session, Stage, on_record
 from study.explore.view import View, over_time, stretch, view
 
 HELLO = "hello"  # what a page says when it is there
 RECORD = "record"  # what it asks for when another record is chosen
 
 
-class Watcher:
-    """One document that shows the desk."""
+class Scene(Protocol):
+    """What a document draws of the sessions of one kind."""
 
-    def __init__(self, desk: Desk, document: Document) -> None:
-        self.desk, self.document = desk, document
-        self.shown = desk.session
-        self.record = worst(self.shown.now.on_each)
-        self.asked = ColumnDataSource({"act": [], "name": [], "count": []}, name="asked")
-        self.state = ColumnDataSource(self._state(), name="state")
-        self.page = html_page.build(self._view(), html_page.history_columns(self.shown), [self.asked, self.state])
+    def lay(self, document: Document) -> None:
+        """Put panels, template and words into an empty document."""
+        ...
+
+    def show(self, session: Any) -> None:
+        """Draw another session."""
+        ...
+
+    def turn_to(self, record: str) -> None:
+        """Show another of several records, by its number."""
+        ...
+
+
+class AloneScene:
+    """A session of one coordinate in a document."""
+
+    def __init__(self, session: Session, stores: Sequence[ColumnDataSource]) -> None:
+        self.shown = session
+        self.record = worst(session.now.on_each)
+        self.page = html_page.build(self._view(), html_page.history_columns(session), stores)
         self.span: tuple[float, float] | None = None
-        with document.models.freeze():  # what belongs to the document is gathered once, not anew for each panel
-            self._lay()
-        desk.watch(self, self._changed)
-        document.on_session_destroyed(lambda _: desk.leave(self))
 
-    def _lay(self) -> None:
+    def lay(self, document: Document) -> None:
+        """Put panels, template and words into an empty document."""
         for panel in html_page.placed(self.page, diagnosed=True):
-            self.document.add_root(panel)
-        self.document.title = html_page.title(self.shown)
-        self.document.template = html_page.template()
-        self.document.template_variables.update(html_page.variables(self.shown, live=True))
-        self.document.js_on_event("document_ready", CustomJS(code="window.study.begin()"))
+            document.add_root(panel)
+        document.title = html_page.title(self.shown)
+        document.template = html_page.template()
+        document.template_variables.update(html_page.variables(self.shown, live=True))
         self.page.sources["words"].js_on_change("data", CustomJS(code="window.study.words()"))
-        self.state.js_on_change("data", CustomJS(code="window.study.state()"))
-        self.asked.on_change("data", self._passed_on)
         self.page.panels["response"].on_event(RangesUpdate, self._zoomed)
+
+    def show(self, session: Session) -> None:
+        """Draw another session."""
+        self.shown = session
+        self.page.show(self._view(), html_page.history_columns(session))
+        if self.span is not None:
+            self._refine(self.span)
+
+    def turn_to(self, record: str) -> None:
+        """Show another of several records."""
+        records = [str(number) for number in range(len(self.shown.now.on_each))]
+        if record in records:
+            self.record, self.span = records.index(record), None
+            self.show(self.shown)
 
     def _view(self) -> View:
         stages = self.shown.stages
@@ -52,6 +74,42 @@ class Watcher:
 
     def _stage(self) -> Stage:
         return on_record(self.shown.now, self.record)
+
+    def _zoomed(self, event: RangesUpdate) -> None:
+        """Draw a stretch of a long record with the samples that the screen has room for."""
+        first, last = event.x0, event.x1
+        if len(self._stage().comparison.prediction.time) <= 2 * decimate.BUCKETS:
+            return
+        if first is not None and last is not None and math.isfinite(last - first) and last > first:
+            self._refine((first, last))
+
+    def _refine(self, span: tuple[float, float]) -> None:
+        self.span = span
+        stage = self._stage()
+        comparison, scales = stage.comparison, scales_of(stage.comparison)
+        part = stretch(comparison, span)
+        self.page.sources["would_time"].data = preview.difference(stage, scales, part)
+        self.page.sources["time"].data = over_time(comparison, scales, span)
+
+
+class Watcher:
+    """One document that follows the desk and passes on what is clicked."""
+
+    def __init__(
+        self, desk: Desk[Any], document: Document, scene: Callable[[Any, Sequence[ColumnDataSource]], Scene]
+    ) -> None:
+        self.desk, self.document = desk, document
+        self.shown = desk.session
+        self.asked = ColumnDataSource({"act": [], "name": [], "count": []}, name="asked")
+        self.state = ColumnDataSource(self._state(), name="state")
+        self.scene = scene(self.shown, [self.asked, self.state])
+        with document.models.freeze():  # what belongs to the document is gathered once, not anew for each panel
+            self.scene.lay(document)
+            document.js_on_event("document_ready", CustomJS(code="window.study.begin()"))
+            self.state.js_on_change("data", CustomJS(code="window.study.state()"))
+            self.asked.on_change("data", self._passed_on)
+        desk.watch(self, self._changed)
+        document.on_session_destroyed(lambda _: desk.leave(self))
 
     def _state(self) -> dict[str, Any]:
         state, many = self.desk.state, len(self.shown.stages) > 1
@@ -69,45 +127,17 @@ class Watcher:
         self.document.hold("combine")
         if session is not self.shown:
             self.shown = session
-            self._draw()
+            self.scene.show(session)
         self.state.data = self._state()
         self.document.unhold()
-
-    def _draw(self) -> None:
-        self.page.show(self._view(), html_page.history_columns(self.shown))
-        if self.span is not None:
-            self._refine(self.span)
-
-    def _turn_to(self, name: str) -> None:
-        """Show another of several records."""
-        records = [str(number) for number in range(len(self.shown.now.on_each))]
-        if name in records:
-            self.record, self.span = records.index(name), None
-            self.document.hold("combine")
-            self._draw()
-            self.document.unhold()
 
     def _passed_on(self, _attribute: str, _old: object, new: dict[str, list[Any]]) -> None:
         act, name = (new[key][0] if new[key] else "" for key in ("act", "name"))
         if act == HELLO:  # what changed while the page was on its way is shown now
             self._show()
         elif act == RECORD:
-            self._turn_to(name)
+            self.document.hold("combine")
+            self.scene.turn_to(name)
+            self.document.unhold()
         elif isinstance(act, str) and isinstance(name, str):
             self.desk.ask(act, name)
-
-    def _zoomed(self, event: RangesUpdate) -> None:
-        """Draw a stretch of a long record with the samples that the screen has room for."""
-        first, last = event.x0, event.x1
-        if len(self._stage().comparison.prediction.time) <= 2 * decimate.BUCKETS:
-            return
-        if first is not None and last is not None and math.isfinite(last - first) and last > first:
-            self._refine((first, last))
-
-    def _refine(self, span: tuple[float, float]) -> None:
-        self.span = span
-        stage = self._stage()
-        comparison, scales = stage.comparison, scales_of(stage.comparison)
-        part = stretch(comparison, span)
-        self.page.sources["would_time"].data = preview.difference(stage, scales, part)
-        self.page.sources["time"].data = over_time(comparison, scales, span)

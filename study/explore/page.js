@@ -213,7 +213,7 @@ window.study = (() => {
       const [name, number] = (source.name ?? "").split("@")
       if (number === `${k}.${record}`) model(name).data = source.data
     }
-    words()
+    window.study.words()
     for (const button of document.querySelectorAll("[data-act=step]"))
       button.classList.toggle("now", button.dataset.name === String(k))
   }
@@ -323,8 +323,7 @@ window.study = (() => {
     if (element) preview((hovered = Number(element.dataset.candidate)))
   })
   document.addEventListener("keydown", (event) => {
-    if (event.key === "Escape") { clear(); hovered = null; for (const i of pins) pin(i) }
-    if (event.key === "Escape") preview(null)
+    if (event.key === "Escape" && model("blocks")) { clear(); hovered = null; for (const i of pins) pin(i); preview(null) }
     if ((event.key === "Enter" || event.key === " ") && event.target.dataset?.candidate !== undefined) {
       event.preventDefault()
       pin(Number(event.target.dataset.candidate))
@@ -333,12 +332,12 @@ window.study = (() => {
   })
 
   const begin = () => {
-    words()
+    window.study.words()
     if (model("state")) { state(); put("asked", {act: ["hello"], name: [""], count: [++count]}) }
     buttons()
     for (const shown of document.querySelectorAll("[data-panel]")) untabbed(shown)
     setTimeout(() => { for (const shown of document.querySelectorAll("[data-panel]")) untabbed(shown) }, 1500)
     window.study.ready = true
   }
-  return {words, state, selected, clear, step, begin, ready: false}
+  return {words, state, selected, clear, step, begin, model, column, put, place, DRAWN, ready: false}
 })()

@@ -1,13 +1,14 @@
 """A session as one HTML file: every model of the session, no server, no network, the same bytes from the same input."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any, cast
 
 from bokeh.document import Document
 from bokeh.models import ColumnDataSource, CustomJS
 from bokeh.resources import Resources
+from jinja2 import Template
 
 from study.compare.comparison import Comparison
 from study.explore import html_page
@@ -31,24 +32,29 @@ def saved(session: Session) -> bytes:
     stores: list[ColumnDataSource] = []
     for (number, record), seen in views.items() if len(views) > 1 else ():
         columns: dict[str, Columns] = {
-            **seen.columns, "frame": html_page.frame(seen, history), "history": _marked(history, number - many)
+            **seen.columns, "frame": html_page.frame(seen, history), "history": marked(history, number - many)
         }  # fmt: skip
         stores += [ColumnDataSource(c, name=f"{name}@{number}.{record}") for name, c in columns.items()]
     made = html_page.build(views[first], history, stores)
     values = html_page.variables(session, live=False)
     shown = html_page.placed(made, values["diagnosed"])
+    return as_file(shown, html_page.template(), {**values, "title": html_page.title(session)})
+
+
+def as_file(panels: Sequence[Any], template: Template, values: Mapping[str, Any]) -> bytes:
+    """Panels in a template as a file that needs no server; each has its place in the template by its name."""
     document = Document()
     with document.models.freeze():  # what belongs to the document is gathered once, not anew for each panel
-        for panel in shown:
+        for panel in panels:
             document.add_root(panel)
     document.js_on_event("document_ready", CustomJS(code="window.study.begin()"))
     content, ids = _numbered(document.to_json(deferred=False))
-    roots = {p.name: SimpleNamespace(id=ids[p.id], elementid=f"study-{p.name}") for p in shown}
+    roots = {p.name: SimpleNamespace(id=ids[p.id], elementid=f"study-{p.name}") for p in panels}
     items = [{"docid": "study", "roots": {r.id: r.elementid for r in roots.values()},
               "root_ids": [r.id for r in roots.values()]}]  # fmt: skip
     script = EMBED.format(docs=_in_script({"study": content}), items=_in_script(items))
-    text = html_page.template().render(
-        **values, title=html_page.title(session), roots=roots, plot_script=f"<script>{script}</script>",
+    text = template.render(
+        **values, roots=roots, plot_script=f"<script>{script}</script>",
         bokeh_js=Resources(mode="inline", components=["bokeh"], minified=True, log_level="error").render_js(),
     )  # fmt: skip
     return text.encode()
@@ -59,7 +65,7 @@ def of_comparison(comparison: Comparison) -> bytes:
     return saved(begin_with(comparison))
 
 
-def _marked(history: Columns, place: int) -> Columns:
+def marked(history: Columns, place: int) -> Columns:
     """The history with a larger dot where the page stands."""
     size = [6.0] * len(history["size"])
     size[place] = 10.0

@@ -15,7 +15,7 @@ from tornado.ioloop import IOLoop
 
 from study.explore.desk import Desk
 from study.explore.guard import GuardedTornado, one_line_each
-from study.explore.live import Watcher
+from study.explore.live import AloneScene, Scene, Watcher
 from study.support.errors import StudyError
 
 HOST = "127.0.0.1"
@@ -24,14 +24,17 @@ LARGEST = 1_000_000  # bytes of a request: a page sends none
 DAY = 86400  # seconds within which a page that was fetched must open its socket
 
 
-def serve(desk: Desk, port: int | None, ready: Callable[[str], None]) -> None:
+def serve(
+    desk: Desk[Any], port: int | None, ready: Callable[[str], None], scene: Callable[..., Scene] = AloneScene
+) -> None:
     """Serve a desk until interrupted, and call ``ready`` with the address once it can be opened.
 
-    A port of zero takes any that is free, None the usual one or, if that is taken, any.
+    ``scene`` draws a session of the desk's kind. A port of zero takes any that is free, None the usual one or, if that
+    is taken, any.
     """
 
     def show(document: Document) -> None:
-        Watcher(desk, document)
+        Watcher(desk, document, scene)
 
     application = Application(FunctionHandler(show))
     one_line_each()

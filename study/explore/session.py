@@ -3,10 +3,10 @@
 Every function gives a new session; what was found of a model stays with its stage, so that undoing computes nothing.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -35,6 +35,49 @@ Step = dict[str, Any]
 Progress = Callable[[str], None]
 SHOWN = 8  # candidates
 NONE = Several()
+
+
+class AnyStage(Protocol):
+    """A model of a session, of one coordinate or of a structure."""
+
+    @property
+    def model(self) -> Model:
+        """Values that it gives are held."""
+        ...
+
+    @property
+    def label(self) -> str:
+        """What was done to arrive at it."""
+        ...
+
+    @property
+    def diagnosis(self) -> object | None:
+        """None as long as nobody has asked."""
+        ...
+
+
+class AnySession(Protocol):
+    """A session of one coordinate, or of a structure."""
+
+    @property
+    def now(self) -> AnyStage:
+        """The present model."""
+        ...
+
+    @property
+    def stages(self) -> Sequence[AnyStage]:
+        """From the model as given to the present one."""
+        ...
+
+    @property
+    def own(self) -> object:
+        """The user's own candidates."""
+        ...
+
+    @property
+    def steps(self) -> list[Step]:
+        """The history."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -84,10 +127,14 @@ class Session:
     @property
     def steps(self) -> list[Step]:
         """The history, the steps before this session included."""
-        own = [history_step(r.comparison, r.added, r.dropped) for r in self.stages]
-        last = self.earlier[-1] if self.earlier else None
-        known = last is not None and last["terms"] == own[0]["terms"] and last["record"] == own[0]["record"]
-        return [*self.earlier, *own[1 if known else 0 :]]
+        return joined(self.earlier, [history_step(r.comparison, r.added, r.dropped) for r in self.stages])
+
+
+def joined(earlier: Sequence[Step], own: Sequence[Step]) -> list[Step]:
+    """The steps of a session after those that were kept: the model that both begin or end with stands once."""
+    last = earlier[-1] if earlier else None
+    known = last is not None and last["terms"] == own[0]["terms"] and last["record"] == own[0]["record"]
+    return [*earlier, *own[1 if known else 0 :]]
 
 
 def begin(
@@ -246,15 +293,17 @@ def with_stage(session: Session, stage: Stage) -> Session:
     return replace(session, stages=tuple(stages))
 
 
-def own_term(session: Session, text: str) -> Term:
-    """A user's formula of the whitelisted kind, or ``NAME=FORMULA`` with a name that is not taken, as a term."""
+def own_term(text: str, taken: Collection[str], channels: Collection[str]) -> Term:
+    """A user's formula of the whitelisted kind, or ``NAME=FORMULA`` with a name that is not taken, as a term.
+
+    ``channels`` are the measured ones that it may name.
+    """
     name, sign, formula = text.partition("=")
-    taken = {t.name for t in (*session.own, *session.now.model.terms)}
     if not sign:
         name = next(f"own_{i}" for i in range(1, len(taken) + 2) if f"own_{i}" not in taken)
         formula = text
     term = custom(name.strip(), formula.strip())
-    known = ("u", "v", "t", *session.prepared.record.extra)
+    known = ("u", "v", "t", *channels)
     for used in formulas.names(formula.strip()):
         uses = f"the expression {formula.strip()!r} uses the name {used!r}"
         expect(used in known, f"{uses}; it may use {', '.join(known)}")
@@ -279,7 +328,9 @@ def tried(session: Session, text: str) -> Session:
     StudyError
         If the formula is refused, or has no finite response on this record.
     """
-    term, now = own_term(session, text), session.now
+    now = session.now
+    taken = {t.name for t in (*session.own, *now.model.terms)}
+    term = own_term(text, taken, session.prepared.record.extra)
     if now.diagnosis is None:
         raise StudyError("the present model is still being diagnosed; a formula can be tried when that is done")
     known = [Candidate(r.term, r.fit, r.prediction) for r in now.diagnosis.candidates]

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from html import escape
-from typing import Any
+from typing import Any, Protocol
 
 from study.compare.comparison import Comparison
 from study.compare.comparison_sentences import says
@@ -17,6 +17,7 @@ from study.explore.page_units import Scale, in_sentence, in_text, length, mass, 
 from study.explore.session import Stage
 from study.figures.labels import power_of_ten, term_names
 from study.support.numbers import percent
+from study.support.statistics import Gain
 from study.support.thresholds import ALPHA
 
 VERDICTS = {MISSING: "An effect is missing", NOTHING: "Nothing is missing"}
@@ -111,10 +112,28 @@ def _candidates(stage: Stage, rows: Sequence[Ranked], live: bool) -> str:
     return f"<ol>{HEAD if offered else ''}{''.join(_row(i, row, stage, live) for i, row in offered)}{rest}</ol>"
 
 
+class Explains(Protocol):
+    """A candidate, of one coordinate or at a place."""
+
+    @property
+    def gain(self) -> Gain:
+        """What it explains of the held-out residual."""
+        ...
+
+    @property
+    def p_value(self) -> float:
+        """Of what it explains, with the number of candidates accounted for."""
+        ...
+
+
+def gives(row: Explains) -> bool:
+    """Whether a candidate explains more than chance would: one that does not is not offered."""
+    return row.gain.explained > 0.0 and row.p_value < ALPHA
+
+
 def offers(diagnosis: Diagnosis, row: Ranked) -> bool:
     """Whether a candidate is offered: the user's own, and one of what is missing that explains more than chance."""
-    explains = row.gain.explained > 0.0 and row.p_value < ALPHA
-    return row.name not in LIBRARY or (diagnosis.verdict != NOTHING and explains)
+    return row.name not in LIBRARY or (diagnosis.verdict != NOTHING and gives(row))
 
 
 def _row(place: int, row: Ranked, stage: Stage, live: bool) -> str:
@@ -135,7 +154,7 @@ def _row(place: int, row: Ranked, stage: Stage, live: bool) -> str:
         f"<li class='candidate' data-candidate='{place}' data-label='{escape(_label(row, unit))}' tabindex='0' "
         f"aria-label='{words}, explains {explained}'><span class='rank'>{_rank(place, row, stage)}</span>"
         f"<span class='name' title='{words}; a click pins it beside another'><b>{words}</b></span>{_ties(row)}"
-        f"{_bar(row)}<span class='explained'>{explained}</span>{add}<small hidden>{detail}</small></li>"
+        f"{bar(row.gain)}<span class='explained'>{explained}</span>{add}<small hidden>{detail}</small></li>"
     )
 
 
@@ -159,9 +178,9 @@ def _ties(row: Ranked) -> str:
     return f"<span class='tie' title='cannot be told from {escape(everyone)}'>tie {len(row.tied_with) + 1}</span>"
 
 
-def _bar(row: Ranked) -> str:
+def bar(gain: Gain) -> str:
     """Explained share with its standard error; what reaches beyond the axis is cut."""
-    share, error = 100.0 * row.gain.explained, 100.0 * row.gain.error
+    share, error = 100.0 * gain.explained, 100.0 * gain.error
     low, high = (min(max(x, 0.0), 100.0) for x in (share - error, share + error))
     grid = "".join(f"<line class='grid' x1='{x}' x2='{x}' y1='0' y2='16'/>" for x in (0, 25, 50, 75, 100))
     ends = f"M{low:.2f} 8H{high:.2f}M{low:.2f} 5V11M{high:.2f} 5V11"

@@ -15,6 +15,7 @@ from study.support.picture_page import Picture, Section
 TITLE = "Measured records"
 PICTURES: Mapping[str, str] = {  # of a climb's folder, and what they show
     "history.png": "every model of the climb and its held-out error",
+    "climb/step_0/structure.png": "where a force is missing from the structure as given",
     "climb/step_0/candidates.png": "what could be missing from the model as given",
     "climb/step_0/constancy.png": "the test of a constant coefficient: a true effect has one",
     "climb/decay.png": "frequency and damping ratio against amplitude, of the model reached",
@@ -23,7 +24,13 @@ PICTURES: Mapping[str, str] = {  # of a climb's folder, and what they show
     "climb/missing_force.png": "the force that the model reached still lacks",
     "climb/force_error.png": "unexplained force by frequency, of the model reached",
 }
-KEPT = ("climb/decay.png", "climb/loops.png", "climb/response.png", "climb/step_0/constancy.png")  # the first ...
+KEPT = (
+    "climb/decay.png",
+    "climb/loops.png",
+    "climb/step_0/structure.png",
+    "climb/response.png",
+    "climb/step_0/constancy.png",
+)  # the first ...
 MOST = 2  # ... of these that there are stand in the documentation
 
 

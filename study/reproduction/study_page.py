@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from study.reproduction import summary
+from study.reproduction import structure_pages, summary
 from study.reproduction.claims.claim_pages import conditions
 from study.support import document, picture_page
 from study.support.document import Text
@@ -20,6 +20,7 @@ def page(tables: summary.Tables, pictures: Sequence[Picture]) -> bytes:
         ("numbers", "The report's numbers beside ours", fragment(summary.numbers(tables))),
         ("claims", "Every claim", _claims(tables)),
         ("parameters", "Parameters by case", fragment(summary.parameters(tables))),
+        ("structures", "Structures of several coordinates", fragment(structure_pages.blocks(tables.structures))),
         ("estimators", "How far each estimator is off", fragment(summary.estimators(tables)[1:])),
         ("reading", 'What "unit variance" refers to', fragment(summary.reading(tables))),
         ("times", "Run times", fragment(summary.run_times(tables))),

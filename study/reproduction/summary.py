@@ -6,9 +6,10 @@ from typing import Any
 
 import pandas as pd
 
-from study.reproduction import error_pages
+from study.reproduction import error_pages, structure_pages
 from study.reproduction.claims.claim_pages import shortened, verdict
 from study.reproduction.claims.judgement import REPRODUCED
+from study.reproduction.structure_pages import Structures
 from study.support.document import Block, Bullets, Heading, Text, table
 from study.support.numbers import percent
 
@@ -28,6 +29,10 @@ FILES = (
     ("`results/study.html`", "all of it for a browser, in one file: pictures by system, tables that sort, claims"),
     ("`results/estimators.md`", "how far each estimator is off, by parameter and case"),
     ("`results/claims.md`, `claims.csv`", "every checkable statement: reported, measured, criterion, verdict"),
+    (
+        "`results/structures.md`, `structures.csv`, `structure_claims.csv`",
+        "structures: what is claimed, every coefficient",
+    ),
     ("`results/excitation_reading.csv`", 'both readings of "unit variance" against the numbers that the report quotes'),
     ("`results/integrator_steps.md`, `.csv`", "what the report's one step a sample does to each recovered parameter"),
     ("`results/monte_carlo.csv`", "how often each tolerance is met over many seeds: `snakemake -j2 monte_carlo`"),
@@ -46,6 +51,7 @@ class Tables:
     times: pd.DataFrame  # columns stage, case, seconds: one row a job
     noise: dict[str, float]  # of each case, by name, in the order of the page
     setting: str  # the reading of unit variance that the study runs with
+    structures: Structures
 
 
 def blocks(tables: Tables) -> list[Block]:
@@ -54,6 +60,7 @@ def blocks(tables: Tables) -> list[Block]:
         ("What is not reproduced, or only partly, and why", failing),
         ("The report's numbers beside ours", numbers),
         ("Parameters by case", parameters),
+        ("Structures of several coordinates", lambda t: structure_pages.blocks(t.structures)),
         ('What "unit variance" refers to', reading),
         ("Where everything is", lambda _: [table(["where", "what"], FILES)]),
         ("Run times", run_times),
@@ -84,7 +91,7 @@ def counts(tables: Tables) -> list[Block]:
             f"With noise on the displacement, {_met(noisy)} parameters of {noisy['case'].nunique()} cases are "
             "within the same tolerances; the claims of Section 5.4 say why."
         )
-    return [Bullets(tuple(lines))]
+    return [Bullets((*lines, structure_pages.count(tables.structures)))]
 
 
 def _met(table: pd.DataFrame) -> str:
@@ -150,7 +157,7 @@ def _tolerance(row: "pd.Series[Any]") -> str:
 def failing(tables: Tables) -> list[Block]:
     """What is not reproduced, or partly, and why."""
     failed = tables.claims[tables.claims["verdict"] != REPRODUCED].sort_values("verdict", kind="stable")
-    return [_columns(failed, "verdict", "where", "claim", "why")]
+    return [_columns(failed, "verdict", "where", "claim", "why"), *structure_pages.failing(tables.structures)]
 
 
 def _columns(frame: pd.DataFrame, *names: str) -> Block:

@@ -1,7 +1,7 @@
 """A structure with a measured linear part held against a record: modes, coefficients, and the error of its free run."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,12 +9,13 @@ import numpy as np
 from study.equations import model_file
 from study.equations.model import Model
 from study.equations.place import in_words
-from study.structure.measured_fit import MeasuredFit, fit_measured
+from study.structure.measured_fit import MeasuredFit, fit_measured, grown
 from study.structure.measured_prediction import MeasuredPrediction, predict_measured
+from study.structure.measured_screening import screened_by_lines
 from study.structure.measured_spectra import CoefficientSpectrum, coefficient_spectra
 from study.structure.prepared_structure import PreparedStructure
 from study.support.arrays import Floats
-from study.support.errors import StudyError
+from study.support.errors import expect
 from study.support.numbers import percent
 
 
@@ -57,17 +58,16 @@ def compare_measured(
 ) -> MeasuredComparison:
     """Fit modes and what the terms leave open to one part of a record and judge the free run on the other.
 
+    Shape parameters that are open are searched for along the lines of the record.
+
     Raises
     ------
     StudyError
         If the model cannot be fitted.
     """
     report: Callable[[str], None] = progress or (lambda _: None)
-    if open_shapes := [k for t in model.terms for k in t.keys[len(t.symbols) :] if model.values[k] is None]:
-        like = f"{open_shapes[0].rpartition('.')[2]}: 0.001"
-        raise StudyError(f"{model.name!r} gives no value for {', '.join(open_shapes)}; expected one, such as {like}")
     report("modes")
-    fit = fit_measured(model, prepared)
+    fit = _first_fit(model, prepared)
     report("free run")
     prediction = predict_measured(fit, prepared)
     report("coefficients by frequency")
@@ -77,6 +77,19 @@ def compare_measured(
     return MeasuredComparison(
         model, prepared, fit, modes_measured(fit), prediction, coefficient_spectra(fit, prepared), tuple(notes)
     )
+
+
+def _first_fit(model: Model, prepared: PreparedStructure) -> MeasuredFit:
+    """The fit of a model; of terms with an open shape parameter one after the other, beside those before."""
+    unknown = [t for t in model.terms if None in t.parameters]
+    known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
+    fit = fit_measured(known, prepared)
+    for entry in unknown:
+        found = screened_by_lines(known, prepared, [entry], fit.residual, fit.modal.modes)
+        expect(found, f"{entry.name} explains nothing of {prepared.record.name!r}; expected an effect that does")
+        fit, known = grown(known, found[0].entry, prepared), known.with_term(entry)
+        known = known.with_values({k: fit.values[k] for k in entry.keys[len(entry.symbols) :]})
+    return fit
 
 
 def modes_measured(fit: MeasuredFit) -> MeasuredModes:
@@ -193,3 +206,15 @@ def measured_summary(comparison: MeasuredComparison) -> str:
         tabulate(shapes, heads, tablefmt="simple", disable_numparse=True), measured_says(comparison),
     ]  # fmt: skip
     return "\n\n".join(parts) + (f"\n({'; '.join(comparison.notes)})" if comparison.notes else "")
+
+
+def measured_step(comparison: MeasuredComparison, added: str | None = None) -> dict[str, Any]:
+    """A comparison as a step of the history (``study.compare.history``); there is no error of the force."""
+    prediction, document = comparison.prediction, measured_document(comparison)
+    return {
+        "terms": [t.name for t in comparison.model.terms], "added": added, "dropped": None,
+        "record": comparison.prepared.record.name, "error": {"force": None, "response": prediction.error},
+        "rms": float(np.sqrt(np.mean(prediction.residual**2))), "unit": "",
+        "noise_floor": {"response": prediction.floor}, "converged": comparison.fit.converged,
+        "coefficients": document["coefficients"],
+    }  # fmt: skip

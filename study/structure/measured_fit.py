@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from study.equations.model import Model, with_registers
+from study.equations.model import Model, ModelTerm, with_registers
 from study.records.interpolation import between_samples
 from study.records.record import MOTIONS
 from study.structure.measured_start import modal_starts
@@ -181,6 +181,33 @@ def fit_measured(model: Model, prepared: PreparedStructure) -> MeasuredFit:
         return best
     coupled = _fitted(model, best.modal, prepared, best.values, tuple(given), best.steps, TRIALS, best.initial)
     return coupled if _criterion(coupled, prepared) < _criterion(best, prepared) else best
+
+
+def grown(model: Model, entry: ModelTerm, prepared: PreparedStructure) -> MeasuredFit:
+    """A model with a term more, whose shape parameters have values: fitted with these, then with them free.
+
+    Raises as :func:`fit_measured`.
+    """
+    fit, shapes = fit_measured(model.with_term(entry), prepared), entry.keys[len(entry.symbols) :]
+    return (
+        refined(fit, prepared, [k for k in fit.model.values if k not in fit.keys and k not in shapes])
+        if shapes
+        else fit
+    )
+
+
+def refined(fit: MeasuredFit, prepared: PreparedStructure, held: Collection[str]) -> MeasuredFit:
+    """A fit gone on with from where it ended, with what it held beside ``held`` free; its modes stay as many.
+
+    Raises
+    ------
+    DivergenceError
+        If the structure diverges from there.
+    """
+    names = (*held, *(key for key in fit.modal.coupling if key not in fit.keys))
+    model = fit.model.with_values({key: fit.values[key] for key in fit.model.values})
+    again = _fitted(model, fit.modal, prepared, fit.values, names, fit.steps, TRIALS, fit.initial)
+    return _settled(again, model, prepared, names, TRIALS)
 
 
 def _settled(

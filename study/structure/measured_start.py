@@ -185,7 +185,22 @@ def _real(values: Complexes) -> Floats:
 
 
 def modal_starts(model: Model, prepared: PreparedStructure) -> Iterator[tuple[ModalKeys, dict[str, float]]]:
-    """For one mode, two and so on, a value of each of their keys and of the model's coefficients.
+    """For one mode, two and so on, values of their keys and of the model's coefficients (:func:`line_fits`)."""
+    return ((fit.modal, fit.values) for fit in line_fits(model, prepared))
+
+
+@dataclass(frozen=True, eq=False)
+class LineFit:
+    """Modes and coefficients with the smallest error of the lines."""
+
+    modal: ModalKeys
+    values: dict[str, float]
+    left: float  # power of the lines that it leaves, over that of all
+    criterion: float  # of Bayes, for white noise in proportion to each sensor (Schwarz, 1978)
+
+
+def line_fits(model: Model, prepared: PreparedStructure, most: int = MOST) -> Iterator[LineFit]:
+    """For one mode, two and so on up to ``most``, modes and coefficients with the smallest error of the lines.
 
     Raises
     ------
@@ -205,13 +220,16 @@ def modal_starts(model: Model, prepared: PreparedStructure) -> Iterator[tuple[Mo
     drives = np.array([[float(c == w) for _, w in model.forces] for c in points])
     inputs = np.concatenate([lines.forces, lines.unit], axis=1)
     space = observability(lines.s.imag, inputs, lines.outputs / lines.order * np.abs(lines.order), BLOCKS)
-    for modes in range(1, MOST + 1):
+    power = float(np.sum(np.abs(lines.outputs) ** 2))
+    for modes in range(1, most + 1):
         modal = ModalKeys(points, modes)
         problem = _Modal(lines, modal, at, drives, ways, np.pi / prepared.dt)
         starts = (_searched(problem, space.poles(order), modes) for order in range(2 * modes, 2 * modes + SPARE + 1))
         found = next((point for point in starts if point is not None), None)
         if found is not None:
-            yield modal, _named(model, modal, problem.split(found.x))
+            left = float(found.residual @ found.residual) / power
+            criterion = len(found.residual) * np.log(left) + len(found.x) * np.log(len(found.residual))
+            yield LineFit(modal, _named(model, modal, problem.split(found.x)), left, float(criterion))
 
 
 def _searched(problem: _Modal, poles: Complexes, modes: int) -> Point | None:

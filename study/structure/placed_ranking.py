@@ -112,13 +112,13 @@ def rank_placed(
     best = min(rows, key=lambda r: float(r.residual @ r.residual))
     noise = noise_left(best.fit.residual)
     white = {r.name: r.white(noise) for r in rows}
-    test = _test(fit, before, noise)
-    rows = [replace(r, p_value=min(1.0, asked * test.p_value(r))) for r in rows]
+    test = held_out_test(fit, before, noise)
+    rows = [replace(r, p_value=min(1.0, asked * test.p_value(r.parts, bool(r.term.parameters)))) for r in rows]
     return [replace(r, distance=away, tied_with=tied) for r, away, tied in in_order(rows, white, asked)]
 
 
 @dataclass(frozen=True, eq=False)
-class _Test:
+class HeldOutTest:
     """Whether a candidate explains what the model leaves beyond what its own coefficients could, on held-out parts.
 
     A structure has many coefficients, each with an error that shows in all of the judging part alike: a candidate that
@@ -130,11 +130,14 @@ class _Test:
     own: tuple[Floats, Floats]  # what the model leaves of judging and fitting part, white
     bases: tuple[Floats, Floats]  # orthonormal bases of what its own coefficients and initial state could change there
 
-    def p_value(self, row: PlacedRanked) -> float:
-        """Of one candidate alone; where its shape was searched for along the fitting part, on the other part only."""
-        used = 1 if row.term.parameters else 2
+    def p_value(self, parts: tuple[Floats, Floats], searched: bool) -> float:
+        """Of one candidate alone, by what it leaves of both parts (:func:`held_out_parts`).
+
+        Where its shape was searched for along the fitting part, on the other part only.
+        """
+        used = 1 if searched else 2
         before, after = list[Floats](), list[Floats]()
-        for own, basis, part in zip(self.own[:used], self.bases, row.parts, strict=False):
+        for own, basis, part in zip(self.own[:used], self.bases, parts, strict=False):
             if len(own) and len(part):
                 change = own - self.noise.weighted(part).ravel()
                 left, moved = (x - basis @ (basis.T @ x) for x in (own, change))
@@ -143,19 +146,21 @@ class _Test:
         return statistics.gain(np.concatenate(before), np.concatenate(after)).p_value
 
 
-def _test(fit: StructureFit, before: StructurePrediction, noise: SensorNoise) -> _Test:
+def held_out_test(fit: StructureFit, before: StructurePrediction, noise: SensorNoise) -> HeldOutTest:
+    """The test of whatever a fitted structure lacks, in noise as the best candidate leaves it."""
     jacobian = linearise(fit, before.prepared)
     parts = held_out_parts(fit, before, jacobian, before.prepared.fit)
     try:
         columns = [before.derivatives(fit), jacobian] if not before.diverged else []
     except DivergenceError:
         columns = []
-    bases = [_basis(noise.weighted(x)) for x in columns] or [np.zeros((part.size, 0)) for part in parts]
+    bases = [orthonormal(noise.weighted(x)) for x in columns] or [np.zeros((part.size, 0)) for part in parts]
     white = [noise.weighted(part).ravel() if len(part) else np.zeros(0) for part in parts]
-    return _Test(noise, (white[0], white[1]), (bases[0], bases[1]))
+    return HeldOutTest(noise, (white[0], white[1]), (bases[0], bases[1]))
 
 
-def _basis(columns: Floats) -> Floats:
+def orthonormal(columns: Floats) -> Floats:
+    """An orthonormal basis of derivatives (samples, sensors, keys), shape (samples sensors, keys)."""
     flat = columns.reshape(-1, columns.shape[2])
     length = np.linalg.norm(flat, axis=0)
     return np.linalg.qr(flat / np.where(length > 0.0, length, 1.0))[0]

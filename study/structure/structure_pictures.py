@@ -119,7 +119,7 @@ def response(comparison: StructureComparison) -> Figure:
     time = prediction.prepared.record.time[slice(*prediction.prepared.judge)]
     names: list[str] = []
     for panel, i in zip(axes, order, strict=True):
-        sensor, near = prediction.prepared.sensors[int(i)], _closeup(prediction.residual[:, int(i)])
+        sensor, near = prediction.prepared.sensors[int(i)], closeup(prediction.residual[:, int(i)])
         panels.response(
             panel, time[near], prediction.measured[near, int(i)], prediction.predicted[near, int(i)],
             SI_UNITS[sensor.motion],
@@ -131,7 +131,7 @@ def response(comparison: StructureComparison) -> Figure:
     return figure
 
 
-def _closeup(residual: Floats, samples: int = 300) -> slice:
+def closeup(residual: Floats, samples: int = 300) -> slice:
     """The stretch with the largest mean square."""
     if len(residual) <= samples:
         return slice(0, len(residual))

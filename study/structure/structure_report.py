@@ -1,14 +1,17 @@
 """The diagnosis of a structure in words, as a table for people and as fields for files."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from study.diagnose import needless
 from study.equations.place import Place
 from study.equations.place import in_words as placed
 from study.figures.labels import term_names
 from study.structure.modes import modes_table
+from study.structure.placed_needless import PlacedNeedless
 from study.structure.placed_ranking import PlacedRanked
 from study.structure.structure_comparison import document, mode_rows
 from study.structure.structure_record import Sensor
@@ -131,8 +134,13 @@ def _unknown(diagnosis: StructureDiagnosis) -> list[str]:
     return said
 
 
-def fields(diagnosis: StructureDiagnosis) -> dict[str, Any]:
-    """What ``diagnosis.json`` holds; candidates best first."""
+def unneeded_in_words(found: Sequence[PlacedNeedless], diagnosis: StructureDiagnosis) -> str:
+    """Which terms the diagnosed structure does not need, in sentences; empty if it needs all."""
+    return needless.paragraph(found, complete=diagnosis.verdict == NOTHING)
+
+
+def fields(diagnosis: StructureDiagnosis, unneeded: Sequence[PlacedNeedless] = ()) -> dict[str, Any]:
+    """What ``diagnosis.json`` holds: candidates best first, and the terms that the structure does not need."""
     comparison = diagnosis.comparison
     whole = document(comparison)
     rows = {r.name: r for r in diagnosis.candidates}
@@ -151,6 +159,7 @@ def fields(diagnosis: StructureDiagnosis) -> dict[str, Any]:
         "modes": {"before": whole["modes"], "after": mode_rows(after) if after is not None else None},
         "where": whole["where"],
         "converged": comparison.fit.converged,
+        "not_needed": needless.fields(unneeded),
         "says": in_words(diagnosis),
     }
 

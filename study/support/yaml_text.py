@@ -99,9 +99,12 @@ def scalar(text: str) -> str:
 def with_entry(text: str, key: str, entry: str) -> str:
     """The text with one entry, YAML on one line, more at the end of its top-level list ``key``; nothing else changes.
 
-    :func:`read_plain` must accept the text, and the list have an entry.
+    :func:`read_plain` must accept the text.
     """
     sequence = _list(text, key)
+    if not sequence.value:  # in brackets, as there is no other way to write that
+        inside = sequence.start_mark.index + 1
+        return text[:inside] + entry + text[inside:]
     if sequence.flow_style:
         end = sequence.value[-1].end_mark.index
         return f"{text[:end]}, {entry}{text[end:]}"

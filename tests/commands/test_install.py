@@ -88,7 +88,8 @@ def test_the_wheel_holds_the_package_its_types_and_its_looks(wheel):
     wanted = {
         "study/py.typed", "study/__init__.pyi", "study/figures/study.mplstyle", "study/explore/page.html",
         "study/explore/page.css", "study/explore/page.js", "study/support/picture_page.css",
-        "study/support/picture_page.js",
+        "study/support/picture_page.js", "study/explore/placed.html", "study/explore/placed.css",
+        "study/explore/placed.js", "study/structure/structure.html",
     }  # fmt: skip
     assert wanted <= names
     modules = {path.relative_to(ROOT).as_posix() for path in (ROOT / "study").rglob("*.py")}

@@ -1,7 +1,6 @@
 """``study explore`` in a real browser: one session from the first verdict to the saved page without a network."""
 
 import contextlib
-import os
 import re
 import socket
 import subprocess
@@ -12,9 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Page, TimeoutError, sync_playwright
+from playwright.sync_api import Page, TimeoutError
 
-from scripts.page_picture import MISSING, QUIET, browser
 from study import trials
 from study.compare import history
 from study.equations import model_file
@@ -51,19 +49,6 @@ def address(rig: Path) -> Iterator[str]:
         server.wait(10)
         server.stdout.close()
     assert "Traceback" not in (rig / "errors.txt").read_text()
-
-
-@pytest.fixture(scope="module")
-def page() -> Iterator[Page]:
-    """An empty page of a browser."""
-    where = browser()
-    if where is None:
-        pytest.fail(MISSING) if os.environ.get("CI") else pytest.skip(MISSING)
-    with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=where, args=list(QUIET))
-        opened = started.new_page(viewport={"width": 1280, "height": 900})
-        yield opened
-        started.close()
 
 
 def watched(page: Page) -> tuple[list[str], list[str]]:

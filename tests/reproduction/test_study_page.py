@@ -11,7 +11,7 @@ from study.reproduction.claims import claims_table
 from study.reproduction.claims.claim_pages import LONGEST, conditions, shortened
 from study.support import document
 from study.support.picture_page import Picture
-from tests.reproduction.test_summary import CLAIMS, ERRORS, PARAMETERS, READING, TIMES
+from tests.reproduction.test_summary import CLAIMS, ERRORS, PARAMETERS, READING, STRUCTURES, TIMES
 
 PNG = bytes.fromhex("89504e470d0a1a0a") + b"picture"
 LONG = pd.DataFrame(
@@ -27,7 +27,9 @@ LONG = pd.DataFrame(
 @pytest.fixture
 def page():
     claims = pd.concat([CLAIMS, LONG], ignore_index=True)
-    tables = summary.Tables(PARAMETERS, claims, READING, ERRORS, TIMES, {"quiet": 0.0, "noisy": 0.05}, "raw")
+    tables = summary.Tables(
+        PARAMETERS, claims, READING, ERRORS, TIMES, {"quiet": 0.0, "noisy": 0.05}, "raw", STRUCTURES
+    )
     pictures = [
         Picture("A <system>", "Figure 21", "its path", PNG),
         Picture("Another", "Figure 22", "its other path", PNG),

@@ -5,7 +5,7 @@ from html.parser import HTMLParser
 import pandas as pd
 import pytest
 
-from study.reproduction import summary
+from study.reproduction import structure_pages, summary
 from study.support import document
 
 PARAMETERS = pd.DataFrame(
@@ -41,11 +41,29 @@ ERRORS = pd.DataFrame(
 TIMES = pd.DataFrame(
     [("record", "quiet", 1.0), ("record", "noisy", 2.0), ("claims", "", 4.0)], columns=["stage", "case", "seconds"]
 )
+STRUCTURES = structure_pages.Structures(
+    pd.DataFrame(
+        [
+            ("two", "miso", "k[a-b]", 100.0, 101.0, 1.0, 0.01, 0.02, True),
+            ("two", "miso", "k3[a-b]", 1e6, 2e6, 1e4, 1.0, 0.02, False),
+            ("two", "siso", "k[a-b]", 100.0, 150.0, 1.0, 0.5, 0.02, False),
+        ],
+        columns=list(PARAMETERS.columns),
+    ),
+    pd.DataFrame(
+        [
+            ("two", "MI/SO is right", "k within 2 %; k3 within 2 %", "k +1 %; k3 +100 %", "partly"),
+            ("two", "SI/SO is wrong", "off by 10 %", "50 %", "holds"),
+        ],
+        columns=["case", "claim", "criterion", "measured", "verdict"],
+    ),
+    {"two": "Two <masses>"},
+)  # fmt: skip
 
 
 @pytest.fixture
 def tables():
-    return summary.Tables(PARAMETERS, CLAIMS, READING, ERRORS, TIMES, {"quiet": 0.0, "noisy": 0.05}, "raw")
+    return summary.Tables(PARAMETERS, CLAIMS, READING, ERRORS, TIMES, {"quiet": 0.0, "noisy": 0.05}, "raw", STRUCTURES)
 
 
 def flat(text):
@@ -74,7 +92,7 @@ def test_counts_are_counted(tables):
 
 
 def test_a_study_without_noise_does_not_speak_of_it():
-    quiet = summary.Tables(PARAMETERS[:3], CLAIMS, READING, ERRORS, TIMES, {"quiet": 0.0}, "raw")
+    quiet = summary.Tables(PARAMETERS[:3], CLAIMS, READING, ERRORS, TIMES, {"quiet": 0.0}, "raw", STRUCTURES)
     assert "With noise" not in document.markdown(summary.counts(quiet))
 
 
@@ -150,3 +168,16 @@ def test_markdown_keeps_bars_within_their_cell(tables):
 
 def test_an_empty_table_says_so():
     assert document.markdown([document.table(["a"], [])]) == "None.\n"
+
+
+def test_structures_stand_in_the_verdict_and_have_a_section(tables):
+    page = flat(document.markdown(summary.blocks(tables)))
+    verdict = page[: page.index("What is not reproduced")]
+    assert "1 of 2 claims hold; MI/SO recovers 1 of 2 coefficients of 1 cases" in verdict
+    section = page[page.index("Structures of several coordinates", page.index("Parameters by case")) :]
+    assert "**partly**: MI/SO is right" in section
+    assert "k3 within 2 %: k3 +100 %" in section
+    assert "| siso | k[a-b] | 100 | 150 |" in section
+    missing = page[page.index("What is not reproduced") : page.index("The report's numbers")]
+    assert "MI/SO is right" in missing
+    assert "SI/SO is wrong" not in missing

@@ -58,9 +58,18 @@ def test_stiffness_is_found_and_what_is_missing_is_in_pitch(name):
     best = {c: max(p[0].share for e, p in ordered if e.place and e.place.moving == (c,)) for c in model.coordinates}
     assert best["pitch"] > 0.5
     assert best["heave"] < 0.5 * best["pitch"]
+    stiffening = {c: _share(ordered, "quadratic_stiffness", c) for c in model.coordinates}
+    assert stiffening["pitch"] > 0.5
+    assert stiffening["heave"] < 0.05
     assert not any(
         e.place and len(e.place.moving) > 1 for e, _ in ordered
     )  # one body: nothing lies between its motions
+
+
+def _share(ordered, effect, coordinate):
+    """What an effect at a coordinate explains in the reverse system of what the linear terms leave."""
+    named = (p[0].share for e, p in ordered if e.term.name == effect and e.place and e.place.moving == (coordinate,))
+    return next(named, 0.0)
 
 
 def test_heave_of_the_second_wing_has_dry_friction():

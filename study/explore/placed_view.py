@@ -1,0 +1,215 @@
+"""What a page shows of a structure, as columns by the name of their source.
+
+What belongs to a place, a sensor or a candidate stands there for all of them, marked by the column ``of``: the page's
+script draws that of the selected one.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from study.compare.noise import segments_of
+from study.explore import decimate
+from study.explore.axis_scales import Columns, Floats
+from study.explore.page_units import Scale, in_text, length, power, rate
+from study.explore.placed_session import PlacedStage
+from study.explore.placed_words import placed_words
+from study.figures.labels import power_of_ten
+from study.records.record import SI_UNITS
+from study.records.spectra import autospectrum
+from study.structure.connection_spectra import dynamic_stiffnesses, highest_frequency, missing_force_spectra
+from study.structure.sketch import Sketch
+from study.structure.structure_comparison import StructureComparison
+from study.structure.structure_pictures import closeup, sketch_of, sketch_of_diagnosis
+
+NINETY_FIVE = 1.96  # standard errors to each side
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedView:
+    """A structure of the session as it is drawn."""
+
+    columns: dict[str, Columns]  # of each source; all of one have the same length
+    drawn: Sketch
+    highest: float  # frequency in hertz at which the axes of frequency end
+
+
+def placed_view(stage: PlacedStage, step: int, live: bool = True) -> PlacedView:
+    """The columns of a structure, by its number in the session; only a ``live`` page can act."""
+    comparison = stage.comparison
+    drawn = sketch_of(comparison) if stage.diagnosis is None else sketch_of_diagnosis(stage.diagnosis)
+    labels = {link.place.path: link.place.label for link in drawn.links}
+    lengths, forces = _scales(comparison)
+    stiffness, unit = _stiffness(comparison, labels)
+    columns = {
+        "sensors": _sensors(comparison),
+        "all_motion": _motions(comparison),
+        "all_close": _motions(comparison, close=True),
+        "all_map": _maps(comparison, labels, lengths, forces),
+        "all_force": _force(comparison, labels, forces),
+        "all_stiffness": stiffness,
+        "all_spectrum": _spectra(comparison),
+        "all_constancy": _constancy(stage),
+        "units": {"panel": ["map_x", "map_y", "force_y", "stiffness_y"], "label": [
+            f"relative displacement / {in_text(lengths.unit)}", f"missing force / {in_text(forces.unit)}",
+            f"missing force / ({in_text(forces.unit)}/√Hz)", f"force over displacement / ({unit})",
+        ]},
+        "words": placed_words(stage, drawn, step, live),
+    }  # fmt: skip
+    return PlacedView({name: _small(c) for name, c in columns.items()}, drawn, highest_frequency(comparison))
+
+
+def _small(columns: Columns) -> Columns:
+    return {n: np.asarray(c, dtype=np.float32) if _plain(c) else c for n, c in columns.items()}
+
+
+def _plain(column: Any) -> bool:
+    return getattr(column, "dtype", None) == np.float64
+
+
+def _scales(comparison: StructureComparison) -> tuple[Scale, Scale]:
+    """Units in which relative displacements and missing forces of all places are easy to read."""
+    curves = [c for c in comparison.forces.curves.values() if len(c.at)]
+    far = max((float(np.max(np.abs(c.at))) for c in curves), default=1.0)
+    most = max((float(np.max(np.abs(c.mean))) for c in curves), default=1.0)
+    return _length(comparison, far), power("N or N m" if _turns(comparison) else "N", most)
+
+
+def _turns(comparison: StructureComparison) -> bool:
+    """Whether a coordinate may be a rotation: two motions of one body are coupled by its inertia."""
+    return any(t.place is not None and t.place.kind == "couples" for t in comparison.model.terms)
+
+
+def _length(comparison: StructureComparison, largest: float) -> Scale:
+    """Metres become mm where that is easier to read; what may be an angle stays."""
+    return power("m or rad", largest) if _turns(comparison) else length("m", largest)
+
+
+def _sensors(comparison: StructureComparison) -> Columns:
+    prediction = comparison.prediction
+    names = [str(s) for s in prediction.prepared.sensors]
+    units = [
+        f"{s.motion} / {in_text(_motion_scale(comparison, i).unit)}" for i, s in enumerate(prediction.prepared.sensors)
+    ]
+    at = [s.coordinate for s in prediction.prepared.sensors]
+    errors, floors = 100.0 * prediction.errors, 100.0 * prediction.floors
+    return {"name": names, "at": at, "unit": units, "error": errors, "floor": floors}
+
+
+def _joined(parts: Iterator[tuple[str, Mapping[str, Floats]]], names: Sequence[str]) -> Columns:
+    """Columns of all places, sensors or candidates below each other; each part is what marks it, and its columns."""
+    marks, found = list[str](), {name: list[Floats]() for name in names}
+    for mark, columns in parts:
+        marks += [mark] * len(columns[names[0]])
+        for name in names:
+            found[name].append(columns[name])
+    return {"of": marks, **{n: np.concatenate(c) if c else np.empty(0) for n, c in found.items()}}
+
+
+def _motion_scale(comparison: StructureComparison, i: int) -> Scale:
+    """Unit in which the motion of a sensor is easy to read."""
+    unit = SI_UNITS[comparison.prediction.prepared.sensors[i].motion]
+    most = float(np.max(np.abs(comparison.prediction.measured[:, i]), initial=0.0))
+    if _turns(comparison):
+        return power(unit.replace("m", "(m or rad)", 1) if "/" in unit else "m or rad", most)
+    return length(unit, most) if unit == "m" else rate(unit, most)
+
+
+def _motions(comparison: StructureComparison, close: bool = False) -> Columns:
+    """Measured and predicted motion of every sensor and their difference, on the part that is judged.
+
+    Or ``close`` up where that is largest.
+    """
+    prediction = comparison.prediction
+    time = prediction.prepared.record.time[slice(*prediction.prepared.judge)]
+
+    def parts() -> Iterator[tuple[str, Mapping[str, Floats]]]:
+        for i, sensor in enumerate(prediction.prepared.sensors):
+            near = closeup(prediction.residual[:, i]) if close else slice(None)
+            motions = {
+                "measured": prediction.measured[near, i], "predicted": prediction.predicted[near, i],
+                "difference": prediction.residual[near, i],
+            }  # fmt: skip
+            factor = _motion_scale(comparison, i).factor
+            shown = {name: decimate.extremes(x) / factor for name, x in motions.items()}
+            yield str(sensor), {"t": decimate.times(time[near]), **shown}
+
+    return _joined(parts(), ("t", "measured", "predicted", "difference"))
+
+
+def _spectra(comparison: StructureComparison) -> Columns:
+    """Density of the difference of every sensor, and of its noise, over its rms motion."""
+    prediction = comparison.prediction
+
+    def parts() -> Iterator[tuple[str, Mapping[str, Floats]]]:
+        for i, sensor in enumerate(prediction.prepared.sensors):
+            left, dt = prediction.residual[:, i] / prediction.size[i], prediction.prepared.dt
+            f, density = autospectrum(left, dt, segments_of(len(left)))
+            inside = (f > 0.0) & (f <= highest_frequency(comparison))
+            noise = prediction.floors[i] / np.sqrt(0.5 / dt)
+            values = {"f": f[inside], "difference": np.sqrt(density[inside]), "noise": np.full(inside.sum(), noise)}
+            yield str(sensor), values
+
+    return _joined(parts(), ("f", "difference", "noise"))
+
+
+def _maps(
+    comparison: StructureComparison, labels: Mapping[frozenset[str], str], along: Scale, force: Scale
+) -> Columns:  # fmt: skip
+    def parts() -> Iterator[tuple[str, Mapping[str, Floats]]]:
+        for place, _ in comparison.forces.aligned:
+            curve = comparison.forces.curves.get(place.label)
+            if curve is not None and place.path in labels:
+                half = NINETY_FIVE * curve.error
+                values = {"mean": curve.mean, "low": curve.mean - half, "high": curve.mean + half}
+                scaled = {name: x / force.factor for name, x in values.items()}
+                yield labels[place.path], {"at": curve.at / along.factor, **scaled}
+
+    return _joined(parts(), ("at", "mean", "low", "high"))
+
+
+def _force(comparison: StructureComparison, labels: Mapping[frozenset[str], str], force: Scale) -> Columns:
+    """Density of the force that each place lacks."""
+    frequency, densities = missing_force_spectra(comparison)
+    inside = (frequency > 0.0) & (frequency <= highest_frequency(comparison))
+
+    def parts() -> Iterator[tuple[str, Mapping[str, Floats]]]:
+        for path, density in densities.items():
+            if path in labels and np.all(density[inside] > 0.0):
+                yield labels[path], {"f": frequency[inside], "force": np.sqrt(density[inside]) / force.factor}
+
+    return _joined(parts(), ("f", "force"))
+
+
+def _stiffness(comparison: StructureComparison, labels: Mapping[frozenset[str], str]) -> tuple[Columns, str]:
+    """Dynamic stiffness of each connection with 95 % intervals and that of the model, and their unit."""
+    found = dynamic_stiffnesses(comparison)
+    scale = power("N/m", max((float(np.max(np.abs(s.model), initial=0.0)) for s in found.values()), default=1.0))
+
+    def parts() -> Iterator[tuple[str, Mapping[str, Floats]]]:
+        for path, read in found.items():
+            if path in labels:
+                half = NINETY_FIVE * read.error
+                values = {
+                    "measured": read.measured, "low": read.measured - half, "high": read.measured + half,
+                    "model": read.model,
+                }  # fmt: skip
+                scaled = {name: x / scale.factor for name, x in values.items()}
+                yield labels[path], {"f": read.frequency, **scaled}
+
+    return _joined(parts(), ("f", "measured", "low", "high", "model")), in_text(scale.unit)
+
+
+def _constancy(stage: PlacedStage) -> Columns:
+    """A(f) of each candidate with 95 % intervals."""
+
+    def parts() -> Iterator[tuple[str, Mapping[str, Floats]]]:
+        for row in stage.diagnosis.candidates if stage.diagnosis is not None else ():
+            if row.flatness is not None:
+                factor = power_of_ten(abs(row.coefficient))[0]
+                value, half = row.flatness.value.real / factor, NINETY_FIVE * row.flatness.error / factor
+                yield row.name, {"f": row.flatness.at, "value": value, "low": value - half, "high": value + half}
+
+    return _joined(parts(), ("f", "value", "low", "high"))

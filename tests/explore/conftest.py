@@ -1,0 +1,46 @@
+"""A browser; and a short record of a frame with a hardening joint, of which its owner's model knows nothing."""
+
+import os
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Page, sync_playwright
+
+from scripts.page_picture import MISSING, QUIET, browser
+from study.equations.model_file import format_model, read_model
+from study.records.excitation import Excitation, force
+from study.structure.structure_record import write_structure_csv
+from study.structure.structure_simulation import simulate_structure
+
+FRAME = Path(__file__).parents[2] / "models" / "structures" / "frame.yaml"
+
+
+@pytest.fixture(scope="session")
+def hall(tmp_path_factory):
+    """Folder with ``frame.csv`` and ``frame.yaml``."""
+    folder, frame = tmp_path_factory.mktemp("hall"), read_model(FRAME)
+    drive = force(Excitation(level=400.0, cutoff=12.5), 1600, 0.02, 1)
+    record, rng = simulate_structure(frame, {"shaker": drive}, 0.02), np.random.default_rng(5)
+    kept = {s: x for s, x in record.motions.items() if s.motion == "displacement"}
+    noisy = {s: x + 0.05 * np.std(x) * rng.standard_normal(len(x)) for s, x in kept.items()}
+    write_structure_csv(record.with_motions(noisy), folder / "frame.csv")
+    believed = frame.without_term("cubic_stiffness[floor2-floor3]")
+    model = replace(believed, name="frame").with_values(dict.fromkeys(believed.values, None))
+    (folder / "frame.yaml").write_text(f"# hall 3\n{format_model(model)}")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Page]:
+    """An empty page of a browser."""
+    where = browser()
+    if where is None:
+        pytest.fail(MISSING) if os.environ.get("CI") else pytest.skip(MISSING)
+    with sync_playwright() as playwright:
+        started = playwright.chromium.launch(executable_path=where, args=list(QUIET))
+        opened = started.new_page(viewport={"width": 1280, "height": 900})
+        yield opened
+        started.close()

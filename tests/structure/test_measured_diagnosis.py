@@ -1,0 +1,106 @@
+"""What is missing between sensors where the linear part is as measured: effect and place, on the beam."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study.cli import main
+from study.equations.model_file import parse_model, read_model
+from study.equations.terms import LIBRARY
+from study.records.excitation import Excitation, force
+from study.structure.measured_comparison import compare_measured
+from study.structure.measured_diagnosis import diagnose_measured
+from study.structure.measured_report import measured_in_words
+from study.structure.measured_screening import between_sensors, measured_entries
+from study.structure.prepared_structure import prepare_structure
+from study.structure.structure_record import Sensor, StructureRecord, write_structure_csv
+from study.structure.structure_simulation import simulate_structure
+
+ROOT = Path(__file__).parents[2]
+DT, SAMPLES = 0.005, 4000
+BARE = "name: bare\ncoordinates: [p4, p10]\nforces: {shaker: p4}\nlinear: measured\nterms: []\n"
+OTHERS = tuple(name for name in LIBRARY if name != "cubic_stiffness")  # left out: all effects would take a minute
+
+
+@pytest.fixture(scope="module")
+def record():
+    """Two displacements of the beam at 1 % noise."""
+    model = read_model(ROOT / "models" / "structures" / "beam.yaml")
+    drive = force(Excitation(level=1.0, reading="filtered", cutoff=30.0), SAMPLES, DT, 3)
+    exact, rng = simulate_structure(model, {"shaker": drive}, DT, steps_per_sample=4), np.random.default_rng(4)
+    shown = {s: x for s, x in exact.motions.items() if s in {Sensor(p, "displacement") for p in ("p4", "p10")}}
+    noisy = {s: x + 0.1 * np.std(x) * rng.standard_normal(len(x)) for s, x in shown.items()}
+    return StructureRecord(DT, exact.forces, noisy, name="beam")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, record):
+    place = tmp_path_factory.mktemp("beam")
+    write_structure_csv(record, place / "beam.csv")
+    (place / "bare.yaml").write_text(BARE)
+    return place
+
+
+def test_effect_and_place_are_named_and_add_finds_the_coefficient(folder, capsys):
+    data, model, out = str(folder / "beam.csv"), str(folder / "bare.yaml"), str(folder / "out")
+    without = [word for name in OTHERS for word in ("--without", name)]
+    assert main(["diagnose", data, "--model", model, "--out", out, *without]) == 0
+    found = json.loads((folder / "out" / "diagnosis.json").read_text())
+    first = found["candidates"][0]
+    assert found["verdict"] == "missing_effect"
+    assert (first["term"], first["between"]) == ("cubic_stiffness", ["ground", "p10"])
+    assert not first["tied_with"]
+    assert first["coefficient"] == pytest.approx(1e5, rel=0.03)
+    assert first["response_error"] == pytest.approx(first["noise_floor"], rel=0.05)
+    assert first["response_error"] < 0.3 * found["error"]["response"]
+    assert "Cubic stiffness between the ground and p10 is missing" in capsys.readouterr().out
+    command = ["add", model, "cubic_stiffness", "--between", "ground", "p10", "--data", data, "--out", out]
+    assert main(command) == 0
+    assert "k3[ground-p10]" in capsys.readouterr().out
+    assert read_model(folder / "bare.yaml").terms[-1].name == "cubic_stiffness[ground-p10]"
+    steps = json.loads((folder / "bare.history.json").read_text())["steps"]
+    assert steps[1]["error"]["response"] == pytest.approx(first["response_error"], rel=0.01)
+
+
+def test_nothing_is_missing_from_the_right_model(record):
+    model = parse_model(BARE.replace("[]", "\n  - {term: cubic_stiffness, between: [ground, p10]}"), Path("right.yaml"))
+    asked = tuple(name for name in LIBRARY if name != "quadratic_stiffness")
+    diagnosis = diagnose_measured(compare_measured(model, prepare_structure(record, model)), without=asked)
+    assert diagnosis.verdict == "nothing_missing"
+    assert "Nothing is missing" in measured_in_words(diagnosis)
+
+
+def test_candidates_are_nonlinear_effects_between_sensors(record):
+    model = parse_model(BARE, Path("bare.yaml"))
+    prepared = prepare_structure(record, model)
+    assert len(between_sensors(model, prepared)) == 3
+    names = {e.term.name for e in measured_entries(model, prepared)}
+    assert {"cubic_stiffness", "hysteresis", "dead_band", "coulomb_friction"} <= names
+    assert not names & {
+        "linear_stiffness",
+        "linear_damping",
+        "inertia",
+        "relaxation",
+        "constant_force",
+        "harmonic_force",
+    }
+
+
+def test_an_open_shape_parameter_is_searched_for():
+    """The report's Dead-Band system as a structure of one mode."""
+    text = (ROOT / "models" / "dead_band.yaml").read_text().replace("value", "at: x, value")
+    place = "coordinates: [x]\nforces: {shaker: x}\n"
+    whole = parse_model(text.replace("terms:", f"{place}terms:"), Path("whole.yaml"))
+    drive = force(Excitation(level=1.0, cutoff=12.5), 2048, 0.02, 1990)
+    record = simulate_structure(whole, {"shaker": drive}, 0.02, steps_per_sample=16)
+    shown = StructureRecord(
+        0.02, record.forces, {s: x for s, x in record.motions.items() if s.motion == "displacement"}
+    )
+    model = parse_model(f"{place}linear: measured\nterms: [{{term: dead_band, at: x}}]", Path("dead.yaml"))
+    comparison = compare_measured(model, prepare_structure(shown, model))
+    true, found = whole.numbers(), comparison.fit.values
+    assert "dead_band[x].u_g" in comparison.fit.keys
+    assert found["dead_band[x].u_g"] == pytest.approx(true["dead_band[x].u_g"], rel=0.02)
+    assert comparison.prediction.error < 0.02
