@@ -113,7 +113,7 @@ def in_order(rows: Sequence[R], white: Mapping[str, Floats], asked: int) -> list
 def distance(row: Row, other: Row, white: Mapping[str, Floats]) -> float:
     """By how many standard errors a candidate leaves more than another of samples that neither was fitted to.
 
-    Zero for two forms of one equation, whose predictions differ by no more than the integration itself. ``white`` holds
+    Zero for two forms of one equation, whose predictions differ by no more than the numbers' own error. ``white`` holds
     the whitened residuals by name.
     """
     apart = float(np.sqrt(np.mean((row.residual - other.residual) ** 2)))

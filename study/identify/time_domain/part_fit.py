@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model
 from study.identify.time_domain.free_run_fit import WHITE, FreeRunFit, fit_free_run
+from study.identify.time_domain.stretch_states import states_along
 from study.records.prepared import Prepared
 from study.support.autoregression import whitened
 from study.support.errors import DivergenceError
@@ -152,8 +153,4 @@ def judging_run(fit: FreeRunFit, prepared: Prepared) -> JudgingRun:
     begun = plan.judge[0] in prepared.record.joints
     if plan.judge[0] == fit.span[1] and not (fit.restarts or begun):
         return JudgingRun(fit, prepared, fit.first, fit.initial)
-    again = fit_free_run(
-        fit.model, prepared.record, held=tuple(fit.model.values), response=plan.response,
-        steps_per_sample=fit.steps_per_sample, span=plan.judge, lost=prepared.lost,
-    )  # fmt: skip
-    return JudgingRun(fit, prepared, plan.judge[0], again.initial)
+    return JudgingRun(fit, prepared, plan.judge[0], states_along(fit, prepared, plan.judge))
