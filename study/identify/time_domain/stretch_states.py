@@ -60,10 +60,12 @@ def is_poor(fit: FreeRunFit, measured: Floats) -> bool:
     """
     if not fit.converged:
         return True
-    if fit.rms < POOR * float(np.std(measured)):
-        return False
-    neighbours = 1.0 - float(np.mean(np.diff(fit.residual) ** 2)) / (2.0 * fit.rms**2)
-    return neighbours > SMOOTH
+    return fit.rms >= POOR * float(np.std(measured)) and is_smooth(fit.residual)
+
+
+def is_smooth(residual: Floats) -> bool:
+    """Whether neighbouring samples of a residual are as much alike as those of a motion."""
+    return 1.0 - float(np.mean(np.diff(residual) ** 2)) / (2.0 * float(np.mean(residual**2))) > SMOOTH
 
 
 def _held(fit: FreeRunFit, prepared: Prepared, span: tuple[int, int], initial: str | Floats) -> FreeRunFit:
