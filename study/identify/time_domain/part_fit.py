@@ -128,10 +128,18 @@ class JudgingRun:
         return run.respond({}, self.initial)[0][self.prepared.plan.judge[0] - self.first :]
 
     def derivatives(self, fit: FreeRunFit) -> Floats:
-        """As :func:`linearise`, on the judging part, of a fit with the same motion."""
+        """As :func:`linearise`, on the judging part, of a fit with the same motion.
+
+        Raises
+        ------
+        DivergenceError
+            If they leave the range of finite numbers, as they do long before the motion of a chaotic system.
+        """
         values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
         run = self._run(fit.keys, self.prepared.response, 1, fit.model)
         derivatives = run.respond(values, self.initial, run.moving)[1][self.prepared.plan.judge[0] - self.first :]
+        if not np.all(np.abs(derivatives) < FAR):
+            raise DivergenceError("the derivatives of the free run leave the range of numbers", run.time(0))
         return self.prepared.known(derivatives, self.prepared.plan.judge)
 
     def _run(self, keys: Sequence[str], motion: str, finer: int, model: Model | None = None) -> FreeRun:
