@@ -76,5 +76,5 @@ def accounted_test(
 
 
 def _lost(prediction: Prediction) -> bool:
-    """Whether a free run has lost the motion: it misses much, and what it leaves looks like a motion, not like noise."""
+    """Whether a free run has lost the motion: it misses much, and what it leaves looks like a motion, not as noise."""
     return prediction.error > LOST and is_smooth(prediction.residual)
