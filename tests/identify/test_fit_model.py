@@ -12,9 +12,9 @@ from study.identify.time_domain import fit_model as fits
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.fit_model import fit_model, with_term
 from study.identify.time_domain.multiple_shooting import is_chaotic
-from study.identify.time_domain.stretch_states import is_poor
 from study.identify.time_domain.part_fit import fit_part
 from study.identify.time_domain.settling import continued
+from study.identify.time_domain.stretch_states import is_poor
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.prepared import prepare_record, whole
 from study.support.errors import StudyError
