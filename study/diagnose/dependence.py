@@ -35,7 +35,7 @@ LONGEST = 16384  # samples of either part that are looked at
 
 
 @dataclass(frozen=True)
-class Leftover:
+class Unexplained:
     """A free run and what it leaves unexplained, on the fitting part and then on the judging part."""
 
     displacement: Floats  # of the free run, over its standard deviation; shape (n,)
@@ -47,7 +47,7 @@ class Leftover:
     base: Baseline  # of the fitted model: its transfer passes other forces, its residual holds the lines
 
 
-def leftover(base: Baseline, prepared: Prepared) -> Leftover:
+def unexplained(base: Baseline, prepared: Prepared) -> Unexplained:
     """What a fitted model leaves; where its free run does not stay finite to the end, on the fitting part alone."""
     fit, (first, last) = base.fit, prepared.plan.judge
     prepared = replace(prepared, plan=replace(prepared.plan, judge=(first, min(last, first + LONGEST))))
@@ -70,7 +70,7 @@ def leftover(base: Baseline, prepared: Prepared) -> Leftover:
     u, v, residual, slopes = rows
     first, last = len(fit.keys), len(shaped.keys)
     edges = first + np.cumsum([0, *(len(texts) for texts in families.values())])
-    return Leftover(
+    return Unexplained(
         displacement=u / np.std(u), velocity=v / np.std(v), residual=residual,
         own=np.hstack([slopes[:, :first], slopes[:, last:]]),
         shapes={name: slopes[:, a:b] for name, (a, b) in zip(families, pairwise(edges), strict=True)},
@@ -95,12 +95,12 @@ def _with_shapes(fit: FreeRunFit, texts: Sequence[str]) -> FreeRunFit:
     return replace(fit, model=model, keys=keys, values=np.append(fit.values, np.zeros(len(texts))))
 
 
-def explained_by(left: Leftover) -> dict[str, float]:
+def explained_by(left: Unexplained) -> dict[str, float]:
     """Held-out share of the residual that each family of shapes explains; at most one, negative for nothing."""
     return {name: gain.explained for name, gain in _families(left).items()}
 
 
-def significant(left: Leftover, level: float) -> float:
+def significant(left: Unexplained, level: float) -> float:
     """Largest held-out share that shapes of the motion, its past or time explain, and not by chance.
 
     All families of shapes are asked, and each shape of the motion and its past by itself: one coefficient sees less
@@ -112,7 +112,7 @@ def significant(left: Leftover, level: float) -> float:
     return max((0.0, *(g.explained for g in gains if g.p_value * len(gains) < level)))
 
 
-def _families(left: Leftover) -> dict[str, Gain]:
+def _families(left: Unexplained) -> dict[str, Gain]:
     families = {**left.shapes, "past": _passed(left, _states(left)), "time": _passed(left, _times(left))}
     found = {name: _held_out(left, columns) for name, columns in families.items()}
     for name, x in (("displacement", left.displacement), ("velocity", left.velocity)):
@@ -121,7 +121,7 @@ def _families(left: Leftover) -> dict[str, Gain]:
     return found
 
 
-def _one_by_one(left: Leftover, columns: Floats) -> list[Gain]:
+def _one_by_one(left: Unexplained, columns: Floats) -> list[Gain]:
     """What each column explains by itself beside the model's own (Frisch and Waugh, 1933: one regression for all)."""
     both = np.column_stack([left.residual, columns])
     amounts = np.column_stack([least_squares(left.own[: left.split], x, 1e-6) for x in both[: left.split].T])
@@ -149,7 +149,7 @@ def _functions(x: str, size: float) -> list[str]:
     return [*powers, f"abs({x})", f"{x}*abs({x})", f"sgn({x})", *limits]
 
 
-def _states(left: Leftover) -> list[Floats]:
+def _states(left: Unexplained) -> list[Floats]:
     """Relaxations of several speeds, of the motion and of where it turned."""
     steps: Floats = np.diff(left.displacement, prepend=left.displacement[0])
     rate = float(np.std(steps) / np.std(left.velocity))  # time step in units of displacement over velocity
@@ -181,7 +181,7 @@ def hysteretic(steps: Floats, beta: float) -> Floats:
     return state
 
 
-def _times(left: Leftover) -> list[Floats]:
+def _times(left: Unexplained) -> list[Floats]:
     turn = 2.0 * np.pi * np.arange(len(left.residual)) / len(left.base.fit.residual)
     shapes: list[Floats] = []
     for line in modulation_lines(left.base)[:3]:
@@ -191,7 +191,7 @@ def _times(left: Leftover) -> list[Floats]:
     return shapes
 
 
-def _passed(left: Leftover, shapes: Sequence[Floats]) -> Floats:
+def _passed(left: Unexplained, shapes: Sequence[Floats]) -> Floats:
     """Forces of these shapes passed through the linear system, shape (n, shapes)."""
     n = len(left.residual)
     if not shapes:  # a spectrum without a single line has no times: what is nothing explains nothing
@@ -203,7 +203,7 @@ def _passed(left: Leftover, shapes: Sequence[Floats]) -> Floats:
     return np.column_stack([irfft(transfer * rfft(s, size), size)[:n] for s in shapes])
 
 
-def _held_out(left: Leftover, columns: Floats) -> Gain:
+def _held_out(left: Unexplained, columns: Floats) -> Gain:
     """What amounts from the fitting part, beside the model's own, explain of the judging part."""
     design = np.hstack([left.own, columns])
     early, late = design[: left.split], design[left.split :]
@@ -212,6 +212,6 @@ def _held_out(left: Leftover, columns: Floats) -> Gain:
     return statistics.beside(left.residual[left.split :], late @ amounts, _beside_own(left))
 
 
-def _beside_own(left: Leftover) -> Floats:
+def _beside_own(left: Unexplained) -> Floats:
     """Residual of the judging part beside what the model's own coefficients, fitted to both parts, take of it."""
     return (left.residual - left.own @ least_squares(left.own, left.residual, 1e-6))[left.split :]

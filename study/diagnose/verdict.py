@@ -33,7 +33,7 @@ PERIODS = 100.0  # of the motion that a search uses, at least
 SHORT, LONG = 2048, 16384  # samples: it uses half of the fitting part if that is more, within these limits
 SETTLED = 4  # of the candidates, the best: fitted on the whole fitting part and with enough steps
 MOST = 0.5  # of what is unexplained: what an effect of a component, or of a decay, explains that is named first
-PAIRED = 1  # the best so many candidates are tried together with every other
+PAIRED = 3  # the best so many candidates are tried together with every other
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ def diagnose(
     tried = candidates.try_all(candidates.candidate_terms(base, extra, without), base, look, progress)
     rows = rank(with_best_settled(tried, prepared), comparison)
     verdict, rows, left, pair = _decide(rows, base, comparison)
-    families = dependence.explained_by(dependence.leftover(base, look)) if verdict == UNKNOWN else {}
+    families = dependence.explained_by(dependence.unexplained(base, look)) if verdict == UNKNOWN else {}
     return Diagnosis(verdict, comparison, tuple(rows), left, pair, families)
 
 
@@ -183,6 +183,6 @@ def _left(fit: FreeRunFit, prediction: Prediction) -> float:
     Noise may have any colour; what physics leaves depends on the motion.
     """
     look = prediction.prepared.shortened(min(len(fit.residual), LONG))
-    left = dependence.leftover(shape_search.baseline(continued(fit, look), look), look)
+    left = dependence.unexplained(shape_search.baseline(continued(fit, look), look), look)
     nameless = 0.1 * ALPHA  # what no candidate explains is believed less easily than what one does
     return prediction.error * float(np.sqrt(dependence.significant(left, nameless)))

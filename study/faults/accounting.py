@@ -7,10 +7,11 @@ from study.compare.by_estimator import FREE_RUN
 from study.compare.comparison import Comparison, compare
 from study.equations.model import Model
 from study.faults.correction import corrected
-from study.faults.fault import FORCE_NOISE, Fault
+from study.faults.drift import slow_response
+from study.faults.fault import DRIFT, FORCE_NOISE, Fault
 from study.faults.force_noise import force_noise
 from study.faults.imposed import FAULTS
-from study.faults.leftover import leftover
+from study.faults.leftover import better, leftover
 from study.faults.search import first_faults, search
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -82,12 +83,37 @@ def accounted(
         return _compared(model, fewer, faults, None, estimator, progress)
     fit = fit_model(model, fewer)
     found, near = search(prepared, fit if fewer is first else _on_all(fit, first), faults, asked)
+    if DRIFT in asked:
+        found, near = _beneath_a_drift(model, prepared, faults, asked, (found, near))
     if found == faults:
         return _compared(model, fewer, found, fit, estimator, progress)
     final = corrected(prepared, found)
     kept = needed(final)
     best = _fitted(model, kept, near if kept is final else _on_all(near, kept))
     return _compared(model, kept, found, best, estimator, progress)
+
+
+def _beneath_a_drift(
+    model: Model, prepared: Prepared, faults: Sequence[Fault], asked: Sequence[str],
+    plain: tuple[tuple[Fault, ...], FreeRunFit],
+) -> tuple[tuple[Fault, ...], FreeRunFit]:  # fmt: skip
+    """The better end of two searches for faults: the plain one, and one that a large drift cannot lead astray.
+
+    The second begins with the model fitted to the response without its slowest lines, where these stand out.
+    """
+    slow = slow_response(corrected(prepared, faults), len(asked))
+    if slow is None or slow.waveform is None:
+        return plain
+    try:
+        begun = fit_model(model, corrected(prepared, (*faults, slow)))
+    except StudyError:
+        return plain
+    whole = replace(begun, residual=begun.residual + slow.waveform[slice(*begun.span)])  # of the record as it is
+    other = search(prepared, whole, faults, asked)
+    ends = [leftover(fit, corrected(prepared, found)) for found, fit in (plain, other)]
+    if ends[1] is None or not any(fault.fault == DRIFT for fault in other[0]):
+        return plain
+    return other if ends[0] is None or better(ends[0], ends[1], 1) else plain
 
 
 def _all_samples(prepared: Prepared) -> Prepared:

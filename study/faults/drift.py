@@ -10,6 +10,7 @@ from scipy.special import fdtrc
 
 from study.faults.fault import DRIFT, Fault
 from study.faults.leftover import Leftover
+from study.records.prepared import Prepared
 from study.support.arrays import Floats
 from study.support.least_squares import least_squares
 from study.support.thresholds import ALPHA, TOLERANCE
@@ -24,13 +25,11 @@ def drift(left: Leftover, asked: int) -> Fault | None:
     The F test of both groups of lines, of which a smooth spectrum makes independent numbers of one variance.
     """
     places, residual = _in_time(left)
-    if len(residual) < FEWEST:
+    found = _slow_lines(residual, asked)
+    if found is None:
         return None
+    count, noise = found
     lines = np.asarray(dct(residual, norm="ortho"), dtype=np.float64)
-    if _p_value(lines, 1, SLOWEST, BESIDE) * asked >= ALPHA:
-        return None
-    count = _extent(lines, ALPHA)
-    noise = float(np.mean(lines[count + 1 : 3 * count + SLOWEST + 1] ** 2))
     power = max(float(np.sum(lines[1 : count + 1] ** 2)) - count * noise, 0.0) / len(residual)
     if power <= (TOLERANCE * left.size) ** 2:
         return None
@@ -42,13 +41,43 @@ def drift(left: Leftover, asked: int) -> Fault | None:
     return Fault(DRIFT, left.prepared.response, float(np.sqrt(power)), error, unit, explained, waveform)
 
 
+def slow_response(prepared: Prepared, asked: int) -> Fault | None:
+    """The slowest lines of the response itself, where they hold more than those beside them; None elsewhere.
+
+    A drift larger than the motion takes the coefficients with it: a mass almost without a spring follows any ramp. What
+    is said of it here, the mean included, is no more than where a fit that does not follow it may begin.
+    """
+    spans = prepared.plan.fit, prepared.plan.judge
+    places = np.unique(np.concatenate([np.arange(*span) for span in spans])).astype(np.float64)
+    values = prepared.record[prepared.response][places.astype(np.int64)]
+    found = _slow_lines(values, asked)
+    if found is None:
+        return None
+    waveform = _slow(places, values, found[0], len(prepared.record)) + np.mean(values)
+    return Fault(DRIFT, prepared.response, float(np.std(waveform)), waveform=waveform)
+
+
+def _slow_lines(values: Floats, asked: int) -> tuple[int, float] | None:
+    """How many of the slowest lines stand above the next, and the mean power of these; None without any."""
+    if len(values) < FEWEST:
+        return None
+    lines = np.asarray(dct(values, norm="ortho"), dtype=np.float64)
+    if _p_value(lines, 1, SLOWEST, BESIDE) * asked >= ALPHA:
+        return None
+    count = _extent(lines, ALPHA)
+    return count, float(np.mean(lines[count + 1 : 3 * count + SLOWEST + 1] ** 2))
+
+
 def slow_part(left: Leftover, count: int) -> Floats:
     """The ``count`` slowest cosines of a residual along the whole record, without their mean, shape (n,)."""
-    places, residual = _in_time(left)
+    return _slow(*_in_time(left), count, len(left.prepared.record))
+
+
+def _slow(places: Floats, values: Floats, count: int, length: int) -> Floats:
     first, last = places[0], places[-1]
     shapes = _cosines((places - first + 0.5) / (last - first + 1.0), count)
-    amounts = least_squares(shapes, residual)
-    everywhere = np.clip(np.arange(len(left.prepared.record), dtype=np.float64), first, last)
+    amounts = least_squares(shapes, values)
+    everywhere = np.clip(np.arange(length, dtype=np.float64), first, last)
     slow = _cosines((everywhere - first + 0.5) / (last - first + 1.0), count)[:, 1:] @ amounts[1:]
     return np.asarray(slow, dtype=np.float64)
 

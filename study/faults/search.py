@@ -14,7 +14,7 @@ from scipy.special import ndtr
 from study.faults import adjustable, physics
 from study.faults.correction import corrected
 from study.faults.drift import drift
-from study.faults.fault import CLIPPING, DRIFT, DROP_OUTS, FORCE_NOISE, HUM, SPIKES, Fault
+from study.faults.fault import CLIPPING, DRIFT, DROP_OUTS, FORCE_NOISE, HUM, OFFSET, SPIKES, Fault
 from study.faults.force_noise import force_noise
 from study.faults.hum import hum, is_of_the_mains, line
 from study.faults.leftover import Leftover, better, leftover, share
@@ -251,6 +251,8 @@ def _tied(stage: Stage, one: Refined, effect: Leftover) -> Stage | None:
     names = _added(effect, stage)
     if _no_effect(effect, stage) or (one.fault.fault == HUM and _beyond_reason(stage, effect)):
         return _accepted(stage, one)
+    if one.fault.fault == OFFSET and any(f.fault == DRIFT for f in stage.faults):
+        return _accepted(stage, one)  # a channel that drifts has no zero of its own
     fault = _explaining(one.fault, stage.rich, one.left).with_rivals(*names)
     return replace(stage, faults=(*stage.faults, fault), rich=effect)
 

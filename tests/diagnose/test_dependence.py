@@ -19,7 +19,7 @@ from study.records.record import Record
 
 def left_by(model, record):
     prepared = prepare_record(record)
-    return dependence.leftover(shape_search.baseline(fit_model(model, prepared), prepared), prepared)
+    return dependence.unexplained(shape_search.baseline(fit_model(model, prepared), prepared), prepared)
 
 
 def test_an_imitator_under_noise_leaves_a_shape_and_the_truth_leaves_none():

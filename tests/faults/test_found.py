@@ -113,6 +113,23 @@ def test_what_an_effect_does_as_well_is_said_and_left_alone(measured, systems):
     assert found.value == pytest.approx(known["value"], rel=0.05)
 
 
+@pytest.mark.parametrize("size", [0.5, 3.0])
+@pytest.mark.parametrize("shape", ["ramp", "walk"])
+def test_a_drift_from_zero_is_no_constant_force_however_large(shape, size, measured, systems):
+    record = measured("linear")
+    walk = np.cumsum(np.random.default_rng(4).standard_normal(len(record)))
+    slow = np.linspace(0.0, 1.0, len(record)) if shape == "ramp" else np.convolve(walk, np.ones(2001) / 2001, "same")
+    slow = slow * size * np.std(record["displacement"]) / np.std(slow)
+    faulty = record.with_channels({"displacement": record["displacement"] + slow})
+    result = accounted(unknown(systems["linear"]), prepare_record(faulty))
+    found = {fault.fault: fault for fault in result.faults}
+    assert set(found) == {"drift", "offset"}
+    assert all(fault.corrected for fault in found.values())
+    assert found["drift"].value == pytest.approx(np.std(slow), rel=0.03)
+    assert found["offset"].value == pytest.approx(np.mean(slow), rel=0.03)
+    assert all(abs(z) < FAR for z in off_by(result, systems["linear"]).values())
+
+
 def test_a_held_value_is_undone_and_not_searched_for(measured, systems):
     faulty, known = impose(measured("duffing"), "displacement", "delay", np.random.default_rng(11))
     prepared, model = prepare_record(faulty), unknown(systems["duffing"])
