@@ -47,8 +47,9 @@ def gain(before: Floats, after: Floats, *, evenly: bool = False) -> Gain:
 
     ``before - after`` is the change of the prediction, fitted elsewhere. If it is useless, its product with
     ``before`` is of either sign: that is tested, block by block. A test of whether the residual's power falls
-    would be half as sensitive, as the change adds its own power to the residual. With ``evenly`` the blocks of the test
-    hold as much of the change each: of a decay all of it may lie in one block in fifty, among forty-nine of noise.
+    would be half as sensitive, as the change adds its own power to the residual. With ``evenly`` the test is made
+    in blocks with equal shares of the change as well, and the smaller p value of both doubled: of a decay, all of it
+    may lie in one block in fifty, among forty-nine of noise.
     """
     a, apart, b = (block_powers(values) for values in (before, before - after, after))
     total = float(np.sum(a))
@@ -58,8 +59,10 @@ def gain(before: Floats, after: Floats, *, evenly: bool = False) -> Gain:
     left_out = 1.0 - (np.sum(b) - b) / np.maximum(np.sum(a) - a, np.finfo(float).tiny)
     n = len(a)
     error = float(np.sqrt((n - 1) / n * np.sum((left_out - np.mean(left_out)) ** 2)))
-    products = _of_even_changes(before, before - after) if evenly else a + apart - b
-    return Gain(explained, error, _p_value(products))
+    p_value = _p_value(a + apart - b)
+    if evenly:
+        p_value = min(1.0, 2.0 * min(p_value, _p_value(_of_even_changes(before, before - after))))
+    return Gain(explained, error, p_value)
 
 
 def _of_even_changes(before: Floats, change: Floats) -> Floats:
