@@ -66,14 +66,19 @@ def gain(before: Floats, after: Floats, *, evenly: bool = False) -> Gain:
 
 
 def _of_even_changes(before: Floats, change: Floats) -> Floats:
-    """Sum of the products of a residual and a change, in blocks with equal shares of the change's power."""
-    power = np.cumsum(change**2)
-    count = max(2, min(BLOCKS, len(change) // SHORTEST))
-    wanted = np.searchsorted(power, np.linspace(0.0, float(power[-1]), count + 1)[1:-1]).tolist()
+    """Sum of the products of a residual and a change, in blocks with equal shares of the change's power.
+
+    None is shorter than ``SHORTEST``: what loud ones have more is shared by those that follow.
+    """
+    power = np.concatenate([[0.0], np.cumsum(change**2)])
+    count, last = max(2, min(BLOCKS, len(change) // SHORTEST)), len(change)
     edges = [0]
-    for edge in wanted:
-        if edge - edges[-1] >= SHORTEST and edge < len(change):
-            edges.append(edge)
+    while len(edges) < count:
+        wanted = power[edges[-1]] + (power[-1] - power[edges[-1]]) / (count - len(edges) + 1)
+        edge = max(int(np.searchsorted(power, wanted)), edges[-1] + SHORTEST)
+        if edge > last - SHORTEST:
+            break
+        edges.append(edge)
     return np.add.reduceat(before * change, edges)
 
 
