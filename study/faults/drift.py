@@ -5,14 +5,13 @@ adds its own at the slowest.
 """
 
 import numpy as np
-from scipy.fft import dct
+from scipy.fft import dct, idct
 from scipy.special import fdtrc
 
 from study.faults.fault import DRIFT, Fault
 from study.faults.leftover import Leftover
-from study.records.prepared import Prepared
+from study.records.prepared import FORCE, Prepared
 from study.support.arrays import Floats
-from study.support.least_squares import least_squares
 from study.support.thresholds import ALPHA, TOLERANCE
 
 SLOWEST, BESIDE = 8, 32  # cosines, of half a period each more than the one before, that are held against the next
@@ -42,18 +41,17 @@ def drift(left: Leftover, asked: int) -> Fault | None:
 
 
 def slow_response(prepared: Prepared, asked: int) -> Fault | None:
-    """The slowest lines of the response itself, where they hold more than those beside them; None elsewhere.
+    """The slowest lines of the response itself, where they hold more than those beside them and the force's do not.
 
     A drift larger than the motion takes the coefficients with it: a mass almost without a spring follows any ramp. What
     is said of it here, the mean included, is no more than where a fit that does not follow it may begin.
     """
     spans = prepared.plan.fit, prepared.plan.judge
     places = np.unique(np.concatenate([np.arange(*span) for span in spans])).astype(np.float64)
-    values = prepared.record[prepared.response][places.astype(np.int64)]
-    found = _slow_lines(values, asked)
-    if found is None:
+    values, force = (prepared.record[name][places.astype(np.int64)] for name in (prepared.response, FORCE))
+    if _slow_lines(values, asked) is None or _slow_lines(force, asked) is not None:
         return None
-    waveform = _slow(places, values, found[0], len(prepared.record)) + np.mean(values)
+    waveform = _slow(places, values, SLOWEST, len(prepared.record)) + np.mean(values)
     return Fault(DRIFT, prepared.response, float(np.std(waveform)), waveform=waveform)
 
 
@@ -74,12 +72,11 @@ def slow_part(left: Leftover, count: int) -> Floats:
 
 
 def _slow(places: Floats, values: Floats, count: int, length: int) -> Floats:
-    first, last = places[0], places[-1]
-    shapes = _cosines((places - first + 0.5) / (last - first + 1.0), count)
-    amounts = least_squares(shapes, values)
-    everywhere = np.clip(np.arange(length, dtype=np.float64), first, last)
-    slow = _cosines((everywhere - first + 0.5) / (last - first + 1.0), count)[:, 1:] @ amounts[1:]
-    return np.asarray(slow, dtype=np.float64)
+    """The slowest cosines of values at these places; a straight line bridges what lies between the parts."""
+    first, last = int(places[0]), int(places[-1])
+    lines = np.asarray(dct(np.interp(np.arange(first, last + 1), places, values), norm="ortho"), dtype=np.float64)
+    lines[0], lines[count + 1 :] = 0.0, 0.0
+    return np.pad(np.asarray(idct(lines, norm="ortho"), dtype=np.float64), (first, length - 1 - last), "edge")
 
 
 def _in_time(left: Leftover) -> tuple[Floats, Floats]:
@@ -87,10 +84,6 @@ def _in_time(left: Leftover) -> tuple[Floats, Floats]:
     places, residual = np.concatenate(left.samples), np.concatenate(left.residual)
     order = np.argsort(places)
     return places[order], residual[order]
-
-
-def _cosines(x: Floats, count: int) -> Floats:
-    return np.cos(np.pi * np.outer(x, np.arange(count + 1)))
 
 
 def _p_value(lines: Floats, first: int, last: int, beside: int) -> float:

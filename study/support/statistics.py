@@ -100,7 +100,8 @@ def worse(first: Floats, second: Floats) -> float:
     standard errors, which a few strong blocks can hide in their scatter, and the signed ranks (Wilcoxon, 1945), where
     they count no more than weak ones.
     """
-    d = block_powers(first) - block_powers(second)
+    size = 2.0 ** math.frexp(max(float(np.max(np.abs(first))), float(np.max(np.abs(second)))))[1]  # of one far astray
+    d = block_powers(first / size) - block_powers(second / size)
     spread, mean = float(np.std(d, ddof=1) / np.sqrt(len(d))), float(np.mean(d))
     by_mean = mean / spread if spread > 0.0 else math.copysign(math.inf, mean) if mean else 0.0
     n = len(d)

@@ -68,3 +68,11 @@ def test_what_lies_in_the_first_block_of_a_decay_is_seen_and_no_more_invented_fo
     assert np.median(seen) < 0.02
     assert np.median(plain) > 0.3, "in blocks of equal time the ranks of mere noise decide"
     assert np.mean(np.array(invented) < 0.05) < 0.07
+
+
+@pytest.mark.parametrize("far", [1e3, 1e170])
+def test_what_runs_far_astray_is_worse_however_far(far):
+    residual = np.random.default_rng(3).standard_normal(4800)
+    astray = far * np.random.default_rng(4).standard_normal(4800)
+    assert statistics.worse(astray, residual) > 4.0
+    assert statistics.worse(residual, astray) < -4.0

@@ -65,9 +65,7 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
     unknown = tuple(t for t in model.terms if None in t.parameters)
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
     look = shape_search.stretch(known, prepared) if unknown else prepared
-    fit = best_fit(known, look, first_starts(known, look))
-    if not fit.converged and any(term.name not in LINEAR for term in known.terms):
-        fit = better(fit, _built_up(known, look)) or fit
+    fit = _from_nothing(known, look)
     for entry in unknown:
         fit = with_term(fit, entry, shape_search.baseline(fit, look), look)
     ordered = replace(model, terms=tuple(next(t for t in fit.model.terms if t.name == e.name) for e in model.terms))
@@ -83,6 +81,20 @@ def _followed(fit: FreeRunFit, model: Model, prepared: Prepared) -> FreeRunFit:
     return fit
 
 
+def _from_nothing(model: Model, prepared: Prepared) -> FreeRunFit:
+    """The fit from the first starts; a nonlinear model that these bring to no minimum is built up term by term."""
+    fit, reason = None, None
+    try:
+        fit = best_fit(model, prepared, first_starts(model, prepared))
+    except StudyError as error:
+        reason = error
+    if (fit is None or not fit.converged) and any(term.name not in LINEAR for term in model.terms):
+        fit = better(fit, _built_up(model, prepared))
+    if fit is None:
+        raise reason or StudyError(why_no_response(model, prepared))
+    return fit
+
+
 def first_starts(model: Model, prepared: Prepared) -> list[dict[str, float]]:
     """Where a fit from nothing begins: the best linear approximation, and the reverse system's solution if any."""
     linear = linear_start(model, prepared)
@@ -91,31 +103,17 @@ def first_starts(model: Model, prepared: Prepared) -> list[dict[str, float]]:
 
 
 def _built_up(model: Model, prepared: Prepared) -> FreeRunFit | None:
-    """The fit of the first terms alone that comes to a minimum, the others added one by one; None without any.
+    """The fit of all terms but the last, and the last one added; None where either has no finite response.
 
     Terms that do nearly the same, as three laws of damping of one decay, lead a fit of all of them astray from afar.
     """
-    for count in range(len(model.terms) - 1, 0, -1):
-        fewer = replace(model, terms=model.terms[:count])
-        try:
-            fit = best_fit(fewer, prepared, first_starts(fewer, prepared))
-        except StudyError:
-            continue
-        if fit.converged:
-            return _with_the_others(fit, model, prepared)
-    return None
-
-
-def _with_the_others(fit: FreeRunFit, model: Model, prepared: Prepared) -> FreeRunFit | None:
-    for entry in model.terms[len(fit.model.terms) :]:
-        start = fit.model.numbers() | {key: value or 0.0 for key, value in entry.values.items()}
-        grown = fit.model.with_term(entry)
-        held = [key for key in model.held_keys if key in grown.values]
-        try:
-            fit = best_fit(grown, prepared, [start], held)
-        except StudyError:
-            return None
-    return fit
+    last = model.terms[-1]
+    try:
+        fit = fit_model(replace(model, terms=model.terms[:-1]), prepared)
+        start = fit.model.numbers() | {key: value or 0.0 for key, value in last.values.items()}
+        return best_fit(fit.model.with_term(last), prepared, [start], model.held_keys)
+    except StudyError:
+        return None
 
 
 def with_term(fit: FreeRunFit, entry: ModelTerm, base: Baseline, prepared: Prepared) -> FreeRunFit:
