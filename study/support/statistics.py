@@ -70,6 +70,8 @@ def _of_even_changes(before: Floats, change: Floats) -> Floats:
 
     None is shorter than ``SHORTEST``: what loud ones have more is shared by those that follow.
     """
+    peak = float(np.max(np.abs(change)))
+    change = change / peak if peak > 0.0 else change  # one that runs far astray would overflow
     power = np.concatenate([[0.0], np.cumsum(change**2)])
     count, last = max(2, min(BLOCKS, len(change) // SHORTEST)), len(change)
     edges = [0]
