@@ -15,6 +15,14 @@ with one_sentence():
 report: "rules/captions/workflow.rst"
 
 
+onstart:
+    # To hold to a number of jobs a second, Snakemake looks again a second later, after each job that has ended, for good:
+    # after fifty jobs fifty times a second, each time at every file that waiting jobs need, which takes a core. Here a job
+    # waits for nothing but a core, and the one that ends says so.
+    if workflow.local_exec:
+        workflow.scheduler.job_rate_limiter = None
+
+
 include: "rules/common.smk"
 include: "rules/reproduce.smk"
 include: "rules/claims.smk"

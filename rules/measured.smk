@@ -7,7 +7,9 @@
 from study.commands import measurements
 
 with one_sentence():
-    MEASUREMENTS = measurements.load(Path("config"), STUDY.cases)
+    MEASUREMENTS = measurements.load(
+        Path("config"), STUDY.cases, {"all", "gallery", "gallery_page", "campaign", *(rule.name for rule in workflow.rules)}
+    )
 
 CODE["measured"] = rests_on(Path("scripts/measured.py"))
 CODE["measured"] += [f"study/explore/page.{ending}" for ending in ("html", "css", "js")]

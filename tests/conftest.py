@@ -84,6 +84,13 @@ def systems() -> dict[str, Model]:
     return {name: build_model(name, {**LINEAR, **terms}) for name, terms in TABLE_1.items()}
 
 
+@pytest.fixture
+def numbers_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands draw nothing, which is half of their time: for tests of numbers that several commands tell."""
+    monkeypatch.setattr("study.figures.page.rendered", lambda *_: b"")
+    monkeypatch.setattr("study.explore.saved.saved", lambda _: b"")
+
+
 @pytest.fixture(scope="session")
 def make_model() -> Callable[[str, Mapping[str, Mapping[str, float]]], Model]:
     """``make_model(name, {term: values})``."""

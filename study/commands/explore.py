@@ -1,21 +1,31 @@
 """``study explore``: the four steps on a page in the browser."""
 
 import argparse
+from typing import TYPE_CHECKING
 
 from study.commands import structures
 from study.commands.command import Command, progress, whole
 from study.commands.record_arguments import (
     accounted_for,
+    accounted_together,
+    add_each_record_argument,
     add_record_arguments,
     inputs_of,
     out_folder,
     read_records,
-    refuse_groups,
+    separated_records,
+    sources,
 )
+
+if TYPE_CHECKING:
+    from study.compare.history import Step
+    from study.equations.model import Model
+    from study.explore.session import Session
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    add_record_arguments(parser, nargs=1, out="folder that Save writes to")
+    add_record_arguments(parser, out="folder that Save writes to")
+    add_each_record_argument(parser)
     parser.add_argument("--port", type=whole(0, 65535), help="of the page; 0 for any (default 5006 if free)")
     parser.add_argument("--no-browser", action="store_true", help="say the address and open nothing")
 
@@ -24,15 +34,12 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.equations.model_file import read_model
     from study.support.extras import needed
 
-    refuse_groups(arguments)
     if read_model(arguments.model).coordinates:
         structures.explore(arguments)
         return
     needed("bokeh", "'study explore'", "explore")
     from study.compare import history
-    from study.compare.comparison import STEPS
     from study.equations.model_file import WANTED, parse_model
-    from study.explore import session as sessions
     from study.explore.desk import Desk
     from study.explore.server import serve
     from study.support.file_sets import keep
@@ -42,16 +49,33 @@ def _run(arguments: argparse.Namespace) -> None:
     keep([arguments.model], [folder / arguments.model.name])
     steps = history.read(arguments.model)
     text = read_text(arguments.model, WANTED)
-    model = parse_model(text, arguments.model)
-    (record,) = read_records(arguments)
-    with progress("step", STEPS) as step:
-        accounted = accounted_for(arguments, model, record, arguments.records[0], progress=step)
-        session = sessions.begin_with(accounted.comparison, earlier=steps)
+    session = _begun(arguments, parse_model(text, arguments.model), steps)
     desk = Desk(session, arguments.model, text, folder, inputs_of(arguments))
     try:
         serve(desk, arguments.port, lambda address: _ready(address, not arguments.no_browser))
     except KeyboardInterrupt:
         print("\nended; what was not saved is gone")
+
+
+def _begun(arguments: argparse.Namespace, model: "Model", steps: "list[Step]") -> "Session":
+    """The session with the model as given, on one record or fitted to several together and to each by itself."""
+    from study.compare.comparison import STEPS
+    from study.explore import session as sessions
+    from study.explore.by_record import Several, by_record, of_own
+    from study.faults.accounting import Accounted
+
+    records = read_records(arguments)
+    together, marked, separate = separated_records(arguments, model, records)
+    many = len(records) > 1 and not separate
+    with progress("step", STEPS * (1 + len(records) * many)) as step:
+        found = accounted_together(arguments, together, marked, arguments.records[0], progress=step)
+        own: list[Accounted] = []
+        for record, path in zip(records, sources(arguments), strict=True) if many else ():
+            own.append(accounted_for(arguments, model, record, path, progress=step))
+    comparisons = [a.comparison for a in own]
+    several = Several(tuple(c.prepared for c in comparisons), tuple(records), separate)
+    known = of_own(comparisons) if own else by_record(several, found.comparison) if separate else None
+    return sessions.begin_with(found.comparison, earlier=steps, several=several, known=known)
 
 
 def _ready(address: str, browser: bool) -> None:
@@ -61,6 +85,8 @@ def _ready(address: str, browser: bool) -> None:
 
 COMMAND = Command(
     "explore", "the four steps on a page in the browser",
-    "study explore rig.csv --model rig.yaml\n  study explore rig.csv --model rig.yaml --port 5100 --no-browser",
+    "study explore rig.csv --model rig.yaml\n"
+    "  study explore low.csv mid.csv high.csv --model rig.yaml  # one model on all, and each record by itself\n"
+    "  study explore rig.csv --model rig.yaml --port 5100 --no-browser",
     _arguments, _run,
 )  # fmt: skip

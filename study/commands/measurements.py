@@ -56,10 +56,11 @@ class Measurement(Row):
     options: Annotated[tuple[str, ...], BeforeValidator(_words)]  # of ``study compare``
 
 
-def load(folder: Path, cases: Collection[str] = ()) -> Mapping[str, Measurement]:
+def load(folder: Path, cases: Collection[str] = (), targets: Collection[str] = ()) -> Mapping[str, Measurement]:
     """Read ``measurements.tsv`` of a folder; whether the data are there is not asked.
 
-    No record, nor the target of its climb, may have one of the names of ``cases``.
+    No record, nor the target of its climb, nor its entry, may have one of the names of ``cases`` or of the workflow's
+    other ``targets``.
 
     Raises
     ------
@@ -76,6 +77,8 @@ def load(folder: Path, cases: Collection[str] = ()) -> Mapping[str, Measurement]
             for name in (row.record, f"{row.record}_climb", row.entry):
                 case = f"{name!r} is a case of cases.tsv; give the record or the case another name"
                 expect(name not in cases, case)
+                other = f"{name!r} is another target of the workflow; give the record or its entry another name"
+                expect(name not in targets, other)
             expect(model.is_file(), f"there is no model {row.model!r}; models/ holds {known}")
         folder_named = os.environ.get(VARIABLE[1:]) or VARIABLE
         paths = tuple(path.replace(VARIABLE, folder_named, 1) for path in row.paths)

@@ -179,8 +179,11 @@ def explore(arguments: argparse.Namespace) -> None:
     from study.structure.structure_comparison import compare_structure
     from study.structure.structure_page import PAGE, structure_page
     from study.structure.structure_verdict import diagnose_structure
+    from study.support.errors import expect
     from study.support.file_sets import write_files
 
+    several = arguments.records[1:] or arguments.each_record
+    expect(not several, f"{several and several[0]}: the page of a structure shows one record; expected no more")
     folder, model = out_folder(arguments), read_model(arguments.model)
     (prepared,) = prepared_structures(arguments, model)
     with progress(" candidates", name=prepared.record.name) as step:

@@ -11,10 +11,12 @@ from typing import Any
 
 from study.compare import across_levels
 from study.compare.fitted_coefficients import Coefficient
+from study.figures.labels import prefixed, term_names
 from study.support import document
 from study.support.numbers import percent
 
 TITLE = "Measured records"
+TINY = 1e-9  # a chance that is not written out
 VERDICTS = {
     "missing_effect": "an effect is missing", "nothing_missing": "nothing is missing",
     "unknown_effect": "something unknown is missing",
@@ -38,7 +40,8 @@ class Measured:
     @property
     def shown_level(self) -> str:
         """With its unit."""
-        return "" if math.isnan(self.level) else f"{self.level:.4g} {self.unit}"
+        factor, unit = prefixed(self.unit, self.level)
+        return "" if math.isnan(self.level) else f"{self.level / factor:.3g} {unit}"
 
     @property
     def unit(self) -> str:
@@ -60,7 +63,8 @@ def measured(name: str, rig: str, comparison: Mapping[str, Any], diagnosis: Mapp
     if not parts:
         return [Measured(name, rig, comparison, diagnosis)]
     return [
-        Measured(f"{name} {number}", rig, {**comparison, **part}, diagnosis) for number, part in enumerate(parts, 1)
+        Measured(f"{name} {part.get('record', number)}", rig, {**comparison, **part}, diagnosis)
+        for number, part in enumerate(parts, 1)
     ]
 
 
@@ -68,27 +72,30 @@ def blocks(records: Iterable[Measured]) -> list[document.Block]:
     """The page: a table of verdicts, then the coefficients of each rig, its records in the order of their level."""
     rigs = _by_rig(records)
     every = [record for rig in rigs.values() for record in rig]
-    counts = [f"{sum(r.diagnosis['verdict'] == key for r in every)}: {word}" for key, word in VERDICTS.items()]
+    counts = [(word, sum(r.diagnosis["verdict"] == key for r in every)) for key, word in VERDICTS.items()]
+    said = "; ".join(f"{word} in {count}" for word, count in counts if count)
     heading = ("record", "level", "error", "noise floor", "verdict", "first effect", "explains", "error with it")
     page: list[document.Block] = [
         document.Heading(TITLE, 1),
         document.Text(
-            f"{len(every)} records. {'; '.join(counts)}. Level: rms of the measured response. Error: of the free run on"
-            " the part that was not fitted, over that rms."
+            f"{len(every)} records: {said}. Level: rms of the measured response. Error: of the free run on the part "
+            "that was not fitted, over that rms. Each record is fitted by itself, values with 95 % intervals; a model "
+            "that lacks nothing has the same coefficients at all levels. p: the chance of such differences if a "
+            "coefficient is the same in all records; 'no' accounts for the number of coefficients."
         ),
         document.table(heading, [_verdict(record) for record in every]),
     ]
-    for (rig, model), rows in rigs.items():
-        page += [document.Heading(f"{rig}: coefficients of {model}"), *_coefficients(rows)]
+    for (rig, model, _), rows in rigs.items():
+        page += [document.Heading(f"{rig}: coefficients of the model {model}, by level"), *_coefficients(rows)]
     return page
 
 
-def _by_rig(records: Iterable[Measured]) -> dict[tuple[str, str], list[Measured]]:
+def _by_rig(records: Iterable[Measured]) -> dict[tuple[str, str, str], list[Measured]]:
     """Records of one rig, one model and one unit, by level."""
     found: dict[tuple[str, str, str], list[Measured]] = {}
     for record in records:
         found.setdefault((record.rig, str(record.comparison["model"]["name"]), record.unit), []).append(record)
-    return {(rig, model): sorted(rows, key=lambda r: r.level) for (rig, model, _), rows in found.items()}
+    return {key: sorted(rows, key=lambda r: r.level) for key, rows in found.items()}
 
 
 def _verdict(record: Measured) -> tuple[str, ...]:
@@ -96,39 +103,33 @@ def _verdict(record: Measured) -> tuple[str, ...]:
     verdict = str(found["verdict"])
     missing = verdict == "missing_effect"
     first: Mapping[str, Any] = found["candidates"][0] if found["candidates"] and missing else {}
-    tied = ", ".join(["", *first.get("tied_with", ())])
+    effects = " or ".join(term_names(name) for name in (first["term"], *first.get("tied_with", ()))) if first else ""
     return (
         record.name, record.shown_level, percent(record.comparison["error"]["response"]),
         percent(record.comparison["noise_floor"]["response"]), VERDICTS.get(verdict, verdict),
-        f"{first['term']}{tied}" if first else "", percent(first["explained"]) if first else "",
+        effects, percent(first["explained"]) if first else "",
         percent(first["response_error"]) if first else "",
     )  # fmt: skip
 
 
 def _coefficients(rows: Sequence[Measured]) -> list[document.Block]:
-    """Values with standard errors, a column a record; of several records the chance of such differences."""
+    """Values with 95 % intervals, a column a record; of several records the chance of such differences."""
     own = [record.coefficients for record in rows]
-    columns = [f"{record.name}, {record.level:.3g} {record.unit}" for record in rows]
+    columns = [", ".join(filter(None, (record.name, record.shown_level))) for record in rows]
     if len(rows) == 1:
         return [document.table(("coefficient", *columns, "unit"), [(c.key, _value(c), c.unit) for c in own[0]])]
     judged = {level.key: level for level in across_levels.levels([record.level for record in rows], own)}
     lines = [
         (key[0].key, *map(_value, key), key[0].unit, *_judged(judged.get(key[0].key))) for key in zip(*own, strict=True)
     ]
-    return [
-        document.table(("coefficient", *columns, "unit", "the same at all levels?", "p"), lines),
-        document.Text(
-            "p: the chance of such differences if the coefficient is the same in all records; the number of "
-            "coefficients is accounted for."
-        ),
-    ]
+    return [document.table(("coefficient", *columns, "unit", "the same at all levels?", "p"), lines)]
 
 
 def _value(found: Coefficient) -> str:
-    return f"{found.value:.5g} (given)" if found.error is None else f"{found.value:.5g} +- {found.error:.2g}"
+    return f"{found.value:.5g} (given)" if found.error is None else f"{found.value:.5g} ± {1.96 * found.error:.2g}"
 
 
 def _judged(level: across_levels.Level | None) -> tuple[str, str]:
     if level is None:
         return "", ""
-    return "moves" if level.moves else "yes", f"{level.p_value:.2g}"
+    return "no" if level.moves else "yes", f"{level.p_value:.2g}" if level.p_value > TINY else f"< {TINY:g}"

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from study.identify.time_domain.weighted_fit import weighted
 from study.records.plan import Plan
 from study.records.prepared import Prepared
 from study.records.record import Record
+from study.records.stretches import records_judged
 from study.support.errors import StudyError
 
 STEPS = 5  # reports of progress a record
@@ -105,19 +107,44 @@ def compare(
         alike = rivals(fit, prepared)
     report("free run")
     prediction = predict(fit, prepared)
-    report("force")
-    in_reverse = local_force_error if estimator == "local_polynomial" else force_error
-    force = in_reverse(fit.model, prediction)
-    report("where it fails")
-    lacking = missing_force(fit.model, (*fit.keys, *(known.symbols if known else ())), prediction)
-    report("what it grows with")
+    keys = (*fit.keys, *(known.symbols if known else ()))
+    judged = _judged(
+        fit, keys, prediction, local_force_error if estimator == "local_polynomial" else force_error, report
+    )
     said = [CHAOTIC if fit.restarts else None, rivals_note(fit, alike, prediction)]
     return Comparison(
-        model=model, prepared=prepared, fit=fit, coefficients=coefficients(fit, prepared, known), prediction=prediction,
-        force=force, bands=bands(prediction.noise, force, prediction.low), missing_force=lacking,
-        growths=None if prediction.noise.alone else growths(lacking), time=along_time(prediction),
-        notes=(*prepared.notes, *(note for note in said if note)), estimator=estimator,
+        model=model, prepared=prepared, fit=fit, coefficients=coefficients(fit, prepared, known),
+        notes=(*prepared.notes, *(note for note in said if note)), estimator=estimator, **judged,
     )  # fmt: skip
+
+
+def _judged(
+    fit: FreeRunFit, keys: Sequence[str], prediction: Prediction,
+    in_reverse: Callable[[Model, Prediction], ForceError] = force_error, report: Progress = lambda _: None,
+) -> dict[str, Any]:  # fmt: skip
+    """The fields of a comparison that say how good a fit is on the judging part, and where it fails."""
+    noise = prediction.noise
+    report("force")
+    force = in_reverse(fit.model, prediction)
+    report("where it fails")
+    lacking = missing_force(fit.model, keys, prediction)
+    report("what it grows with")
+    return {
+        "prediction": prediction, "force": force, "bands": bands(noise, force, prediction.low),
+        "missing_force": lacking, "growths": None if noise.alone else growths(lacking), "time": along_time(prediction),
+    }  # fmt: skip
+
+
+def on_each_record(comparison: Comparison) -> tuple[Comparison, ...]:
+    """A comparison with several records that are fitted together, judged on each of them; none of one record.
+
+    Fit and coefficients are those of all, the free run is the stretch of theirs along one record.
+    """
+    keys = [c.key for c in comparison.coefficients if not c.held]
+    parts = records_judged(comparison.prepared)
+    alone = [replace(comparison, prepared=p, **_judged(comparison.fit, keys, comparison.prediction.along(p)))
+             for p in parts]  # fmt: skip
+    return tuple(alone)
 
 
 def across(comparisons: Sequence[Comparison]) -> tuple[Level, ...]:

@@ -52,7 +52,8 @@ def links(comparison: Comparison) -> Links:
     place = block[lacking.inner]
     u, v, force = (x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force))
     frequency, power = _spectra(comparison.prediction.residual, comparison.prediction.dt, bounds)
-    times = np.asarray(float(comparison.prediction.time[0]) + bounds * comparison.prediction.dt, dtype=np.float64)
+    time = comparison.prediction.time
+    times = np.append(time[bounds[:-1]], time[-1] + comparison.prediction.dt)
     return Links(
         times, frequency, power, _classes(u, force, place, count),
         _classes(v, force, place, count), _cells(u, v, place, count),

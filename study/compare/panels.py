@@ -47,19 +47,26 @@ def response(axes: Axes, time: Floats, measured: Floats, predicted: Floats, unit
     """Measured and predicted response."""
     factor, shown = labels.prefixed(unit, float(np.max(np.abs(measured))))
     close = len(time) <= CLOSE
-    history(axes, time, measured / factor, MEASURED, linewidth=2.6 if close else 0.6)
+    history(axes, *broken(time, measured / factor), MEASURED, linewidth=2.6 if close else 0.6)
     dashed = {"linestyle": (0, (3.0, 1.2)), "linewidth": 1.3} if close else {"alpha": 0.75, "linewidth": 0.6}
-    history(axes, time, predicted / factor, PREDICTED, **dashed)
+    history(axes, *broken(time, predicted / factor), PREDICTED, **dashed)
     return _time_axis(axes, time, f"response ({dimensions.pretty(shown)})")
 
 
 def residual(axes: Axes, time: Floats, difference: Floats, noise: float, unit: str) -> Axes:
     """What the model misses, beside twice the noise floor."""
     factor, shown = labels.prefixed(unit, float(np.max(np.abs(difference))))
-    history(axes, time, difference / factor, RESIDUAL)
+    history(axes, *broken(time, difference / factor), RESIDUAL)
     for k, side in enumerate((-2.0, 2.0)):
         axes.axhline(side * noise / factor, label="twice the rms of the noise" if k else None, zorder=3.0, **NOISE)
     return _time_axis(axes, time, f"difference ({dimensions.pretty(shown)})")
+
+
+def broken(time: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Times and values with one that is none wherever time is left out, so that no line is drawn across."""
+    steps = np.diff(time)
+    places = 1 + np.flatnonzero(np.abs(steps - np.median(steps)) > 0.5 * np.median(steps))
+    return np.insert(time, places, time[places - 1]), np.insert(values, places, np.nan)
 
 
 def _time_axis(axes: Axes, time: Floats, label: str) -> Axes:

@@ -1,7 +1,8 @@
 """The free run of a fitted model along the part of the record that was not fitted, its error and its noise floor."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,12 +102,28 @@ class Prediction:
 
     @property
     def closeup(self) -> slice:
-        """Some cycles of the response about the stretch where the residual is largest."""
+        """Some cycles of the response about the stretch where the residual is largest; no time is left out of them."""
         centred = self.measured - np.mean(self.measured)
         crossings = max(int(np.count_nonzero(np.diff(np.signbit(centred)))), 2)
         length = int(np.clip(2 * CYCLES * len(centred) / crossings, 32, len(centred)))
         first = int(np.argmax(np.convolve(self.residual**2, np.ones(length), "valid")))
-        return slice(first, first + length)
+        gaps = np.flatnonzero(np.abs(np.diff(self.time[first : first + length]) - self.dt) > 0.5 * self.dt)
+        ends = [first, *(first + 1 + gaps).tolist(), first + length]
+        pieces = [slice(a, b) for a, b in pairwise(ends)]
+        return max(pieces, key=lambda piece: float(np.sum(self.residual[piece] ** 2)))
+
+    def along(self, part: Prepared) -> "Prediction":
+        """The same free run along a part of what is judged, at whose first sample the motion begins anew."""
+        if part.plan.judge == self.prepared.plan.judge:
+            return self
+        begin, (first, last) = self.prepared.plan.judge[0], part.plan.judge
+        run, predicted = self.run, self.predicted[first - begin : last - begin]
+        if run is None:
+            return replace(self, prepared=part, predicted=predicted)
+        starts = [begin, *(b for b in self.prepared.record.begins if b > begin)]
+        states = np.atleast_2d(run.initial)[starts.index(first) : np.searchsorted(starts, last)]
+        own = replace(run, prepared=part, first=first, initial=states)
+        return replace(self, prepared=part, run=own, predicted=predicted)
 
     def above(self, values: Floats) -> Floats:
         """Values of the judging or fitting part without what lies below ``low``, shape (n,)."""

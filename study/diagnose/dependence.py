@@ -17,7 +17,7 @@ from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from study.equations.model import ModelTerm
 from study.equations.terms import custom
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.part_fit import judging_run, linearise, run_of
+from study.identify.time_domain.part_fit import judging_run, run_of, with_states
 from study.identify.time_domain.shape_search import Baseline, modulation_lines, residual_lines
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS
@@ -57,7 +57,7 @@ def unexplained(base: Baseline, prepared: Prepared) -> Unexplained:
     # Of segments, each initial state matters to its own samples alone; those of stretches are taken out of all columns.
     joined = bool(prepared.record.stretches)
     states = 0 if fit.restarts or joined or prepared.response == FORCE else 2
-    rows = [*motions, fit.residual, _columns(linearise(shaped, prepared), len(shaped.keys), states, joined)]
+    rows = [*motions, fit.residual, _columns(with_states(shaped, prepared), len(shaped.keys), states, joined)]
     try:
         run = judging_run(fit, prepared)
         later = [run.motion(name) for name in MOTIONS[:2]]

@@ -103,9 +103,10 @@ def ranking(axes: Axes, diagnosis: Found) -> Axes:
     axes.set_xticks([0, 20, 40, 60, 80, 100])
     for y, row in zip(place, rows, strict=True):
         axes.annotate(f"leaves {percent(row.response_error)}", (1.0, y), xycoords=("axes fraction", "data"),
-                      xytext=(-3, 0), textcoords="offset points", ha="right", va="center", fontsize=8)  # fmt: skip
+                      xytext=(-3, 0), textcoords="offset points", ha="right", va="center", fontsize=8,
+                      bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0})  # fmt: skip
     before = diagnosis.comparison.prediction
-    axes.set_xlabel(f"share of the held-out difference ({percent(before.error)} of the response) explained (%)")
+    axes.set_xlabel(f"explained share of the difference (%), which is {percent(before.error)} of the response")
     return axes
 
 

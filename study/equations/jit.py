@@ -47,12 +47,24 @@ def _decorated(function: Callable[..., Any], **options: bool) -> Any:
     """Numba's dispatcher; it keeps nothing where neither the installation nor the user has a folder to write to."""
     decorate = partial(_untyped.numba.njit, nogil=True, error_model="numpy", **options)
     try:
-        return decorate(cache=True)(function)
+        return _once(decorate(cache=True)(function))
     except RuntimeError as error:
         if "cache" not in str(error):
             raise
     _say_once()
-    return decorate()(function)
+    return _once(decorate()(function))
+
+
+def _once(dispatcher: Any) -> Any:
+    """Compile once for all whole numbers; Numba would anew for each that a calling kernel writes out, 0 or 1 or 2."""
+    of_types, unliteral = dispatcher.get_call_template, _untyped.numba.types.unliteral
+
+    def of_plain_types(given: Any, named: Any) -> Any:
+        plain = {name: unliteral(kind) for name, kind in named.items()}
+        return of_types(tuple(unliteral(kind) for kind in given), plain)
+
+    dispatcher.get_call_template = of_plain_types
+    return dispatcher
 
 
 @cache

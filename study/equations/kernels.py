@@ -133,7 +133,8 @@ def integrate_rk4(
     """
     h = dt / steps
     w = np.zeros((4, x.shape[0]))
-    w[0] = x
+    for i in range(x.shape[0]):
+        w[0, i] = x[i]
     for sample in range(out.shape[0]):
         j = 2 * steps * sample
         _slope(code, first, r, outputs, start + sample * dt, drive, j, w, 0, 2)
@@ -169,7 +170,8 @@ def integrate_abm4(
     n = x.shape[0]
     h = dt / steps
     w = np.zeros((8, n))  # state, trial, slope, room; then the slopes of this step and the three before it, a ring
-    w[0] = x
+    for i in range(x.shape[0]):
+        w[0, i] = x[i]
     total = (out.shape[0] - 1) * steps
     for step in range(total + 1):
         time = start + step * h
@@ -211,12 +213,20 @@ def _call(_: Any, address: Any, r: Any, w: Any, numbers: Any, drive: Any, j: Any
 
 
 @compiled
+def copy_state(w: Floats, source: int, target: int) -> None:
+    """``w[source]`` into ``w[target]``; number by number, as an assignment of views takes Numba seconds to compile."""
+    for i in range(w.shape[1]):
+        for c in range(w.shape[2]):
+            w[target, i, c] = w[source, i, c]
+
+
+@compiled
 def _pull(
     native: Native, r: Floats, side: int, sign: float, time: float, drive: Floats, j: int, w: Floats, row: int
 ) -> float:  # fmt: skip
     """Acceleration at the state ``w[row]`` if sgn v is ``sign``, which the register of the side then holds."""
     r[side] = sign
-    w[1] = w[row]
+    copy_state(w, row, 1)
     _call(native[1], r, w, (time,), drive, j)
     return float(w[2, 1, 0])
 
@@ -235,7 +245,7 @@ def _substep(
         for c in range(drive.shape[1]):
             outer = (1.0 - x) * drive[j, c] - x * drive[j + 2, c]
             local[i, c] = (1.0 - 2.0 * x) * outer + 4.0 * x * (1.0 - x) * drive[j + 1, c]
-    w[0] = w[3]
+    copy_state(w, 3, 0)
     _call(native[0], r, w, (time + begin * h, (end - begin) * h), local, 0)
 
 
@@ -318,7 +328,7 @@ def _switching_step(
     """
     begin = 0.0
     for _ in range(6):
-        w[3] = w[0]
+        copy_state(w, 0, 3)
         _substep(native, r, time, h, begin, 1.0, drive, j, local, w)
         if r[side] == 0.0:
             begin = _to_release(native, r, side, time, h, begin, drive, j, local, w)
@@ -349,7 +359,9 @@ def integrate_variation(
     h = dt / steps
     w = np.zeros((4, y.shape[0], y.shape[1]))
     local = np.zeros((3, drive.shape[1]))
-    w[0] = y
+    for i in range(y.shape[0]):
+        for c in range(y.shape[1]):
+            w[0, i, c] = y[i, c]
     if side >= 0:
         if y[1, 0] != 0.0:
             r[side] = math.copysign(1.0, y[1, 0])
@@ -358,7 +370,7 @@ def integrate_variation(
             r[side] = 0.0 if held else -1.0
     for sample in range(out.shape[0]):
         j = 2 * steps * sample
-        w[1] = w[0]
+        copy_state(w, 0, 1)
         _call(native[1], r, w, (start + sample * dt,), drive, j)
         if not (abs(w[0, 0, 0]) < 1e150 and abs(w[0, 1, 0]) < 1e150 and math.isfinite(w[2, 1, 0])):
             return sample
@@ -371,7 +383,9 @@ def integrate_variation(
                     _call(native[0], r, w, (time, h), drive, j + 2 * m)
                 else:
                     _switching_step(native, r, side, time, h, drive, j + 2 * m, local, w)
-    y[:] = w[0]
+    for i in range(y.shape[0]):
+        for c in range(y.shape[1]):
+            y[i, c] = w[0, i, c]
     return -1
 
 
@@ -396,7 +410,9 @@ def integrate_segments(
         if failed >= 0:
             return int(begin + failed)
         if i + 2 == bounds.shape[0]:
-            out[begin:end] = target[: end - begin]
+            for sample in range(begin, end):
+                for c in range(out.shape[1]):
+                    out[sample, c] = target[sample - begin, c]
     return -1
 
 
@@ -443,10 +459,12 @@ def integrate_known(
     h = dt / steps
     for k in range(bounds.shape[0] - 1):
         w = np.zeros((4, states.shape[1], states.shape[2]))
-        w[0] = states[k]
+        for i in range(w.shape[1]):
+            for c in range(w.shape[2]):
+                w[0, i, c] = states[k, i, c]
         for sample in range(bounds[k], bounds[k + 1]):
             time = starts[k] + (sample - bounds[k]) * dt
-            w[1] = w[0]
+            copy_state(w, 0, 1)
             _known_slopes(code, first, r, slots, time, drive, 2 * steps * sample, w)
             _chain(r, slots, 0, w, out[sample])
             if not math.isfinite(out[sample, 0]):
@@ -454,15 +472,15 @@ def integrate_known(
             if w.shape[1] == 0 or sample + 1 == bounds[k + 1]:
                 continue
             for s in range(steps):
-                w[1] = w[0]
-                w[3] = w[0]
+                copy_state(w, 0, 1)
+                copy_state(w, 0, 3)
                 for stage in range(4):
                     late = (stage + 1) // 2
                     j = 2 * (steps * sample + s) + late
                     _known_slopes(code, first, r, slots, time + (s + 0.5 * late) * h, drive, j, w)
                     w[3] += (h / 3.0 if late == 1 else h / 6.0) * w[2]
                     w[1] = w[0] + (h if stage == 2 else 0.5 * h) * w[2]
-                w[0] = w[3]
+                copy_state(w, 3, 0)
     return -1
 
 

@@ -23,7 +23,7 @@ def panels(s: Sources, frequency: Any) -> dict[str, Any]:
 def magnitude(s: Sources, frequency: Any) -> Any:
     """Response over force, measured with its 95 % band and by the model."""
     drawn = theme.panel(
-        "frf", HEIGHT, "frequency / Hz", "response over force", narrow=True, ranges=(frequency, None), y_axis_type="log"
+        "frf", HEIGHT, "frequency / Hz", "magnitude", narrow=True, ranges=(frequency, None), y_axis_type="log"
     )
     band = drawn.varea("f", "low", "high", source=s["frf"], fill_color="#a3adb7", fill_alpha=0.35)
     measured = drawn.line("f", "measured", source=s["frf"], **theme.MEASURED)

@@ -27,5 +27,16 @@ def times(time: Floats, buckets: int = BUCKETS) -> Floats:
     return np.stack([time[starts], time[(starts + ends) // 2]], axis=1).ravel()
 
 
+def gaps(time: Floats, shown: Floats, dt: float) -> NDArray[np.int64]:
+    """Places in the times that are shown at which a line breaks: before them lies time that is not in ``time``."""
+    after = time[1:][np.diff(time) > 1.5 * dt]
+    return np.searchsorted(shown, after - 0.5 * dt).astype(np.int64)
+
+
+def broken(values: Floats, places: NDArray[np.int64]) -> Floats:
+    """Values with one that is none at each gap."""
+    return np.insert(values, places, np.nan) if len(places) else values
+
+
 def _starts(samples: int, buckets: int) -> NDArray[np.int64]:
     return np.linspace(0, samples, buckets + 1).astype(np.int64)[:-1]

@@ -11,9 +11,10 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from study.equations.model import Model
 from study.explore import session as sessions
-from study.explore.saved_files import PAGE, files
-from study.explore.session import Session
+from study.explore.saved_files import PAGE, files, of_stage
+from study.explore.session import Session, Stage
 from study.support.errors import StudyError
 from study.support.file_sets import write_files
 
@@ -44,6 +45,8 @@ class Desk:
         self.state = State()
         self.model, self.text, self.folder, self.inputs = model, text, folder, tuple(inputs)
         self.watchers: dict[object, Callable[[], None]] = {}
+        self._drawn: tuple[Stage | None, Mapping[str, bytes]] = (None, {})
+        self._pen = threading.Lock()  # what draws pictures has a style that all threads share
         self._lock = threading.RLock()
         self._rest = threading.Event()  # never set but to end
         self._hand = ThreadPoolExecutor(1, "change")
@@ -78,8 +81,9 @@ class Desk:
         self._hand.submit(self._do, work, name, action)
 
     def diagnose(self) -> None:
-        """Ask what is missing from the present model, unless that is known, behind everything else."""
+        """Ask what is missing from the present model, unless that is known, behind everything else; then draw it."""
         self._behind.submit(self._examine)
+        self._behind.submit(self._draw)
 
     def close(self) -> None:
         """End the threads; work that waits is dropped."""
@@ -115,14 +119,31 @@ class Desk:
         session = sessions.tried(self.session, text)
         self._tell(session, accepted=text)
         self._behind.submit(self._examine, session.own)
+        self._behind.submit(self._draw)
 
     def _save(self, how: str) -> None:
-        contents = files(self.session, self.model.name, self.text, values=how == VALUES)
+        session = self.session
+        with self._pen:
+            ahead = self._drawn[1] if self._drawn[0] is session.now else None
+            contents = files(session, self.model.name, self.text, values=how == VALUES, drawn=ahead)
         write_files(self.folder, contents, self.inputs)
         with_them = "with" if how == VALUES else "without"
         self._tell(
             notice=f"Saved in {self.folder}: {self.model.name} {with_them} fitted values, {PAGE}, pictures and tables"
         )
+
+    def _draw(self) -> None:
+        """Draw what Save would write of the present model, which takes longer than a user likes to wait."""
+        with self._pen:
+            session = self.session
+            if session.now.diagnosis is None or self._rest.is_set() or self._drawn[0] is session.now:
+                return
+            self._drawn = session.now, of_stage(session.now, by_level=not session.several.separate)
+
+    def _still(self, model: Model) -> None:
+        """End what is done of a model that is no longer the present one."""
+        if self.session.now.model != model or self._rest.is_set():
+            raise OvertakenError
 
     def _examine(self, own: object = None) -> None:
         self._rest.wait(SETTLE)
@@ -132,11 +153,16 @@ class Desk:
             return
 
         def count(candidates: int) -> None:
-            if self.session.now.model != model or self._rest.is_set():
-                raise OvertakenError
+            self._still(model)
             self._tell(diagnosing=f"diagnosing: {candidates} candidates tried")
 
         try:
+            if asked.now.on_each and asked.now.by_record is None:
+                self._tell(diagnosing="fitting each record by itself")
+                asked = sessions.by_itself(asked)
+                self._still(model)
+                with self._lock:
+                    self._tell(sessions.with_stage(self.session, asked.now))
             self._tell(diagnosing="diagnosing")
             stage, _ = sessions.examined(asked, count)
             with self._lock:

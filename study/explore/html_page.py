@@ -28,12 +28,10 @@ KINDS = {
     "response": "time", "difference": "time", "force": "band", "coherence": "band", "spectrum": "band",
     "against_u": "u", "against_v": "v",
 }  # fmt: skip
-CLOSE, SHORT, LONG, TICKS = (
-    0.5,
-    1.4,
-    2.6,
-    5.0,
-)  # decades of an axis with many, three or two ticks in each; ticks of one longer
+CLOSE, SHORT, LONG = 0.5, 1.4, 2.6  # decades of an axis with even ticks, three or two in a decade
+TICKS = 5.0  # of a longer axis
+MARGIN = 1.2  # by which an axis reaches beyond what it shows, at most
+BEGINS, ENDS = ("start", "reset_start"), ("end", "reset_end")  # of a range, the second for the tool that resets it
 SELECTED = "if (cb_obj.final) window.study.selected(kind, cb_obj.geometry.x0, cb_obj.geometry.x1)"
 
 
@@ -46,7 +44,7 @@ class Page:
 
     def show(self, seen: View, history: Columns) -> None:
         """Draw another model; the words come last, since the page begins anew when they change."""
-        for name, columns in {**seen.columns, "history": history, "frame": frame(seen)}.items():
+        for name, columns in {**seen.columns, "history": history, "frame": frame(seen, history)}.items():
             if name != "words":
                 self.sources[name].data = columns
         self.panels["history"].y_range.factors = history["name"][::-1]
@@ -56,7 +54,7 @@ class Page:
 
 def build(seen: View, history: Columns, stores: Sequence[ColumnDataSource] = ()) -> Page:
     """A page that shows one model, with the columns of its history; ``stores`` are further sources of its script."""
-    given = {**seen.columns, **GHOSTS, "history": history, "frame": frame(seen)}
+    given = {**seen.columns, **GHOSTS, "history": history, "frame": frame(seen, history)}
     sources = {name: ColumnDataSource(columns, name=name) for name, columns in given.items()}
     t, highest = seen.columns["time"]["t"], seen.highest
     time = theme.fixed("range_time", float(t[0]), float(t[-1]))
@@ -107,9 +105,9 @@ def history_columns(session: Session) -> Columns:
     }
 
 
-def frame(seen: View) -> Columns:
+def frame(seen: View, history: Columns) -> Columns:
     """Labels and limits that differ from model to model, as settings of named models."""
-    scale = seen.scales
+    scale, t = seen.scales, seen.columns["time"]["t"]
     largest = max(float(np.nanmax(np.abs(seen.columns["plane"]["mean"]), initial=0.0)), seen.least)
     u, v, f, y, d = (
         in_text(s.unit) for s in (scale.displacement, scale.velocity, scale.force, scale.response, scale.difference)
@@ -117,23 +115,25 @@ def frame(seen: View) -> Columns:
     labels = {
         "response": f"{seen.quantity} / {y}", "close": f"{seen.quantity} / {y}", "difference": f"difference / {d}",
         "spectrum": f"density / ({d}/√Hz)", "plane": f"velocity / {v}", "against_u": f"missing force / {f}",
-        "against_v": f"missing force / {f}", "frf": f"response over force / ({y}/{seen.force_unit})",
+        "against_v": f"missing force / {f}", "frf": f"magnitude / ({y}/{seen.force_unit})",
     }  # fmt: skip
     motions = {"plane": f"displacement / {u}", "against_u": f"displacement / {u}", "against_v": f"velocity / {v}"}
     rows: list[tuple[str, str, Any]] = [
         *((f"{name}_y", "axis_label", label) for name, label in labels.items()),
         *((f"{name}_x", "axis_label", label) for name, label in motions.items()),
         ("mapper", "low", -largest), ("mapper", "high", largest), ("range_frequency", "end", seen.highest),
+        *(("range_time", name, float(t[0])) for name in BEGINS), *(("range_time", name, float(t[-1])) for name in ENDS),
         ("range_force", "start", seen.limits[0]), ("range_force", "end", seen.limits[1]),
         ("frequency_decades", "ticks", log_ticks(seen.highest / 300.0, seen.highest)),
-        *((f"{name}_ticks", "ticks", log_ticks(*ends)) for name, ends in _log_axes(seen).items()),
+        *((f"{name}_ticks", "ticks", log_ticks(*ends)) for name, ends in _log_axes(seen, history).items()),
     ]  # fmt: skip
     return dict(zip(("model", "property", "value"), map(list, zip(*rows, strict=True)), strict=True))
 
 
-def _log_axes(seen: View) -> dict[str, tuple[float, float]]:
-    """Ends of the logarithmic axes of y, by the panel."""
-    shown = {"force": seen.limits}
+def _log_axes(seen: View, history: Columns) -> dict[str, tuple[float, float]]:
+    """Ends of the logarithmic axes of what is drawn, by the panel."""
+    tried = [x for name in ("response", "force", "floor") for x in history[name] if x > 0.0]
+    shown = {"force": seen.limits, "history": (min(tried, default=1.0), max(tried, default=1.0))}
     for panel, names in (("spectrum", ("difference", "noise")), ("frf", ("measured", "predicted"))):
         values = np.concatenate([np.asarray(seen.columns[panel][name], dtype=np.float64) for name in names])
         values = values[np.isfinite(values) & (values > 0.0)]
@@ -144,12 +144,20 @@ def _log_axes(seen: View) -> dict[str, tuple[float, float]]:
 def log_ticks(low: float, high: float) -> list[float]:
     """Ticks of a logarithmic axis that do not collide: 1, 2, 5 of a decade, 1 and 3, or decades alone."""
     reach = math.log10(high / low)
-    fine = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0)
-    rough = (1.0, 2.0, 5.0) if reach < SHORT else (1.0, 3.0) if reach < LONG else (1.0,)
-    mantissas = fine if reach < CLOSE else rough
+    if reach < CLOSE:
+        return even_ticks(low / MARGIN, high * MARGIN)
+    mantissas = (1.0, 2.0, 5.0) if reach < SHORT else (1.0, 3.0) if reach < LONG else (1.0,)
     every = max(1, math.ceil(reach / TICKS))
     first, last = math.floor(math.log10(low)) - 1, math.ceil(math.log10(high)) + 1
     return [m * 10.0**power for power in range(first, last + 1) if power % every == 0 for m in mantissas]
+
+
+def even_ticks(low: float, high: float) -> list[float]:
+    """Three to eight ticks at equal distances of 1, 2 or 5 in their last digit."""
+    least = (high - low) / 7.0
+    power = 10.0 ** math.floor(math.log10(least))
+    step = next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= least)
+    return [step * k for k in range(max(math.ceil(low / step), 1), math.floor(high / step) + 1)]
 
 
 @cache
@@ -164,6 +172,7 @@ def variables(session: Session, live: bool) -> dict[str, Any]:
         "record": session.prepared.record.name, "model": session.now.model.name, "live": live,
         "style": _text("page.css"), "script": _text("page.js"),
         "steps": [words.name(r, i) for i, r in enumerate(session.stages)],
+        "several": bool(session.now.on_each),
         "diagnosed": live or any(r.diagnosis is not None for r in session.stages),
     }  # fmt: skip
 

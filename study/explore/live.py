@@ -9,10 +9,13 @@ from bokeh.models import ColumnDataSource, CustomJS
 
 from study.explore import decimate, html_page, preview
 from study.explore.axis_scales import scales_of
+from study.explore.by_record import worst
 from study.explore.desk import Desk
+from study.explore.session import Stage, on_record
 from study.explore.view import View, over_time, stretch, view
 
 HELLO = "hello"  # what a page says when it is there
+RECORD = "record"  # what it asks for when another record is chosen
 
 
 class Watcher:
@@ -21,6 +24,7 @@ class Watcher:
     def __init__(self, desk: Desk, document: Document) -> None:
         self.desk, self.document = desk, document
         self.shown = desk.session
+        self.record = worst(self.shown.now.on_each)
         self.asked = ColumnDataSource({"act": [], "name": [], "count": []}, name="asked")
         self.state = ColumnDataSource(self._state(), name="state")
         self.page = html_page.build(self._view(), html_page.history_columns(self.shown), [self.asked, self.state])
@@ -44,7 +48,10 @@ class Watcher:
 
     def _view(self) -> View:
         stages = self.shown.stages
-        return view(stages[-1], len(stages) - 1)
+        return view(stages[-1], len(stages) - 1, record=self.record)
+
+    def _stage(self) -> Stage:
+        return on_record(self.shown.now, self.record)
 
     def _state(self) -> dict[str, Any]:
         state, many = self.desk.state, len(self.shown.stages) > 1
@@ -62,31 +69,45 @@ class Watcher:
         self.document.hold("combine")
         if session is not self.shown:
             self.shown = session
-            self.page.show(self._view(), html_page.history_columns(session))
-            if self.span is not None:
-                self._refine(self.span)
+            self._draw()
         self.state.data = self._state()
         self.document.unhold()
+
+    def _draw(self) -> None:
+        self.page.show(self._view(), html_page.history_columns(self.shown))
+        if self.span is not None:
+            self._refine(self.span)
+
+    def _turn_to(self, name: str) -> None:
+        """Show another of several records."""
+        records = [str(number) for number in range(len(self.shown.now.on_each))]
+        if name in records:
+            self.record, self.span = records.index(name), None
+            self.document.hold("combine")
+            self._draw()
+            self.document.unhold()
 
     def _passed_on(self, _attribute: str, _old: object, new: dict[str, list[Any]]) -> None:
         act, name = (new[key][0] if new[key] else "" for key in ("act", "name"))
         if act == HELLO:  # what changed while the page was on its way is shown now
             self._show()
+        elif act == RECORD:
+            self._turn_to(name)
         elif isinstance(act, str) and isinstance(name, str):
             self.desk.ask(act, name)
 
     def _zoomed(self, event: RangesUpdate) -> None:
         """Draw a stretch of a long record with the samples that the screen has room for."""
         first, last = event.x0, event.x1
-        if len(self.shown.now.comparison.prediction.time) <= 2 * decimate.BUCKETS:
+        if len(self._stage().comparison.prediction.time) <= 2 * decimate.BUCKETS:
             return
         if first is not None and last is not None and math.isfinite(last - first) and last > first:
             self._refine((first, last))
 
     def _refine(self, span: tuple[float, float]) -> None:
         self.span = span
-        stage = self.shown.now
+        stage = self._stage()
         comparison, scales = stage.comparison, scales_of(stage.comparison)
         part = stretch(comparison, span)
-        self.page.sources["would_time"].data = preview.difference(stage.shown, scales, part)
+        self.page.sources["would_time"].data = preview.difference(stage, scales, part)
         self.page.sources["time"].data = over_time(comparison, scales, span)

@@ -7,6 +7,7 @@ window.study = (() => {
   const place = (id) => document.getElementById(id)
 
   // ---- words and axes of the present stage
+  const framed = {}
   function words() {
     const source = model("words"), places = source.get_column("place"), html = source.get_column("html")
     for (let i = 0; i < places.length; i++) {
@@ -17,7 +18,11 @@ window.study = (() => {
     const [names, properties, values] = ["model", "property", "value"].map((key) => frame.get_column(key))
     for (let i = 0; i < names.length; i++) {
       const target = model(names[i])
-      if (target && target[properties[i]] !== values[i]) target[properties[i]] = values[i]
+      // a zoom in time stays from model to model, and goes where another record has other times
+      const key = names[i] + properties[i]
+      const before = names[i] === "range_time" ? framed[key] ?? values[i] : target?.[properties[i]]
+      framed[key] = values[i]
+      if (target && before !== values[i]) target[properties[i]] = values[i]
     }
     far = null
     clear()
@@ -58,12 +63,15 @@ window.study = (() => {
     }
     for (const name of ["difference", "spectrum", "against_u", "against_v"]) entry(name, label, has)
   }
+  const title = (i) => document.querySelector(`[data-candidate="${i}"] .name b`)?.textContent ?? "candidate"
 
   // a click on a candidate pins it, another one lets it go; of three the first goes
   function pin(i) {
     pins = pins.includes(i) ? pins.filter((other) => other !== i) : [...pins, i].slice(-2)
-    for (const row of document.querySelectorAll("[data-candidate]"))
+    for (const row of document.querySelectorAll("[data-candidate]")) {
       row.classList.toggle("pinned", pins.includes(Number(row.dataset.candidate)))
+      row.classList.toggle("second", pins[1] === Number(row.dataset.candidate))
+    }
     preview(hovered)
   }
 
@@ -77,8 +85,8 @@ window.study = (() => {
     const none = [NaN, NaN]  // two points without a value: an axis needs some
     put("shown", shown.f.length ? {...shown, zero: shown.f.map(() => 0)} : {f: [0, 1], value: none, low: none, high: none, zero: [0, 0]})
     if (element) model("constancy_y").axis_label = element.dataset.label
-    const title = place("constancy-of")
-    if (title) title.textContent = element ? element.querySelector(".name b").textContent : "no candidate"
+    const heading = place("constancy-of")
+    if (heading) heading.textContent = element ? `${title(i)}, 95 % intervals` : ""
     const card = place("constancy-card"), empty = place("constancy-none"), detail = place("detail")
     if (card) card.classList.toggle("none", !shown.f.length)
     if (empty) empty.hidden = !element || shown.f.length > 0
@@ -195,16 +203,21 @@ window.study = (() => {
     if (element) { element.textContent = element.dataset.hint; element.classList.remove("on") }
   }
 
-  // ---- steps of a saved page
-  function step(k) {
+  // ---- steps and records of a saved page
+  let present = null
+  const pressed = () => document.querySelector("[data-act=record][aria-pressed=true]")?.dataset.name ?? "0"
+  function step(k) { show(k, pressed()) }
+  function show(k, record) {
+    present = k
     for (const source of Bokeh.documents[0].all_models) {
       const [name, number] = (source.name ?? "").split("@")
-      if (number === String(k)) model(name).data = source.data
+      if (number === `${k}.${record}`) model(name).data = source.data
     }
     words()
     for (const button of document.querySelectorAll("[data-act=step]"))
       button.classList.toggle("now", button.dataset.name === String(k))
   }
+  const last = () => Math.max(0, document.querySelectorAll("[data-act=step]").length - 1)
 
   // ---- axes of frequency, linear or logarithmic
   function logarithm(button) {
@@ -268,6 +281,7 @@ window.study = (() => {
   let count = 0
   function act(action, name) {
     if (action === "step") return step(Number(name))
+    if (action === "record" && !model("asked")) return show(present ?? last(), name)
     if (action === "csv") return exported(name)
     if (action === "logarithm") return logarithm(document.querySelector("[data-act=logarithm]"))
     if (action === "save") name = place("with-values").checked ? "values" : "open"

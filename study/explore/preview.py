@@ -17,9 +17,9 @@ from study.records.spectra import autospectrum
 def columns(stage: Stage, scales: Scales) -> dict[str, Columns]:
     """For each candidate what it would leave, under its place: difference, its spectrum, and the missing force."""
     rows, force = stage.shown, scales.force.factor
-    lacking = [within(stage.would[row.name]) for row in rows]
+    lacking = [within(stage.would[row.name][0]) for row in rows]
     return {
-        "would_time": difference(rows, scales),
+        "would_time": difference(stage, scales),
         "would_spectrum": {str(i): _spectrum(stage.comparison, row, scales) for i, row in enumerate(rows)},
         "would_u": _curves([(u, f) for u, _, f in lacking], scales.displacement.factor, force),
         "would_v": _curves([(v, f) for _, v, f in lacking], scales.velocity.factor, force),
@@ -37,10 +37,15 @@ def _curves(pairs: Sequence[tuple[Floats, Floats]], along: float, factor: float)
     return curves
 
 
-def difference(rows: Sequence[Ranked], scales: Scales, part: slice = slice(None)) -> Columns:
+def difference(stage: Stage, scales: Scales, part: slice = slice(None)) -> Columns:
     """The difference that each candidate would leave, over time."""
-    factor = scales.difference.factor
-    return {str(i): decimate.extremes(row.residual[part]) / factor for i, row in enumerate(rows)}
+    factor, judged = scales.difference.factor, stage.comparison.prediction
+    time = judged.time[part]
+    places = decimate.gaps(time, decimate.times(time), judged.dt)
+    return {
+        str(i): decimate.broken(decimate.extremes(row.residual[part]) / factor, places)
+        for i, row in enumerate(stage.shown)
+    }
 
 
 def _spectrum(comparison: Comparison, row: Ranked, scales: Scales) -> Floats:

@@ -12,24 +12,29 @@ from bokeh.resources import Resources
 from study.compare.comparison import Comparison
 from study.explore import html_page
 from study.explore.axis_scales import Columns
-from study.explore.session import Session, Stage
+from study.explore.by_record import worst
+from study.explore.session import Session, begin_with
 from study.explore.view import view
 
 EMBED = "Bokeh.safely(() => Bokeh.embed.embed_items({docs}, {items}))"
 
 
 def saved(session: Session) -> bytes:
-    """The whole session as a file that a browser opens; it shows the last model first."""
-    views = [view(stage, number, live=False) for number, stage in enumerate(session.stages)]
+    """The whole session as a file that a browser opens; it shows the last model first, where that misses most."""
+    many, first = len(session.stages), (len(session.stages) - 1, worst(session.now.on_each))
+    views = {
+        (number, record): view(stage, number, live=False, record=record)
+        for number, stage in enumerate(session.stages)
+        for record in range(max(len(stage.on_each), 1))
+    }
     history = html_page.history_columns(session)
     stores: list[ColumnDataSource] = []
-    if len(views) > 1:
-        for number, seen in enumerate(views):
-            columns: dict[str, Columns] = {
-                **seen.columns, "frame": html_page.frame(seen), "history": _marked(history, number - len(views))
-            }  # fmt: skip
-            stores += [ColumnDataSource(c, name=f"{name}@{number}") for name, c in columns.items()]
-    made = html_page.build(views[-1], history, stores)
+    for (number, record), seen in views.items() if len(views) > 1 else ():
+        columns: dict[str, Columns] = {
+            **seen.columns, "frame": html_page.frame(seen, history), "history": _marked(history, number - many)
+        }  # fmt: skip
+        stores += [ColumnDataSource(c, name=f"{name}@{number}.{record}") for name, c in columns.items()]
+    made = html_page.build(views[first], history, stores)
     values = html_page.variables(session, live=False)
     shown = html_page.placed(made, values["diagnosed"])
     document = Document()
@@ -51,8 +56,7 @@ def saved(session: Session) -> bytes:
 
 def of_comparison(comparison: Comparison) -> bytes:
     """The same of a comparison alone, which nobody has diagnosed."""
-    stage = Stage(comparison.model, "as given", None, comparison)
-    return saved(Session(comparison.prepared, (stage,)))
+    return saved(begin_with(comparison))
 
 
 def _marked(history: Columns, place: int) -> Columns:

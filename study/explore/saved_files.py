@@ -1,33 +1,53 @@
 """What Save writes: the model file with its comments, the history, the pictures, and the session as one page."""
 
+from collections.abc import Mapping
+
 from study.compare import history
-from study.compare.comparison_pictures import pictures
+from study.compare.comparison_pictures import level_pictures, pictures
 from study.compare.comparison_report import as_json, document, tables
 from study.compare.history_picture import files as history_pictures
 from study.diagnose.diagnosis_files import files as diagnosis_files
 from study.equations import model_file
 from study.explore.saved import saved
-from study.explore.session import Session
+from study.explore.session import Session, Stage
 
 PAGE = "explore.html"
 
 
-def files(session: Session, name: str, text: str, values: bool = False) -> dict[str, bytes]:
+def files(
+    session: Session, name: str, text: str, values: bool = False, drawn: Mapping[str, bytes] | None = None
+) -> dict[str, bytes]:
     """Contents by file name, of a session whose model came from a file of this name and text: its comments stay.
 
     With ``values`` the model file gives what was fitted, and a fit of it holds that; otherwise what the session holds.
+    ``drawn`` is what :func:`of_stage` gives of the present model, where that is known.
     """
     now, steps = session.now, session.steps
     model = now.model.with_values(now.values) if values else now.model
-    stem = name.rpartition(".")[0] or name
+    for one in session.several.separate:  # terms that tell the records of this session apart belong to it alone
+        for term in [t.name for t in model.terms if set(t.term.symbols) & set(one.differences)]:
+            model = model.without_term(term)
     contents = {
         name: model_file.revised(text, name, model).encode(),
         history.name_for(name): history.as_bytes(steps),
-        "comparison.json": as_json(document([now.comparison])),
-        **{f"{table}.csv": content for table, content in tables([now.comparison]).items()},
         PAGE: saved(session),
     }
-    contents |= pictures(now.comparison) | history_pictures(steps, stem)
+    shown = of_stage(now, by_level=not session.several.separate) if drawn is None else drawn
+    return contents | dict(shown) | history_pictures(steps, name.rpartition(".")[0] or name)
+
+
+def of_stage(now: Stage, by_level: bool = True) -> dict[str, bytes]:
+    """Pictures and tables of one model, on each of its records and, if ``by_level``, by level."""
+    each = now.on_each or (now.comparison,)
+    levels = now.by_record.levels if now.by_record is not None and by_level else ()
+    contents = {
+        "comparison.json": as_json(document(each, levels)),
+        **{f"{table}.csv": content for table, content in tables(each, levels).items()},
+    }
+    for comparison in each:
+        prefix = f"{comparison.record.name}_" if len(each) > 1 else ""
+        contents |= {prefix + name: content for name, content in pictures(comparison).items()}
+    contents |= level_pictures(levels, now.comparison.record.units.get("force", "N"))
     if now.diagnosis is not None:
         contents |= diagnosis_files(now.diagnosis, now.said, now.unneeded or ())
     return contents

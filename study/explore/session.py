@@ -4,12 +4,13 @@ Every function gives a new session; what was found of a model stays with its sta
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from study.compare.comparison import Comparison, compare
+from study.compare.comparison import Comparison, compare, on_each_record
 from study.compare.comparison_report import history_step
 from study.compare.missing_force import MissingForce, missing_force
 from study.diagnose import candidates, dropping
@@ -24,13 +25,16 @@ from study.diagnose.verdict import Diagnosis, search_base, search_part
 from study.equations import formulas
 from study.equations.model import Model
 from study.equations.terms import LIBRARY, Term, custom
+from study.explore.by_record import ByRecord, Several, by_record
 from study.records.oversampling import without_spare_samples
 from study.records.prepared import Prepared
+from study.records.stretches import records_judged
 from study.support.errors import StudyError, expect
 
 Step = dict[str, Any]
 Progress = Callable[[str], None]
 SHOWN = 8  # candidates
+NONE = Several()
 
 
 @dataclass(frozen=True)
@@ -43,9 +47,12 @@ class Stage:
     comparison: Comparison
     diagnosis: Diagnosis | None = None  # None as long as nobody has asked
     said: str = ""  # the diagnosis in words
-    would: Mapping[str, MissingForce] = field(default_factory=dict[str, MissingForce])  # with a candidate, by its name
+    # what a candidate would leave on each record, by its name
+    would: Mapping[str, tuple[MissingForce, ...]] = field(default_factory=dict[str, tuple[MissingForce, ...]])
     dropped: str | None = None  # the term that was taken out of the model before
     unneeded: tuple[Needless, ...] | None = None  # terms that it does not need; None as long as nobody has asked
+    on_each: tuple[Comparison, ...] = ()  # of several records: the same fit judged on each of them
+    by_record: ByRecord | None = None  # coefficients of each record's own; None as long as nobody has asked
 
     @property
     def shown(self) -> tuple[Ranked, ...]:
@@ -67,6 +74,7 @@ class Session:
     stages: tuple[Stage, ...]  # from the model as given to the present one
     own: tuple[Term, ...] = ()  # the user's own candidates
     earlier: tuple[Step, ...] = ()  # of the history that was kept beside the model file
+    several: Several = NONE
 
     @property
     def now(self) -> Stage:
@@ -89,15 +97,39 @@ def begin(
     return begin_with(compare(model, without_spare_samples(prepared), progress=progress), earlier=earlier)
 
 
-def begin_with(comparison: Comparison, *, earlier: Sequence[Step] = ()) -> Session:
-    """A session with the model as it was compared, on the record as it was corrected for that."""
-    first = Stage(comparison.model, "as given", None, comparison)
-    return Session(comparison.prepared, (first,), earlier=tuple(earlier))
+def begin_with(
+    comparison: Comparison, *, earlier: Sequence[Step] = (), several: Several = NONE, known: ByRecord | None = None
+) -> Session:
+    """A session with the model as it was compared, on the record, or records, as corrected for that.
+
+    ``known`` are the coefficients of each of several records.
+    """
+    comparison = _named_after_all(comparison)
+    first = replace(stage_of(comparison, "as given", None), by_record=known)
+    return Session(comparison.prepared, (first,), earlier=tuple(earlier), several=several)
+
+
+def _named_after_all(comparison: Comparison) -> Comparison:
+    """A comparison with several records called as all of them are."""
+    prepared = comparison.prepared
+    parts = records_judged(prepared)
+    if not parts:
+        return comparison
+    together = replace(prepared.record, name=", ".join(part.record.name for part in parts))
+    return replace(comparison, prepared=replace(prepared, record=together))
+
+
+def stage_of(comparison: Comparison, label: str, added: str | None, dropped: str | None = None) -> Stage:
+    """A model as it was compared, which nobody has diagnosed."""
+    each: tuple[Comparison, ...] = ()
+    with suppress(StudyError):  # one may be too short to be judged by itself: then all are shown as one
+        each = on_each_record(comparison)
+    return Stage(comparison.model, label, added, comparison, dropped=dropped, on_each=each)
 
 
 def climbed(session: Session, comparison: Comparison, label: str, added: str | None) -> Session:
     """The session with a model more."""
-    return replace(session, stages=(*session.stages, Stage(comparison.model, label, added, comparison)))
+    return replace(session, stages=(*session.stages, stage_of(comparison, label, added)))
 
 
 def candidate(session: Session, name: str) -> Ranked:
@@ -124,9 +156,28 @@ def dropped(session: Session, name: str) -> Session:
         If it is not in the model or cannot be left out.
     """
     comparison = dropping.dropped(session.now.comparison, name)
-    return replace(
-        session, stages=(*session.stages, Stage(comparison.model, f"- {name}", None, comparison, dropped=name))
-    )
+    return replace(session, stages=(*session.stages, stage_of(comparison, f"- {name}", None, dropped=name)))
+
+
+def on_record(stage: Stage, number: int) -> Stage:
+    """A stage of several records as one of them shows it; that of one record as it is."""
+    if not stage.on_each:
+        return stage
+    comparison, diagnosis = stage.on_each[number], stage.diagnosis
+    if diagnosis is not None:
+        rows = [replace(r, prediction=r.prediction.along(comparison.prepared)) for r in diagnosis.candidates]
+        diagnosis = replace(diagnosis, candidates=tuple(rows))
+    would = {name: (lacking[number],) for name, lacking in stage.would.items()}
+    return replace(stage, comparison=comparison, diagnosis=diagnosis, would=would)
+
+
+def by_itself(session: Session) -> Session:
+    """The session with the coefficients of each record known; as it is of one record, or where they are."""
+    now = session.now
+    if not now.on_each or now.by_record is not None:
+        return session
+    now = replace(now, by_record=by_record(session.several, now.comparison))
+    return replace(session, stages=(*session.stages[:-1], now))
 
 
 def weighed(session: Session) -> Session:
@@ -166,31 +217,32 @@ def examined(session: Session, progress: Callable[[int], None] | None = None) ->
     return _foreseen(replace(now, diagnosis=diagnosis, said=said)), diagnosis
 
 
-def lacking_with(row: Ranked) -> MissingForce:
-    """The force that the model with a candidate lacks."""
-    return missing_force(row.fit.model, (), row.prediction)
-
-
 def _foreseen(stage: Stage) -> Stage:
     """The stage with what each candidate that is shown would leave; one that cannot run leaves what there is."""
     would = dict(stage.would)
     for row in stage.shown:
         if row.name not in would:
-            try:
-                would[row.name] = lacking_with(row)
-            except StudyError:
-                would[row.name] = stage.comparison.missing_force
+            would[row.name] = tuple(_lacking_with(row, c) for c in stage.on_each or (stage.comparison,))
     return replace(stage, would=would)
+
+
+def _lacking_with(row: Ranked, comparison: Comparison) -> MissingForce:
+    """The force that the model with a candidate lacks on a record; what it lacks without if it cannot run."""
+    try:
+        return missing_force(row.fit.model, (), row.prediction.along(comparison.prepared))
+    except StudyError:
+        return comparison.missing_force
 
 
 def with_stage(session: Session, stage: Stage) -> Session:
     """The session with a diagnosed stage in place of those of its model; unchanged if that was undone meanwhile."""
     stages = (
-        replace(r, diagnosis=stage.diagnosis, said=stage.said, would=stage.would, unneeded=stage.unneeded)
+        replace(r, diagnosis=stage.diagnosis, said=stage.said, would=stage.would, unneeded=stage.unneeded,
+                by_record=stage.by_record)
         if r.model == stage.model
         else r
         for r in session.stages
-    )
+    )  # fmt: skip
     return replace(session, stages=tuple(stages))
 
 

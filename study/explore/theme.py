@@ -63,9 +63,10 @@ def panel(
     if narrow and "x_axis_type" not in more:
         ticker: Any = drawn.xaxis[0].ticker
         ticker.desired_num_ticks = 4
-    if more.get("y_axis_type") == "log":
-        drawn.yaxis[0].ticker = FixedTicker(name=f"{name}_ticks", ticks=[], minor_ticks=[])
-        drawn.yaxis[0].formatter = CustomJSTickFormatter(code=POWERS)
+    for side, axis in (("x", drawn.xaxis[0]), ("y", drawn.yaxis[0])):
+        if more.get(f"{side}_axis_type") == "log":
+            axis.ticker = FixedTicker(name=f"{name}_ticks", ticks=[], minor_ticks=[])
+            axis.formatter = CustomJSTickFormatter(code=POWERS)
     for grid in drawn.grid:
         grid.grid_line_color = RULE
     return drawn

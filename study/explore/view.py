@@ -11,10 +11,10 @@ from study.compare.comparison import Comparison
 from study.compare.force_map import CELLS, curve, surface
 from study.compare.links import links
 from study.diagnose.ranked import Ranked
-from study.explore import check_columns, decimate, preview, words
+from study.explore import check_columns, decimate, preview, record_words, words
 from study.explore.axis_scales import Columns, Floats, Scales, heard, least_force, scales_of, within
 from study.explore.page_units import Scale, in_text
-from study.explore.session import Stage
+from study.explore.session import Stage, on_record
 from study.figures.labels import power_of_ten
 
 NINETY_FIVE = 1.96  # standard errors to each side
@@ -37,8 +37,9 @@ class View:
     force_unit: str  # of the record, as text
 
 
-def view(stage: Stage, step: int, live: bool = True) -> View:
-    """The columns of a model, by its number in the session; only a ``live`` page can act."""
+def view(found: Stage, step: int, live: bool = True, record: int = 0) -> View:
+    """The columns of a model, by its number in the session, on one of the records; only a ``live`` page can act."""
+    stage = on_record(found, record)
     comparison, scales = stage.comparison, scales_of(stage.comparison)
     rows, force, least = stage.shown, scales.force, least_force(stage.comparison)
     u, v, missing = within(comparison.missing_force)
@@ -56,12 +57,19 @@ def view(stage: Stage, step: int, live: bool = True) -> View:
         **preview.columns(stage, scales),
         **check_columns.columns(comparison, scales),
         **_links(comparison, scales),
-        "words": words.words(stage, rows, step, live, force.unit),
+        "words": _words(found, stage, step, live, force.unit),
     }
     small = {name: _small(c) for name, c in columns.items()}
     limits, highest = force_limits(comparison), comparison.force.highest
     unit = in_text(comparison.record.units.get("force", ""))
     return View(small, scales, highest, comparison.plan.response, limits, least / force.factor, unit)
+
+
+def _words(found: Stage, stage: Stage, step: int, live: bool, force_unit: str) -> Columns:
+    """The words of a stage as one record shows it, and of all records."""
+    said = words.words(stage, stage.shown, step, live, force_unit)
+    more = record_words.words(found, stage.comparison.record.name, live)
+    return {"place": [*said["place"], *more], "html": [*said["html"], *more.values()]}
 
 
 def _small(columns: Columns) -> Columns:
@@ -76,11 +84,15 @@ def _small(columns: Columns) -> Columns:
 def over_time(comparison: Comparison, scales: Scales, span: tuple[float, float] | None = None) -> Columns:
     """Measured and predicted response and their difference, over a span of time in seconds or all that is judged."""
     judged, part = comparison.prediction, stretch(comparison, span)
-    return {
-        "t": decimate.times(judged.time[part]),
-        "measured": decimate.extremes(judged.measured[part]) / scales.response.factor,
-        "predicted": decimate.extremes(judged.predicted[part]) / scales.response.factor,
-        "difference": decimate.extremes(judged.residual[part]) / scales.difference.factor,
+    shown = decimate.times(judged.time[part])
+    places = decimate.gaps(judged.time[part], shown, judged.dt)
+    lines = {
+        "measured": (judged.measured, scales.response), "predicted": (judged.predicted, scales.response),
+        "difference": (judged.residual, scales.difference),
+    }  # fmt: skip
+    drawn = {name: decimate.extremes(y[part]) / scale.factor for name, (y, scale) in lines.items()}
+    return {"t": np.insert(shown, places, shown[places - 1])} | {
+        name: decimate.broken(y, places) for name, y in drawn.items()
     }
 
 

@@ -11,7 +11,7 @@ from study.compare.fitted_coefficients import Coefficient
 from study.compare.modal import modal
 from study.diagnose.needless import Needless
 from study.diagnose.ranked import Ranked
-from study.diagnose.verdict import MISSING, NOTHING
+from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
 from study.equations.terms import LIBRARY
 from study.explore.page_units import Scale, in_sentence, in_text, length, mass, number, rate
 from study.explore.session import Stage
@@ -28,7 +28,11 @@ NOT_ASKED = (
 PREDICTED = "The model runs free under the measured force, on the part of the record that it was not fitted to."
 FLOOR = "From the quietest bands of what is left, or from what differs between periods."
 FORCE = "The model in reverse: what its terms, computed from the measured motion, leave of the measured force."
-ONLY_NOISE = "What is left is noise: the panels below have nothing to show."
+SCALE = "".join(f"<span style='left:{x}%'>{x}</span>" for x in (0, 50, 100))
+HEAD = (
+    f"<li class='scale'><span class='head'>share of the difference explained / %</span><i class='axis'>{SCALE}</i></li>"
+)
+ONLY_NOISE = "What is left is noise: there is no missing force to show over displacement and velocity."
 
 
 def words(stage: Stage, rows: Sequence[Ranked], step: int, live: bool, force_unit: str) -> dict[str, Any]:
@@ -100,19 +104,17 @@ def _verdict(stage: Stage, live: bool) -> str:
 def _candidates(stage: Stage, rows: Sequence[Ranked], live: bool) -> str:
     if stage.diagnosis is None:
         return ""
-    scale = "".join(f"<span style='left:{x}%'>{x}</span>" for x in (0, 50, 100))
-    heading = "effect, and the share of the difference that it explains / %"
-    head = f"<li class='scale'><span class='head'>{heading}</span><i class='axis'>{scale}</i></li>"
-    offered = [(i, row) for i, row in enumerate(rows) if gives(row) or row.name not in LIBRARY]
+    offered = [(i, row) for i, row in enumerate(rows) if offers(stage.diagnosis, row)]
     more = len(stage.diagnosis.candidates) - len(offered)
     others = f"{more} more explain no more than chance would" if offered else f"none of {more} explains any of it"
     rest = f"<li class='more'>{others}</li>" if more > 0 else ""
-    return f"<ol>{head}{''.join(_row(i, row, stage, live) for i, row in offered)}{rest}</ol>"
+    return f"<ol>{HEAD if offered else ''}{''.join(_row(i, row, stage, live) for i, row in offered)}{rest}</ol>"
 
 
-def gives(row: Ranked) -> bool:
-    """Whether a candidate explains more than chance would: one that does not is not offered."""
-    return row.gain.explained > 0.0 and row.p_value < ALPHA
+def offers(diagnosis: Diagnosis, row: Ranked) -> bool:
+    """Whether a candidate is offered: the user's own, and one of what is missing that explains more than chance."""
+    explains = row.gain.explained > 0.0 and row.p_value < ALPHA
+    return row.name not in LIBRARY or (diagnosis.verdict != NOTHING and explains)
 
 
 def _row(place: int, row: Ranked, stage: Stage, live: bool) -> str:
@@ -127,7 +129,7 @@ def _row(place: int, row: Ranked, stage: Stage, live: bool) -> str:
     found = f" Found in {escape(row.term.cause)}." if row.name in LIBRARY else ""
     detail = (
         f"<b>{words}</b> <i>{formula}</i>, coefficient <em>{escape(size)}</em>; explains {explained[:-2]} ± "
-        f"{100.0 * row.gain.error:.1f} %, error with it {percent(row.response_error)}. {escape(meaning)}.{found}"
+        f"{number(100.0 * row.gain.error, 1)} %, error with it {percent(row.response_error)}. {escape(meaning)}.{found}"
     )
     return (
         f"<li class='candidate' data-candidate='{place}' data-label='{escape(_label(row, unit))}' tabindex='0' "

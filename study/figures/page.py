@@ -7,13 +7,18 @@ engine would measure every text on every page, which costs more than drawing it.
 # Matplotlib leaves the **kwargs of its methods untyped.
 # pyright: reportUnknownMemberType=false
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from io import BytesIO
+from pathlib import Path
 
+from matplotlib import style as styles
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+
+from study.support.errors import StudyError
+from study.support.files import replace_file
 
 LEFT, RIGHT, BOTTOM = 0.88, 0.16, 0.55  # inches
 TITLE, LEGEND_ROW, GAP = 0.58, 0.21, 0.34
@@ -94,6 +99,34 @@ def letter(axes: Sequence[Axes], names: Sequence[str]) -> None:
     """Name the panels (a), (b), ... as the report does."""
     for index, (panel, name) in enumerate(zip(axes, names, strict=True)):
         panel.set_title(f"({chr(ord('a') + index)}) {name}")
+
+
+def frame_cells(axes: Axes, rows: Sequence[str], columns: Sequence[str], rotation: float = 0.0) -> None:
+    """Names at the rows and columns of an image, and lines between its cells."""
+    axes.set_xticks(range(len(columns)), columns, rotation=rotation)
+    axes.set_yticks(range(len(rows)), rows)
+    axes.set_xticks([at - 0.5 for at in range(len(columns) + 1)], minor=True)
+    axes.set_yticks([at - 0.5 for at in range(len(rows) + 1)], minor=True)
+    axes.grid(visible=False)
+    axes.grid(visible=True, which="minor", color="0.85")
+    axes.tick_params(which="minor", length=0)
+
+
+def write_each(kinds: Mapping[str, Callable[[], Figure]], outputs: Mapping[str, Sequence[Path]], style: Path) -> None:
+    """Draw the kinds of figure that are asked for in a style, each into its files, PNG or SVG.
+
+    Raises
+    ------
+    StudyError
+        If a kind of figure is asked for that there is not.
+    """
+    with styles.context(style):
+        for kind, paths in outputs.items():
+            if kind not in kinds:
+                raise StudyError(f"there is no kind of figure {kind!r}; known are {', '.join(kinds)}")
+            figure = kinds[kind]()
+            for path in paths:
+                replace_file(path, rendered(figure, path.suffix[1:]))
 
 
 def rendered(figure: Figure, kind: str) -> bytes:

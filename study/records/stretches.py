@@ -65,6 +65,27 @@ def _refuse_different(first: Record, other: Record) -> None:
         )
 
 
+def records_judged(prepared: Prepared) -> tuple[Prepared, ...]:
+    """A prepared record of several records, each time with the samples of one of them to judge; none of one record.
+
+    What is fitted stays the same. Each is called as the record whose samples are judged.
+    """
+    record, (begin, end) = prepared.record, prepared.plan.judge
+    bounds = (0, *record.joints, len(record))
+    judged = [(s.source, a, b) for s, (a, b) in zip(record.stretches, itertools.pairwise(bounds), strict=False)
+              if begin <= a and b <= end]  # fmt: skip
+    runs = [list(stretches) for _, stretches in itertools.groupby(judged, key=lambda stretch: id(stretch[0]))]
+    if len(runs) < 2:
+        return ()
+    return tuple(
+        replace(
+            prepared, record=replace(record, name=run[0][0].name),
+            plan=replace(prepared.plan, judge=(run[0][1], run[-1][2])),
+        )
+        for run in runs
+    )  # fmt: skip
+
+
 def sure(completed: CompletedRecord, first: int, last: int) -> Stretch:
     """A stretch of a completed record without the samples at its ends that derivatives leave uncertain."""
     edge = completed.edge

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from study.equations.jit import compiled
-from study.equations.kernels import first_zero, run
+from study.equations.kernels import copy_state, first_zero, run
 from study.support.arrays import Floats, Ints
 
 CUTS = 6  # of a step, for each place with friction
@@ -143,7 +143,7 @@ def _hold_derivatives(
 
 @compiled
 def _variation(
-    code: Ints, first: int, r: Floats, slopes: Ints, by_state: Ints, by_key: Ints, sides: Ints, by_side: Ints,
+    code: Ints, first: int, r: Floats, slopes: Ints, by_state: Ints, by_key: Ints, sides: Ints | None, by_side: Ints,
     directions: Floats, held: Ints, time: float, drive: Floats, j: int, w: Floats, columns: int,
 ) -> None:  # fmt: skip
     """Derivatives of ``w[1]`` into ``w[2]``: the states in the first column, their sensitivities in the others.
@@ -154,10 +154,11 @@ def _variation(
     n = directions.shape[1]
     _evaluate(code, first, r, n, time, drive, j, w)
     holding = False
-    for a in range(len(sides)):
-        holding = holding or held[a] != 0
-    if holding:
-        _hold(code, first, r, slopes, sides, by_side, directions, held)
+    if sides is not None:
+        for a in range(len(sides)):
+            holding = holding or held[a] != 0
+        if holding:
+            _hold(code, first, r, slopes, sides, by_side, directions, held)
     for i in range(n):
         for c in range(columns):
             w[2, i, c] = w[1, n + i, c]
@@ -175,13 +176,14 @@ def _variation(
             i, m = n + by_state[k, 0], by_state[k, 1]
             for c in range(1, columns):
                 w[2, i, c] += partial * w[1, m, c]
-    if holding:
-        _hold_derivatives(r, sides, by_side, directions, held, w, columns)
+    if sides is not None:  # noqa: SIM102 - alone, Numba leaves out what follows where there is no dry friction
+        if holding:
+            _hold_derivatives(r, sides, by_side, directions, held, w, columns)
 
 
 @compiled
 def _rk4_step(
-    code: Ints, first: int, r: Floats, slopes: Ints, by_state: Ints, by_key: Ints, sides: Ints, by_side: Ints,
+    code: Ints, first: int, r: Floats, slopes: Ints, by_state: Ints, by_key: Ints, sides: Ints | None, by_side: Ints,
     directions: Floats, held: Ints, time: float, h: float, drive: Floats, j: int, w: Floats, columns: int,
 ) -> None:  # fmt: skip
     """One Runge-Kutta step of ``w[0]`` in place; drive[j], drive[j + 1], drive[j + 2] are half a step apart."""
@@ -372,7 +374,7 @@ def _switching_step(
     begin = 0.0
     early, fresh = np.zeros(len(sides)), np.zeros(len(sides), dtype=np.int64)
     for cut in range(CUTS * len(sides) + 1):
-        w[4] = w[0]
+        copy_state(w, 0, 4)
         for a in range(len(sides)):
             early[a] = r[sides[a]]
         _part(
@@ -382,7 +384,8 @@ def _switching_step(
         a, x = _next_event(r, sides, directions, held, early, fresh, (1.0 - begin) * h, w)
         if a < 0 or cut == CUTS * len(sides):
             return
-        fresh[:] = 0
+        for b in range(len(sides)):
+            fresh[b] = 0
         if held[a] == 0:
             begin = _switch(
                 code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, a, time, h, begin, x,
@@ -410,7 +413,7 @@ def _set_sides(
         held[a] = 1 if v == 0.0 else 0
         r[sides[a]] = np.sign(v)
     for _ in range(len(sides)):
-        w[1] = w[0]
+        copy_state(w, 0, 1)
         _variation(code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, time, drive, 0, w, 1)
         for a in range(len(sides)):
             if held[a] != 0 and abs(r[sides[a]]) > 1.0:
@@ -419,7 +422,7 @@ def _set_sides(
 
 @compiled
 def integrate_structure(
-    code: Ints, first: int, r: Floats, slopes: Ints, by_state: Ints, by_key: Ints, sides: Ints, by_side: Ints,
+    code: Ints, first: int, r: Floats, slopes: Ints, by_state: Ints, by_key: Ints, sides: Ints | None, by_side: Ints,
     directions: Floats, start: float, dt: float, steps: int, drive: Floats, y: Floats, rows: Ints, out: Floats,
 ) -> int:  # fmt: skip
     """A free run with its exact derivatives by Runge-Kutta, ``steps`` steps a sample.
@@ -431,13 +434,15 @@ def integrate_structure(
     n, h = directions.shape[1], dt / steps
     w = np.zeros((5, y.shape[0], y.shape[1]))
     local = np.zeros((3, drive.shape[1]))
-    held = np.zeros(len(sides), dtype=np.int64)
-    w[0] = y
-    if len(sides) > 0:
+    held = np.zeros(directions.shape[0], dtype=np.int64)
+    for i in range(y.shape[0]):
+        for c in range(y.shape[1]):
+            w[0, i, c] = y[i, c]
+    if sides is not None:
         _set_sides(code, first, r, slopes, by_state, by_key, sides, by_side, directions, held, start, drive, w)
     for sample in range(out.shape[1]):
         j = 2 * steps * sample
-        w[1] = w[0]
+        copy_state(w, 0, 1)
         _variation(
             code,
             first,
@@ -464,7 +469,7 @@ def integrate_structure(
         if sample + 1 < out.shape[1]:
             for m in range(steps):
                 time = start + sample * dt + m * h
-                if len(sides) == 0:
+                if sides is None:
                     _rk4_step(
                         code, first, r, slopes, by_state, by_key, sides, by_side, directions, held,
                         time, h, drive, j + 2 * m, w, w.shape[2],
@@ -474,5 +479,7 @@ def integrate_structure(
                         code, first, r, slopes, by_state, by_key, sides, by_side, directions, held,
                         time, h, drive, j + 2 * m, local, w,
                     )  # fmt: skip
-    y[:] = w[0]
+    for i in range(y.shape[0]):
+        for c in range(y.shape[1]):
+            y[i, c] = w[0, i, c]
     return -1

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from study.compare.panels import force_curve
+from study.figures.page import frame_cells
 from study.structure.missing_forces import MissingForces
 from study.structure.modes import Modes
 from study.structure.structure_prediction import StructurePrediction
@@ -59,13 +60,7 @@ def shared_force(axes: Axes, forces: MissingForces) -> Axes:
             j, i, f"{value:.0f}", ha="center", va="center", fontsize=8,
             color="white" if value > 100.0 * DARK else "black",
         )  # fmt: skip
-    axes.set_xticks(range(len(names)), names, rotation=30 if len(names) > 3 else 0)
-    axes.set_yticks(range(len(names)), names)
-    axes.set_xticks(np.arange(len(names) + 1) - 0.5, minor=True)
-    axes.set_yticks(np.arange(len(names) + 1) - 0.5, minor=True)
-    axes.grid(visible=False)
-    axes.grid(visible=True, which="minor", color="0.85")
-    axes.tick_params(which="minor", length=0)
+    frame_cells(axes, names, names, 30.0 if len(names) > 3 else 0.0)
     axes.set_xlabel("and this one, with the opposite sign (%)")
     axes.set_ylabel("in the equation of")
     return axes

@@ -81,8 +81,9 @@ class StructureRun:
         state = np.zeros((own.states, out.shape[2]))
         state[: len(initial), 0] = initial
         state[list(free), range(first, out.shape[2])] = 1.0
+        sides = own.sides if len(own.sides) else None
         failed = kernels.integrate_structure(
-            program.code, program.first, program.registers.copy(), own.slopes, own.by_state, own.by_key, own.sides,
+            program.code, program.first, program.registers.copy(), own.slopes, own.by_state, own.by_key, sides,
             own.by_side, own.directions, self.start, self.dt, self.steps, self.drive, state, self.rows, out,
         )  # fmt: skip
         if failed >= 0:

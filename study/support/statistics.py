@@ -127,11 +127,12 @@ def _p_value(products: Floats) -> float:
     return float(np.sum(ways[int(np.sum(rank[products > 0.0])) :])) / 2.0**n
 
 
-def clustered_covariance(jacobian: Floats, residual: Floats) -> Floats:
+def clustered_covariance(jacobian: Floats, residual: Floats, others: int = 0) -> Floats:
     """Covariance of least-squares estimates when the residual is correlated in time or with the motion.
 
     The sandwich ``H^-1 (sum over blocks g_b g_b^T) H^-1`` with ``g_b = J_b^T e_b`` and ``H = J^T J``
-    (Liang and Zeger, 1986), never below the formula for white noise.
+    (Liang and Zeger, 1986), never below the formula for white noise. ``others`` is how many unknowns the columns of the
+    Jacobian are beside.
     """
     scale = np.linalg.norm(jacobian, axis=0)
     scale = np.where(scale > 0.0, scale, 1.0)
@@ -145,7 +146,7 @@ def clustered_covariance(jacobian: Floats, residual: Floats) -> Floats:
     steps = blocks @ inverse  # what each block moves the estimates by: of their products no variance is negative
     sandwich = steps.T @ steps * count / (count - 1)
     variance = np.diag(sandwich)
-    white = np.diag(inverse) * float(residual @ residual) / max(len(residual) - len(scale), 1)
+    white = np.diag(inverse) * float(residual @ residual) / max(len(residual) - len(scale) - others, 1)
     larger = np.sqrt(np.maximum(variance, white) / np.maximum(variance, np.finfo(float).tiny))
     covariance = sandwich * np.outer(larger, larger)
     np.fill_diagonal(covariance, np.maximum(variance, white))  # one that a single sample decides has no scatter at all

@@ -7,6 +7,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
+from study.figures.page import frame_cells
+
 STEPS = {
     "before": ("before", "C1", "s", -0.27),
     "after": ("after adding what was found", "C0", "o", -0.09),
@@ -33,13 +35,8 @@ def confusion(axes: Axes, counts: pd.DataFrame) -> Axes:
                 j, i, f"{100.0 * value:.0f}", ha="center", va="center", fontsize=8,
                 color="white" if value > DARK else "black",
             )  # fmt: skip
-    axes.set_xticks(range(len(names)), names, rotation=90)
-    axes.set_yticks(range(len(hidden)), [f"{name} ({int(n.sum())})" for name, n in zip(hidden, numbers, strict=True)])
-    axes.set_xticks(np.arange(len(names) + 1) - 0.5, minor=True)
-    axes.set_yticks(np.arange(len(hidden) + 1) - 0.5, minor=True)
-    axes.grid(visible=False)
-    axes.grid(visible=True, which="minor", color="0.85")
-    axes.tick_params(which="minor", length=0)
+    titles = [f"{name} ({int(n.sum())})" for name, n in zip(hidden, numbers, strict=True)]
+    frame_cells(axes, titles, names, 90.0)
     axes.set_xlabel("diagnose says")
     axes.set_ylabel("hidden (trials)")
     return axes

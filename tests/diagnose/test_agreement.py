@@ -17,6 +17,7 @@ from study.trials.experiment import REPORT_LIKE, WIDE
 from study.trials.sealed import write
 
 ALIKE = 1e-9  # relative: the same computation, whoever asks for it
+pytestmark = pytest.mark.usefixtures("numbers_only")
 TRIALS = [(31, "cubic_stiffness", 0.0, "displacement"), (32, "quadratic_damping", 0.01, "acceleration")]
 TRIALS += [(33, "dead_band", 0.05, "velocity")]
 OVERSAMPLED = 520001, "quadratic_damping", 0.05, "velocity"

@@ -10,14 +10,14 @@ import pytest
 
 from study import cli, trials
 from study.compare import history
-from study.compare.comparison import compare
+from study.compare.comparison import Comparison, compare
 from study.compare.force_map import curve, surface
 from study.compare.links import links
 from study.diagnose.adding import added
 from study.equations import model_file
 from study.equations.model import Model, free
 from study.equations.terms import get
-from study.explore import decimate, html_page, page_units, view, words
+from study.explore import decimate, html_page, page_units, saved_files, view, words
 from study.explore import session as sessions
 from study.explore.desk import Desk
 from study.explore.saved import saved
@@ -333,6 +333,32 @@ def test_the_desk_does_one_thing_at_a_time_and_says_what_went_wrong(asked, tmp_p
     desk.close()
 
 
+def test_what_save_writes_is_drawn_before_it_is_asked_for(asked, tmp_path, monkeypatch):
+    drawn: list[Comparison] = []
+    ahead = threading.Event()
+
+    def pictures(comparison: Comparison) -> dict[str, bytes]:
+        drawn.append(comparison)
+        ahead.set()
+        return {"response.png": b"drawn"}
+
+    for name in ("history_pictures", "diagnosis_files"):
+        monkeypatch.setattr(saved_files, name, lambda *_: {})
+    monkeypatch.setattr(saved_files, "pictures", pictures)
+    text = model_file.format_model(asked.stages[0].model)
+    desk, done = Desk(asked, tmp_path / "rig.yaml", text, tmp_path / "out"), threading.Event()
+    desk.diagnose()  # known: nothing is asked again, but it is drawn
+    assert ahead.wait(120.0)
+    desk.watch(done, lambda: done.set() if desk.state.notice else None)
+    desk.ask("save", "open")
+    assert done.wait(120.0)
+    assert "Saved in" in desk.state.notice
+    desk.close()
+    assert drawn == [asked.now.comparison]
+    assert (tmp_path / "out" / "response.png").read_bytes() == b"drawn"
+    assert files(asked, "rig.yaml", text, drawn=saved_files.of_stage(asked.now)) == files(asked, "rig.yaml", text)
+
+
 @pytest.mark.parametrize(
     ("words_", "said"),
     [
@@ -383,7 +409,7 @@ def test_what_gives_nothing_is_counted_and_not_offered(asked):
     stage = asked.now
     places = dict(zip(*words.words(stage, stage.shown, 0, True, "N").values(), strict=True))
     offered = re.findall(r"data-candidate='(\d+)'", places["candidates"])
-    assert [int(i) for i in offered] == [i for i, row in enumerate(stage.shown) if words.gives(row)]
+    assert [int(i) for i in offered] == [i for i, row in enumerate(stage.shown) if words.offers(stage.diagnosis, row)]
     assert 0 < len(offered) < len(stage.shown)
     assert f"{len(stage.diagnosis.candidates) - len(offered)} more explain no more than chance" in places["candidates"]
 

@@ -12,12 +12,13 @@ from study.identify.time_domain import fit_model as fits
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.fit_model import fit_model, with_term
 from study.identify.time_domain.multiple_shooting import is_chaotic
-from study.identify.time_domain.part_fit import fit_part
+from study.identify.time_domain.part_fit import covariance_of, fit_part, linearise, with_states
 from study.identify.time_domain.settling import continued
 from study.identify.time_domain.stretch_states import is_poor
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.prepared import prepare_record, whole
 from study.support.errors import StudyError
+from study.support.least_squares import least_squares
 
 
 def noisy(record, seed=1, fraction=0.01):
@@ -98,6 +99,11 @@ def test_a_width_is_found_within_its_error_where_no_free_run_follows(seed, syste
     assert fit.restarts
     assert abs(fit.estimate["dead_band.u_g"] - 0.0025) < 4.0 * fit.estimate.error("dead_band.u_g")
     assert fit.estimate["dead_band.u_g"] == pytest.approx(0.0025, rel=0.02)
+    beside, all_states = linearise(fit, whole(made)), with_states(fit, whole(made))
+    keys, target = len(fit.keys), np.random.default_rng(seed).standard_normal(len(fit.residual))
+    assert beside.shape[1] == keys < len(fit.restarts) < all_states.shape[1]
+    assert least_squares(beside, target) == pytest.approx(least_squares(all_states, target)[:keys], rel=1e-6)
+    assert covariance_of(fit, beside) == pytest.approx(covariance_of(fit, all_states)[:keys, :keys], rel=1e-3)
 
 
 def test_where_the_motion_runs_away_from_a_start_one_nearer_to_the_linear_one_is_taken(systems):

@@ -64,6 +64,9 @@ def test_a_record_that_is_a_case(folder):
     for name in ("silverbox", "silverbox_climb"):
         with pytest.raises(StudyError, match=rf"row 2 \(record 'silverbox'\): '{name}' is a case of cases.tsv"):
             measurements.load(folder, [name])
+    for name in ("silverbox_climb", "damper"):
+        with pytest.raises(StudyError, match=f"'{name}' is another target of the workflow; give the record"):
+            measurements.load(folder, targets=[name])
 
 
 def test_a_byte_order_mark_is_none_of_the_table(folder):

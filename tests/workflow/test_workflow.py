@@ -90,7 +90,7 @@ def edited(path, old, new):
 def built(tmp_path_factory):
     """The small study, complete."""
     folder = project(tmp_path_factory.mktemp("study"), DUFFING, NOISY)
-    run(folder, "-j2")
+    (folder / "said.txt").write_text(run(folder, "-j2", "--verbose"))
     return folder
 
 
@@ -107,6 +107,13 @@ def test_a_row_of_the_table_gives_every_product(built):
     assert "| duffing " in page
     assert "| noisy " in page
     assert "## Run times" in page
+
+
+def test_snakemake_looks_for_work_when_a_job_ends_not_all_the_time(built):
+    said = (built / "said.txt").read_text()
+    jobs, looks = said.count("Finished jobid"), said.count("Resources before job selection")
+    assert jobs > 15
+    assert looks <= jobs + 1, "with a number of jobs a second to hold to, it is hundreds of times"
 
 
 def test_a_new_row_runs_its_own_jobs_and_what_joins_all_cases(built):

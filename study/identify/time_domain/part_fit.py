@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,8 +63,24 @@ def run_of(
 def linearise(fit: FreeRunFit, prepared: Prepared) -> Floats:
     """Derivatives of the response on the samples that were fitted, shape (n, keys + 2): keys, then initial states.
 
-    These are two for each stretch of the record, and none where the motion is prescribed.
+    These are two for each stretch of the record, and none where the motion is prescribed. Where the fit begins anew at
+    restarts there may be thousands: the derivatives by the keys are then those beside all of them, shape (n, keys),
+    whose regression has the same coefficients and errors (Frisch and Waugh, 1933).
     """
+    if not fit.restarts:
+        return with_states(fit, prepared)
+    values, run = dict(zip(fit.keys, fit.values.tolist(), strict=True)), run_of(fit, prepared, fit.keys)
+    derivatives = prepared.known(run.respond_by_segment(values, fit.initial, run.moving)[1], fit.span)
+    keys = len(fit.keys)
+    for segment in pairwise((0, *run.cuts, run.samples)):
+        own = derivatives[slice(*segment)]
+        states = own[:, keys:] / np.maximum(np.linalg.norm(own[:, keys:], axis=0), np.finfo(float).tiny)
+        own[:, :keys] -= states @ np.linalg.lstsq(states, own[:, :keys], rcond=1e-10)[0]
+    return derivatives[:, :keys]
+
+
+def with_states(fit: FreeRunFit, prepared: Prepared) -> Floats:
+    """The same with the derivatives by the initial states of all segments, shape (n, keys + 2 segments)."""
     values, run = dict(zip(fit.keys, fit.values.tolist(), strict=True)), run_of(fit, prepared, fit.keys)
     return prepared.known(run.respond(values, fit.initial, run.moving)[1], fit.span)
 
@@ -73,7 +90,8 @@ def covariance_of(fit: FreeRunFit, jacobian: Floats) -> Floats:
 
     ``jacobian`` is what :func:`linearise` gives of the fit.
     """
-    return clustered_covariance(whitened(jacobian, fit.noise), whitened(fit.residual, fit.noise))
+    others = fit.initial.size if fit.restarts and jacobian.shape[1] == len(fit.keys) else 0
+    return clustered_covariance(whitened(jacobian, fit.noise), whitened(fit.residual, fit.noise), others)
 
 
 def integration_shift(fit: FreeRunFit, prepared: Prepared, jacobian: Floats) -> Floats:

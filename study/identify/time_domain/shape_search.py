@@ -16,7 +16,7 @@ from study.equations.substeps import needed_steps
 from study.equations.term import Parameter, Term
 from study.identify.frequency_domain.starting_values import linear_start, oscillator
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.part_fit import linearise, run_of
+from study.identify.time_domain.part_fit import run_of, with_states
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS
 from study.support.arrays import Complexes, Floats
@@ -93,7 +93,7 @@ class Start:
 
 def baseline(fit: FreeRunFit, prepared: Prepared) -> Baseline:
     """Prepare a fitted model for the search."""
-    jacobian = linearise(fit, prepared)
+    jacobian = with_states(fit, prepared)
     scale = np.linalg.norm(jacobian, axis=0)
     basis = np.linalg.qr(jacobian / np.where(scale > 0.0, scale, 1.0))[0]
     displacement, _ = run_of(fit, prepared, motion="displacement").respond({}, fit.initial)

@@ -4,15 +4,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
-from matplotlib import style as styles
 from matplotlib.figure import Figure
 
 from study.figures import coherence, curves, frequency_response, labels, page
 from study.records.record import read_csv
 from study.reproduction import preliminary
 from study.reproduction.pictures import distribution
-from study.support.errors import StudyError
-from study.support.files import replace_file
 
 HIGHEST = 10.0  # hertz: the report's systems have their dynamics below it (Section 2.2)
 BESIDE = (labels.FREE_SHAPE, "instrumental")  # whose coherences stand over those of MI/SO
@@ -118,10 +115,4 @@ def draw(
         "coherence": lambda: cumulative(coherence_csv, system, highest, drawn),
         "histogram": lambda: histogram(record_csv, title),
     }
-    with styles.context(style):
-        for kind, paths in outputs.items():
-            if kind not in kinds:
-                raise StudyError(f"there is no kind of figure {kind!r}; known are {', '.join(kinds)}")
-            figure = kinds[kind]()
-            for path in paths:
-                replace_file(path, page.rendered(figure, path.suffix[1:]))
+    page.write_each(kinds, outputs, style)

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from matplotlib import style as styles
 from matplotlib.figure import Figure
 
 from study.equations.model_file import read_model
@@ -13,8 +12,6 @@ from study.records import spectra
 from study.records.record import read_csv
 from study.reproduction import preliminary
 from study.reproduction.pictures import distribution, force_patterns
-from study.support.errors import StudyError
-from study.support.files import replace_file
 
 HIGHEST = 10.0  # hertz, as in the figures of A_j
 
@@ -105,10 +102,4 @@ def draw(source: Source, outputs: Mapping[str, Sequence[Path]], *, style: Path, 
         "force_history": lambda: force_history(source, segments),
         "force_histogram": lambda: force_histogram(source),
     }
-    with styles.context(style):
-        for kind, paths in outputs.items():
-            if kind not in kinds:
-                raise StudyError(f"there is no kind of figure {kind!r}; known are {', '.join(kinds)}")
-            figure = kinds[kind]()
-            for path in paths:
-                replace_file(path, page.rendered(figure, path.suffix[1:]))
+    page.write_each(kinds, outputs, style)

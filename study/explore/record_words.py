@@ -1,0 +1,97 @@
+"""The tables of several records as fragments of HTML: how good the one model is on each, and their own coefficients."""
+
+from collections.abc import Sequence
+from html import escape
+
+from study.compare.across_levels import Level
+from study.compare.comparison import Comparison
+from study.explore.page_units import in_text, number
+from study.explore.session import Stage
+from study.support.numbers import percent
+
+WAITING = "each record is being fitted by itself …"
+NOT_ASKED = "Not asked for here: <code>study compare</code> fits each record by itself."
+OWN = "Error with coefficients of the record's own: far below the first, where the one model on all lacks something."
+
+
+def words(stage: Stage, shown: str, live: bool) -> dict[str, str]:
+    """The fragments by their place; ``shown`` is the name of the record that the panels show. None of one record."""
+    if not stage.on_each:
+        return {}
+    return {"records": _records(stage, shown), "levels": _levels(stage, live), "of-record": f"of {escape(shown)}"}
+
+
+def _records(stage: Stage, shown: str) -> str:
+    """A row a record, whose name is a button that turns the panels to it, and one for all."""
+    unit = in_text(stage.comparison.record.units.get("force", ""))
+    heads = ("record", f"rms force / {escape(unit)}", "error", "noise floor", "of force", "own fit")
+    head = "".join(f"<th{f' title={chr(34)}{OWN}{chr(34)}' if h == 'own fit' else ''}>{h}</th>" for h in heads)
+    own = stage.by_record.errors if stage.by_record is not None else ()
+    names = [c.record.name for c in stage.on_each]
+    rows = [
+        _row(_button(i, c.record.name, c.record.name == shown), c, percent(own[i]) if own else "–")
+        for i, c in enumerate(stage.on_each)
+    ]
+    everything = _row(f"all {len(names)}", stage.comparison, "")
+    return f"<table><tr>{head}</tr>{''.join(rows)}{everything.replace('<tr>', '<tr class=all>', 1)}</table>"
+
+
+def _button(place: int, name: str, pressed: bool) -> str:
+    return (
+        f"<button data-act='record' data-name='{place}' aria-pressed='{str(pressed).lower()}' "
+        f"title='{escape(name)}: show it in all panels'>{escape(name)}</button>"
+    )
+
+
+def _row(name: str, comparison: Comparison, own: str) -> str:
+    judged = comparison.prediction
+    level = f"{judged_level(comparison):.3g}"
+    cells = (level, percent(judged.error), percent(judged.floor), percent(comparison.force.total), own)
+    return f"<tr><th>{name}</th>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
+
+
+def judged_level(comparison: Comparison) -> float:
+    """Rms force of the part that is judged."""
+    force = comparison.record["force"][slice(*comparison.plan.judge)]
+    return float(force.std())
+
+
+def _levels(stage: Stage, live: bool) -> str:
+    """A row a coefficient, a column a record, as ``study compare`` shows it."""
+    found = stage.by_record
+    if found is not None and found.why_not:
+        return f"<p>{escape(found.why_not)}</p>"
+    fitted = [c for c in stage.comparison.coefficients if not c.held]
+    if found is None:  # as many rows, so that nothing moves when they come
+        if not live:
+            return f"<p>{NOT_ASKED}</p>"
+        rows = "".join(
+            f"<tr><th><i>{escape(_symbol(c.key))}</i><small>{escape(in_text(c.unit))}</small></th><td>&nbsp;</td></tr>"
+            for c in fitted
+        )
+        return f"<table><tr><th></th><th>{WAITING}<small>&nbsp;</small></th></tr>{rows}</table>"
+    if not found.levels:
+        return "<p>every coefficient is held</p>"
+    forces = [f"{force:.3g}" for force in found.levels[0].force]
+    columns = zip(found.names, forces, strict=True)
+    unit = in_text(stage.comparison.record.units.get("force", ""))
+    head = "".join(f"<th>{escape(name)}<small>{force} {escape(unit)}</small></th>" for name, force in columns)
+    rows = "".join(_level(level) for level in found.levels)
+    return f"<table><tr><th></th>{head}<th>differs?</th></tr>{rows}</table>"
+
+
+def _level(level: Level) -> str:
+    values = _cells(level.value, level.error)
+    answer = f"{'yes' if level.moves else 'no'}<small>p = {number(level.p_value, 1)}</small>"
+    moves = " class='moves'" if level.moves else ""
+    unit = f"<small>{escape(in_text(level.unit))}</small>"
+    return f"<tr{moves}><th><i>{escape(_symbol(level.key))}</i>{unit}</th>{values}<td>{answer}</td></tr>"
+
+
+def _symbol(key: str) -> str:
+    return key.rpartition(".")[2]
+
+
+def _cells(values: Sequence[float], errors: Sequence[float]) -> str:
+    pairs = zip(values, errors, strict=True)
+    return "".join(f"<td>{number(v)}<small>± {number(1.96 * e, 2)}</small></td>" for v, e in pairs)
