@@ -82,7 +82,9 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         "--absolute", action="store_true", help="on a moving base (column base_acceleration): the response is absolute"
     )  # fmt: skip
     reading.add_argument(
-        "--as-sampled", action="store_true", help="use all samples, though the motion asks for fewer"
+        "--as-sampled", action="store_true",
+        help="use all samples of a driven response, though its motion asks for fewer; they always are in free decays, "
+        "components, motions without a spring, and beside --use",
     )  # fmt: skip
     reading.add_argument("--free", action="store_true", help="a free decay: no force acts, a column of it is left out")
     reading.add_argument(

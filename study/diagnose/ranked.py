@@ -20,6 +20,7 @@ from study.support.statistics import Gain
 from study.support.thresholds import ENOUGH, GOOD, NEARLY, UNSTEADY
 
 Floats = NDArray[np.float64]
+ROUNDED = math.sqrt(float(np.finfo(float).eps))  # of the response: rounding leaves no minimum told more closely
 
 
 @dataclass(frozen=True)
@@ -53,8 +54,8 @@ class Ranked:
 
     @property
     def numerical(self) -> float:
-        """Rms error of the integration itself."""
-        return self.prediction.numerical
+        """Rms error of the integration itself; of a force that takes none, that of finding a least sum of squares."""
+        return max(self.prediction.numerical, ROUNDED * self.prediction.size)
 
     @property
     def response_error(self) -> float:

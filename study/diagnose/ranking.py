@@ -43,7 +43,12 @@ def rank(candidates: Sequence[Candidate], comparison: Comparison) -> list[Ranked
     white = {r.name: r.held_out.white(noise) for r in rows}
     alone = held_out_of(comparison)
     rows, own = [_gained(r, evidence(before, alone)) for r in rows], alone.white(noise)
-    rows = [replace(r, p_value=min(1.0, len(rows) * _p_value(own, white[r.name], _independent(r)))) for r in rows]
+    free = before.prepared.free
+
+    def chance(row: Ranked) -> float:
+        return min(1.0, len(rows) * _p_value(own, white[row.name], _independent(row), free))
+
+    rows = [replace(r, p_value=chance(r)) for r in rows]
     return [replace(r, distance=away, tied_with=tied) for r, away, tied in in_order(rows, white, len(rows))]
 
 
@@ -113,7 +118,7 @@ def in_order(rows: Sequence[R], white: Mapping[str, Floats], asked: int) -> list
 def distance(row: Row, other: Row, white: Mapping[str, Floats]) -> float:
     """By how many standard errors a candidate leaves more than another of samples that neither was fitted to.
 
-    Zero for two forms of one equation, whose predictions differ by no more than the integration itself. ``white`` holds
+    Zero for two forms of one equation, whose predictions differ by no more than the numbers' own error. ``white`` holds
     the whitened residuals by name.
     """
     apart = float(np.sqrt(np.mean((row.residual - other.residual) ** 2)))
@@ -137,9 +142,9 @@ def _independent(row: Ranked) -> int | None:
     return len(row.held_out.judged) if row.term.tuned else None
 
 
-def _p_value(before: Floats, after: Floats, samples: int | None) -> float:
+def _p_value(before: Floats, after: Floats, samples: int | None, evenly: bool) -> float:
     one, other = _common(before, after)
-    return statistics.gain(one[:samples], other[:samples]).p_value
+    return statistics.gain(one[:samples], other[:samples], evenly=evenly).p_value
 
 
 def _common(one: Floats, other: Floats) -> tuple[Floats, Floats]:

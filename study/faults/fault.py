@@ -104,6 +104,8 @@ def paragraph(faults: tuple[Fault, ...]) -> str:
 def _what_follows(fault: Fault) -> str:
     if fault.rivals:
         effects = " or ".join(name.replace("_", " ") for name in fault.rivals)
+        if fault.channel == "force":
+            return f"; {effects} may be no more than that: look at the instruments first. Nothing is corrected"
         return f"; {effects} would do as much, and this record cannot tell them apart: nothing is corrected"
     if fault.fault in NAMED_ALONE:
         return "; it stays in what is left unexplained"

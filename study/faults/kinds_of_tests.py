@@ -8,9 +8,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from study.compare.prediction import Prediction
 from study.equations.common_factor import per_unit_mass, with_known_mass
 from study.equations.model import Model, has_spring
 from study.faults.accounting import Accounted, accounted
+from study.identify.time_domain.stretch_states import is_smooth
 from study.records.moving_base import on_a_moving_base, relative_to_base
 from study.records.prepared import Prepared
 from study.records.record import Record
@@ -68,6 +70,11 @@ def accounted_test(
     found = accounted(model, prepared, **options)
     if runs_on(prepared):
         anew = apart(prepared)
-        while found.comparison.prediction.error > LOST and (shorter := next(anew, None)) is not None:
+        while _lost(found.comparison.prediction) and (shorter := next(anew, None)) is not None:
             found = accounted(model, shorter, **options)
     return found
+
+
+def _lost(prediction: Prediction) -> bool:
+    """Whether a free run has lost the motion: it misses much, and what it leaves looks like a motion, not as noise."""
+    return prediction.error > LOST and is_smooth(prediction.residual)

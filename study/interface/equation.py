@@ -223,7 +223,8 @@ class Model:
             Faults of the measurement: False to look for none; by name a value that is known, or None for one that is
             not to be looked for. If left out, what stands beside the record's file.
         as_sampled : bool
-            Use all samples, though the motion asks for fewer.
+            Use all samples of a driven response, though its motion asks for fewer; they always are used of free
+            decays, components, motions without a spring, and of stretches that are named.
 
         Raises
         ------

@@ -9,9 +9,10 @@ import pandas as pd
 from study.support import document
 from study.support.document import Block, Text, table
 from study.support.numbers import percent
-from study.trials.kind_runs import VISIBLE, Row
+from study.trials.kind_runs import Row
 from study.trials.kinds import TESTS
 from study.trials.rates import Rate, proportion
+from study.trials.visible import VISIBLE
 
 HEADING = (
     "test", "true effect first", "first or tied", "of those that the record shows", "nothing missing where nothing is",

@@ -1,7 +1,11 @@
 """Trials of other kinds of tests than a force on a mass and spring, all drawn from one seed.
 
 Free decays, blows of a hammer, a moving base, a component whose motion is prescribed, an axis in closed loop: each is a
-system with an effect hidden behind what its owner believes, or with none.
+system with an effect hidden behind what its owner believes, or with none. Effects are drawn so that the record shows
+them, as in :mod:`study.trials.draw`: along the motion without them they carry, beyond what a linear model can take
+over, 10 to 40 % of the spring's force or, where they damp, 25 to 100 % of the viscous force; the motion forgets how it
+began, and the coefficient is as many of the standard errors that noise leaves it as a test of all candidates needs
+(:mod:`study.trials.visible`).
 """
 
 import math
@@ -18,14 +22,17 @@ from study.records.excitation import displacement_noise
 from study.records.record import SI_UNITS, Record
 from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
+from study.support.least_squares import least_squares
 from study.trials.draw import NOISES, Trial
 from study.trials.draw import scaled as in_units
+from study.trials.strength import SHARE
+from study.trials.visible import forgets, stands_out
 
 LINEAR = ("linear_damping", "linear_stiffness")
 TIMED = ("periodic_stiffness", "harmonic_force")  # what knows of time: no program of a test is in step with it
-WEAK, STRONG = 0.1, 0.4  # share of the spring's force, or of the viscous one, that a hidden effect carries
+DAMPED = 2.5  # times as large a share, of the viscous force, is what a hidden damper carries
 STEPS = 8  # of the integration, a sample
-ATTEMPTS = 40
+ATTEMPTS = 300
 
 
 @dataclass(frozen=True)
@@ -63,8 +70,11 @@ def make_test(test: str, seed: int, hidden: Sequence[str] | None = None, noise: 
         except StudyError:
             continue
         clean = drawn.record[drawn.measured]
-        values = clean + displacement_noise(clean, level, seed) if level > 0.0 else clean
-        record = replace(drawn.record.with_channels({drawn.measured: values}), name=f"{test}_{seed}")
+        added = displacement_noise(clean - np.mean(clean), level, seed)
+        size = math.sqrt(level) * float(np.std(clean))
+        if not all(stands_out(drawn.record, drawn.truth, name, size) for name in hidden):
+            continue
+        record = replace(drawn.record.with_channels({drawn.measured: clean + added}), name=f"{test}_{seed}")
         believed = drawn.believed.with_values(dict.fromkeys(drawn.believed.values))
         return Trial(record, believed, drawn.truth, tuple(hidden), level, tuple(0.0 for _ in hidden), None)
     raise StudyError(f"no system of {test} {seed} stays finite with {', '.join(hidden)}")
@@ -110,12 +120,20 @@ def _with_hidden(rng: np.random.Generator, model: Model, names: Sequence[str], q
         v, u = quiet["velocity"], quiet["displacement"]
         drains = abs(float(unit @ v)) > 0.5 * float(np.linalg.norm(unit) * np.linalg.norm(v))
         viscous = values.get("c", 0.0) * float(np.std(v))
-        beside = viscous if drains and viscous > 0.0 else values.get("k", 0.0) * float(np.std(u)) or viscous
-        share = float(rng.uniform(WEAK, STRONG)) * (2.5 if drains else 1.0)
-        amount = share * beside / max(float(np.sqrt(np.mean(unit**2))), 1e-300)
+        damper = drains and viscous > 0.0
+        beside = viscous if damper else values.get("k", 0.0) * float(np.std(u)) or viscous
+        share = float(rng.uniform(*SHARE)) * (DAMPED if damper else 1.0)
+        amount = share * beside / max(_beyond(unit, quiet, model), 1e-300)
         sign = -1.0 if entry.term.either_sign and rng.random() < 0.5 and not entry.term.steady else 1.0
         model = model.with_term(replace(entry, coefficients=(sign * amount,)))
     return model
+
+
+def _beyond(values: Floats, record: Record, model: Model) -> float:
+    """Root mean square of a force less what the terms of a linear model can take over along a motion."""
+    shapes = {"inertia": "acceleration", "linear_damping": "velocity", "linear_stiffness": "displacement"}
+    motion = np.column_stack([record[shapes[t.name]] for t in model.terms if t.name in shapes])
+    return float(np.sqrt(np.mean((values - motion @ least_squares(motion, values)) ** 2)))
 
 
 def _shaped(rng: np.random.Generator, name: str, quiet: Record) -> ModelTerm:
@@ -161,6 +179,7 @@ def _blows(rng: np.random.Generator, hidden: tuple[str, ...]) -> Drawn:
         force[inside] += float(rng.uniform(0.5, 1.5)) * np.sin(np.pi * (time[inside] - begin) / width)
         begin += float(rng.uniform(8.0, 20.0)) / frequency
     truth = _with_hidden(rng, model, hidden, _run(model, force, dt))
+    _refuse_restless(truth, force, dt)
     record = _run(truth, force, dt)
     return Drawn(model, truth, _only(record, "displacement"), "displacement")
 
@@ -171,6 +190,7 @@ def _base(rng: np.random.Generator, hidden: tuple[str, ...]) -> Drawn:
     model = _per_unit_mass(model)
     base = _band(rng, 4096, 3.0 * frequency * dt)
     truth = _with_hidden(rng, model, hidden, _run(model, -base, dt))
+    _refuse_restless(truth, -base, dt)
     record = _run(truth, -base, dt)
     shown = {"base_acceleration": base, "force": np.zeros(len(base)), "displacement": record["displacement"]}
     return Drawn(model, truth, Record(dt, shown, {**SI_UNITS, "base_acceleration": "m/s^2"}), "displacement")
@@ -247,6 +267,11 @@ def _refuse_lost(record: Record) -> None:
     """A decay whose second half stands still tells of nothing but friction."""
     u = record["displacement"]
     expect(float(np.std(u[len(u) // 2 :])) > 0.02 * float(np.std(u)), "the motion has stopped")
+
+
+def _refuse_restless(truth: Model, force: Floats, dt: float) -> None:
+    """A system that magnifies every disturbance is drawn again."""
+    expect(forgets(truth, force, dt, STEPS), "the motion is chaotic")
 
 
 TESTS: dict[str, Maker] = {

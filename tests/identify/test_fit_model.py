@@ -11,9 +11,10 @@ from study.equations.terms import get
 from study.identify.time_domain import fit_model as fits
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.fit_model import fit_model, with_term
-from study.identify.time_domain.multiple_shooting import is_chaotic, is_poor
+from study.identify.time_domain.multiple_shooting import is_chaotic
 from study.identify.time_domain.part_fit import covariance_of, fit_part, linearise, with_states
 from study.identify.time_domain.settling import continued
+from study.identify.time_domain.stretch_states import is_poor
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.prepared import prepare_record, whole
 from study.support.errors import StudyError

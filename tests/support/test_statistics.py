@@ -50,6 +50,26 @@ def test_errors_of_a_models_own_coefficients_are_no_evidence_for_a_change_that_r
     assert alarms["gain"] > 30  # what is held against the residual as it stands
 
 
+def of_a_decay(noise):
+    """The residual of a decay whose candidate matters in its first part alone, and the change that it makes."""
+    n = len(noise)
+    change = 3.0 * np.exp(-60.0 * np.arange(n) / n) * np.sin(0.4 * np.arange(n))
+    return change, noise
+
+
+def test_what_lies_in_the_first_block_of_a_decay_is_seen_and_no_more_invented_for_it():
+    rng = np.random.default_rng(3)
+    seen, plain, invented = [], [], []
+    for _ in range(300):
+        change, noise = of_a_decay(rng.standard_normal(4096))
+        seen.append(statistics.gain(change + noise, noise, evenly=True).p_value)
+        plain.append(statistics.gain(change + noise, noise).p_value)
+        invented.append(statistics.gain(noise, noise - change, evenly=True).p_value)
+    assert np.median(seen) < 0.02
+    assert np.median(plain) > 0.3, "in blocks of equal time the ranks of mere noise decide"
+    assert np.mean(np.array(invented) < 0.05) < 0.07
+
+
 @pytest.mark.parametrize("far", [1e3, 1e170])
 def test_what_runs_far_astray_is_worse_however_far(far):
     residual = np.random.default_rng(3).standard_normal(4800)

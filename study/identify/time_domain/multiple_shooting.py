@@ -15,19 +15,16 @@ from study.identify.time_domain.shooting import (
     needed_restarts,
     own_begins,
 )
+from study.identify.time_domain.stretch_states import LOOSE, with_which_stretches_begin
 from study.records.prepared import Prepared
 from study.records.record import Record
-from study.support.arrays import Floats
 from study.support.errors import DivergenceError
 
 ROUNDS = 2  # attempts at one continuous motion
-LOOSE = 12  # free runs of the first fit, whose segments are independent
 SOFT, SOFTLY = (0.3, 1.0, 3.0), 5  # continuity weights that lead coefficients near the truth, and free runs with each
 FIRM, FIRMLY = 30.0, 12  # continuity weight at which gaps are within the noise of the states, and free runs
 TIGHT, TIGHTLY = 100.0, 30  # continuity weight at which the segments are one motion, and free runs
 CLEAN = 0.01  # of the response's standard deviation: a residual to which long steps of the integrator may add
-POOR = 0.05  # of the response's standard deviation: a residual that may hide a motion
-SMOOTH = 0.5  # correlation of neighbouring samples of a residual; white noise has none
 DEVIATIONS = 3.0  # by how many standard deviations the misfit may exceed what fewer unknowns explain
 
 
@@ -67,6 +64,7 @@ def fit_in_segments(
         return fit_free_run(
             loose.model, record, held=held, response=response, steps_per_sample=steps_per_sample,
             span=whole, max_iterations=max_iterations,
+            initial=with_which_stretches_begin(segments, states) if apart else "estimate",
         )  # fmt: skip
     if loose.rms < NEGLIGIBLE * segments.spread:  # continuity constraints would fit the errors of the integrator
         return fit_segments(loose.model, segments, states, held, max_iterations)
@@ -74,19 +72,6 @@ def fit_in_segments(
     for continuity in SOFT[1:]:
         near = fit_segments(near.model, rough, near.initial, held, SOFTLY, continuity, NEAR)
     return _continuous(near, loose, segments, rough, held)
-
-
-def is_poor(fit: FreeRunFit, measured: Floats) -> bool:
-    """Whether a fit has not converged, or only to a local minimum: its residual is large and smooth, like a motion.
-
-    ``measured`` is the response that it was fitted to.
-    """
-    if not fit.converged:
-        return True
-    if fit.rms < POOR * float(np.std(measured)):
-        return False
-    neighbours = 1.0 - float(np.mean(np.diff(fit.residual) ** 2)) / (2.0 * fit.rms**2)
-    return neighbours > SMOOTH
 
 
 def is_chaotic(fit: FreeRunFit, prepared: Prepared) -> bool:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model
 from study.identify.time_domain.free_run_fit import WHITE, FreeRunFit, fit_free_run
+from study.identify.time_domain.stretch_states import states_along
 from study.records.prepared import Prepared
 from study.support.autoregression import whitened
 from study.support.errors import DivergenceError
@@ -145,10 +146,18 @@ class JudgingRun:
         return run.respond({}, self.initial)[0][self.prepared.plan.judge[0] - self.first :]
 
     def derivatives(self, fit: FreeRunFit) -> Floats:
-        """As :func:`linearise`, on the judging part, of a fit with the same motion."""
+        """As :func:`linearise`, on the judging part, of a fit with the same motion.
+
+        Raises
+        ------
+        DivergenceError
+            If they leave the range of finite numbers, as they do long before the motion of a chaotic system.
+        """
         values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
         run = self._run(fit.keys, self.prepared.response, 1, fit.model)
         derivatives = run.respond(values, self.initial, run.moving)[1][self.prepared.plan.judge[0] - self.first :]
+        if not np.all(np.abs(derivatives) < FAR):
+            raise DivergenceError("the derivatives of the free run leave the range of numbers", run.time(0))
         return self.prepared.known(derivatives, self.prepared.plan.judge)
 
     def _run(self, keys: Sequence[str], motion: str, finer: int, model: Model | None = None) -> FreeRun:
@@ -170,8 +179,4 @@ def judging_run(fit: FreeRunFit, prepared: Prepared) -> JudgingRun:
     begun = plan.judge[0] in prepared.record.joints
     if plan.judge[0] == fit.span[1] and not (fit.restarts or begun):
         return JudgingRun(fit, prepared, fit.first, fit.initial)
-    again = fit_free_run(
-        fit.model, prepared.record, held=tuple(fit.model.values), response=plan.response,
-        steps_per_sample=fit.steps_per_sample, span=plan.judge, lost=prepared.lost,
-    )  # fmt: skip
-    return JudgingRun(fit, prepared, plan.judge[0], again.initial)
+    return JudgingRun(fit, prepared, plan.judge[0], states_along(fit, prepared, plan.judge))

@@ -10,8 +10,9 @@ from study.equations.model import Model
 from study.equations.substeps import needed_steps
 from study.identify.frequency_domain.starting_values import linear_start
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.multiple_shooting import POOR, fit_in_segments, is_chaotic, is_poor
+from study.identify.time_domain.multiple_shooting import fit_in_segments, is_chaotic
 from study.identify.time_domain.part_fit import STEPS, covariance_of, fit_part, integration_shift, linearise
+from study.identify.time_domain.stretch_states import POOR, is_poor
 from study.records.prepared import FORCE, Prepared
 from study.records.states import angular_rate
 from study.support.errors import DivergenceError, StudyError
@@ -124,6 +125,8 @@ def from_segments(model: Model, prepared: Prepared, held: Sequence[str], steps: 
         near = fit_in_segments(
             model, prepared.record, start=start, held=held, response=prepared.response, span=stretch.plan.fit
         )
-        return fit_part(near.model, prepared, held, steps=steps)
+        again = near.span == prepared.plan.fit and not near.restarts and bool(prepared.record.stretches)
+        begin = np.atleast_2d(near.initial) if again else None
+        return fit_part(near.model, prepared, held, steps=steps, initial=begin)
     except StudyError:
         return None

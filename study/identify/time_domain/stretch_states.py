@@ -1,0 +1,76 @@
+"""States with which the stretches of a record begin, where its own first samples tell them too badly.
+
+A spring that hardens turns the error of a first amplitude into a wrong frequency, and the motion is out of step before
+a stretch ends: there a fit of its state ends in another minimum. Within segments of a period nothing drifts that far,
+so their states, each by itself, are found first (multiple shooting).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from study.identify.time_domain.continuation import fit_segments
+from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
+from study.identify.time_domain.shooting import ShootingSegments, even_restarts, own_begins
+from study.records.prepared import FORCE, Prepared
+from study.support.arrays import Floats
+from study.support.errors import DivergenceError
+
+LOOSE = 12  # free runs of a fit whose segments are independent
+POOR = 0.05  # of the response's standard deviation: a residual that may hide a motion
+SMOOTH = 0.5  # correlation of neighbouring samples of a residual; white noise has none
+
+
+def states_along(fit: FreeRunFit, prepared: Prepared, span: tuple[int, int]) -> Floats:
+    """States with which a fitted model follows a span best, shape (states,) or (stretches, states).
+
+    Raises
+    ------
+    DivergenceError
+        If the free run leaves the range of finite numbers.
+    """
+    plain = _held(fit, prepared, span, "estimate")
+    measured = prepared.record[prepared.response][slice(*span)]
+    if prepared.response == FORCE or not own_begins(prepared.record, span) or not is_poor(plain, measured):
+        return plain.initial
+    segments = ShootingSegments(
+        prepared.record, prepared.response, span, even_restarts(prepared.record, prepared.response, span),
+        fit.steps_per_sample,
+    )  # fmt: skip
+    try:
+        first = segments.first_states(fit.model)
+        loose = fit_segments(fit.model, segments, first, tuple(fit.model.values), LOOSE)
+        again = _held(fit, prepared, span, with_which_stretches_begin(segments, np.atleast_2d(loose.initial)))
+    except DivergenceError:
+        return plain.initial
+    return again.initial if again.rms < plain.rms else plain.initial
+
+
+def with_which_stretches_begin(segments: ShootingSegments, states: Floats) -> Floats:
+    """Of the states of segments those with which a span, and each stretch in it, begins, shape (stretches, states)."""
+    begins: Sequence[int] = (segments.span[0], *segments.restarts)
+    own = (segments.span[0], *own_begins(segments.record, segments.span))
+    return states[[begins.index(b) for b in own]]
+
+
+def is_poor(fit: FreeRunFit, measured: Floats) -> bool:
+    """Whether a fit has not converged, or only to a local minimum: its residual is large and smooth, like a motion.
+
+    ``measured`` is the response that it was fitted to.
+    """
+    if not fit.converged:
+        return True
+    return fit.rms >= POOR * float(np.std(measured)) and is_smooth(fit.residual)
+
+
+def is_smooth(residual: Floats) -> bool:
+    """Whether neighbouring samples of a residual are as much alike as those of a motion."""
+    return 1.0 - float(np.mean(np.diff(residual) ** 2)) / (2.0 * float(np.mean(residual**2))) > SMOOTH
+
+
+def _held(fit: FreeRunFit, prepared: Prepared, span: tuple[int, int], initial: str | Floats) -> FreeRunFit:
+    """The model with all coefficients held: its states alone are fitted."""
+    return fit_free_run(
+        fit.model, prepared.record, held=tuple(fit.model.values), response=prepared.response,
+        steps_per_sample=fit.steps_per_sample, span=span, lost=prepared.lost, initial=initial,
+    )  # fmt: skip
