@@ -14,8 +14,9 @@ from typing import Any, Generic, TypeVar
 
 from study.equations.model import Model
 from study.explore import session as sessions
+from study.explore.any_session import AnySession
 from study.explore.saved_files import PAGE, files, of_stage
-from study.explore.session import AnySession, Session
+from study.explore.session import Session
 from study.support.errors import StudyError
 from study.support.file_sets import write_files
 

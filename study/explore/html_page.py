@@ -13,9 +13,10 @@ from jinja2 import Environment, Template
 
 from study.compare.history import label
 from study.explore import check_plots, plots, theme, words
+from study.explore.any_session import AnySession
 from study.explore.axis_scales import Columns
 from study.explore.page_units import in_text
-from study.explore.session import AnySession, Session
+from study.explore.session import Session
 from study.explore.view import View
 
 GHOSTS: dict[str, Columns] = {

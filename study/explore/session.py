@@ -6,7 +6,7 @@ Every function gives a new session; what was found of a model stays with its sta
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -35,49 +35,6 @@ Step = dict[str, Any]
 Progress = Callable[[str], None]
 SHOWN = 8  # candidates
 NONE = Several()
-
-
-class AnyStage(Protocol):
-    """A model of a session, of one coordinate or of a structure."""
-
-    @property
-    def model(self) -> Model:
-        """Values that it gives are held."""
-        ...
-
-    @property
-    def label(self) -> str:
-        """What was done to arrive at it."""
-        ...
-
-    @property
-    def diagnosis(self) -> object | None:
-        """None as long as nobody has asked."""
-        ...
-
-
-class AnySession(Protocol):
-    """A session of one coordinate, or of a structure."""
-
-    @property
-    def now(self) -> AnyStage:
-        """The present model."""
-        ...
-
-    @property
-    def stages(self) -> Sequence[AnyStage]:
-        """From the model as given to the present one."""
-        ...
-
-    @property
-    def own(self) -> object:
-        """The user's own candidates."""
-        ...
-
-    @property
-    def steps(self) -> list[Step]:
-        """The history."""
-        ...
 
 
 @dataclass(frozen=True)
