@@ -125,7 +125,7 @@ def saved_structure(session: PlacedSession) -> bytes:
     lasting, stores = history_columns(session), list[ColumnDataSource]()
     for number, seen in enumerate(views if len(views) > 1 else []):
         columns = {**seen.columns, "history": marked(lasting, number - len(views))}
-        stores += [ColumnDataSource(c, name=f"{name}@{number}") for name, c in columns.items()]
+        stores += [ColumnDataSource(c, name=f"{name}@{number}.0") for name, c in columns.items()]
     scene = PlacedScene(session, stores, views[-1])
     return as_file(list(scene.panels.values()), template(), variables(session, live=False))
 

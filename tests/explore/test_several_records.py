@@ -24,7 +24,7 @@ from study.explore import decimate, saved_files, view
 from study.explore import session as sessions
 from study.explore.by_record import Several, by_record, of_own
 from study.explore.desk import Desk
-from study.explore.live import Watcher
+from study.explore.live import AloneScene, Watcher
 from study.explore.saved import saved
 from study.faults.kinds_of_tests import accounted_test
 from study.records.excitation import Excitation, force
@@ -153,16 +153,18 @@ def test_the_saved_page_and_the_tables_hold_every_record(grown, monkeypatch):
 
 def test_the_live_page_turns_to_the_record_that_is_asked_for(grown, tmp_path):
     desk = Desk(grown, tmp_path / "rig.yaml", model_file.format_model(BELIEVED), tmp_path / "out")
-    watcher = Watcher(desk, Document())
+    watcher = Watcher(desk, Document(), AloneScene)
+    scene = watcher.scene
+    assert isinstance(scene, AloneScene)
     for place, name in ((1, "high"), (0, "low")):
         watcher.asked.data = {"act": ["record"], "name": [str(place)], "count": [place]}
-        source = watcher.page.sources["words"].data
+        source = scene.page.sources["words"].data
         assert dict(zip(*source.values(), strict=True))["of-record"] == f"of {name}"
-        time = watcher.page.sources["time"].data["t"]
+        time = scene.page.sources["time"].data["t"]
         assert time[0] == pytest.approx(grown.now.on_each[place].prediction.time[0])
     for wrong in ("2", "-1", "low", ""):
         watcher.asked.data = {"act": ["record"], "name": [wrong], "count": [9]}
-        assert watcher.record == 0
+        assert scene.record == 0
     desk.close()
 
 
