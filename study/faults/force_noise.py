@@ -4,6 +4,7 @@ The spectrum of what is left is held against two kinds of noise by Whittle's lik
 response: noise on the force behind the structure, and noise on the response itself; both white or of first order.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from study.faults.leftover import Leftover
 from study.identify.time_domain.part_fit import run_of
 from study.records.prepared import FORCE, Prepared
 from study.support.arrays import Floats
+from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares
 from study.support.thresholds import ALPHA, TOLERANCE
 
@@ -57,7 +59,10 @@ def force_noise(left: Leftover, asked: int) -> Fault | None:
     on_response = min(_likely(power, _first_order(memory, turn)).cost for memory in MEMORIES)
     memory, size, found = 0.0, LITTLE * float(np.std(left.prepared.record[FORCE])), list[_Noise]()
     for _ in range(REPEATS):
-        white = _passed(left, len(power), memory, size) / _first_order(memory, turn)
+        passed = _passed(left, memory, size)
+        if passed is None:
+            break
+        white = passed / _first_order(memory, turn)
         found = [_likely(power, white * _first_order(m, turn)) for m in MEMORIES]
         best = min(found, key=lambda noise: noise.cost)
         if KEPT * (on_response - best.cost) < np.log(asked / ALPHA) or best.power <= (TOLERANCE * left.size) ** 2:
@@ -65,6 +70,8 @@ def force_noise(left: Leftover, asked: int) -> Fault | None:
         before, memory, size = (memory, size), MEMORIES[found.index(best)], best.rms
         if memory == before[0] and abs(size - before[1]) < best.error_of_rms:
             break
+    if not found:
+        return None
     value, error = _rms(found)
     unit = left.prepared.record.units.get("force", "")
     explained = min(found, key=lambda noise: noise.cost).power / float(np.mean(residual**2))
@@ -81,22 +88,27 @@ def _rms(found: list[_Noise]) -> tuple[float, float]:
     return value, float(np.sqrt(weights @ (np.where(weights > 1e-6, errors, 0.0) ** 2 + (sizes - value) ** 2)))
 
 
-def _passed(left: Leftover, lines: int, memory: float, size: float) -> Floats:
+def _passed(left: Leftover, memory: float, size: float) -> Floats | None:
     """Spectrum of the response to noise of unit mean square and first order on the force, shape (lines,).
 
     The mean over runs with noise of this rms, of some neighbouring lines: a nonlinear structure answers noise of each
-    size and colour and along each motion in another way, and a lightly damped one rings beyond the ends of a part.
+    size and colour and along each motion in another way, and a lightly damped one rings beyond the ends of a part. Runs
+    that noise lets escape are left out; None where all do.
     """
     rng, record = np.random.default_rng(0), left.prepared.record
     quiet = np.concatenate(left.predicted)
     colour = np.sqrt(_first_order(memory, 2.0 * np.pi * np.asarray(rfftfreq(len(record)))))
-    logarithm = np.zeros(lines)
+    logarithms: list[Floats] = []
     for _ in range(RUNS):
         noise = np.asarray(irfft(np.asarray(rfft(rng.standard_normal(len(record)))) * colour, len(record)))
         noisy = record.with_channels({FORCE: record[FORCE] + size * noise})
-        added = (_response(left, replace(left.prepared, record=noisy)) - quiet) / size
-        logarithm += np.log(_periodogram(added)) / RUNS
-    smooth = np.convolve(logarithm, np.ones(LINES), "same") / np.convolve(np.ones(lines), np.ones(LINES), "same")
+        with suppress(DivergenceError):
+            response = _response(left, replace(left.prepared, record=noisy))
+            logarithms.append(np.log(_periodogram((response - quiet) / size)))
+    if not logarithms:
+        return None
+    near, whole = np.ones(LINES), np.ones(len(logarithms[0]))
+    smooth = np.convolve(np.mean(logarithms, axis=0), near, "same") / np.convolve(whole, near, "same")
     return np.exp(smooth + np.euler_gamma)  # whose periodograms scatter as a chi squared of two degrees of freedom
 
 

@@ -72,16 +72,16 @@ def _of_even_changes(before: Floats, change: Floats) -> Floats:
     """
     peak = float(np.max(np.abs(change)))
     change = change / peak if peak > 0.0 else change  # one that runs far astray would overflow
-    power = np.concatenate([[0.0], np.cumsum(change**2)])
+    power = np.concatenate([np.zeros(1), np.cumsum(change**2)])
     count, last = max(2, min(BLOCKS, len(change) // SHORTEST)), len(change)
     edges = [0]
     while len(edges) < count:
         wanted = power[edges[-1]] + (power[-1] - power[edges[-1]]) / (count - len(edges) + 1)
-        edge = max(int(np.searchsorted(power, wanted)), edges[-1] + SHORTEST)
+        edge = max(int(np.count_nonzero(power < wanted)), edges[-1] + SHORTEST)
         if edge > last - SHORTEST:
             break
         edges.append(edge)
-    return np.add.reduceat(before * change, edges)
+    return np.asarray(np.add.reduceat(before * change, edges), dtype=np.float64)
 
 
 def beside(before: Floats, change: Floats, freed: Floats) -> Gain:
@@ -102,7 +102,8 @@ def worse(first: Floats, second: Floats) -> float:
     standard errors, which a few strong blocks can hide in their scatter, and the signed ranks (Wilcoxon, 1945), where
     they count no more than weak ones.
     """
-    size = 2.0 ** math.frexp(max(float(np.max(np.abs(first))), float(np.max(np.abs(second)))))[1]  # of one far astray
+    peak = max(float(np.max(np.abs(first))), float(np.max(np.abs(second))))  # of one far astray no square is finite
+    size = math.ldexp(0.5, math.frexp(peak)[1])
     d = block_powers(first / size) - block_powers(second / size)
     spread, mean = float(np.std(d, ddof=1) / np.sqrt(len(d))), float(np.mean(d))
     by_mean = mean / spread if spread > 0.0 else math.copysign(math.inf, mean) if mean else 0.0

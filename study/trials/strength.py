@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 SHARE = (0.10, 0.40)  # of the rms restoring force, in every trial
 ROUNDS = 12  # of the iteration on the amount
 STEEPEST = 3.0  # power of the amount by which a share is taken to grow, or one over it, at most
+FARTHEST = 100.0  # logarithm of what an amount may grow by at once; with far less the motion escapes
 CLOSE = 0.05  # relative distance from the wanted share at which it ends
 
 
@@ -62,7 +63,8 @@ def _amount(one: tuple[float, float], other: tuple[float, float], wanted: float)
     if not (min(*one, *other) > 0.0 and math.isfinite(other[1]) and one[0] != other[0]):
         return _between(other[0], wanted)
     slope = math.log(other[1] / one[1]) / math.log(other[0] / one[0])
-    return other[0] * (wanted / other[0]) ** (1.0 / min(max(slope, 1.0 / STEEPEST), STEEPEST))
+    steps = math.log(wanted / other[0]) / min(max(slope, 1.0 / STEEPEST), STEEPEST)
+    return other[0] * math.exp(min(steps, FARTHEST))
 
 
 def share_of(model: Model, name: str, record: Record) -> float:
