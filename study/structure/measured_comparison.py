@@ -1,13 +1,14 @@
 """A structure with a measured linear part held against a record: modes, coefficients, and the error of its free run."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from study.equations import model_file
-from study.equations.model import Model
+from study.equations.model import Model, ModelTerm
 from study.equations.place import in_words
 from study.structure.measured_fit import MeasuredFit, fit_measured, grown
 from study.structure.measured_prediction import MeasuredPrediction, predict_measured
@@ -15,8 +16,10 @@ from study.structure.measured_screening import screened_by_lines
 from study.structure.measured_spectra import CoefficientSpectrum, coefficient_spectra
 from study.structure.prepared_structure import PreparedStructure
 from study.support.arrays import Floats
-from study.support.errors import expect
+from study.support.errors import DivergenceError, expect
 from study.support.numbers import percent
+
+ASIDE = (0.9, 0.95, 1.05, 1.1)  # of a shape parameter: where fits begin beside what the screening found
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,9 +90,23 @@ def _first_fit(model: Model, prepared: PreparedStructure) -> MeasuredFit:
     for entry in unknown:
         found = screened_by_lines(known, prepared, [entry], fit.residual, fit.modal.modes)
         expect(found, f"{entry.name} explains nothing of {prepared.record.name!r}; expected an effect that does")
-        fit, known = grown(known, found[0].entry, prepared), known.with_term(entry)
+        fit, known = _beside_minima(known, found[0].entry, prepared), known.with_term(entry)
         known = known.with_values({k: fit.values[k] for k in entry.keys[len(entry.symbols) :]})
     return fit
+
+
+def _beside_minima(known: Model, entry: ModelTerm, prepared: PreparedStructure) -> MeasuredFit:
+    """The best of fits from the shape that the screening found and from shapes a little aside.
+
+    Along a gap or a dead band the misfit has kinks, and a local minimum between any two.
+    """
+    fits: list[MeasuredFit] = []
+    for factor in (1.0, *ASIDE):
+        shape = tuple(factor * (value or 0.0) for value in entry.parameters)
+        with suppress(DivergenceError):
+            fits.append(grown(known, replace(entry, parameters=shape), prepared))
+    expect(fits, f"no values of {entry.name} let it follow {prepared.record.name!r}; expected them in the model file")
+    return min(fits, key=lambda fit: float(np.mean((fit.residual / prepared.scale) ** 2)))
 
 
 def modes_measured(fit: MeasuredFit) -> MeasuredModes:
