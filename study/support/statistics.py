@@ -58,7 +58,8 @@ def gain(before: Floats, after: Floats, *, evenly: bool = False) -> Gain:
     explained = 1.0 - float(np.sum(b)) / total
     left_out = 1.0 - (np.sum(b) - b) / np.maximum(np.sum(a) - a, np.finfo(float).tiny)
     n = len(a)
-    error = float(np.sqrt((n - 1) / n * np.sum((left_out - np.mean(left_out)) ** 2)))
+    with np.errstate(over="ignore"):  # of one far astray the error is beyond all measure too
+        error = float(np.sqrt((n - 1) / n * np.sum((left_out - np.mean(left_out)) ** 2)))
     p_value = _p_value(a + apart - b)
     if evenly:
         p_value = min(1.0, 2.0 * min(p_value, _p_value(_of_even_changes(before, before - after))))
