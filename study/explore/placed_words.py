@@ -17,6 +17,7 @@ from study.structure.sketch import Sketch
 from study.structure.sketch_svg import svg
 from study.structure.structure_comparison import PlacedCoefficient, StructureComparison, says
 from study.structure.structure_leftover import explained_by_place
+from study.structure.structure_page import terms_there
 from study.support.numbers import percent
 
 SHOWN, TRIED = 12, 8  # candidates; those named of one place
@@ -81,7 +82,7 @@ def _places(stage: PlacedStage, drawn: Sketch) -> str:
     blocks: list[str] = []
     for link in drawn.links:
         path = link.place.path
-        known = [f"<h3>{escape(_capital(placed(link.place)))}</h3><p>{escape(_terms(comparison, path))}</p>"]
+        known = [f"<h3>{escape(_capital(placed(link.place)))}</h3><p>{escape(terms_there(comparison, path))}</p>"]
         if path in shares:
             known.append(
                 f"<p>Any force there could make {percent(shares[path])} of what stands above the noise; general "
@@ -106,16 +107,6 @@ def _tried(row: PlacedRanked) -> str:
 
 def _capital(text: str) -> str:
     return text[0].upper() + text[1:]
-
-
-def _terms(comparison: StructureComparison, path: frozenset[str]) -> str:
-    """The terms that the model has at a place."""
-    names = [
-        in_words(e.term.name)
-        for e in comparison.model.terms
-        if e.place is not None and e.place.path == path and (e.term.name != "inertia" or e.place.kind != "at")
-    ]
-    return f"The model has {', '.join(names)} there." if names else "The model has no term there."
 
 
 def _candidates(stage: PlacedStage, live: bool) -> str:

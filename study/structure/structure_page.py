@@ -86,7 +86,7 @@ def _places(
     blocks: list[str] = []
     for link in drawn.links:
         place, path = link.place, link.place.path
-        known = [f"<h2>{escape(_capital(placed(place)))}</h2>", f"<p>{escape(_terms(comparison, path))}</p>"]
+        known = [f"<h2>{escape(_capital(placed(place)))}</h2>", f"<p>{escape(terms_there(comparison, path))}</p>"]
         if path in shares:
             known.append(f"<p>Any force there could make {percent(shares[path])} of what stands above the noise.</p>")
         own = [r for r in rows if r.entry.place is not None and r.entry.place.path == path]
@@ -105,8 +105,8 @@ def _capital(text: str) -> str:
     return text[0].upper() + text[1:]
 
 
-def _terms(comparison: StructureComparison, path: frozenset[str]) -> str:
-    """The terms that the model has at a place."""
+def terms_there(comparison: StructureComparison, path: frozenset[str]) -> str:
+    """The terms that the model has at a place, in a sentence."""
     names = [
         term_names(e.term.name)
         for e in comparison.model.terms
