@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field
 
 from study.commands.parser import parser
 from study.equations.model_file import read_model
-from study.support.config_files import Row, Text, read_rows
+from study.support.config_files import TableRow, Text, read_rows
 from study.support.errors import StudyError, at, expect
 
 VARIABLE = "$STUDY_DATA"  # at the beginning of a path: the folder that this environment variable names
@@ -45,7 +45,7 @@ def _words(text: object) -> object:
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*\Z", max_length=64, description=NAME)]
 
 
-class Measurement(Row):
+class Measurement(TableRow):
     """One row of ``config/measurements.tsv``."""
 
     record: Name

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from study.compare.across_levels import Level
 from study.compare.along_time import AlongTime
 from study.compare.force_error import ForceError
-from study.compare.force_map import Curve, Surface
+from study.compare.force_map import ForceCurve, Surface
 from study.equations import dimensions
 from study.figures import labels
 
@@ -131,7 +131,7 @@ def missing_force(axes: Axes, plane: Surface, unit: dict[str, str]) -> Axes:
     return axes
 
 
-def force_curve(axes: Axes, curve: Curve, against: str, unit: dict[str, str]) -> Axes:
+def force_curve(axes: Axes, curve: ForceCurve, against: str, unit: dict[str, str]) -> Axes:
     """Mean missing force against displacement or velocity, with 95 % intervals."""
     largest = float(np.max(np.abs(curve.at), initial=0.0))
     scaled = labels.prefixed(unit[against], largest) if against == "displacement" else _rate(unit[against], curve.at)

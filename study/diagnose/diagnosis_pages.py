@@ -3,7 +3,7 @@
 from matplotlib.figure import Figure
 
 from study.diagnose import diagnosis_pictures
-from study.diagnose.diagnosis_pictures import Found
+from study.diagnose.diagnosis_pictures import PicturedDiagnosis
 from study.diagnose.verdict import Diagnosis
 from study.figures import page
 from study.figures.sheet import in_style
@@ -11,7 +11,7 @@ from study.figures.sheet import in_style
 FOLLOWED = 3  # candidates whose coefficient is drawn along frequency and amplitude
 
 
-def pages(diagnosis: Found, record: str) -> dict[str, Figure]:
+def pages(diagnosis: PicturedDiagnosis, record: str) -> dict[str, Figure]:
     """Figures by the stem of their file name; the caller applies the style sheet."""
     ranking, (axes,) = page.page(
         f"What is missing from the model of {record}", f"verdict: {diagnosis.verdict.replace('_', ' ')}",

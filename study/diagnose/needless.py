@@ -13,7 +13,7 @@ from study.compare.comparison import Comparison
 from study.compare.prediction import Prediction, predict
 from study.diagnose.credibility import certain
 from study.diagnose.dropping import fitted_without, removal
-from study.diagnose.held_out import Evidence, alike, evidence_of
+from study.diagnose.held_out import HeldOutResidual, alike, evidence_of
 from study.equations.model import ModelTerm
 from study.figures.labels import term_names
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -191,7 +191,7 @@ class _Stage:
                 break
         return None
 
-    def _evidence(self, fit: FreeRunFit, without: Prediction, both: bool) -> list[Evidence]:
+    def _evidence(self, fit: FreeRunFit, without: Prediction, both: bool) -> list[HeldOutResidual]:
         """What a model without a term leaves, this one and the one that was given; of both parts if all have them.
 
         A frequency was picked by the fitting part's own chance, which bears no witness of it then.

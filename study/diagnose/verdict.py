@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from study.compare.comparison import Comparison
 from study.compare.prediction import Prediction
 from study.diagnose import candidates, dependence, pairs
-from study.diagnose.candidates import Candidate
+from study.diagnose.candidates import FittedCandidate
 from study.diagnose.constancy import changes, curves, wavers
 from study.diagnose.credibility import credible
 from study.diagnose.held_out import HeldOut, alike, evidence, held_out_of
@@ -97,7 +97,7 @@ def _at_search_steps(fit: FreeRunFit, look: Prepared) -> FreeRunFit:
         return fit_part(fit.model, look, fit.held, steps=fit.steps_per_sample)
 
 
-def with_best_settled(tried: Sequence[Candidate], prepared: Prepared) -> list[Candidate]:
+def with_best_settled(tried: Sequence[FittedCandidate], prepared: Prepared) -> list[FittedCandidate]:
     """The best candidates fitted as they would be if they were added, then the others."""
     ordered = sorted(tried, key=lambda c: (c.unphysical, float(c.prediction.residual @ c.prediction.residual)))
     return candidates.all_settled(ordered[:SETTLED], prepared) + ordered[SETTLED:]

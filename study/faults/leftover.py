@@ -19,7 +19,7 @@ INDISTINCT = 1e-5  # share of a column's length that the model's own coefficient
 
 
 @dataclass(frozen=True, eq=False)
-class Leftover:
+class FittedResidual:
     """Residual of a fitted model on the fitting and on the judging part; n and m samples, p keys."""
 
     fit: FreeRunFit
@@ -95,15 +95,15 @@ class Share:
         return p_value * asked < ALPHA and self.power > TOLERANCE**2
 
 
-def leftover(fit: FreeRunFit, prepared: Prepared) -> Leftover | None:
+def leftover(fit: FreeRunFit, prepared: Prepared) -> FittedResidual | None:
     """What a fit leaves; None where its free run is no smooth function of its coefficients, or none at all."""
     if fit.restarts:
         return None
     prediction = predict(fit, prepared)
-    return None if prediction.diverged else Leftover(fit, prediction, prepared)
+    return None if prediction.diverged else FittedResidual(fit, prediction, prepared)
 
 
-def share(left: Leftover, columns: tuple[Floats, Floats], leading: bool = False) -> Share | None:
+def share(left: FittedResidual, columns: tuple[Floats, Floats], leading: bool = False) -> Share | None:
     """Joint regression of the residual on the model's own sensitivities and more columns.
 
     ``columns`` are those of a fault or an effect on both parts, shapes (n, k) and (m, k). They get only what the
@@ -137,14 +137,14 @@ def _p_value(amounts: Floats, covariance: Floats) -> float:
     return float(fdtrc(count, freedom - count + 1, wald * (freedom - count + 1) / (count * freedom)))
 
 
-def better(before: Leftover, after: Leftover, asked: int) -> bool:
+def better(before: FittedResidual, after: FittedResidual, asked: int) -> bool:
     """Whether a fit leaves less of the judging part than another by no chance, so many having been tried."""
     power = float(np.mean(before.residual[1] ** 2) - np.mean(after.residual[1] ** 2)) / before.size**2
     held_out = gain(before.residual[1], after.residual[1])
     return held_out.p_value * asked < ALPHA and power > TOLERANCE**2
 
 
-def amounts_on_both(left: Leftover, columns: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+def amounts_on_both(left: FittedResidual, columns: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
     """Amounts of the columns, shape (k,), and their clustered covariance, from both parts of the record together."""
     fitted, judged = left.known(columns)
     count = fitted.shape[1]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc
 
 from study.faults.fault import CLIPPING, CONVERTER_STEPS, DROP_OUTS, Fault
-from study.faults.leftover import Leftover
+from study.faults.leftover import FittedResidual
 from study.records.prepared import Prepared
 from study.support.arrays import Floats, Ints
 from study.support.thresholds import ALPHA, TOLERANCE
@@ -86,7 +86,7 @@ def _switches(values: Floats) -> bool:
     return len(np.unique(values[:4096])) <= 3
 
 
-def drop_outs(left: Leftover, asked: int) -> Fault | None:
+def drop_outs(left: FittedResidual, asked: int) -> Fault | None:
     """Samples in runs of one value, which noise does not repeat; None without any.
 
     A system at rest, as one that friction holds, stands still too. Without noise a run counts where the model says that
@@ -150,7 +150,7 @@ def _standing(values: Floats) -> tuple[NDArray[np.bool_], int]:
     return mask, count
 
 
-def widened(fault: Fault, given: Prepared, left: Leftover) -> Fault:
+def widened(fault: Fault, given: Prepared, left: FittedResidual) -> Fault:
     """Clipping with all samples lost whose true motion may be beyond the limit, as the free run tells.
 
     Noise decides whether a sample near the limit is clipped. If those that are not were kept, their noise would not

@@ -18,7 +18,7 @@ TWO_SIDED_95 = NormalDist().inv_cdf(0.975)
 
 
 @dataclass(frozen=True)
-class Curve:
+class ResponseCurve:
     """One estimator's A_j(f); arrays of shape (lines,)."""
 
     estimator: str  # its name, by which styles knows it
@@ -41,7 +41,7 @@ class InputResponse:
 
     number: int  # j, counted from 1
     shape: str  # formula of the input, such as u**3
-    curves: tuple[Curve, ...]  # one for each estimator
+    curves: tuple[ResponseCurve, ...]  # one for each estimator
     frequency: Floats  # lines of the exact function, in hertz
     exact: Complexes | None  # the exact function; None where the record is a measured one
 
@@ -69,7 +69,7 @@ def responses(table: pd.DataFrame, highest: float, drawn: Sequence[str] | None =
 def _response(number: int, part: pd.DataFrame) -> InputResponse:
     groups = _groups(part, "estimator")
     curves = [
-        Curve(name, _column(rows, "frequency"), _complex(rows, "real", "imag"), _column(rows, "standard_error"))
+        ResponseCurve(name, _column(rows, "frequency"), _complex(rows, "real", "imag"), _column(rows, "standard_error"))
         for name, rows in sorted(groups, key=lambda group: rank(group[0]))
     ]
     _, first = groups[0]

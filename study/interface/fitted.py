@@ -14,7 +14,7 @@ from study.compare.response_functions import ResponseFunctions
 from study.equations.model import ModelTerm
 from study.faults.accounting import accounted
 from study.faults.fault import Fault
-from study.faults.instrument_settings import NOTHING_ASKED, Settings, settings_beside, settings_of
+from study.faults.instrument_settings import NOTHING_ASKED, FaultSettings, settings_beside, settings_of
 from study.interface.data import Record
 from study.interface.equation import Model, term
 from study.interface.forces import Force, simulate
@@ -304,9 +304,9 @@ def prepared_part(
     return prepare_record(record, plan, cutoff)
 
 
-def _settings(record: Record, measurement: Mapping[str, float | None] | bool | None) -> Settings:
+def _settings(record: Record, measurement: Mapping[str, float | None] | bool | None) -> FaultSettings:
     if measurement is None or measurement is True:
-        return settings_beside(record.source) if record.source is not None else Settings()
+        return settings_beside(record.source) if record.source is not None else FaultSettings()
     if measurement is False:
         return NOTHING_ASKED
     try:

@@ -152,14 +152,14 @@ class Identification:
         return found if isinstance(found, MisoResult) else None
 
     def _curve(self, number: int) -> "InputResponse":
-        from study.figures.curves import Curve, InputResponse
+        from study.figures.curves import InputResponse, ResponseCurve
 
         count = len(self.inputs)
         expect(1 <= number <= count, f"there is no input {number}; expected 1 to {count}: {', '.join(self.inputs)}")
         found, j = self._responses(), number - 1
         kept = (found.frequency > 0.0) & (found.frequency <= self.heard)
         error = np.sqrt(np.maximum(found.covariance[kept, j, j].real, 0.0))
-        curve = Curve(self.estimator, found.frequency[kept], found.response[j][kept], error)
+        curve = ResponseCurve(self.estimator, found.frequency[kept], found.response[j][kept], error)
         return InputResponse(number, self.inputs[j], (curve,), found.frequency[kept], None)
 
     def __repr__(self) -> str:

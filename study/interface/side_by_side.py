@@ -88,7 +88,7 @@ def across(fits: Sequence[Fit]) -> Across:
 
 
 @dataclass(frozen=True)
-class Row:
+class RankedModel:
     """One model of :func:`compare`."""
 
     name: str  # of the model, told apart by its terms
@@ -112,7 +112,7 @@ class Ranking:
         In this order; the first is what the others are held against.
     """
 
-    rows: tuple[Row, ...]
+    rows: tuple[RankedModel, ...]
 
     def to_frame(self) -> "pd.DataFrame":
         """One row a model, indexed by its name."""
@@ -174,13 +174,13 @@ def _told_apart(fit: Fit, names: Sequence[str], common: Set[str]) -> str:
     return " + ".join([fit.given.name, *own])
 
 
-def _row(fit: Fit, best: Fit, name: str) -> Row:
+def _row(fit: Fit, best: Fit, name: str) -> RankedModel:
     explained = error = p_value = float("nan")
     one, other = fit.comparison.prediction, best.comparison.prediction
     if fit is not best and len(one.measured) == len(other.measured) and np.array_equal(one.measured, other.measured):
         gain = statistics.gain(one.residual, other.residual)
         explained, error, p_value = gain.explained, gain.error, gain.p_value
-    return Row(
+    return RankedModel(
         name, fit.record.name, fit.error, fit.floor, fit.force_error, len(fit.comparison.fit.keys), explained, error,
         p_value,
     )  # fmt: skip

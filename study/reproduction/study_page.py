@@ -6,7 +6,7 @@ from study.reproduction import structure_pages, summary
 from study.reproduction.claims.claim_pages import conditions
 from study.support import document, picture_page
 from study.support.document import Text
-from study.support.picture_page import Picture, Section, fragment
+from study.support.picture_page import PageSection, Picture, fragment
 
 TITLE = "The report, run again"
 
@@ -25,7 +25,7 @@ def page(tables: summary.Tables, pictures: Sequence[Picture]) -> bytes:
         ("reading", 'What "unit variance" refers to', fragment(summary.reading(tables))),
         ("times", "Run times", fragment(summary.run_times(tables))),
     ]
-    return picture_page.page(TITLE, [Section(*section) for section in sections])
+    return picture_page.page(TITLE, [PageSection(*section) for section in sections])
 
 
 def _claims(tables: summary.Tables) -> str:

@@ -27,7 +27,7 @@ COHERENCE_COLUMNS = [
 NOISE_COLUMNS = ["frequency", "estimator", "noise"]
 
 
-class Judged(Protocol):
+class AllowedErrors(Protocol):
     """What an estimate may be off by name: relative, absolute where the true value is zero."""
 
     @property
@@ -62,7 +62,7 @@ def parameters(
     return pd.DataFrame(rows, columns=PARAMETER_COLUMNS)
 
 
-def judge(name: str, true: float, estimate: float, settings: Judged) -> dict[str, Any]:
+def judge(name: str, true: float, estimate: float, settings: AllowedErrors) -> dict[str, Any]:
     """Relative error, tolerance and verdict of one estimate."""
     relative = (estimate - true) / true if true else math.nan
     tolerance = (settings.relative if true else settings.absolute).get(name, math.nan)

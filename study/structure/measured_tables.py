@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from study.equations.model import Model
 from study.figures import frequency_response, page
-from study.figures.curves import Curve, InputResponse
+from study.figures.curves import InputResponse, ResponseCurve
 from study.records.record import MOTIONS
 from study.records.spectra import cross_spectra
 from study.reproduction.tables import PARAMETER_COLUMNS, stacked
@@ -141,10 +141,12 @@ def measured_figure(table: pd.DataFrame, title: str) -> Figure:
 
 
 def _item(rows: pd.DataFrame, number: int) -> InputResponse:
-    curves: list[Curve] = []
+    curves: list[ResponseCurve] = []
     for name in dict.fromkeys(str(e) for e in rows["estimator"]):
         own = rows[rows["estimator"] == name]
-        curves.append(Curve(name, _of(own, "frequency"), _pair(own, ""), np.nan_to_num(_of(own, "standard_error"))))
+        curves.append(
+            ResponseCurve(name, _of(own, "frequency"), _pair(own, ""), np.nan_to_num(_of(own, "standard_error")))
+        )
     first = rows[rows["estimator"] == str(rows["estimator"].iloc[0])]
     return InputResponse(number, "u", tuple(curves), _of(first, "frequency"), _pair(first, "exact_"))
 

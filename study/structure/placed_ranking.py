@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from study.diagnose import ranked
-from study.diagnose.constancy import Curve, along_amplitude, along_frequency, changes
+from study.diagnose.constancy import CoefficientCurve, along_amplitude, along_frequency, changes
 from study.diagnose.ranking import in_order
 from study.equations.model import ModelTerm
 from study.equations.term import Term
@@ -37,8 +37,8 @@ class PlacedRanked:
     error: float  # standard error of that
     parameters: dict[str, float]  # shape parameters, and the phase of an effect of any phase
     parameter_errors: dict[str, float]
-    flatness: Curve | None  # the coefficient along frequency, at the sensor that sees most of it
-    steadiness: Curve | None  # along amplitude, at all sensors
+    flatness: CoefficientCurve | None  # the coefficient along frequency, at the sensor that sees most of it
+    steadiness: CoefficientCurve | None  # along amplitude, at all sensors
     parts: tuple[Floats, Floats]  # held-out residuals of judging and fitting part, each shape (samples, sensors)
     p_value: float = 1.0  # of what it explains, with the number of candidates accounted for (Bonferroni)
     tied_with: tuple[str, ...] = ()
@@ -208,7 +208,7 @@ def _examined(candidate: PlacedCandidate, before: StructurePrediction) -> Placed
 
 def _curves(
     fit: StructureFit, entry: ModelTerm, dt: float, jacobian: Floats, scale: Floats
-) -> tuple[Curve | None, Curve | None]:
+) -> tuple[CoefficientCurve | None, CoefficientCurve | None]:
     """The coefficient along frequency and along amplitude (``diagnose.constancy``); sensors one after the other."""
     columns = [fit.keys.index(s) for s in entry.symbols]
     direction = fit.values[columns]

@@ -11,7 +11,14 @@ import pandas as pd
 
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.identify.frequency_domain.inputs import Input
-from study.reproduction.tables import COHERENCE_COLUMNS, PARAMETER_COLUMNS, RESPONSE_COLUMNS, Judged, judge, stacked
+from study.reproduction.tables import (
+    COHERENCE_COLUMNS,
+    PARAMETER_COLUMNS,
+    RESPONSE_COLUMNS,
+    AllowedErrors,
+    judge,
+    stacked,
+)
 from study.structure.action_reaction import JointEstimate
 from study.structure.reverse_system import EquationResult, exact_responses
 from study.structure.structure_study import CaseResult
@@ -27,7 +34,7 @@ def place_of(item: Input) -> str:
     return " and ".join(dict.fromkeys(labels))
 
 
-def structure_parameters(case: str, result: CaseResult, limits: Judged) -> pd.DataFrame:
+def structure_parameters(case: str, result: CaseResult, limits: AllowedErrors) -> pd.DataFrame:
     """Every coefficient of every estimator from all equations together, one row each."""
     rows = [
         (case, estimator, *_judged(symbol, result.model.values[symbol], found.joint, limits), "")
@@ -37,7 +44,7 @@ def structure_parameters(case: str, result: CaseResult, limits: Judged) -> pd.Da
     return pd.DataFrame(rows, columns=PARAMETER_COLUMNS)
 
 
-def _judged(key: str, true: float | None, joint: JointEstimate, limits: Judged) -> tuple[Any, ...]:
+def _judged(key: str, true: float | None, joint: JointEstimate, limits: AllowedErrors) -> tuple[Any, ...]:
     value, error = joint.estimate[key], joint.estimate.error(key)
     known = 0.0 if true is None else true
     return (key, known, value, error, *judge(key[: key.index("[")], known, value, limits).values())

@@ -15,7 +15,7 @@ from study.structure.missing_forces import MissingForces, missing_forces
 from study.structure.modes import Modes, modes_of, modes_table
 from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_fit import StructureFit, covariance_of, linearise, settled
-from study.structure.structure_leftover import Leftover, explained_by_place, left_over
+from study.structure.structure_leftover import FamilyGain, explained_by_place, left_over
 from study.structure.structure_prediction import StructurePrediction, predict_structure
 from study.structure.structure_start import first_fit
 from study.support.arrays import Floats
@@ -55,7 +55,7 @@ class StructureComparison:
     notes: tuple[str, ...]
 
     @cached_property
-    def leftovers(self) -> tuple[Leftover, ...]:
+    def leftovers(self) -> tuple[FamilyGain, ...]:
         """What general shapes of the motion at each place explain of what is left, held out; asked for when shown."""
         return tuple(left_over(self.prediction))
 

@@ -23,7 +23,7 @@ from study.structure.placed_ranking import PlacedRanked, rank_placed
 from study.structure.placed_search import PlacedBaseline, placed_baseline, with_placed_term
 from study.structure.structure_comparison import StructureComparison, compare_structure
 from study.structure.structure_fit import covariance_of, fit_structure, linearise, settled, sized
-from study.structure.structure_leftover import Leftover, left_over
+from study.structure.structure_leftover import FamilyGain, left_over
 from study.structure.structure_prediction import StructurePrediction
 from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE
 
@@ -41,7 +41,7 @@ class StructureDiagnosis:
     candidates: tuple[PlacedRanked, ...]  # best first
     asked: int  # effects times places
     left: float  # rms of the structure that remains beside the best explanation, over the rms response
-    families: tuple[Leftover, ...]  # for an unknown effect: what general shapes at each place explain, best first
+    families: tuple[FamilyGain, ...]  # for an unknown effect: what general shapes at each place explain, best first
 
     @cached_property
     def modes_after(self) -> Modes | None:
@@ -119,11 +119,11 @@ def _decide(rows: list[PlacedRanked], comparison: StructureComparison, asked: in
     return StructureDiagnosis(verdict, comparison, tuple(rows), asked, left, _ordered(families))
 
 
-def _left(prediction: StructurePrediction, families: Sequence[Leftover]) -> float:
+def _left(prediction: StructurePrediction, families: Sequence[FamilyGain]) -> float:
     """Rms over that of the response which general shapes explain of a residual, and not by chance."""
     found = [f.gain.explained for f in families if f.gain.p_value * len(families) < NAMELESS]
     return prediction.error * float(np.sqrt(max((0.0, *found))))
 
 
-def _ordered(families: Sequence[Leftover]) -> tuple[Leftover, ...]:
+def _ordered(families: Sequence[FamilyGain]) -> tuple[FamilyGain, ...]:
     return tuple(sorted(families, key=lambda f: -f.gain.explained))

@@ -24,7 +24,7 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Section:
+class PageSection:
     """A part of the page that the line at its top leads to."""
 
     anchor: str
@@ -32,7 +32,7 @@ class Section:
     content: str  # HTML
 
 
-def page(title: str, sections: Sequence[Section]) -> bytes:
+def page(title: str, sections: Sequence[PageSection]) -> bytes:
     """The page, in UTF-8."""
     links = "".join(f'<a href="#{s.anchor}">{html.escape(s.title)}</a>' for s in sections)
     body = "".join(f'<section id="{s.anchor}"><h2>{html.escape(s.title)}</h2>{s.content}</section>' for s in sections)

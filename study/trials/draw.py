@@ -10,7 +10,7 @@ import numpy as np
 from study.equations.free_run import predict
 from study.equations.model import Model, ModelTerm, free
 from study.equations.simulate import Integrator, simulate
-from study.equations.term import Parameter, Term
+from study.equations.term import ShapeParameter, Term
 from study.equations.terms import LIBRARY, get
 from study.records.excitation import displacement_noise, force
 from study.records.record import MOTIONS, Record
@@ -268,7 +268,7 @@ def _drawn(rng: np.random.Generator, term: Term, quiet: Record) -> ModelTerm:
     return replace(entry, coefficients=tuple(float(s) for s in shape), parameters=tuple(values))
 
 
-def scaled(value: float, parameter: Parameter, scale: float, omega: float) -> float:
+def scaled(value: float, parameter: ShapeParameter, scale: float, omega: float) -> float:
     """A value in the unit of its quantity, from one in units of rms displacement and angular rate (rad/s)."""
     match parameter.quantity:
         case "length":

@@ -21,7 +21,7 @@ def measured(name, rig, level, stiffness, error=1.0, verdict="missing_effect"):
 
 
 def told(*records):
-    tables = [b for b in campaign.blocks(records) if isinstance(b, document.Table)]
+    tables = [b for b in campaign.blocks(records) if isinstance(b, document.TableBlock)]
     return tables[0], tables[1:]
 
 

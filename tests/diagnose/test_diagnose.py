@@ -236,7 +236,9 @@ def test_an_imitator_that_leaves_only_noise_is_found_out_by_its_coefficient() ->
 def test_a_constant_is_a_constant_and_a_moving_coefficient_is_not() -> None:
     rng = np.random.default_rng(3)
     error = np.full(8, 0.1)
-    flat = [constancy.Curve(np.arange(8.0), 5.0 + 0.1 * rng.standard_normal(8) + 0j, error) for _ in range(400)]
+    flat = [
+        constancy.CoefficientCurve(np.arange(8.0), 5.0 + 0.1 * rng.standard_normal(8) + 0j, error) for _ in range(400)
+    ]
     p_values = np.array([curve.p_value() for curve in flat])
     assert np.mean(p_values < 0.1) == pytest.approx(0.1, abs=0.05)
-    assert constancy.Curve(np.arange(8.0), 5.0 + 0.2 * np.arange(8.0) + 0j, error).p_value() < 1e-6
+    assert constancy.CoefficientCurve(np.arange(8.0), 5.0 + 0.2 * np.arange(8.0) + 0j, error).p_value() < 1e-6

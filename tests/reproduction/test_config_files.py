@@ -9,7 +9,7 @@ import pytest
 from study.commands import measurements
 from study.reproduction.config import load
 from study.reproduction.settings import StudySettings
-from study.support.config_files import Row, read_rows, read_yaml
+from study.support.config_files import TableRow, read_rows, read_yaml
 from study.support.errors import StudyError
 
 ROOT = Path(__file__).parents[2]
@@ -130,7 +130,7 @@ def test_more_inputs_than_a_band_tells_apart(folder):
     assert "half_width is 5; 2 inputs of degree 2 have 9 unknowns in a band, which needs 8 or more" in refused(folder)
 
 
-class Pair(Row):
+class Pair(TableRow):
     a: str
     b: float
 

@@ -151,7 +151,7 @@ def test_responses_are_sorted_by_input_and_estimator_and_leave_out_zero_frequenc
 def test_the_band_holds_95_percent_of_real_parts_and_of_magnitudes():
     rng = np.random.default_rng(11)
     noise = (rng.standard_normal((2, 200_000)).T @ [1.0, 1j]) * 3.0 / np.sqrt(2.0)
-    curve = curves.Curve("miso", np.ones(len(noise)), 400.0 + noise, np.full(len(noise), 3.0))
+    curve = curves.ResponseCurve("miso", np.ones(len(noise)), 400.0 + noise, np.full(len(noise), 3.0))
     assert np.mean(np.abs(curve.values.real - 400.0) < curve.half_width) == pytest.approx(0.95, abs=0.003)
     assert np.mean(np.abs(np.abs(curve.values) - 400.0) < curve.half_width) == pytest.approx(0.95, abs=0.003)
 
@@ -196,14 +196,14 @@ def test_magnitude_band_is_about_the_curve():
 @pytest.mark.parametrize(("angle", "shown"), [(179.0, 179.0), (-179.0, 181.0), (-10.0, -10.0), (0.0, 0.0)])
 def test_phase_does_not_wrap_at_180_degrees(angle, shown):
     frequency = np.array([1.0, 2.0])
-    curve = curves.Curve("miso", frequency, np.full(2, np.exp(1j * np.radians(angle))), np.zeros(2))
+    curve = curves.ResponseCurve("miso", frequency, np.full(2, np.exp(1j * np.radians(angle))), np.zeros(2))
     item = curves.InputResponse(1, "u", (curve,), frequency, None)
     np.testing.assert_allclose(drawn(frequency_response.phase(axes(), item))["MI/SO"].get_ydata(), shown)
 
 
 def test_phase_leaves_a_gap_where_it_wraps():
     frequency = np.arange(1.0, 4.0)
-    curve = curves.Curve("miso", frequency, np.exp(1j * np.radians([-80.0, -100.0, -100.0])), np.zeros(3))
+    curve = curves.ResponseCurve("miso", frequency, np.exp(1j * np.radians([-80.0, -100.0, -100.0])), np.zeros(3))
     item = curves.InputResponse(1, "u", (curve,), frequency, None)
     np.testing.assert_allclose(
         drawn(frequency_response.phase(axes(), item))["MI/SO"].get_ydata(), [-80.0, np.nan, 260.0]
@@ -238,7 +238,7 @@ def test_imaginary_part_of_a_damping_term_is_logarithmic_and_marks_wrong_signs()
 def test_a_curve_has_a_gap_where_its_band_is_taller_than_the_panel():
     frequency, error = np.arange(1.0, 11.0), np.full(10, 0.1)
     error[6] = 100.0
-    curve = curves.Curve("miso", frequency, np.full(10, 2.0 + 1.0j), error)
+    curve = curves.ResponseCurve("miso", frequency, np.full(10, 2.0 + 1.0j), error)
     item = curves.InputResponse(2, "u**3", (curve,), frequency, np.full(10, 2.0 + 1.0j))
     real, imaginary = Figure().subplots(2)
     frequency_response.real_and_imaginary(real, imaginary, item, "N/m^3", frequency_response.common_span([item]))

@@ -34,7 +34,7 @@ LONGEST, SHORTEST, PARTS = 1024, 64, 12  # samples in a segment, at most and at 
 
 
 @dataclass(frozen=True)
-class Lines:
+class LinearApproximation:
     """Best linear approximation on the lines of the fitting part where force and response have something in common."""
 
     omega: Complexes  # 2 pi j f, shape (lines,)
@@ -48,7 +48,7 @@ class Lines:
         return self.neighbours <= MAIN_LOBE
 
 
-def coherent_lines(prepared: Prepared) -> Lines:
+def coherent_lines(prepared: Prepared) -> LinearApproximation:
     """The lines by the usual segments; by longer ones where too few lines of those are driven, as in slow records.
 
     Raises
@@ -78,7 +78,7 @@ def coherent_lines(prepared: Prepared) -> Lines:
     )
 
 
-def _lines(part: Record, response: str, length: int) -> tuple[Lines, float]:
+def _lines(part: Record, response: str, length: int) -> tuple[LinearApproximation, float]:
     """The lines by segments of a length, and how many of those driven may be coherent by chance."""
     force, motion = (part[name] - np.mean(part[name]) for name in ("force", response))
     if part.joints:
@@ -98,10 +98,10 @@ def _lines(part: Record, response: str, length: int) -> tuple[Lines, float]:
     places = np.flatnonzero(keep)
     neighbours = int(places[-1] - places[0]) + 1 if len(places) else 0
     expected = CHANCE * float(np.count_nonzero(driven))
-    return Lines(omega, receptance, weight, neighbours), expected + 3.0 * float(np.sqrt(expected))
+    return LinearApproximation(omega, receptance, weight, neighbours), expected + 3.0 * float(np.sqrt(expected))
 
 
-def solved(lines: Lines, wanted: Sequence[str]) -> tuple[Floats, Floats]:
+def solved(lines: LinearApproximation, wanted: Sequence[str]) -> tuple[Floats, Floats]:
     """Those of k, c and m that are wanted, and their standard errors from what the lines leave; shapes (wanted,)."""
     design = np.stack([lines.omega ** LINEAR_ORDERS[key] for key in wanted], axis=1) * lines.weight[:, None]
     target = lines.weight / lines.receptance

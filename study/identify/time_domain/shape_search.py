@@ -13,7 +13,7 @@ from scipy.fft import irfft, rfft, rfftfreq
 
 from study.equations.model import Model, ModelTerm
 from study.equations.substeps import needed_steps
-from study.equations.term import Parameter, Term
+from study.equations.term import ShapeParameter, Term
 from study.identify.frequency_domain.starting_values import linear_start, oscillator
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import run_of, with_states
@@ -170,7 +170,7 @@ def grid(term: Term, base: Baseline) -> list[tuple[float, ...]]:
     return points
 
 
-def _places(parameter: Parameter, point: tuple[float, ...], base: Baseline) -> list[float]:
+def _places(parameter: ShapeParameter, point: tuple[float, ...], base: Baseline) -> list[float]:
     """Values of one shape parameter to try beside those of the parameters before it."""
 
     def lines(kind: str, shifts: Floats) -> Floats:
@@ -182,7 +182,7 @@ def _places(parameter: Parameter, point: tuple[float, ...], base: Baseline) -> l
 
 
 def values_to_try(
-    parameter: Parameter, point: tuple[float, ...], u: Floats, dt: float, lines: Callable[[str, Floats], Floats],
+    parameter: ShapeParameter, point: tuple[float, ...], u: Floats, dt: float, lines: Callable[[str, Floats], Floats],
     sharp: Sequence[float] = (),
 ) -> list[float]:  # fmt: skip
     """Values of one shape parameter for a motion u beside those of the parameters before it, ``point``.

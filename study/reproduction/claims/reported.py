@@ -9,7 +9,7 @@ from typing import Annotated, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from study.support.config_files import Row, Text, read_rows
+from study.support.config_files import TableRow, Text, read_rows
 from study.support.errors import StudyError
 
 MANY = 8  # numbers that still read well in one cell
@@ -54,7 +54,7 @@ IN_WORDS = _names("""
 """)
 
 
-class Statement(Row):
+class Statement(TableRow):
     """One row: a statement, with its number where it has one."""
 
     id: Annotated[
