@@ -56,7 +56,9 @@ class Measurement(TableRow):
     options: Annotated[tuple[str, ...], BeforeValidator(_words)]  # of ``study compare``
 
 
-def load(folder: Path, cases: Collection[str] = (), targets: Collection[str] = ()) -> Mapping[str, Measurement]:
+def load_measurements(
+    folder: Path, cases: Collection[str] = (), targets: Collection[str] = ()
+) -> Mapping[str, Measurement]:
     """Read ``measurements.tsv`` of a folder; whether the data are there is not asked.
 
     No record, nor the target of its climb, nor its entry, may have one of the names of ``cases`` or of the workflow's
@@ -87,7 +89,7 @@ def load(folder: Path, cases: Collection[str] = (), targets: Collection[str] = (
 
 
 def is_structure(row: Measurement) -> bool:
-    """Whether the model of a row has coordinates; it was read by :func:`load`."""
+    """Whether the model of a row has coordinates; it was read by :func:`load_measurements`."""
     return bool(read_model(Path(row.model)).coordinates)
 
 

@@ -69,7 +69,7 @@ def attempt(term: Term, base: Baseline, prepared: Prepared) -> FittedCandidate |
 
 def _attempt(entry: ModelTerm, base: Baseline, prepared: Prepared) -> FittedCandidate | None:
     try:
-        return judged(entry.term, with_term(base.fit, entry, base, prepared), prepared)
+        return judged_candidate(entry.term, with_term(base.fit, entry, base, prepared), prepared)
     except StudyError:
         return None
 
@@ -83,7 +83,7 @@ def _plainer(term: Term) -> ModelTerm | None:
     return replace(free(term), parameters=fixed) if any(value == 0.0 for value in fixed) else None
 
 
-def judged(term: Term, fit: FreeRunFit, prepared: Prepared) -> FittedCandidate | None:
+def judged_candidate(term: Term, fit: FreeRunFit, prepared: Prepared) -> FittedCandidate | None:
     """A fitted candidate with its prediction; None where its free run does not stay finite."""
     prediction = predict(fit, prepared)
     return None if prediction.diverged else FittedCandidate(term, fit, prediction)
@@ -95,7 +95,7 @@ def all_settled(candidates: Sequence[FittedCandidate], prepared: Prepared) -> li
     def settle(candidate: FittedCandidate) -> FittedCandidate:
         try:
             fit = finished(candidate.fit, prepared)
-            return judged(candidate.term, fit, prepared) or candidate
+            return judged_candidate(candidate.term, fit, prepared) or candidate
         except StudyError:
             return candidate
 

@@ -115,7 +115,7 @@ def _label(row: PicturedCandidate, first: PicturedCandidate) -> str:
     return term_names(row.name) + (" (tie)" if tied else "")
 
 
-def constancy(frequency: Axes, amplitude: Axes, rows: Sequence[PicturedCandidate]) -> None:
+def constancy_panels(frequency: Axes, amplitude: Axes, rows: Sequence[PicturedCandidate]) -> None:
     """The coefficient of the first candidates along frequency and amplitude, relative to its value."""
     followed(frequency, rows, "frequency")
     followed(amplitude, rows, "amplitude")

@@ -13,7 +13,7 @@ TIES = 2  # ties named in the table; the file names all
 SHOWN = 8  # candidates in the table on the screen
 
 
-def table(diagnosis: Diagnosis) -> str:
+def candidate_table(diagnosis: Diagnosis) -> str:
     """The first candidates as a person reads them in ten seconds."""
     head = ["", "effect", "explains", "error with it", "coefficient", "p", "changes by", "tied with"]
     units = diagnosis.comparison.record.units
@@ -39,7 +39,7 @@ def _few(names: tuple[str, ...]) -> str:
     return f"{shown} and {len(names) - TIES} more" if len(names) > TIES else shown
 
 
-def fields(diagnosis: Diagnosis) -> dict[str, Any]:
+def diagnosis_fields(diagnosis: Diagnosis) -> dict[str, Any]:
     """What ``diagnosis.json`` holds of the diagnosis itself; candidates best first."""
     prediction = diagnosis.comparison.prediction
     return {

@@ -41,7 +41,7 @@ class HeldOutResidual:
     error: float  # rms of it over that of the response
 
 
-def evidence(prediction: Prediction, held: HeldOut) -> HeldOutResidual:
+def residual_held_out(prediction: Prediction, held: HeldOut) -> HeldOutResidual:
     """The judging part's residual; with stretches to fit and to judge in turn, those of both parts.
 
     The first stretch of a decay is the loudest, and is fitted: what shows there alone is seen the other way round.
@@ -59,7 +59,7 @@ def evidence_of(fit: FreeRunFit, prediction: Prediction, both: bool = True) -> H
     prepared = prediction.prepared
     if not (both and prepared.record.stretches):
         return HeldOutResidual(prediction.residual, prediction.error)
-    return evidence(prediction, held_out(fit, prediction, linearise(fit, prepared), prepared))
+    return residual_held_out(prediction, held_out(fit, prediction, linearise(fit, prepared), prepared))
 
 
 def alike(one: HeldOutResidual, other: HeldOutResidual) -> bool:

@@ -116,7 +116,7 @@ def needless(comparison: Comparison, besides: Collection[str] = ()) -> tuple[Nee
     return tuple(found)
 
 
-def paragraph(found: Sequence[Unneeded], any_more: bool = False, complete: bool = True) -> str:
+def needless_in_words(found: Sequence[Unneeded], any_more: bool = False, complete: bool = True) -> str:
     """What to tell of all of them; empty if there are none. ``complete`` is false where an effect is missing."""
     said = [n.sentence(any_more) for n in found]
     if found and not complete:
@@ -135,13 +135,13 @@ def of_records(names: Sequence[str], found: Sequence[Sequence[Needless]], any_mo
         return ""
     several = len(names) > 1
     said = [
-        (f"{name}: " if several else "") + paragraph([n for n in row if n.name in common], any_more)
+        (f"{name}: " if several else "") + needless_in_words([n for n in row if n.name in common], any_more)
         for name, row in zip(names, found, strict=True)
     ]
     return " ".join([*said, "'study drop' takes a term out."])
 
 
-def fields(found: Sequence[Unneeded]) -> list[dict[str, Any]]:
+def needless_fields(found: Sequence[Unneeded]) -> list[dict[str, Any]]:
     """The same for files, the one whose loss costs least first."""
     return [
         {"term": n.name, "error_with": n.error_with, "error_without": n.error_without, "p_value": n.p_value,

@@ -96,7 +96,7 @@ def wanders(error: float, gain: Gain, unsteadiness: float, steadiness: Coefficie
     return wavers(steadiness, asked)
 
 
-def examined(candidate: FittedCandidate, before: Prediction) -> Ranked:
+def ranked_candidate(candidate: FittedCandidate, before: Prediction) -> Ranked:
     """A candidate with its coefficient's error and constancy; ``before`` is the prediction without it."""
     fit, prepared = candidate.fit, before.prepared
     jacobian = linearise(fit, prepared)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from study.compare.comparison import Comparison
 from study.diagnose.candidates import FittedCandidate
-from study.diagnose.held_out import HeldOutResidual, alike, evidence, held_out_of
-from study.diagnose.ranked import Ranked, examined
+from study.diagnose.held_out import HeldOutResidual, alike, held_out_of, residual_held_out
+from study.diagnose.ranked import Ranked, ranked_candidate
 from study.equations.term import Term
 from study.support import statistics
 from study.support.autoregression import autoregression
@@ -34,7 +34,7 @@ def rank(candidates: Sequence[FittedCandidate], comparison: Comparison) -> list[
     before = comparison.prediction
 
     def row(candidate: FittedCandidate) -> Ranked:
-        return examined(candidate, before)
+        return ranked_candidate(candidate, before)
 
     with ThreadPoolExecutor(cores()) as pool:
         rows = list(pool.map(row, candidates))
@@ -42,7 +42,7 @@ def rank(candidates: Sequence[FittedCandidate], comparison: Comparison) -> list[
     noise = autoregression(rows[0].fit.residual)
     white = {r.name: r.held_out.white(noise) for r in rows}
     alone = held_out_of(comparison)
-    rows, own = [_gained(r, evidence(before, alone)) for r in rows], alone.white(noise)
+    rows, own = [_gained(r, residual_held_out(before, alone)) for r in rows], alone.white(noise)
     free = before.prepared.free
 
     def chance(row: Ranked) -> float:
@@ -129,7 +129,7 @@ def distance(row: Rankable, other: Rankable, white: Mapping[str, Floats]) -> flo
 
 def _gained(row: Ranked, before: HeldOutResidual) -> Ranked:
     """A candidate with what it explains of all that counts of the held-out residual."""
-    after = evidence(row.prediction, row.held_out)
+    after = residual_held_out(row.prediction, row.held_out)
     return replace(row, gain=statistics.gain(before.residual, after.residual)) if alike(before, after) else row
 
 

@@ -216,7 +216,7 @@ def get(name: str) -> Term:
     return LIBRARY[name]
 
 
-def search(word: str) -> tuple[Term, ...]:
+def find_terms(word: str) -> tuple[Term, ...]:
     """The library's terms that a word finds: in the name, or where no name has it, in formula, meaning or cause.
 
     Raises
@@ -244,7 +244,8 @@ def custom(name: str, force: str) -> Term:
     if not name.isidentifier() or not name.isascii():
         raise StudyError(f"{name!r} is not a name for a term; use letters, digits and underscores")
     graph = Graph()
-    formulas.build(graph, force, {n: graph.input(n) for n in formulas.names(force)})  # raises unless it is a formula
+    known = {n: graph.input(n) for n in formulas.names(force)}
+    formulas.add_formula(graph, force, known)  # raises unless it is a formula
     return _single(name, f"q_{name}", force, meaning=f"the user's own force {force}", cause="as the user knows")
 
 

@@ -16,7 +16,7 @@ from study.compare.missing_force import MissingForce, missing_force
 from study.diagnose import candidates, dropping
 from study.diagnose.adding import added_candidate
 from study.diagnose.candidates import FittedCandidate
-from study.diagnose.diagnosis_files import in_words, unneeded_in_words
+from study.diagnose.diagnosis_files import diagnosis_in_words, unneeded_in_words
 from study.diagnose.force_between import diagnose_as_read
 from study.diagnose.needless import Needless, needless
 from study.diagnose.ranked import Ranked
@@ -159,7 +159,7 @@ def dropped(session: Session, name: str) -> Session:
     StudyError
         If it is not in the model or cannot be left out.
     """
-    comparison = dropping.dropped(session.now.comparison, name)
+    comparison = dropping.compared_without(session.now.comparison, name)
     return replace(session, stages=(*session.stages, stage_of(comparison, f"- {name}", None, dropped=name)))
 
 
@@ -217,7 +217,7 @@ def examined(session: Session, progress: Callable[[int], None] | None = None) ->
     """
     diagnosis = diagnose_as_read(session.now.comparison, extra=session.own, progress=progress)
     now = weighed(session).now
-    said = f"{in_words(diagnosis)} {unneeded_in_words(now.unneeded or (), diagnosis)}".strip()
+    said = f"{diagnosis_in_words(diagnosis)} {unneeded_in_words(now.unneeded or (), diagnosis)}".strip()
     return _foreseen(replace(now, diagnosis=diagnosis, said=said)), diagnosis
 
 

@@ -11,8 +11,8 @@ from study.faults.drift import slow_response
 from study.faults.fault import DRIFT, FORCE_NOISE, Fault
 from study.faults.force_noise import force_noise
 from study.faults.imposed import FAULTS
-from study.faults.leftover import better, leftover
-from study.faults.search import first_faults, search
+from study.faults.leftover import leaves_less, leftover
+from study.faults.search import first_faults, search_faults
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.settling import settled
@@ -82,7 +82,7 @@ def accounted(
     if not asked:
         return _compared(model, fewer, faults, None, estimator, progress)
     fit = fit_model(model, fewer)
-    found, near = search(prepared, fit if fewer is first else _on_all(fit, first), faults, asked)
+    found, near = search_faults(prepared, fit if fewer is first else _on_all(fit, first), faults, asked)
     if DRIFT in asked:
         found, near = _beneath_a_drift(model, prepared, faults, asked, (found, near))
     if found == faults:
@@ -109,11 +109,11 @@ def _beneath_a_drift(
     except StudyError:
         return plain
     whole = replace(begun, residual=begun.residual + slow.waveform[slice(*begun.span)])  # of the record as it is
-    other = search(prepared, whole, faults, asked)
+    other = search_faults(prepared, whole, faults, asked)
     ends = [leftover(fit, corrected(prepared, found)) for found, fit in (plain, other)]
     if ends[1] is None or not any(fault.fault == DRIFT for fault in other[0]):
         return plain
-    return other if ends[0] is None or better(ends[0], ends[1], 1) else plain
+    return other if ends[0] is None or leaves_less(ends[0], ends[1], 1) else plain
 
 
 def _all_samples(prepared: Prepared) -> Prepared:

@@ -21,7 +21,7 @@ def unit(fault: str, response_unit: str) -> str:
     return {DELAY: "samples", GAIN_CHANGE: "1", HIGH_PASS: "Hz"}.get(fault, response_unit)
 
 
-def columns(fault: str, left: FittedResidual, value: float = 0.0) -> Columns:
+def fault_columns(fault: str, left: FittedResidual, value: float = 0.0) -> Columns:
     """Derivative of the response by the fault's value on both parts, shapes (n, k) and (m, k); the first column.
 
     Others stand for what is not known of the channel at its first sample. ``value`` is what the record has been
@@ -43,7 +43,7 @@ def columns(fault: str, left: FittedResidual, value: float = 0.0) -> Columns:
     return np.column_stack([first, fall]), np.column_stack([second, np.zeros(len(judged))])
 
 
-def undone(fault: str, values: Floats, value: float, dt: float) -> Floats:
+def without_fault(fault: str, values: Floats, value: float, dt: float) -> Floats:
     """A channel without the fault, shape (n,)."""
     if fault == OFFSET:
         return values - value

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from study.faults.fault import HOLDABLE, NAMES
-from study.records.readers.options import beside, read_options
+from study.records.readers.options import options_beside, read_options
 from study.support.errors import at, expect
 
 
@@ -29,7 +29,7 @@ def settings_beside(record: Path) -> FaultSettings:
     StudyError
         If it names a fault that is not known, or holds one at a value that one number does not describe.
     """
-    path = beside(record)
+    path = options_beside(record)
     if not path.is_file():
         return FaultSettings()
     options = read_options(path)

@@ -8,7 +8,7 @@ import numpy as np
 
 from study.equations.model import ModelTerm, free
 from study.equations.terms import LIBRARY, Term
-from study.faults.leftover import FittedResidual, better, leftover, share
+from study.faults.leftover import FittedResidual, leaves_less, leftover, share
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -52,7 +52,7 @@ def missing(left: FittedResidual) -> FittedResidual | None:
         return None
 
     def begun(term: Term) -> list[shape_search.Start]:
-        return shape_search.starts(term, base, look)
+        return shape_search.shape_starts(term, base, look)
 
     def fitted(start: tuple[Term, list[shape_search.Start]]) -> FittedResidual | None:
         return _fitted(start[0], base, look, prepared)
@@ -64,7 +64,7 @@ def missing(left: FittedResidual) -> FittedResidual | None:
     names = [t.name for t in terms]
     for group in ([t for t in tried if not unphysical(t.fit, names)], tried):
         best = _simplest_of_the_best(group)
-        if best is not None and better(left, best, len(terms)):
+        if best is not None and leaves_less(left, best, len(terms)):
             return best
     return None
 

@@ -45,7 +45,7 @@ def refined(
     if name == DELAY and value == 0.0:
         value, left = _coarse(given, faults, left)
     for _ in range(STEPS):
-        amounts, covariance = amounts_on_both(left, adjustable.columns(name, left, value))
+        amounts, covariance = amounts_on_both(left, adjustable.fault_columns(name, left, value))
         step, error = float(amounts[0]), math.sqrt(max(float(covariance[0, 0]), 0.0))
         value += step
         if not adjustable.sensible(name, value, left):
@@ -71,7 +71,7 @@ def _coarse(given: Prepared, faults: Sequence[Fault], left: FittedResidual) -> t
 
     A model that is fitted to a record late by a good part of a period finds a minimum of its own.
     """
-    step = float(amounts_on_both(left, adjustable.columns(DELAY, left))[0][0])
+    step = float(amounts_on_both(left, adjustable.fault_columns(DELAY, left))[0][0])
     best = 0.0, left
     for late in COARSE if abs(step) > 0.5 else ():
         tried = _left(given, (*faults, Fault(DELAY, given.response, late)), left)

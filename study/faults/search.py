@@ -17,7 +17,7 @@ from study.faults.drift import drift
 from study.faults.fault import CLIPPING, DRIFT, DROP_OUTS, FORCE_NOISE, HUM, OFFSET, SPIKES, Fault
 from study.faults.force_noise import force_noise
 from study.faults.hum import hum, is_of_the_mains, line
-from study.faults.leftover import FittedResidual, better, leftover, share
+from study.faults.leftover import FittedResidual, leaves_less, leftover, share
 from study.faults.refinement import Refined, refined, relative_power
 from study.faults.spikes import spikes
 from study.faults.spotted import drop_outs, spotted, widened
@@ -43,7 +43,7 @@ def first_faults(prepared: Prepared, held: Mapping[str, float], asked: Sequence[
     return (*given, *spotted(prepared, asked))
 
 
-def search(
+def search_faults(
     given: Prepared, fit: FreeRunFit, faults: Sequence[Fault], asked: Sequence[str]
 ) -> tuple[tuple[Fault, ...], FreeRunFit]:  # fmt: skip
     """All faults of a record, those that are known first, and the model fitted to the corrected record.
@@ -204,7 +204,7 @@ def _effect(stage: SearchStage, one: Refined | None) -> FittedResidual | None:
 
 
 def _columns(fault: Fault, left: FittedResidual) -> tuple[Floats, Floats]:
-    return line(fault.frequency, left) if fault.fault == HUM else adjustable.columns(fault.fault, left)
+    return line(fault.frequency, left) if fault.fault == HUM else adjustable.fault_columns(fault.fault, left)
 
 
 def _best(left: FittedResidual, names: Sequence[str], asked: int) -> str | None:
@@ -216,7 +216,7 @@ def _best(left: FittedResidual, names: Sequence[str], asked: int) -> str | None:
             if fault is not None:
                 power[name] = fault.explained * float(np.mean(left.residual[1] ** 2)) / left.size**2
             continue
-        found = share(left, adjustable.columns(name, left), leading=True)
+        found = share(left, adjustable.fault_columns(name, left), leading=True)
         if found is not None and found.significant(asked) and adjustable.sensible(name, float(found.amounts[0]), left):
             power[name] = found.power
     return max(power, key=lambda name: power[name], default=None)
@@ -260,7 +260,7 @@ def _tied(stage: SearchStage, one: Refined, effect: FittedResidual) -> SearchSta
 def _needs(one: Refined, effect: FittedResidual) -> bool:
     """Whether the effect explains anything beside the corrected fault."""
     both = fitted_again(effect, one.left.prepared)
-    return both is not None and better(one.left, both, 1)
+    return both is not None and leaves_less(one.left, both, 1)
 
 
 def _beyond_reason(stage: SearchStage, effect: FittedResidual) -> bool:
@@ -289,5 +289,5 @@ def _still_there(fault: Fault, rich: FittedResidual, asked: int) -> bool:
     """Whether the record shows a fault beside all effects that it asks for."""
     if fault.fault == DRIFT:
         return drift(rich, asked) is not None
-    needed = share(rich, adjustable.columns(fault.fault, rich), leading=True)
+    needed = share(rich, adjustable.fault_columns(fault.fault, rich), leading=True)
     return needed is not None and needed.significant(asked)

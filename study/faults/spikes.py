@@ -21,7 +21,7 @@ def spikes(left: FittedResidual, asked: int) -> Fault | None:
     spans = left.fit.span, prepared.plan.judge
     for span, residual, reversed_ in zip(spans, left.residual, reversals(left), strict=True):
         known = (prepared.known(np.ones(len(residual)), span) > 0.0) & ~reversed_
-        lost[slice(*span)] = alone(residual, known, ALPHA / asked)
+        lost[slice(*span)] = isolated(residual, known, ALPHA / asked)
     if not np.any(lost):
         return None
     power = np.concatenate(left.residual) ** 2
@@ -53,7 +53,7 @@ def _turning(velocity: Floats) -> NDArray[np.bool_]:
     return np.concatenate([turns, [False]]) | np.concatenate([[False], turns])
 
 
-def alone(residual: Floats, known: NDArray[np.bool_], level: float) -> NDArray[np.bool_]:
+def isolated(residual: Floats, known: NDArray[np.bool_], level: float) -> NDArray[np.bool_]:
     """Samples that differ from the mean of their neighbours by more than chance, and stand alone with it, shape (n,).
 
     The bend ``r_i - (r_(i-1) + r_(i+1)) / 2`` of a sample is compared with the bends near it, and with those of the

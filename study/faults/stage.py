@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from study.faults import physics
 from study.faults.correction import corrected
 from study.faults.fault import SPIKES, Fault
-from study.faults.leftover import FittedResidual, better, leftover
+from study.faults.leftover import FittedResidual, leaves_less, leftover
 from study.records.prepared import Prepared
 
 
@@ -40,7 +40,7 @@ def _pruned(rich: FittedResidual, left: FittedResidual) -> FittedResidual:
     for name in reversed([e.name for e in rich.fit.model.terms if e.name not in left.fit.model]):
         fit = physics.without_effect(rich.fit, name, rich.prepared)
         fewer = None if fit is None else leftover(fit, rich.prepared)
-        if fewer is not None and not better(fewer, rich, 1):
+        if fewer is not None and not leaves_less(fewer, rich, 1):
             rich = fewer
     return left if len(rich.fit.model.terms) == len(left.fit.model.terms) else rich
 

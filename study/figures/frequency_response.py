@@ -24,7 +24,7 @@ OPPOSITE = "opposite sign"
 Part = Callable[[Complexes], Floats]
 
 
-def magnitude(axes: Axes, response: InputResponse, unit: str) -> Axes:
+def magnitude_panel(axes: Axes, response: InputResponse, unit: str) -> Axes:
     """|A_j(f)| of every estimator on a logarithmic scale, with 95 % bands and the exact function."""
     for curve in response.curves:
         _size(axes, curve, np.abs(curve.values))
@@ -38,7 +38,7 @@ def magnitude(axes: Axes, response: InputResponse, unit: str) -> Axes:
     return _frequency_axis(axes, response)
 
 
-def phase(axes: Axes, response: InputResponse) -> Axes:
+def phase_panel(axes: Axes, response: InputResponse) -> Axes:
     """Phase of A_j(f) in degrees, from -90 to 270: neither 0 nor 180 is where it would wrap."""
     turns: list[Floats] = []
     for curve in response.curves:

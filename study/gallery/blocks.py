@@ -29,12 +29,12 @@ def of_record(found: RecordFindings, named: bool) -> list[Block]:
     name = f"**`{found.record}`.** " if named else ""
     return [
         Text(f"{name}The model is given as {begins}. **What is found.** {found.first['says']}"),
-        ladder(found),
+        climb_block(found),
         Text(f"**What is left.** {left(found)}"),
     ]
 
 
-def ladder(found: RecordFindings) -> Block:
+def climb_block(found: RecordFindings) -> Block:
     """Every model of the climb with its held-out error."""
     rows = [
         ("as given" if number == 0 else _spoken(history.label(step)), percent(step["error"]["response"]),

@@ -39,7 +39,7 @@ class Beside:
     interval: tuple[float, float] | None  # 95 %
 
 
-def read(folder: Path, record: str) -> RecordFindings:
+def read_findings(folder: Path, record: str) -> RecordFindings:
     """What the climb of a record left in ``folder``.
 
     Raises
@@ -62,7 +62,7 @@ def _json(path: Path) -> Fields:
         raise StudyError(f"{path}: line {error.lineno} is not JSON") from None
 
 
-def beside(row: Published, found: RecordFindings) -> Beside:
+def found_beside(row: Published, found: RecordFindings) -> Beside:
     """The value found of what a row of published values names."""
     what, _, where = row.key.partition(".")
     if what in ("frequency", "damping") and where in ("loudest", "largest", "quiet"):

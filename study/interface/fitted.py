@@ -126,9 +126,9 @@ class Fit(FitPictures):
     @property
     def says(self) -> Words:
         """What to know of it, in two or three sentences."""
-        from study.compare.comparison_sentences import says
+        from study.compare.comparison_sentences import comparison_in_words
 
-        return Words(says(self.comparison))
+        return Words(comparison_in_words(self.comparison))
 
     def response_functions(self) -> ResponseFunctions:
         """Response over force by frequency, measured and predicted, with coherences."""
@@ -144,9 +144,9 @@ class Fit(FitPictures):
 
     def summary(self) -> Words:
         """The lines that ``study compare`` prints."""
-        from study.compare.comparison_report import summary
+        from study.compare.comparison_report import comparison_summary
 
-        return Words(summary([self.comparison]))
+        return Words(comparison_summary([self.comparison]))
 
     def to_frame(self) -> "pd.DataFrame":
         """The coefficients, one row a key: term, value, standard error, 95 % interval, unit, held or not."""
@@ -226,9 +226,9 @@ class Fit(FitPictures):
 
     def drop(self, name: str) -> "Fit":
         """The fit of the model without one of its terms; a ``StudyError`` if it cannot go."""
-        from study.diagnose.dropping import dropped
+        from study.diagnose.dropping import compared_without
 
-        return replace(self, comparison=dropped(self.comparison, name))
+        return replace(self, comparison=compared_without(self.comparison, name))
 
     def across(self, records: "Sequence[Record]") -> "Across":
         """The same model fitted to several records: do its coefficients move with the level?

@@ -98,7 +98,7 @@ class StudyConfig:
         return list(drawn.with_noise if self.cases[case].noise > 0.0 else drawn.without_noise)
 
 
-def load(folder: Path) -> StudyConfig:
+def load_config(folder: Path) -> StudyConfig:
     """Read ``config.yaml`` and ``cases.tsv`` of a folder, and the models that they name, and check them all.
 
     Nothing that passes here can be refused by a job for the way it is configured.

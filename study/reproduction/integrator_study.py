@@ -35,7 +35,7 @@ class IntegratorRun:
     diverged: float | None = None
 
 
-def study(
+def integrator_study(
     models: Mapping[str, Model],
     record: RecordSettings,
     estimation: Settings,
@@ -102,7 +102,7 @@ def _errors(name: str, true: float, kept: list[tuple[Mapping[str, float], Mappin
     }  # fmt: skip
 
 
-def page(table: pd.DataFrame) -> str:
+def integrator_page(table: pd.DataFrame) -> str:
     """The table as a page: one block a system, relative errors in percent."""
     parts = [
         "# What the integrator's setting does to the recovered parameters",

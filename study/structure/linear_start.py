@@ -170,7 +170,7 @@ def _problem(model: Model, prepared: PreparedStructure, held: Mapping[str, float
     ), free  # fmt: skip
 
 
-def linear_start(model: Model, prepared: PreparedStructure, held: Mapping[str, float]) -> dict[str, float]:
+def structure_linear_start(model: Model, prepared: PreparedStructure, held: Mapping[str, float]) -> dict[str, float]:
     """Linear coefficients that are not held, from the frequency response functions of the fitting part.
 
     Raises

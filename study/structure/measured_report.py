@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from study.equations.place import in_words as placed
+from study.equations.place import place_in_words as placed
 from study.figures.labels import term_names
 from study.structure.measured_comparison import measured_document, measured_says
 from study.structure.measured_diagnosis import MeasuredDiagnosis, MeasuredRanked

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.fft import rfft
 
 from study.equations.model import Model
-from study.identify.frequency_domain.inputs import history
+from study.identify.frequency_domain.inputs import input_history
 from study.identify.frequency_domain.subspace import observability
 from study.records.record import MOTIONS, Record
 from study.structure.missing_forces import placed_inputs
@@ -108,7 +108,7 @@ def unit_histories(model: Model, prepared: PreparedStructure) -> list[Floats]:
         relative = Record(record.dt, channels, name=record.name, start=record.start)
         by_symbol: dict[str, Floats] = {}
         for item in placed_inputs(entry):
-            values = history(item, relative)
+            values = input_history(item, relative)
             for part in item.parts:
                 unit = part.factor * (np.gradient(values, record.dt) if part.order else values)
                 by_symbol[part.symbol] = by_symbol.get(part.symbol, 0.0) + unit

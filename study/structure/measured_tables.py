@@ -115,7 +115,7 @@ def modal_transfer(fit: MeasuredFit, places: list[str], where: str, frequency: F
 def measured_figure(table: pd.DataFrame, title: str) -> Figure:
     """Every coefficient by frequency, which must be real and flat, and the linear part at every sensor."""
     groups = dict.fromkeys((str(q), str(p)) for q, p in zip(table["quantity"], table["place"], strict=True))
-    figure, axes = page.page(
+    figure, axes = page.empty_page(
         title, "Coefficients line by line, and transfer functions of the linear part", rows=len(groups), columns=2,
         width=page.width(2), legend_rows=page.rows_for(5), share=False,
     )  # fmt: skip
@@ -128,15 +128,15 @@ def measured_figure(table: pd.DataFrame, title: str) -> Figure:
             frequency_response.real_and_imaginary(left, right, item, unit, frequency_response.common_span([item]))
             names += [f"{place}: real part", "imaginary part"]
         else:
-            frequency_response.magnitude(left, item, "m/N")
+            frequency_response.magnitude_panel(left, item, "m/N")
             left.set_ylabel("|H| (m/N)")
-            frequency_response.phase(right, item)
+            frequency_response.phase_panel(right, item)
             right.set_ylabel("phase (deg)")
             names += [f"shaker to {place}: magnitude", "phase"]
         for panel in (left, right):
             panel.set_xlabel("frequency (Hz)" if k == len(groups) - 1 else "")
     page.letter(axes, names)
-    page.legend(figure, axes, bands=True)
+    page.shared_legend(figure, axes, bands=True)
     return figure
 
 

@@ -16,7 +16,7 @@ from study.compare.noise import SIGNIFICANT
 from study.equations import kernels
 from study.equations.model import Model, ModelTerm
 from study.equations.place import Place
-from study.identify.frequency_domain.inputs import Input, history, reverse_inputs
+from study.identify.frequency_domain.inputs import Input, input_history, reverse_inputs
 from study.records import noise_floor
 from study.records.completion import derivative
 from study.records.record import MOTIONS, Record
@@ -173,7 +173,7 @@ def unbalanced_forces(model: Model, motion: Floats, prediction: StructurePredict
 def _state(entry: ModelTerm, model: Model, motion: Floats, dt: float) -> Floats:
     """A term's own state along a motion, from rest."""
     item = next(i for i in placed_inputs(entry) if i.state is not None)
-    return history(item, relative_record(entry.place, model, motion, dt))
+    return input_history(item, relative_record(entry.place, model, motion, dt))
 
 
 def placed_inputs(entry: ModelTerm) -> tuple[Input, ...]:

@@ -13,7 +13,13 @@ from study.diagnose.ranking import in_order
 from study.equations.model import ModelTerm
 from study.equations.term import Term
 from study.structure.placed_candidates import PlacedCandidate, physical
-from study.structure.structure_fit import SensorNoise, StructureFit, covariance_of, linearise, noise_left
+from study.structure.structure_fit import (
+    SensorNoise,
+    StructureFit,
+    linearise_structure,
+    noise_left,
+    structure_covariance,
+)
 from study.structure.structure_prediction import StructurePrediction
 from study.support import statistics
 from study.support.arrays import Floats
@@ -148,7 +154,7 @@ class HeldOutTest:
 
 def held_out_test(fit: StructureFit, before: StructurePrediction, noise: SensorNoise) -> HeldOutTest:
     """The test of whatever a fitted structure lacks, in noise as the best candidate leaves it."""
-    jacobian = linearise(fit, before.prepared)
+    jacobian = linearise_structure(fit, before.prepared)
     parts = held_out_parts(fit, before, jacobian, before.prepared.fit)
     try:
         columns = [before.derivatives(fit), jacobian] if not before.diverged else []
@@ -191,8 +197,8 @@ def held_out_parts(
 
 def _examined(candidate: PlacedCandidate, before: StructurePrediction) -> PlacedRanked:
     fit, prepared = candidate.fit, candidate.prediction.prepared
-    jacobian = linearise(fit, prepared)
-    covariance = covariance_of(fit, prepared, jacobian)
+    jacobian = linearise_structure(fit, prepared)
+    covariance = structure_covariance(fit, prepared, jacobian)
     coefficient, error, parameters, errors = ranked.amount(candidate.entry, fit.keys, fit.values, covariance)
     flatness, steadiness = _curves(
         fit, candidate.entry, prepared.dt, jacobian / prepared.scale[:, None], prepared.scale

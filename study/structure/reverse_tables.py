@@ -16,7 +16,7 @@ from study.reproduction.tables import (
     PARAMETER_COLUMNS,
     RESPONSE_COLUMNS,
     AllowedErrors,
-    judge,
+    judge_estimate,
     stacked,
 )
 from study.structure.action_reaction import JointEstimate
@@ -28,7 +28,7 @@ WHERE = ["equation", "place"]  # what the tables of structures have beside
 REACTION_COLUMNS = ["case", "estimator", "parameter", "first", "second", "in_first", "in_second", "error", "p_value"]
 
 
-def place_of(item: Input) -> str:
+def input_place(item: Input) -> str:
     """Where an input acts: that of its coefficients, ``first-second``; several stand side by side."""
     labels = [p.symbol[p.symbol.index("[") + 1 : -1] for p in item.parts]
     return " and ".join(dict.fromkeys(labels))
@@ -47,7 +47,7 @@ def structure_parameters(case: str, result: CaseResult, limits: AllowedErrors) -
 def _judged(key: str, true: float | None, joint: JointEstimate, limits: AllowedErrors) -> tuple[Any, ...]:
     value, error = joint.estimate[key], joint.estimate.error(key)
     known = 0.0 if true is None else true
-    return (key, known, value, error, *judge(key[: key.index("[")], known, value, limits).values())
+    return (key, known, value, error, *judge_estimate(key[: key.index("[")], known, value, limits).values())
 
 
 def structure_reactions(case: str, result: CaseResult) -> pd.DataFrame:
@@ -78,8 +78,8 @@ def _responses(estimator: str, own: EquationResult, values: Mapping[str, float])
         value, error = responses.response[j] * scale, np.sqrt(responses.covariance[:, j, j].real) * scale
         share: Floats | float = np.nan if own.independent is None else own.independent[:, j]
         found.append(
-            (own.coordinate, place_of(item), responses.frequency, estimator, j + 1, item.shape, value.real, value.imag,
-             error, exact.real * scale, exact.imag * scale, share)
+            (own.coordinate, input_place(item), responses.frequency, estimator, j + 1, item.shape, value.real,
+             value.imag, error, exact.real * scale, exact.imag * scale, share)
         )  # fmt: skip
     return found
 
@@ -94,7 +94,7 @@ def structure_coherences(result: CaseResult) -> pd.DataFrame:
                 for j, item in enumerate(own.found.inputs):
                     terms = " + ".join(_words(name) for name in item.terms)
                     parts.append(
-                        (own.coordinate, place_of(item), analysis.frequency, estimator, j + 1, item.shape, terms,
+                        (own.coordinate, input_place(item), analysis.frequency, estimator, j + 1, item.shape, terms,
                          analysis.ordinary[j], analysis.partial[j], analysis.contribution[j], analysis.cumulative[j])
                     )  # fmt: skip
     return stacked([*WHERE, *COHERENCE_COLUMNS], parts)

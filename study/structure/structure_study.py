@@ -115,7 +115,7 @@ class StructureCases:
     cases: Mapping[str, StructureCase]
 
 
-def load(folder: Path, taken: Sequence[str] = ()) -> StructureCases:
+def load_structures(folder: Path, taken: Sequence[str] = ()) -> StructureCases:
     """Read ``structures.yaml`` and ``structures.tsv`` of a folder, and check the models that they name.
 
     ``taken`` are the names of other cases.

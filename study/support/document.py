@@ -125,7 +125,7 @@ def put(path: Path, mark: str, blocks: Sequence[Block]) -> None:
     replace_file(path, text.encode())
 
 
-def page(title: str, blocks: Sequence[Block]) -> str:
+def document_page(title: str, blocks: Sequence[Block]) -> str:
     """The page as one HTML file that asks for nothing from anywhere."""
     body = fragment(blocks)
     return (

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from study.equations.free_run import predict
+from study.equations.free_run import predict_response
 from study.equations.model import Model, ModelTerm, free
 from study.equations.term import ShapeParameter
 from study.equations.terms import LIBRARY, get
@@ -24,7 +24,7 @@ from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares
 from study.trials.draw import NOISES, Trial
-from study.trials.draw import scaled as in_units
+from study.trials.draw import in_own_unit as in_units
 from study.trials.strength import SHARE
 from study.trials.visible import forgets, stands_out
 
@@ -105,7 +105,7 @@ def _run(model: Model, force: Floats, dt: float, initial: Sequence[float] = (0.0
     """The motion of a model under a force, friction's switches met exactly."""
     record = Record(dt, {"force": force}, dict(SI_UNITS))
     motion = {
-        name: predict(model, record, response=name, steps_per_sample=STEPS, initial=initial)
+        name: predict_response(model, record, response=name, steps_per_sample=STEPS, initial=initial)
         for name in ("displacement", "velocity", "acceleration")
     }
     return record.with_channels(motion)
@@ -151,7 +151,7 @@ def _shaped(rng: np.random.Generator, name: str, quiet: Record) -> ModelTerm:
 def _force(entry: ModelTerm, record: Record) -> Floats:
     """The force of an effect with a unit coefficient along a motion, shape (n,)."""
     alone = Model("alone", (replace(entry, coefficients=(1.0,)),))
-    return predict(alone, record, response="force", steps_per_sample=4, initial=(0.0,) * len(alone.states))
+    return predict_response(alone, record, response="force", steps_per_sample=4, initial=(0.0,) * len(alone.states))
 
 
 def _decay(rng: np.random.Generator, hidden: tuple[str, ...]) -> DrawnTest:
@@ -210,7 +210,9 @@ def _component(rng: np.random.Generator, hidden: tuple[str, ...]) -> DrawnTest:
     motion = {"force": np.zeros(samples), "displacement": u, "velocity": v, "acceleration": a}
     record = Record(dt, motion, dict(SI_UNITS))
     truth = _with_hidden(rng, model, hidden, record)
-    force = predict(truth, record, response="force", steps_per_sample=STEPS, initial=(0.0,) * len(truth.states))
+    force = predict_response(
+        truth, record, response="force", steps_per_sample=STEPS, initial=(0.0,) * len(truth.states)
+    )
     return DrawnTest(model, truth, record.with_channels({"force": force}), "force")
 
 

@@ -23,7 +23,7 @@ EFFECTS, PLACES = "trials_of_structures_effects.png", "trials_of_structures_plac
 SAME, END, OTHER = "the same place", "a place with an end in common", "another place"
 
 
-def rates(rows: Sequence[Row]) -> list[Row]:
+def structure_rates(rows: Sequence[Row]) -> list[Row]:
     """How often effect and place come first, ties hold the truth, and nothing is found where nothing is.
 
     ``rows`` are as ``structure_runs.run_structure`` gives them, or as a table of them reads back; a trial that failed
@@ -127,7 +127,7 @@ def in_document(rows: Sequence[Row]) -> list[Block]:
         f"{len(rows)} trials, seeds {min(seeds)} to {max(seeds)}, {failed} of which could not be made or diagnosed and "
         "count as missed; in brackets 95 % intervals and the number of trials."
     )
-    lines = [(str(line["what"]), _shown(line), _wanted(line)) for line in rates(rows)]
+    lines = [(str(line["what"]), _shown(line), _wanted(line)) for line in structure_rates(rows)]
     return [
         Text(about), table(("", "reached", "wanted"), lines),
         Image("Effects: what was hidden and what was said", EFFECTS),

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from study.equations.model import Model, free
 from study.equations.terms import get
 from study.identify.frequency_domain import coefficients, conditioned
-from study.identify.frequency_domain.decay_start import along_the_motion, decay_start, drift_start, scaled
+from study.identify.frequency_domain.decay_start import along_the_motion, decay_start, drift_start, with_given_value
 from study.identify.frequency_domain.inputs import histories, reverse_inputs, without_inertia
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record
@@ -178,11 +178,11 @@ def reverse_start(model: Model, prepared: Prepared) -> dict[str, float]:
     band = (max(float(driven[0]), prepared.band[0]), min(float(driven[-1]), prepared.band[1]))
     if not np.any((matrix.frequency >= band[0]) & (matrix.frequency <= band[1])):
         raise StudyError(f"no frequency that the force of {part.name!r} drives is one at which all motions are valid")
-    estimate = coefficients.fit(conditioned.analyse(matrix), inputs, band, cut.line_inflation())
+    estimate = coefficients.fit_coefficients(conditioned.analyse(matrix), inputs, band, cut.line_inflation())
     if not np.all(np.isfinite(estimate.values)) or not (prepared.free or estimate["m"] > 0.0):
         raise StudyError(f"the reverse system of {model.name!r} and {part.name!r} has no solution")
     found = dict(zip(estimate.symbols, estimate.values.tolist(), strict=True))
-    return scaled({"m": 1.0} | found, model) if prepared.free else found
+    return with_given_value({"m": 1.0} | found, model) if prepared.free else found
 
 
 def _with_shapes(model: Model) -> Model:

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from study.equations.model import Model, ModelTerm
 from study.equations.substeps import needed_steps
 from study.equations.terms import LIBRARY
-from study.identify.frequency_domain.inputs import history, reverse_inputs
+from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.no_response import LINEAR, unfit, why_no_response
 from study.identify.time_domain.part_fit import STEPS, fit_part
-from study.identify.time_domain.settling import KEPT, better, continued, from_segments, settled
+from study.identify.time_domain.settling import KEPT, better_fit, continued, from_segments, settled
 from study.identify.time_domain.shape_search import Baseline
 from study.records.prepared import FORCE, Prepared
 from study.support.errors import StudyError
@@ -64,7 +64,7 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
         )
     unknown = tuple(t for t in model.terms if None in t.parameters)
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
-    look = shape_search.stretch(known, prepared) if unknown else prepared
+    look = shape_search.searched_stretch(known, prepared) if unknown else prepared
     fit = _from_nothing(known, look)
     for entry in unknown:
         fit = with_term(fit, entry, shape_search.baseline(fit, look), look)
@@ -89,7 +89,7 @@ def _from_nothing(model: Model, prepared: Prepared) -> FreeRunFit:
     except StudyError as error:
         reason = error
     if (fit is None or not fit.converged) and any(term.name not in LINEAR for term in model.terms):
-        fit = better(fit, _built_up(model, prepared))
+        fit = better_fit(fit, _built_up(model, prepared))
     if fit is None:
         raise reason or StudyError(why_no_response(model, prepared))
     return fit
@@ -131,7 +131,7 @@ def with_term(fit: FreeRunFit, entry: ModelTerm, base: Baseline, prepared: Prepa
     given = {key: value for key, value in entry.values.items() if value is not None}
     known = fit.model.numbers()
     grown = fit.model.with_term(entry)
-    points = shape_search.starts(entry.term, base, prepared)
+    points = shape_search.shape_starts(entry.term, base, prepared)
     starts = [known | dict.fromkeys(entry.term.symbols, 0.0) | _shapes(entry, p.parameters) | given for p in points]
     if points:
         anew = _reversed(grown.with_values(starts[0]), prepared) or base.linear
@@ -189,7 +189,7 @@ def _at_minimum(
         apart = from_segments(best.model if best else model, prepared, (*held, *shapes))
         if apart is not None and shapes:
             apart = _freed(apart, prepared, held)
-        best = better(best, apart)
+        best = better_fit(best, apart)
     return best
 
 
@@ -247,4 +247,4 @@ def _check_own_formulas(model: Model, prepared: Prepared) -> None:
     known = replace(model, terms=tuple(t for t in model.terms if None not in t.parameters))
     for item in reverse_inputs(known):
         if any(name not in LIBRARY for name in item.terms):
-            history(item, motion)
+            input_history(item, motion)

@@ -48,7 +48,7 @@ def _settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
         apart = _in_segments(fit, prepared)
         return apart if apart is not None and (apart.converged or apart.rms < LOST * fit.rms) else fit
     near = from_segments(fit.model, prepared, fit.held, fit.steps_per_sample)
-    best = better(fit, near) or fit
+    best = better_fit(fit, near) or fit
     if near is None or _stands(best, prepared) or not is_chaotic(near, prepared):
         return best
     apart = _in_segments(near, prepared)  # a fit at wrong values may be regular where the true system is chaotic
@@ -103,7 +103,7 @@ def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     return fit
 
 
-def better(one: FreeRunFit | None, other: FreeRunFit | None) -> FreeRunFit | None:
+def better_fit(one: FreeRunFit | None, other: FreeRunFit | None) -> FreeRunFit | None:
     """The fit with the smaller residual; of two alike the later one, which knows more errors."""
     if one is None or other is None:
         return one or other

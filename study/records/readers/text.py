@@ -22,7 +22,7 @@ import pandas as pd
 from study.records.readers.table import NONE, Column, Table, split_unit
 from study.support.errors import StudyError, expect
 from study.support.units import is_unit
-from study.support.yaml_text import short
+from study.support.yaml_text import excerpt
 
 HEAD_BYTES = 200_000
 HEAD_LINES = 200
@@ -225,7 +225,7 @@ def _checked(name: str, unit: str, cells: "pd.Series[Any]", decimal: str, place:
     texts = [cell.strip(SPACE) if isinstance(cell, str) else "" for cell in cells.tolist()]
     wrong = next((i for i, cell in enumerate(texts) if cell and not _is_number(cell, decimal)), None)
     if wrong is not None:
-        fault = f"column {name!r} holds {short(texts[wrong], 30)!r} in {place(wrong)}; expected a number"
+        fault = f"column {name!r} holds {excerpt(texts[wrong], 30)!r} in {place(wrong)}; expected a number"
         return Column(name, NONE, unit, fault=fault)
     numbers = (cell.replace(",", ".") if decimal == "," else cell for cell in texts)
     return Column(name, np.array([float(cell) if cell else np.nan for cell in numbers]), unit)

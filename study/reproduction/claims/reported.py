@@ -145,7 +145,7 @@ def check_systems(reported: Reported, models: Path) -> None:
             raise StudyError(f"config/reported.tsv: {name!r} names a system that is not in {models.name}/")
 
 
-def load(path: Path) -> Reported:
+def load_reported(path: Path) -> Reported:
     """Read and check the table."""
     statements: dict[str, Statement] = {}
     for _, statement in read_rows(path, Statement):
