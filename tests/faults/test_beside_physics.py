@@ -86,7 +86,7 @@ def test_spikes_and_drop_outs_beside_friction_are_found(fault):
 
 def test_a_record_that_is_over_in_its_middle_has_lost_nothing():
     """Zeros to the end of the file, where nothing was written, were called 50 % drop-outs."""
-    made = trials.make_trial(520303, (), 0.0, "displacement", None, WIDE)
+    made = trials.make_trial(520303, (), 0.0, "displacement", "none", WIDE)
     record = made.record
     half = len(record) // 2
     over = {name: np.where(np.arange(len(record)) < half, record[name], 0.0) for name in ("force", "displacement")}

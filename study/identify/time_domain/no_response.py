@@ -78,7 +78,8 @@ def one_frequency(omega: float, prepared: Prepared) -> str:
     """The sentence for a force that drives one frequency, in rad/s."""
     return (
         f"the force of {prepared.record.name!r} drives one frequency, {omega / (2.0 * np.pi):.3g} Hz, which cannot "
-        "tell mass from stiffness; expected a force of several frequencies, or a model that gives the value of one of them"
+        "tell mass from stiffness; expected a force of several frequencies, or a model that gives the value of one of "
+        "them"
     )
 
 
