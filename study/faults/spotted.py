@@ -14,6 +14,7 @@ from scipy.special import fdtrc
 
 from study.faults.fault import CLIPPING, CONVERTER_STEPS, DROP_OUTS, Fault
 from study.faults.leftover import FittedResidual
+from study.records.moving import moving
 from study.records.prepared import Prepared
 from study.support.arrays import Floats, Ints
 from study.support.thresholds import ALPHA, TOLERANCE
@@ -96,8 +97,13 @@ def drop_outs(left: FittedResidual, asked: int) -> Fault | None:
     prepared, values = left.prepared, left.prepared.record[left.prepared.response]
     if converter_step(values) is not None:
         return None
-    mask, runs = _standing(values)
     places = np.concatenate(left.samples).astype(np.int64)
+    used = np.zeros(len(values), dtype=np.bool_)
+    used[places] = True
+    begun, over = moving(values)
+    used[: begun + 1], used[over:] = False, False  # at rest before or behind
+    mask, runs = _standing(values)
+    mask &= used
     power = np.concatenate(left.residual) ** 2
     if not 0.0 < float(np.mean(mask[places])) < STANDING:
         return None
@@ -115,7 +121,7 @@ def drop_outs(left: FittedResidual, asked: int) -> Fault | None:
     ):
         return None
     explained = float(np.sum(power[there]) / np.sum(power))
-    return Fault(DROP_OUTS, prepared.response, float(np.mean(mask)), unit="1", explained=explained, lost=mask)
+    return Fault(DROP_OUTS, prepared.response, float(np.mean(there)), unit="1", explained=explained, lost=mask)
 
 
 def _at_rest(response: str, standing: Floats) -> bool:
