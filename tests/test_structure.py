@@ -16,6 +16,16 @@ LOOSE = {"__init__", "__main__", "cli"}
 
 # What a notebook calls a record is a record below too: the class of the interface wraps or extends the one it names.
 WRAPPED = {"Diagnosis", "Model", "Record", "Term"}
+# One call for many modules of a kind (readers, estimators), and what a notebook calls as the command line does.
+SHARED_CALLS = {
+    "compare": ("compare/", "interface/"),
+    "identify": ("identify/estimators/", "interface/"),
+    "read": ("records/readers/", "interface/"),
+    "simulate": ("equations/", "interface/"),
+}
+# The pages of a single mass and of a structure answer the same calls; a panel is called after what it draws.
+PAGES = "explore/"
+PANELS = {"explore/plots.py", "explore/placed_panels.py", "explore/check_plots.py"}
 
 
 def imported(path: Path) -> set[str]:
@@ -83,3 +93,15 @@ def test_no_class_name_stands_for_two_things():
         name for name, where in twice.items() if len(where) == 2 and any("interface/" in w for w in where)
     } == WRAPPED
     assert {name: where for name, where in twice.items() if name not in WRAPPED} == {}
+
+
+def test_no_function_name_stands_for_two_things():
+    twice: dict[str, set[str]] = {}
+    for name, where in homes((ast.FunctionDef, ast.AsyncFunctionDef)).items():
+        distinct = {PAGES if w.startswith(PAGES) else w for w in where - PANELS}
+        if len(distinct) > 1:
+            twice[name] = distinct
+    assert {name: where for name, where in twice.items() if name not in SHARED_CALLS} == {}
+    for name, packages in SHARED_CALLS.items():
+        assert len(twice[name]) > 1
+        assert all(where.startswith(packages) for where in twice[name])
