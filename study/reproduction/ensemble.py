@@ -45,7 +45,7 @@ def estimates(
     model: Model, record: RecordSettings, identification: IdentificationSettings, seeds: Iterable[int],
     *, workers: int | None = None, progress: Callable[[int], None] | None = None,
 ) -> pd.DataFrame:  # fmt: skip
-    """Every parameter of every estimator for every seed, as ``tables.parameters`` with a column ``seed``.
+    """Every parameter of every estimator for every seed, as ``tables.parameter_table`` with a column ``seed``.
 
     A seed whose run diverges leaves one row with the parameter ``diverged`` and the time as its estimate.
     """

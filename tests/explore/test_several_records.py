@@ -139,7 +139,12 @@ def test_a_close_up_shows_one_stretch_of_time(begun):
 
 
 def test_the_saved_page_and_the_tables_hold_every_record(grown, monkeypatch):
-    for drawn in ("pictures", "level_pictures", "history_pictures", "diagnosis_files"):  # by tests of their own
+    for drawn in (
+        "comparison_pictures",
+        "level_pictures",
+        "history_pictures",
+        "diagnosis_files",
+    ):  # by tests of their own
         monkeypatch.setattr(saved_files, drawn, lambda *_: {"response.png": b""})
     contents = saved_files.files(grown, "rig.yaml", model_file.format_model(BELIEVED))
     assert {"low_response.png", "high_response.png", "coefficients_by_level.csv"} <= set(contents)
@@ -199,7 +204,7 @@ def test_a_coefficient_may_differ_within_the_one_fit(records, monkeypatch):
     (level,) = session.now.by_record.levels
     assert (level.key, session.now.by_record.names) == ("k", NAMES)
     assert level.moves
-    for drawn in ("pictures", "history_pictures"):
+    for drawn in ("comparison_pictures", "history_pictures"):
         monkeypatch.setattr(saved_files, drawn, lambda *_: {})
     text = model_file.format_model(BELIEVED)
     for values in (True, False):
