@@ -26,14 +26,14 @@ class Source:
 
 
 def pattern(source: Source) -> Figure:
-    """MissingForce force against displacement (Figures 2 to 7): as large a harmonic motion as the random one."""
+    """Restoring force against displacement (Figures 2 to 7): as large a harmonic motion as the random one."""
     record, model = read_csv(source.record), read_model(source.model)
     random = preliminary.random_pattern(record, model.numbers()["m"])
     amplitude, frequency = preliminary.harmonic_beside(model, record)
     cycles = preliminary.closing_cycles(model, frequency)
     harmonic = preliminary.harmonic_pattern(model, amplitude, frequency, cycles)
     figure, axes = page.empty_page(
-        source.title, "MissingForce force against displacement", columns=2, width=7.6, panel=3.1
+        source.title, "Restoring force against displacement", columns=2, width=7.6, panel=3.1
     )
     left, right = axes
     force_patterns.pattern_panels(left, right, harmonic, random, record.units)
