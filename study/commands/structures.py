@@ -89,6 +89,7 @@ def refuse_measured(model: "Model", command: str) -> None:
 def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
     """``study diagnose`` of a structure."""
     from study.compare.comparison_report import as_json
+    from study.diagnose.diagnosis_files import unneeded_in_words
     from study.diagnose.user_candidates import own_candidates
     from study.equations import terms
     from study.structure.placed_needless import placed_needless
@@ -98,7 +99,6 @@ def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
     from study.structure.structure_report import (
         modes_before_and_after,
         placed_candidate_table,
-        placed_unneeded_in_words,
         structure_diagnosis_in_words,
         structure_fields,
     )
@@ -128,7 +128,7 @@ def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
             + structure_diagnosis_in_words(diagnosis)
         )
         if unneeded:
-            print(f"\n{placed_unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
+            print(f"\n{unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
         prefix = f"{prepared.record.name}_" if len(ready) > 1 else ""
         made = {
             PAGE: structure_page(comparison, diagnosis),

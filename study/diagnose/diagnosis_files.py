@@ -5,9 +5,10 @@ from typing import Any
 
 from study.compare.comparison_report import as_json, where
 from study.diagnose import diagnosis_pages, diagnosis_report
+from study.diagnose.diagnosis_pictures import PicturedDiagnosis
 from study.diagnose.diagnosis_sentences import diagnosis_sentences
 from study.diagnose.force_between import reading_in_words
-from study.diagnose.needless import Needless, needless_fields, needless_in_words
+from study.diagnose.needless import Needless, Unneeded, needless_fields, needless_in_words
 from study.diagnose.separating_test import advice
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
 from study.faults import fault
@@ -29,8 +30,8 @@ def choices_in_words(notes: Sequence[str]) -> list[str]:
     return [note for note in notes if "(--" in note or "too coarsely" in note]
 
 
-def unneeded_in_words(found: Sequence[Needless], diagnosis: Diagnosis) -> str:
-    """Which terms the diagnosed model does not need, in sentences; empty if it needs all."""
+def unneeded_in_words(found: Sequence[Unneeded], diagnosis: PicturedDiagnosis) -> str:
+    """Which terms the diagnosed model does not need, at a place or without one, in sentences; empty if it needs all."""
     return needless_in_words(found, complete=diagnosis.verdict == NOTHING)
 
 

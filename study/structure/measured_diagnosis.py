@@ -14,6 +14,7 @@ import numpy as np
 from study.diagnose import ranked
 from study.diagnose.credibility import credible
 from study.diagnose.ranking import in_order
+from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
 from study.equations.model import Model, ModelTerm
 from study.equations.term import Term
 from study.records import noise_floor
@@ -25,7 +26,6 @@ from study.structure.measured_spectra import CoefficientSpectrum, coefficient_sp
 from study.structure.placed_candidates import physical
 from study.structure.placed_ranking import HeldOutTest, orthonormal
 from study.structure.structure_fit import noise_left
-from study.structure.structure_verdict import MISSING, NOTHING, UNKNOWN
 from study.support import statistics
 from study.support.arrays import Floats
 from study.support.cores import cores

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from study.diagnose import needless
+from study.diagnose.needless import needless_fields
+from study.diagnose.verdict import MISSING, NOTHING
 from study.equations.place import Place
 from study.equations.place import place_in_words as placed
 from study.figures.labels import term_names
@@ -15,7 +16,7 @@ from study.structure.placed_needless import PlacedNeedless
 from study.structure.placed_ranking import PlacedRanked
 from study.structure.structure_comparison import mode_rows, structure_document
 from study.structure.structure_record import Sensor
-from study.structure.structure_verdict import MISSING, NOTHING, StructureDiagnosis
+from study.structure.structure_verdict import StructureDiagnosis
 from study.support.numbers import percent
 
 SHOWN, TIES = 8, 2  # candidates in the table on the screen; ties named there
@@ -134,11 +135,6 @@ def _unknown(diagnosis: StructureDiagnosis) -> list[str]:
     return said
 
 
-def placed_unneeded_in_words(found: Sequence[PlacedNeedless], diagnosis: StructureDiagnosis) -> str:
-    """Which terms the diagnosed structure does not need, in sentences; empty if it needs all."""
-    return needless.needless_in_words(found, complete=diagnosis.verdict == NOTHING)
-
-
 def structure_fields(diagnosis: StructureDiagnosis, unneeded: Sequence[PlacedNeedless] = ()) -> dict[str, Any]:
     """What ``diagnosis.json`` holds: candidates best first, and the terms that the structure does not need."""
     comparison = diagnosis.comparison
@@ -159,7 +155,7 @@ def structure_fields(diagnosis: StructureDiagnosis, unneeded: Sequence[PlacedNee
         "modes": {"before": whole["modes"], "after": mode_rows(after) if after is not None else None},
         "where": whole["where"],
         "converged": comparison.fit.converged,
-        "not_needed": needless.needless_fields(unneeded),
+        "not_needed": needless_fields(unneeded),
         "says": structure_diagnosis_in_words(diagnosis),
     }
 

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from study.diagnose.credibility import credible
+from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
 from study.equations.model import ModelTerm
 from study.equations.term import Term
 from study.structure.modes import Modes, modes_of
@@ -33,7 +34,6 @@ from study.structure.structure_leftover import FamilyGain, family_gains
 from study.structure.structure_prediction import StructurePrediction
 from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE
 
-MISSING, NOTHING, UNKNOWN = "missing_effect", "nothing_missing", "unknown_effect"
 SHORT, LONG = 2048, 8192  # samples: a search uses half of the fitting part, within these limits
 NAMELESS = 0.1 * ALPHA  # what no candidate explains is believed less easily than what one does
 

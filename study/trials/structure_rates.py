@@ -70,7 +70,7 @@ def _line(what: str, rate: Rate) -> Row:
 
 
 def confusion_of_effects(rows: Sequence[Row]) -> pd.DataFrame:
-    """Hidden effects down, what was said across, numbers of trials; as ``trial_pictures.confusion_panel`` draws them."""
+    """Hidden effects down, what was said across, numbers of trials, for ``trial_pictures.confusion_panel``."""
     return _counted(rows, _what_hidden, _what_said)
 
 

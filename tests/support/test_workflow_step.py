@@ -111,7 +111,7 @@ def test_simulation_does_not_rest_on_identification():
 
 
 def test_steps_write_files_that_are_never_half_there():
-    """By ``study.support.files`` or ``tables.write_table``: what ``write_text`` began stays as a killed run leaves it."""
+    """By ``study.support.files`` or ``tables.write_table``: what ``write_text`` began a killed run leaves as it is."""
     for path in sorted((ROOT / "scripts").glob("*.py")):
         assert not re.search(r"[.](write_text|write_bytes|to_csv[(](Path|output|page|csv)\b)", path.read_text()), (
             path.name
