@@ -8,6 +8,7 @@ from study.commands.structures import prepared_structures
 from study.compare import history
 from study.compare.comparison_report import as_json
 from study.compare.history_picture import history_files as history_pictures
+from study.diagnose.verdict import MISSING
 from study.equations.model import Model
 from study.equations.model_file import WANTED
 from study.explore import placed_session as sessions
@@ -16,7 +17,6 @@ from study.explore.saved_files import PAGE
 from study.structure import structure_report
 from study.structure.structure_comparison import compare_structure
 from study.structure.structure_pictures import diagnosis_pictures
-from study.structure.structure_verdict import MISSING
 from study.support.file_sets import write_files
 from study.support.files import read_text
 

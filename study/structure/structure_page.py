@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
 
+from study.diagnose.verdict import MISSING
 from study.equations.place import Place
 from study.equations.place import place_in_words as placed
 from study.figures import page
@@ -30,7 +31,7 @@ from study.structure.structure_pictures import (
     sketch_of_diagnosis,
 )
 from study.structure.structure_report import structure_diagnosis_in_words
-from study.structure.structure_verdict import MISSING, StructureDiagnosis
+from study.structure.structure_verdict import StructureDiagnosis
 from study.support.numbers import percent
 
 PAGE = "structure.html"

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from study.compare import panels
 from study.diagnose import diagnosis_pages
+from study.diagnose.verdict import MISSING
 from study.equations.place import place_in_words
 from study.figures import page
 from study.figures.sheet import in_style
@@ -20,7 +21,7 @@ from study.structure.sketch import Sketch, sketch
 from study.structure.sketch_drawing import structure_sketch
 from study.structure.structure_comparison import StructureComparison
 from study.structure.structure_leftover import explained_by_place
-from study.structure.structure_verdict import MISSING, StructureDiagnosis
+from study.structure.structure_verdict import StructureDiagnosis
 from study.support.arrays import Floats
 from study.support.numbers import percent
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 import pandas as pd
 
-from study.structure.structure_verdict import NOTHING
+from study.diagnose.verdict import NOTHING
 from study.support.document import Block, Image, Text, table
 from study.trials.rates import NO_TRIALS, Rate, proportion
 from study.trials.structure_draw import NOISES
