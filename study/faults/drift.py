@@ -55,6 +55,12 @@ def slow_response(prepared: Prepared, asked: int) -> Fault | None:
     return Fault(DRIFT, prepared.response, float(np.std(waveform)), waveform=waveform)
 
 
+def mean_response(prepared: Prepared) -> Fault:
+    """The mean of the response, where a fit that cannot follow it may begin; as a drift that stays the same."""
+    mean = float(np.mean(np.concatenate([prepared.fitted, prepared.judged])))
+    return Fault(DRIFT, prepared.response, mean, waveform=np.full(len(prepared.record), mean))
+
+
 def _slow_lines(values: Floats, asked: int) -> tuple[int, float] | None:
     """How many of the slowest lines stand above the next, and the mean power of these; None without any."""
     if len(values) < FEWEST:
