@@ -4,7 +4,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from study.commands.command import progress
-from study.commands.record_arguments import inputs_of, out_folder, read_options, refuse_groups, written_together
+from study.commands.record_arguments import ALTERNATE, inputs_of, out_folder, read_options, refuse_groups, written_together
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[PreparedStructure]":
     """The records that were named, made ready."""
-    from study.structure.prepared_structure import prepare_structure
+    from study.structure.structure_layout import Parts, lay_out
     from study.structure.structure_reader import read_structure
     from study.support.errors import at
 
@@ -26,9 +26,11 @@ def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[
     made: list[PreparedStructure] = []
     for path in arguments.records:
         record = read_structure(path, model, read_options(arguments))
-        parts = [_within(span, len(record)) for span in (arguments.fit, arguments.judge)]
+        turns = arguments.judge == ALTERNATE
+        fit, judge = (_within(span, len(record)) for span in (arguments.fit, None if turns else arguments.judge))
         with at(path):
-            made.append(prepare_structure(record, model, parts[0], parts[1], arguments.cutoff))
+            parts = Parts(fit, judge, tuple(arguments.use), turns, arguments.cutoff)
+            made.append(lay_out(record, model, parts))
     return made
 
 

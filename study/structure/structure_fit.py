@@ -199,9 +199,7 @@ def fit_structure(
     positive = tuple(key for entry in model.terms for key in positive_keys(entry) if key in keys)
     measured = prepared.measured[slice(*prepared.fit)]
     problem = _Problem(begun, run, measured, noise or sized(prepared.scale), positive)
-    state = np.zeros(run.program.states)
-    if initial is not None:
-        state[: len(initial)] = initial
+    state = _beginning(initial, run, prepared, model)
     point = problem.linearise(np.array([*(values[key] for key in keys), *state]))
     if point is None:
         raise DivergenceError(f"the free run of {model.name!r} diverges with the starting values", run.start)
@@ -215,6 +213,29 @@ def fit_structure(
         begun.with_values(found), keys, x[len(keys) :], measured - response.T, end.converged, end.message,
         prepared.fit[0], steps, problem.noise, undecided,
     )  # fmt: skip
+
+
+def _beginning(initial: Floats | None, run: StructureRun, prepared: PreparedStructure, model: Model) -> Floats:
+    """States with which a search begins: those given, or at rest; where motions begin anew, as they were measured.
+
+    A motion from rest is none of a stiffness that hardens or of dry friction: it tells nothing of the way to it.
+    """
+    state = np.zeros((len(run.drives), run.program.states))
+    if initial is not None:
+        given = initial.reshape(len(run.drives), -1)
+        state[:, : given.shape[1]] = given
+    elif prepared.anew:
+        begins = [begin for begin, _ in prepared.record.runs(prepared.fit)]
+        for i, coordinate in enumerate(model.coordinates):
+            if coordinate in prepared.complete:
+                state[:, [i, i + len(model.coordinates)]] = prepared.complete[coordinate][:2, begins].T
+    return state.ravel()
+
+
+def continued(fit: StructureFit, prepared: PreparedStructure) -> Floats | None:
+    """The states of a fit, where the fitting part begins as it did; with stretches, where it is the same."""
+    same = fit.span == prepared.fit if prepared.anew else fit.first == prepared.fit[0]
+    return fit.initial if same else None
 
 
 def fitted_run(fit: StructureFit, prepared: PreparedStructure, keys: tuple[str, ...], finer: int = 1) -> StructureRun:
@@ -266,8 +287,7 @@ def settled(fit: StructureFit, prepared: PreparedStructure) -> StructureFit:
     for a single coordinate (``weighted_fit``).
     """
     if fit.span != prepared.fit or not fit.converged:
-        begin = fit.initial if fit.first == prepared.fit[0] else None
-        fit = fit_structure(fit.model, prepared, fit.held, steps=fit.steps, initial=begin)
+        fit = fit_structure(fit.model, prepared, fit.held, steps=fit.steps, initial=continued(fit, prepared))
     while fit.keys and fit.steps < MOST_STEPS:
         jacobian = linearise(fit, prepared)
         moved = np.abs(integration_shift(fit, prepared, jacobian))

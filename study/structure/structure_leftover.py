@@ -5,7 +5,7 @@ the second. A force of each shape at each place passes through the linear approx
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
@@ -51,6 +51,7 @@ def left_over(prediction: StructurePrediction) -> list[Leftover]:
     """What each family of shapes at each place explains of what a fitted structure leaves; none if it diverges."""
     fit, prepared = prediction.fit, prediction.prepared
     model = fit.model
+    prediction = _from_the_fit(prediction)
     begin = max(prediction.first, prepared.judge[0] - LONGEST)
     end = min(prepared.judge[1], prepared.judge[0] + LONGEST)
     split = prepared.judge[0] - begin if begin < prepared.judge[0] else (end - begin) // 2
@@ -78,9 +79,18 @@ def left_over(prediction: StructurePrediction) -> list[Leftover]:
         for family, shapes in families:
             lines = np.stack([rfft(x, size) for x in shapes], axis=1)
             columns = irfft((paths @ e)[:, :, None] * lines[:, None, :], size, axis=0)[: len(free)]
-            gain = statistics.gain(*_held_out(own, columns.reshape(len(residual), -1), residual, cut))
+            before, after = _held_out(own, columns.reshape(len(residual), -1), residual, cut)
+            gain = statistics.gain(before, after, evenly=prepared.anew)
             found.append(Leftover(place, family, gain))
     return found
+
+
+def _from_the_fit(prediction: StructurePrediction) -> StructurePrediction:
+    """The same with the fitted stretches before the judged ones, which are as loud; of a decay, halves are not."""
+    fit, prepared = prediction.fit, prediction.prepared
+    if not prepared.anew or prediction.diverged or fit.span != (prepared.fit[0], prepared.judge[0]):
+        return prediction
+    return replace(prediction, first=fit.first, initial=np.concatenate([fit.initial, prediction.initial]))
 
 
 def _derivatives(prediction: StructurePrediction, begin: int, end: int) -> Floats:

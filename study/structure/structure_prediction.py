@@ -92,7 +92,7 @@ def predict_structure(fit: StructureFit, prepared: PreparedStructure) -> Structu
     judged = prepared.measured[slice(*prepared.judge)]
     try:
         first, initial = fit.first, fit.initial
-        if prepared.judge[0] != fit.span[1]:
+        if prepared.anew or prepared.judge[0] != fit.span[1]:
             swapped = replace(prepared, fit=prepared.judge, judge=prepared.fit)
             first = prepared.judge[0]
             initial = fit_structure(fit.model, swapped, tuple(fit.model.values), steps=fit.steps).initial

@@ -22,7 +22,7 @@ from study.structure.placed_candidates import (
 from study.structure.placed_ranking import PlacedRanked, rank_placed
 from study.structure.placed_search import PlacedBaseline, placed_baseline, with_placed_term
 from study.structure.structure_comparison import StructureComparison, compare_structure
-from study.structure.structure_fit import covariance_of, fit_structure, linearise, settled, sized
+from study.structure.structure_fit import continued, covariance_of, fit_structure, linearise, settled, sized
 from study.structure.structure_leftover import Leftover, left_over
 from study.structure.structure_prediction import StructurePrediction
 from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE
@@ -79,9 +79,9 @@ def search_base(comparison: StructureComparison) -> PlacedBaseline:
     """The fitted structure as candidates are tried beside it, on no more samples than a search takes."""
     prepared, fit = comparison.prepared, comparison.fit
     first, last = prepared.fit
-    look = prepared.shortened(int(np.clip((last - first) // 2, SHORT, LONG)))
-    begin = fit.initial if look.fit[0] == fit.first else None
-    again = fit_structure(fit.model, look, fit.held, initial=begin, noise=sized(prepared.scale))
+    wanted = LONG if prepared.anew else int(np.clip((last - first) // 2, SHORT, LONG))  # loud and quiet stretches
+    look = prepared.shortened(wanted)
+    again = fit_structure(fit.model, look, fit.held, initial=continued(fit, look), noise=sized(prepared.scale))
     return placed_baseline(again, look)
 
 
