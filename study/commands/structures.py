@@ -4,7 +4,14 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from study.commands.command import progress
-from study.commands.record_arguments import ALTERNATE, inputs_of, out_folder, read_options, refuse_groups, written_together
+from study.commands.record_arguments import (
+    ALTERNATE,
+    inputs_of,
+    out_folder,
+    read_options,
+    refuse_groups,
+    written_together,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -71,7 +71,7 @@ class PreparedStructure:
 
     @cached_property
     def edge(self) -> int:
-        """Samples at each end that derivatives and integrals leave uncertain; none of stretches that leave these out."""
+        """Samples at each end that derivatives and integrals leave uncertain; stretches leave these out."""
         if self.record.stretches:
             return 0
         return max(self._completed(s.coordinate).edge for s in self.sensors)

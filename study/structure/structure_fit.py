@@ -13,6 +13,7 @@ import numpy as np
 from study.equations.model import Model, ModelTerm
 from study.structure.mass_matrix import matrices
 from study.structure.prepared_structure import PreparedStructure
+from study.structure.stretch_beginnings import beginnings
 from study.structure.structure_run import StructureRun, prepare_run
 from study.support.arrays import Floats
 from study.support.autoregression import autoregression, whitened
@@ -199,8 +200,9 @@ def fit_structure(
     positive = tuple(key for entry in model.terms for key in positive_keys(entry) if key in keys)
     measured = prepared.measured[slice(*prepared.fit)]
     problem = _Problem(begun, run, measured, noise or sized(prepared.scale), positive)
-    state = _beginning(initial, run, prepared, model)
-    point = problem.linearise(np.array([*(values[key] for key in keys), *state]))
+    own = [values[key] for key in keys]
+    begins = (problem.linearise(np.array([*own, *state])) for state in beginnings(initial, run, prepared, model))
+    point = next((p for p in begins if p is not None), None)
     if point is None:
         raise DivergenceError(f"the free run of {model.name!r} diverges with the starting values", run.start)
     size = float(np.linalg.norm(problem.noise.weighted(measured)))
@@ -213,23 +215,6 @@ def fit_structure(
         begun.with_values(found), keys, x[len(keys) :], measured - response.T, end.converged, end.message,
         prepared.fit[0], steps, problem.noise, undecided,
     )  # fmt: skip
-
-
-def _beginning(initial: Floats | None, run: StructureRun, prepared: PreparedStructure, model: Model) -> Floats:
-    """States with which a search begins: those given, or at rest; where motions begin anew, as they were measured.
-
-    A motion from rest is none of a stiffness that hardens or of dry friction: it tells nothing of the way to it.
-    """
-    state = np.zeros((len(run.drives), run.program.states))
-    if initial is not None:
-        given = initial.reshape(len(run.drives), -1)
-        state[:, : given.shape[1]] = given
-    elif prepared.anew:
-        begins = [begin for begin, _ in prepared.record.runs(prepared.fit)]
-        for i, coordinate in enumerate(model.coordinates):
-            if coordinate in prepared.complete:
-                state[:, [i, i + len(model.coordinates)]] = prepared.complete[coordinate][:2, begins].T
-    return state.ravel()
 
 
 def continued(fit: StructureFit, prepared: PreparedStructure) -> Floats | None:

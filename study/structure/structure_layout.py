@@ -14,11 +14,13 @@ from study.equations.model import Model
 from study.records.plan import FEWEST
 from study.records.record import Record, Stretch
 from study.records.states import period
-from study.records.stretches import BLOCKS, PERIODS, cut
+from study.records.stretches import BLOCKS, cut
 from study.structure.prepared_structure import PreparedStructure, prepare_structure
 from study.structure.structure_record import StructureRecord
 from study.support.errors import expect
+from study.support.thresholds import TOLERANCE
 
+PERIODS = 2.0  # of the motion in a block: over more a wrong stiffness takes it out of step (docs/structures.md)
 Span = tuple[int, int]
 Use = tuple[tuple[float, float | None], ...]
 
@@ -102,10 +104,8 @@ def _samples(record: StructureRecord, use: Use) -> list[Span]:
         inside = 0 <= first < last <= len(record)
         until = record.start + len(record) * record.dt
         named = f"{begin:g}:{'' if end is None else f'{end:g}'}"
-        expect(
-            inside,
-            f"{record.name}: the stretch {named} s does not lie in it; expected times from {record.start:g} s to {until:g} s",
-        )
+        expected = f"expected times from {record.start:g} s to {until:g} s"
+        expect(inside, f"{record.name}: the stretch {named} s does not lie in it; {expected}")
         expect(not spans or spans[-1][1] <= first, f"{record.name}: the stretches to use overlap at {begin:g} s")
         spans.append((first, last))
     return spans
@@ -125,12 +125,22 @@ def _sure(source: Record, span: Span, edge: int) -> Stretch:
 def _in_turn(used: Sequence[Stretch], plain: PreparedStructure) -> tuple[list[Stretch], list[Stretch]]:
     """Blocks of the stretches to fit, and those between them to judge; each begins anew."""
     fit, judge = list[Stretch](), list[Stretch]()
-    for number, stretch in enumerate(used):
+    for number, whole in enumerate(used):
+        stretch = _moving(whole, plain)
         samples = max(period(plain.measured[stretch.first : stretch.last, i]) for i in range(len(plain.sensors)))
         count = int(np.clip(int(len(stretch) / max(PERIODS * samples, FEWEST)), 2, BLOCKS))
         for place, block in enumerate(cut(stretch, count)):
             (fit if (number + place) % 2 == 0 else judge).append(block)
     return fit, judge
+
+
+def _moving(stretch: Stretch, plain: PreparedStructure) -> Stretch:
+    """A stretch up to where the motion has died away to practically nothing: rest tells nothing of a structure."""
+    values = plain.measured[stretch.first : stretch.last]
+    away = np.abs(values - np.mean(values[-FEWEST // 2 :], axis=0))
+    loud = np.flatnonzero(np.any(away > TOLERANCE * np.max(away, axis=0), axis=1))
+    last = int(loud[-1]) + 1 if len(loud) else 0
+    return replace(stretch, last=stretch.first + min(max(last, 2 * FEWEST), len(stretch)))
 
 
 def _strung(

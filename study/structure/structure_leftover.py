@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
+from scipy.fft import next_fast_len
 
 from study.diagnose.dependence import DEGREE, TAUS, hysteretic, relaxed
 from study.equations.place import Place
@@ -16,6 +16,7 @@ from study.records.record import MOTIONS
 from study.structure.mass_matrix import matrices
 from study.structure.placed_lines import modulation_lines, residual_lines
 from study.structure.places import connections, transfer
+from study.structure.stretch_transforms import stretch_transforms
 from study.structure.structure_prediction import StructurePrediction
 from study.structure.structure_record import Sensor
 from study.structure.structure_run import prepare_run
@@ -64,9 +65,11 @@ def left_over(prediction: StructurePrediction) -> list[Leftover]:
         return []
     residual = ((prepared.measured[begin:end] - predicted) / prepared.scale).ravel()
     own = own.reshape(len(residual), -1)
-    size = next_fast_len(2 * len(free), real=True)
+    own_runs = stretch_transforms(prepared.record.runs((begin, end)))
+    transforms = replace(own_runs, size=next_fast_len(own_runs.size, real=True))
     linear = matrices(model, model.numbers())
-    paths = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, size) / prepared.scale[:, None]
+    paths = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, transforms.size)
+    paths = paths / prepared.scale[:, None]
     cut, n = split * len(prepared.sensors), len(model.coordinates)
     early = residual[:cut].reshape(split, -1)
     short = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, split) / prepared.scale[:, None]
@@ -77,8 +80,7 @@ def left_over(prediction: StructurePrediction) -> list[Leftover]:
         u = free[:, :n] @ e
         families = [*_families(u, free[:, n:] @ e), ("time", _times(u, short @ e, early, steady))]
         for family, shapes in families:
-            lines = np.stack([rfft(x, size) for x in shapes], axis=1)
-            columns = irfft((paths @ e)[:, :, None] * lines[:, None, :], size, axis=0)[: len(free)]
+            columns = transforms.passed(paths @ e, [transforms.lines(x) for x in shapes])
             before, after = _held_out(own, columns.reshape(len(residual), -1), residual, cut)
             gain = statistics.gain(before, after, evenly=prepared.anew)
             found.append(Leftover(place, family, gain))

@@ -174,7 +174,8 @@ def prepare_run(
     columns = [record.forces[name] for name in names] + [record.extra[name] for name in model.channels]
     return StructureRun(
         program, tuple(keys), _drives(record, (first, last), columns, 2 * steps_per_sample), record.dt,
-        steps_per_sample, np.array([_row(model, s) for s in (record.sensors if sensors is None else sensors)], dtype=np.int64),
+        steps_per_sample,
+        np.array([_row(model, s) for s in (record.sensors if sensors is None else sensors)], dtype=np.int64),
     )  # fmt: skip
 
 
