@@ -130,7 +130,7 @@ def placed_baseline(fit: StructureFit, prepared: PreparedStructure) -> PlacedBas
     wanted = tuple(Sensor(c, m) for m in MOTIONS for c in model.coordinates)
     run = prepare_run(model, prepared.record, sensors=wanted, steps_per_sample=fit.steps, span=fit.span)
     free = run.respond({}, fit.initial)[0].T
-    motion = corrected_motion(free, fit.residual, prepared, model.coordinates)
+    motion = corrected_motion(free, fit.residual, prepared, model.coordinates, fit.span)
     own = stretch_transforms(prepared.record.runs(fit.span))  # of one stretch every other line is one of the record
     paths = transfer(matrices(model, model.numbers()), prepared.sensors, model.coordinates, prepared.dt, own.size)
     left = flat(fit, fit.residual)

@@ -20,7 +20,7 @@ from study.structure.structure_record import StructureRecord
 from study.support.errors import expect
 from study.support.thresholds import TOLERANCE
 
-PERIODS = 2.0  # of the motion in a block: over more a wrong stiffness takes it out of step (docs/structures.md)
+PERIODS = 1.5  # of the motion in a block: over more a wrong stiffness takes it out of step (docs/structures.md)
 Span = tuple[int, int]
 Use = tuple[tuple[float, float | None], ...]
 

@@ -86,6 +86,17 @@ def test_derivatives_by_the_states_of_each_stretch_are_those_of_the_motion():
         assert not np.any(column[end:])
 
 
+@pytest.mark.parametrize("seed", [2, 7, 9])
+@pytest.mark.parametrize("noise", [0.05, 0.1])
+def test_a_fit_begins_where_noise_does_not_lead_it_astray(noise, seed):
+    """Of displacements every 0.01 s: two derivatives of their noise are larger than the acceleration itself."""
+    record = decay(noise=noise, seed=seed)
+    comparison = compare_structure(model(), lay_out(record, model(), Parts((0, 1000), (1000, 1600))))
+    found = comparison.fit.model.values
+    assert found["k[ground-a]"] == pytest.approx(40.0, rel=0.02)
+    assert found["k[a-b]"] == pytest.approx(25.0, rel=0.02)
+
+
 def test_a_hardening_spring_is_found_where_it_is():
     comparison = compare_structure(model(), lay_out(decay(HARD), model(), Parts()))
     diagnosis = diagnose_structure(comparison, without=FEW)
