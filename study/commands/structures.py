@@ -91,7 +91,7 @@ def refuse_measured(model: "Model", command: str) -> None:
     """Say so where a command needs masses, stiffnesses and dampings."""
     from study.support.errors import expect
 
-    like = "expected inertia at every coordinate; 'compare', 'diagnose' and 'add' take it"
+    like = "expected inertia at every coordinate; 'compare', 'diagnose', 'add' and 'drop' take it"
     expect(not model.measured, f"{command} knows no {model.name!r} with 'linear: measured' yet; {like}")
 
 
@@ -228,6 +228,9 @@ def drop(arguments: argparse.Namespace, model: "Model", name: str, text: str) ->
     from study.structure.structure_comparison import compare_structure, document, history_step, summary
 
     folder, steps = out_folder(arguments), history.read(arguments.model)
+    if model.measured:
+        _drop_measured(arguments, model, name, text, steps)
+        return
     comparisons: list[StructureComparison] = []
     for prepared in prepared_structures(arguments, model):
         before = compare_structure(model, prepared)
@@ -235,6 +238,30 @@ def drop(arguments: argparse.Namespace, model: "Model", name: str, text: str) ->
         steps = history.climbed(steps, history_step(before), history_step(comparisons[-1], dropped=name))
     written_together(arguments, text, steps, as_json(document(comparisons[-1])), folder)
     print("\n\n".join(summary(c) for c in comparisons))
+    print("\n" + history.table(steps))
+
+
+def _drop_measured(
+    arguments: argparse.Namespace, model: "Model", name: str, text: str, steps: "list[dict[str, Any]]"
+) -> None:
+    """The same where the linear part is as measured; its modes are fitted anew."""
+    from study.compare import history
+    from study.compare.comparison_report import as_json
+    from study.structure.measured_comparison import (
+        MeasuredComparison,
+        compare_measured,
+        measured_document,
+        measured_step,
+        measured_summary,
+    )
+
+    comparisons: list[MeasuredComparison] = []
+    for prepared in prepared_structures(arguments, model):
+        before = compare_measured(model, prepared)
+        comparisons.append(compare_measured(model.without_term(name), prepared))
+        steps = history.climbed(steps, measured_step(before), measured_step(comparisons[-1], dropped=name))
+    written_together(arguments, text, steps, as_json(measured_document(comparisons[-1])), out_folder(arguments))
+    print("\n\n".join(measured_summary(c) for c in comparisons))
     print("\n" + history.table(steps))
 
 
