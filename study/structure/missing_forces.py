@@ -123,7 +123,9 @@ def corrected_motion(
     motion = free.reshape(len(free), len(MOTIONS), -1).transpose(1, 0, 2).copy()
     for sensor, values in zip(prepared.sensors, difference.T, strict=True):
         band, level = band_above_noise(values, prepared.dt, prepared.low), MOTIONS.index(sensor.motion)
-        for part in runs if band is not None else ():
+        if band is None:
+            continue
+        for part in runs:
             seen = values[part] if prepared.anew else in_band(values[part], prepared.dt, *band)
             for order in range(len(MOTIONS)):
                 steps = order - level

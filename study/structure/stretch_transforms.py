@@ -31,8 +31,10 @@ class StretchTransforms:
 
     def back(self, lines: Complexes) -> Floats:
         """Values (samples, ...) with these lines."""
-        parts = [irfft(x, self.size, axis=0)[: b - a] for x, (a, b) in zip(lines, self.runs, strict=True)]
-        return np.asarray(np.concatenate(parts), dtype=np.float64)
+        parts: list[Floats] = []
+        for x, (begin, end) in zip(lines, self.runs, strict=True):
+            parts.append(np.asarray(irfft(x, self.size, axis=0), dtype=np.float64)[: end - begin])
+        return np.concatenate(parts)
 
     def passed(self, path: Complexes, lines: Sequence[Complexes]) -> Floats:
         """What forces with these lines, each (stretches, lines), add to the sensors at the end of a path.
