@@ -12,7 +12,7 @@ from jinja2 import Environment, Template
 
 from study.compare import history
 from study.compare.comparison_report import as_json
-from study.compare.history_picture import files as history_pictures
+from study.compare.history_picture import history_files as history_pictures
 from study.equations import model_file
 from study.explore import placed_panels, placed_session, plots, theme, words
 from study.explore.axis_scales import Columns
@@ -23,8 +23,8 @@ from study.explore.placed_view import PlacedView, placed_view
 from study.explore.saved import as_file, marked
 from study.explore.saved_files import PAGE
 from study.structure import structure_report
-from study.structure.structure_comparison import document
-from study.structure.structure_pictures import diagnosis_pictures, pictures
+from study.structure.structure_comparison import structure_document
+from study.structure.structure_pictures import diagnosis_pictures, structure_pictures
 
 SHOWN = {  # of all places, sensors and candidates, by the source that the script fills with the selected one's
     "all_map": "map", "all_force": "force", "all_stiffness": "stiffness", "all_motion": "motion", "all_close": "close",
@@ -147,9 +147,9 @@ def structure_files(
 
 def _drawn(session: PlacedSession) -> dict[str, bytes]:
     now = session.now
-    contents = {"comparison.json": as_json(document(now.comparison))} | pictures(now.comparison)
+    contents = {"comparison.json": as_json(structure_document(now.comparison))} | structure_pictures(now.comparison)
     if now.diagnosis is not None:
-        contents |= {"diagnosis.json": as_json(structure_report.fields(now.diagnosis, now.unneeded))}
+        contents |= {"diagnosis.json": as_json(structure_report.structure_fields(now.diagnosis, now.unneeded))}
         contents |= diagnosis_pictures(now.diagnosis)
     return contents
 

@@ -6,7 +6,7 @@ from html import escape
 from typing import Any
 
 from study.equations.place import Place
-from study.equations.place import in_words as placed
+from study.equations.place import place_in_words as placed
 from study.explore.page_units import in_sentence, in_text, number
 from study.explore.placed_session import PlacedStage
 from study.explore.words import NOT_ASKED, UNKNOWN, VERDICTS, WAITING, bar, gives, in_words
@@ -15,7 +15,7 @@ from study.structure.modes import Modes
 from study.structure.placed_ranking import PlacedRanked
 from study.structure.sketch import Sketch
 from study.structure.sketch_svg import svg
-from study.structure.structure_comparison import PlacedCoefficient, StructureComparison, says
+from study.structure.structure_comparison import PlacedCoefficient, StructureComparison, structure_in_words
 from study.structure.structure_leftover import explained_by_place
 from study.structure.structure_page import terms_there
 from study.support.numbers import percent
@@ -29,7 +29,7 @@ def placed_words(stage: PlacedStage, drawn: Sketch, step: int, live: bool) -> di
     chosen = max(drawn.links, key=lambda link: link.share).place
     fragments = {
         "figures": _figures(comparison),
-        "says": escape(in_sentence(says(comparison))),
+        "says": escape(in_sentence(structure_in_words(comparison))),
         "sketch": svg(drawn, chosen),
         "sketch-hint": escape(_hint(stage)),
         "places": _places(stage, drawn),

@@ -6,7 +6,7 @@ from html import escape
 from typing import Any, Protocol
 
 from study.compare.comparison import Comparison
-from study.compare.comparison_sentences import says
+from study.compare.comparison_sentences import comparison_in_words
 from study.compare.fitted_coefficients import Coefficient
 from study.compare.modal import modal
 from study.diagnose.needless import Needless
@@ -41,7 +41,7 @@ def words(stage: Stage, rows: Sequence[Ranked], step: int, live: bool, force_uni
     comparison = stage.comparison
     fragments = {
         "figures": _figures(comparison),
-        "says": escape(in_sentence(says(comparison))),
+        "says": escape(in_sentence(comparison_in_words(comparison))),
         "verdict": _verdict(stage, live),
         "candidates": _candidates(stage, rows, live),
         "coefficients": _coefficients(stage, live),

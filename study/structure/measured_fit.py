@@ -18,7 +18,7 @@ from study.structure.modal_program import ModalKeys, modal_program
 from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_fit import MOST_STEPS, ROUGH, SHIFT
 from study.structure.structure_record import Sensor
-from study.structure.structure_run import Drive, StructureRun
+from study.structure.structure_run import StretchDrive, StructureRun
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError, StudyError
 from study.support.levenberg_marquardt import Point, minimise, point_at
@@ -93,7 +93,7 @@ def modal_run(
     program = replace(made, program=with_registers(made.program, named))
     kinds = list(dict.fromkeys(s.motion for s in sensors))
     rows = [MOTIONS.index(kind) * modal.modes + r for kind in kinds for r in range(modal.modes)]
-    drives = (Drive(drive, record.start + first * record.dt, last - first),)
+    drives = (StretchDrive(drive, record.start + first * record.dt, last - first),)
     run = StructureRun(program, keys, drives, record.dt, steps, np.array(rows, np.int64))
     return ModalRun(model, modal, run, sensors)
 
@@ -183,20 +183,20 @@ def fit_measured(model: Model, prepared: PreparedStructure) -> MeasuredFit:
     return coupled if _criterion(coupled, prepared) < _criterion(best, prepared) else best
 
 
-def grown(model: Model, entry: ModelTerm, prepared: PreparedStructure) -> MeasuredFit:
+def fit_with_term(model: Model, entry: ModelTerm, prepared: PreparedStructure) -> MeasuredFit:
     """A model with a term more, whose shape parameters have values: fitted with these, then with them free.
 
     Raises as :func:`fit_measured`.
     """
     fit, shapes = fit_measured(model.with_term(entry), prepared), entry.keys[len(entry.symbols) :]
     return (
-        refined(fit, prepared, [k for k in fit.model.values if k not in fit.keys and k not in shapes])
+        refined_fit(fit, prepared, [k for k in fit.model.values if k not in fit.keys and k not in shapes])
         if shapes
         else fit
     )
 
 
-def refined(fit: MeasuredFit, prepared: PreparedStructure, held: Collection[str]) -> MeasuredFit:
+def refined_fit(fit: MeasuredFit, prepared: PreparedStructure, held: Collection[str]) -> MeasuredFit:
     """A fit gone on with from where it ended, with what it held beside ``held`` free; its modes stay as many.
 
     Raises

@@ -77,7 +77,7 @@ class PreparedStructure:
         return max(self._completed(s.coordinate).edge for s in self.sensors)
 
     def _completed(self, coordinate: str) -> CompletedRecord:
-        return completed(self.record.whole or self.record, coordinate, self.cutoff)
+        return completed_coordinate(self.record.whole or self.record, coordinate, self.cutoff)
 
     def _motion(self, coordinate: str) -> Floats:
         record = self._completed(coordinate).record
@@ -96,7 +96,7 @@ class PreparedStructure:
         return replace(self, fit=(last - samples, last) if self.judge[0] == last else (first, first + samples))
 
 
-def completed(record: StructureRecord, coordinate: str, cutoff: float | None = None) -> CompletedRecord:
+def completed_coordinate(record: StructureRecord, coordinate: str, cutoff: float | None = None) -> CompletedRecord:
     """The motion of one coordinate, completed."""
     channels = {s.motion: x for s, x in record.motions.items() if s.coordinate == coordinate}
     still = np.zeros(len(record))

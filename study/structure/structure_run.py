@@ -21,7 +21,7 @@ from study.support.errors import DivergenceError, expect
 
 
 @dataclass(frozen=True)
-class Drive:
+class StretchDrive:
     """What acts along a stretch of a record in which the motion goes on without a break.
 
     Attributes
@@ -49,7 +49,7 @@ class StructureRun:
         Its equations of motion.
     keys : tuple of str
         The coefficients and shape parameters to differentiate by.
-    drives : tuple of Drive
+    drives : tuple of StretchDrive
         One for each stretch: the motion begins anew at each.
     dt : float
         Sampling interval in seconds.
@@ -61,7 +61,7 @@ class StructureRun:
 
     program: MotionProgram
     keys: tuple[str, ...]
-    drives: tuple[Drive, ...]
+    drives: tuple[StretchDrive, ...]
     dt: float
     steps: int
     rows: Ints
@@ -114,7 +114,7 @@ class StructureRun:
             begin += drive.samples
         return out[:, :, 0], out[:, :, 1:]
 
-    def _along(self, drive: Drive, program: Program, initial: Floats, free: Sequence[int]) -> Floats:
+    def _along(self, drive: StretchDrive, program: Program, initial: Floats, free: Sequence[int]) -> Floats:
         """Motions and derivatives along one stretch side by side, shape (sensors, samples, 1 + keys + free states)."""
         own, first = self.program, 1 + len(self.keys)
         out = np.empty((len(self.rows), drive.samples, first + len(free)))
@@ -181,9 +181,9 @@ def prepare_run(
 
 def _drives(
     record: StructureRecord, span: tuple[int, int], columns: Sequence[Floats], factor: int
-) -> tuple[Drive, ...]:
+) -> tuple[StretchDrive, ...]:
     """What acts along each stretch of a span, ``factor`` half steps in a sampling interval."""
-    found: list[Drive] = []
+    found: list[StretchDrive] = []
     time = record.time
     for begin, end in record.runs(span):
         first, last = record.run_of(begin)
@@ -191,7 +191,7 @@ def _drives(
         part = slice(factor * (begin - first), factor * (end - 1 - first) + 1)
         for i, channel in enumerate(columns):
             values[:, i] = between_samples(channel[first:last], factor)[part]
-        found.append(Drive(values, float(time[begin]), end - begin))
+        found.append(StretchDrive(values, float(time[begin]), end - begin))
     return tuple(found)
 
 

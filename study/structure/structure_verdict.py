@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from study.diagnose.credibility import credible
-from study.diagnose.verdict import MOST
+from study.diagnose.verdict import MISSING, MOST, NOTHING, UNKNOWN
 from study.equations.model import ModelTerm
 from study.equations.term import Term
 from study.structure.modes import Modes, modes_of
@@ -15,20 +15,26 @@ from study.structure.placed_candidates import (
     candidate_entries,
     elsewhere,
     one_side,
-    promising,
     screened,
-    try_all,
-    with_best_settled,
+    try_placed,
+    with_best_placed_settled,
+    worth_fitting,
 )
 from study.structure.placed_ranking import PlacedRanked, rank_placed
 from study.structure.placed_search import PlacedBaseline, placed_baseline, with_placed_term
 from study.structure.structure_comparison import StructureComparison, compare_structure
-from study.structure.structure_fit import continued, covariance_of, fit_structure, linearise, settled, sized
-from study.structure.structure_leftover import Leftover, left_over
+from study.structure.structure_fit import (
+    fit_structure,
+    linearise_structure,
+    same_states,
+    settled_structure,
+    sized,
+    structure_covariance,
+)
+from study.structure.structure_leftover import FamilyGain, family_gains
 from study.structure.structure_prediction import StructurePrediction
 from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE
 
-MISSING, NOTHING, UNKNOWN = "missing_effect", "nothing_missing", "unknown_effect"
 SHORT, LONG = 2048, 8192  # samples: a search uses half of the fitting part, within these limits
 NAMELESS = 0.1 * ALPHA  # what no candidate explains is believed less easily than what one does
 
@@ -42,7 +48,7 @@ class StructureDiagnosis:
     candidates: tuple[PlacedRanked, ...]  # best first
     asked: int  # effects times places
     left: float  # rms of the structure that remains beside the best explanation, over the rms response
-    families: tuple[Leftover, ...]  # for an unknown effect: what general shapes at each place explain, best first
+    families: tuple[FamilyGain, ...]  # for an unknown effect: what general shapes at each place explain, best first
 
     @cached_property
     def modes_after(self) -> Modes | None:
@@ -50,7 +56,7 @@ class StructureDiagnosis:
         if self.verdict != MISSING:
             return None
         fit, prepared = self.candidates[0].fit, self.comparison.prepared
-        covariance = covariance_of(fit, prepared, linearise(fit, prepared))
+        covariance = structure_covariance(fit, prepared, linearise_structure(fit, prepared))
         return modes_of(fit.model, fit.keys, covariance[: len(fit.keys), : len(fit.keys)])
 
 
@@ -65,24 +71,24 @@ def diagnose_structure(
     ``extra`` are the user's own candidates, ``without`` terms of the library to leave out; ``progress`` is called with
     each candidate that was fitted.
     """
-    base = search_base(comparison)
+    base = placed_search_base(comparison)
     entries = candidate_entries(comparison.fit.model, extra, without)
     report: Callable[[str], None] = progress or (lambda _: None)
     ordered = screened(entries, base)
-    tried = try_all(promising(ordered), base, report)
-    tried = one_side([*tried, *try_all(elsewhere(tried, ordered), base, report)])
-    settled_ones = with_best_settled(tried, comparison.prepared)
+    tried = try_placed(worth_fitting(ordered), base, report)
+    tried = one_side([*tried, *try_placed(elsewhere(tried, ordered), base, report)])
+    settled_ones = with_best_placed_settled(tried, comparison.prepared)
     rows = rank_placed(settled_ones, comparison.fit, comparison.prediction, len(entries))
     return _decide(rows, comparison, len(entries))
 
 
-def search_base(comparison: StructureComparison) -> PlacedBaseline:
+def placed_search_base(comparison: StructureComparison) -> PlacedBaseline:
     """The fitted structure as candidates are tried beside it, on no more samples than a search takes."""
     prepared, fit = comparison.prepared, comparison.fit
     first, last = prepared.fit
     wanted = LONG if prepared.anew else int(np.clip((last - first) // 2, SHORT, LONG))  # loud and quiet stretches
     look = prepared.shortened(wanted)
-    again = fit_structure(fit.model, look, fit.held, initial=continued(fit, look), noise=sized(prepared.scale))
+    again = fit_structure(fit.model, look, fit.held, initial=same_states(fit, look), noise=sized(prepared.scale))
     return placed_baseline(again, look)
 
 
@@ -94,10 +100,10 @@ def added_term(comparison: StructureComparison, entry: ModelTerm) -> StructureCo
     StudyError
         If the structure with it has no finite motion.
     """
-    base = search_base(comparison)
+    base = placed_search_base(comparison)
     fit = with_placed_term(base.fit, entry, base.prepared, base)
     model = comparison.model.with_term(entry)
-    return compare_structure(model, comparison.prepared, settled(fit, comparison.prepared))
+    return compare_structure(model, comparison.prepared, settled_structure(fit, comparison.prepared))
 
 
 def _decide(rows: list[PlacedRanked], comparison: StructureComparison, asked: int) -> StructureDiagnosis:
@@ -110,7 +116,7 @@ def _decide(rows: list[PlacedRanked], comparison: StructureComparison, asked: in
         verdict = UNKNOWN if hopeless or left > TOLERANCE else NOTHING
         return StructureDiagnosis(verdict, comparison, tuple(rows), asked, left, _ordered(families))
     first = believed[0]
-    families = tuple(left_over(first.prediction))
+    families = tuple(family_gains(first.prediction))
     left = _left(first.prediction, families)
     rows = [first] + [r for r in rows if r is not first]
     enough = (first.gain.explained >= ENOUGH or left <= GOOD) and not first.wanders(asked)
@@ -128,7 +134,7 @@ def _stands_out(first: PlacedRanked) -> bool:
     return first.prediction.prepared.anew and first.gain.explained > MOST and not first.unphysical
 
 
-def _left(prediction: StructurePrediction, families: Sequence[Leftover]) -> float:
+def _left(prediction: StructurePrediction, families: Sequence[FamilyGain]) -> float:
     """Rms over that of the response which general shapes explain of a residual, and not by chance.
 
     Of a free decay all that stands above the noise: where its run has lost the motion, shapes along it explain nothing.
@@ -138,5 +144,5 @@ def _left(prediction: StructurePrediction, families: Sequence[Leftover]) -> floa
     return left if prediction.fit.model.forces else max(left, prediction.above_noise)
 
 
-def _ordered(families: Sequence[Leftover]) -> tuple[Leftover, ...]:
+def _ordered(families: Sequence[FamilyGain]) -> tuple[FamilyGain, ...]:
     return tuple(sorted(families, key=lambda f: -f.gain.explained))

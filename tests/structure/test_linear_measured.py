@@ -194,6 +194,6 @@ def test_a_term_is_dropped_beside_a_measured_linear_part(tmp_path, beam, capsys)
     assert "expected one of cubic_stiffness[ground-p10]" in capsys.readouterr().err
     assert main(["drop", str(model), "cubic_stiffness", "--between", "ground", "p10", *words]) == 0
     assert read_model(model).terms == ()
-    before, after = history.read(model)
+    before, after = history.read_history(model)
     assert after["dropped"] == "cubic_stiffness[ground-p10]"
     assert after["error"]["response"] > 2.0 * before["error"]["response"]

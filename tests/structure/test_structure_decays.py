@@ -6,14 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from study.diagnose.verdict import MISSING, NOTHING
 from study.equations.model_file import parse_model
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure
-from study.structure.structure_fit import linearise
+from study.structure.structure_fit import linearise_structure
 from study.structure.structure_layout import Parts, lay_out
 from study.structure.structure_record import Sensor, StructureRecord
 from study.structure.structure_run import prepare_run
-from study.structure.structure_verdict import MISSING, NOTHING, diagnose_structure
+from study.structure.structure_verdict import diagnose_structure
 from study.support.errors import StudyError
 
 DT, SAMPLES = 0.01, 2000
@@ -71,7 +72,7 @@ def test_a_decay_is_fitted_and_judged_in_turn_and_its_motion_begins_anew():
 def test_derivatives_by_the_states_of_each_stretch_are_those_of_the_motion():
     prepared = lay_out(decay(HARD), model(more=HARD), Parts())
     fit = compare_structure(model(more=HARD), prepared).fit
-    jacobian = linearise(fit, prepared)
+    jacobian = linearise_structure(fit, prepared)
     states = len(fit.initial) // 4
     assert states == len(prepared.record.runs(prepared.fit))
     run = prepare_run(fit.model, prepared.record, sensors=prepared.sensors, steps_per_sample=fit.steps, span=fit.span)
