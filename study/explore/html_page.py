@@ -15,6 +15,7 @@ from study.compare.history import label
 from study.explore import check_plots, plots, theme, words
 from study.explore.any_session import AnySession
 from study.explore.axis_scales import Columns
+from study.explore.check_columns import FREE, PRESCRIBED, kind_of
 from study.explore.page_units import in_text
 from study.explore.session import Session
 from study.explore.view import View
@@ -60,6 +61,7 @@ def build(seen: View, history: Columns, stores: Sequence[ColumnDataSource] = ())
     t, highest = seen.columns["time"]["t"], seen.highest
     time = theme.fixed("range_time", float(t[0]), float(t[-1]))
     frequency = theme.fixed("range_frequency", 0.0, highest)
+    frequency.tags = [first_line(seen)]  # where a logarithmic axis begins
     panels: dict[str, Any] = {
         "response": plots.response(sources, time), "difference": plots.difference(sources, time),
         "close": plots.close(sources),
@@ -68,7 +70,7 @@ def build(seen: View, history: Columns, stores: Sequence[ColumnDataSource] = ())
         "spectrum": plots.spectrum(sources, frequency), "plane": plots.plane(sources),
         "against_u": plots.against(sources, "u"), "against_v": plots.against(sources, "v"),
         "history": plots.history(sources, history["name"], history_height(len(history["name"]))),
-        "constancy": plots.constancy(sources), **check_plots.panels(sources, frequency),
+        "constancy": plots.constancy(sources), **check_plots.panels(sources, frequency, seen.kind),
     }  # fmt: skip
     for name, kind in KINDS.items():
         panels[name].js_on_event("selectiongeometry", CustomJS(args={"kind": kind}, code=SELECTED))
@@ -116,27 +118,45 @@ def frame(seen: View, history: Columns) -> Columns:
     labels = {
         "response": f"{seen.quantity} / {y}", "close": f"{seen.quantity} / {y}", "difference": f"difference / {d}",
         "spectrum": f"density / ({d}/√Hz)", "plane": f"velocity / {v}", "against_u": f"missing force / {f}",
-        "against_v": f"missing force / {f}", "frf": f"magnitude / ({y}/{seen.force_unit})",
+        "against_v": f"missing force / {f}", "loop_u": f"force / {y}", "loop_v": f"force / {y}",
+        "cycles": f"energy / ({y} {u})",
+        "frf": f"stiffness / ({y}/{u})" if seen.kind == PRESCRIBED else f"magnitude / ({y}/{seen.force_unit})",
     }  # fmt: skip
-    motions = {"plane": f"displacement / {u}", "against_u": f"displacement / {u}", "against_v": f"velocity / {v}"}
+    motions = {
+        **dict.fromkeys(("plane", "against_u", "loop_u"), f"displacement / {u}"),
+        **dict.fromkeys(("against_v", "loop_v"), f"velocity / {v}"), "cycles": f"stroke / {u}",
+        **dict.fromkeys(("decay_frequency", "decay_damping"), f"amplitude / {y}"),
+    }  # fmt: skip
     rows: list[tuple[str, str, Any]] = [
         *((f"{name}_y", "axis_label", label) for name, label in labels.items()),
         *((f"{name}_x", "axis_label", label) for name, label in motions.items()),
         ("mapper", "low", -largest), ("mapper", "high", largest), ("range_frequency", "end", seen.highest),
         *(("range_time", name, float(t[0])) for name in BEGINS), *(("range_time", name, float(t[-1])) for name in ENDS),
         ("range_force", "start", seen.limits[0]), ("range_force", "end", seen.limits[1]),
+        ("range_frequency", "tags", [first_line(seen)]),
         ("frequency_decades", "ticks", log_ticks(seen.highest / 300.0, seen.highest)),
         *((f"{name}_ticks", "ticks", log_ticks(*ends)) for name, ends in _log_axes(seen, history).items()),
     ]  # fmt: skip
     return dict(zip(("model", "property", "value"), map(list, zip(*rows, strict=True)), strict=True))
 
 
+def first_line(seen: View) -> float:
+    """The lowest frequency in hertz that the panels draw."""
+    return float(seen.columns["force"]["f"][0])
+
+
 def _log_axes(seen: View, history: Columns) -> dict[str, tuple[float, float]]:
     """Ends of the logarithmic axes of what is drawn, by the panel."""
     tried = [x for name in ("response", "force", "floor") for x in history[name] if x > 0.0]
     shown = {"force": seen.limits, "history": (min(tried, default=1.0), max(tried, default=1.0))}
-    for panel, names in (("spectrum", ("difference", "noise")), ("frf", ("measured", "predicted"))):
-        values = np.concatenate([np.asarray(seen.columns[panel][name], dtype=np.float64) for name in names])
+    drawn = {"spectrum": [("spectrum", "difference"), ("spectrum", "noise")]}
+    if seen.kind == FREE:
+        amplitudes = [("decay", "at"), ("decay_model", "at")]
+        drawn |= {"decay_frequency": amplitudes, "decay_damping": amplitudes}
+    else:
+        drawn["frf"] = [("frf", "measured"), ("frf", "predicted")]
+    for panel, sources in drawn.items():
+        values = np.concatenate([np.asarray(seen.columns[s][name], dtype=np.float64) for s, name in sources])
         values = values[np.isfinite(values) & (values > 0.0)]
         shown[panel] = (float(np.min(values)), float(np.max(values))) if len(values) else (1.0, 1.0)
     return shown
@@ -173,7 +193,7 @@ def variables(session: Session, live: bool) -> dict[str, Any]:
         "record": session.prepared.record.name, "model": session.now.model.name, "live": live,
         "style": _text("page.css"), "script": _text("page.js"),
         "steps": [words.name(r, i) for i, r in enumerate(session.stages)],
-        "several": bool(session.now.on_each),
+        "several": bool(session.now.on_each), "checks": check_plots.CARDS[kind_of(session.prepared)],
         "diagnosed": live or any(r.diagnosis is not None for r in session.stages),
     }  # fmt: skip
 

@@ -77,6 +77,10 @@ window.study = (() => {
 
   const entry = (name, label, on) => { const item = model(`panel_${name}_${label}`); if (item) item.visible = on }
 
+  const LITTLE = "It explains too little for its coefficient to be followed along frequency."
+  const NOBODY = "No candidate explains any of what is left: there is no coefficient to follow along frequency."
+  const asked = () => document.querySelector("#verdict h3") !== null
+
   function constancy(i, beside) {
     const element = document.querySelector(`[data-candidate="${i}"]`)
     const rows = element ? column("constancy", "row") : [], shown = {f: [], value: [], low: [], high: []}
@@ -89,7 +93,8 @@ window.study = (() => {
     if (heading) heading.textContent = element ? `${title(i)}, 95 % intervals` : ""
     const card = place("constancy-card"), empty = place("constancy-none"), detail = place("detail")
     if (card) card.classList.toggle("none", !shown.f.length)
-    if (empty) empty.hidden = !element || shown.f.length > 0
+    if (empty) empty.hidden = shown.f.length > 0 || !asked()
+    if (empty) empty.textContent = element ? LITTLE : NOBODY
     const said = (row) => document.querySelector(`[data-candidate="${row}"] small`)?.innerHTML ?? ""
     if (detail) detail.innerHTML = beside === null ? said(i) : `<div class="two"><p>${said(beside)}</p><p>${said(i)}</p></div>`
     for (const row of document.querySelectorAll("[data-candidate]")) row.classList.toggle("shown", row === element)
@@ -223,12 +228,12 @@ window.study = (() => {
   function logarithm(button) {
     const on = button.getAttribute("aria-pressed") !== "true", range = model("range_frequency")
     button.setAttribute("aria-pressed", String(on))
-    const first = column("force", "f")[0]
-    range.start = on ? first : 0
-    for (const name of ["force", "coherence", "spectrum", "frf", "phase", "linearity"]) {
-      const figure = model(`panel_${name}`)
+    range.start = on ? range.tags[0] : 0
+    for (const {dataset: {panel}} of document.querySelectorAll("[data-panel]")) {
+      const figure = model(`panel_${panel}`)
+      if (figure.x_range !== range) continue
       figure.x_scale = new (Bokeh.Models.get(on ? "LogScale" : "LinearScale"))()
-      model(`${name}_x`).ticker = on ? model("frequency_decades") : model("frequency_even")
+      model(`${panel}_x`).ticker = on ? model("frequency_decades") : model("frequency_even")
     }
   }
 
@@ -236,8 +241,9 @@ window.study = (() => {
   const DRAWN = {
     history: ["history"], response: ["time"], close: ["close"], force: ["force"], coherence: ["coherence"],
     spectrum: ["spectrum"], plane: ["plane"], against_u: ["against_u"], against_v: ["against_v"], frf: ["frf"],
-    phase: ["frf"], linearity: ["frf"], autocorrelation: ["autocorrelation"], with_force: ["with_force"],
-    histogram: ["histogram"], constancy: ["shown"],
+    phase: ["frf"], linearity: ["frf"], loop_u: ["loops"], loop_v: ["loops"], cycles: ["cycles"],
+    decay_frequency: ["decay", "decay_model"], decay_damping: ["decay", "decay_model"],
+    autocorrelation: ["autocorrelation"], with_force: ["with_force"], histogram: ["histogram"], constancy: ["shown"],
   }
 
   function table(name) {
@@ -339,5 +345,7 @@ window.study = (() => {
     setTimeout(() => { for (const shown of document.querySelectorAll("[data-panel]")) untabbed(shown) }, 1500)
     window.study.ready = true
   }
-  return {words, state, selected, clear, step, begin, model, column, put, place, DRAWN, ready: false}
+  return {
+    words, state, selected, clear, step, begin, model, column, put, place, asked, DRAWN, LITTLE, NOBODY, ready: false,
+  }
 })()

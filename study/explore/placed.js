@@ -1,7 +1,7 @@
 // The page of a structure: the sketch selects a place, and what is known of it is drawn from tables that Python has
 // filled for all places. What is clicked goes to Python as on the page of one coordinate, whose script runs before.
 ;(() => {
-  const {model, column, put, place, DRAWN} = window.study
+  const {model, column, put, place, asked, DRAWN, LITTLE, NOBODY} = window.study
   const all = (selector) => document.querySelectorAll(selector)
   let where = null, sensor = null, moved = false, row = null
 
@@ -56,9 +56,10 @@
     put("shown", keep.length ? {f: of("f"), value: of("value"), low: of("low"), high: of("high"), zero: keep.map(() => 0)}
       : {f: [0, 1], value: none, low: none, high: none, zero: [0, 0]})
     if (element) model("constancy_y").axis_label = element.dataset.label
-    place("constancy-of").textContent = element ? element.querySelector(".name").textContent : "no candidate"
+    place("constancy-of").textContent = element ? `${element.querySelector(".name").textContent}, 95 % intervals` : ""
     place("constancy-card").classList.toggle("none", !keep.length)
-    place("constancy-none").hidden = !element || keep.length > 0
+    place("constancy-none").hidden = keep.length > 0 || !asked()
+    place("constancy-none").textContent = element ? LITTLE : NOBODY
     place("detail").innerHTML = element?.querySelector("small").innerHTML ?? ""
     for (const item of all("[data-row]")) item.classList.toggle("shown", item === element)
   }

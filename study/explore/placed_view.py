@@ -54,7 +54,7 @@ def placed_view(stage: PlacedStage, step: int, live: bool = True) -> PlacedView:
         "all_constancy": _constancy(stage),
         "units": {"panel": ["map_x", "map_y", "force_y", "stiffness_y"], "label": [
             f"relative displacement / {in_text(lengths.unit)}", f"missing force / {in_text(forces.unit)}",
-            f"missing force / ({in_text(forces.unit)}/√Hz)", f"force over displacement / ({unit})",
+            f"missing force / ({in_text(forces.unit)}/√Hz)", f"stiffness / ({unit})",
         ]},
         "words": placed_words(stage, drawn, step, live),
     }  # fmt: skip

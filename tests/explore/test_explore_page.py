@@ -236,8 +236,9 @@ def _nothing_jumps(page: Page, before: dict[str, float]) -> None:
 
 
 def places(page: Page) -> dict[str, float]:
+    """Of cards, and of the rows of coefficients with their buttons."""
     return page.evaluate(
-        "Object.fromEntries([...document.querySelectorAll('.card')].map((c, i) => "
+        "Object.fromEntries([...document.querySelectorAll('.card, #coefficients tr')].map((c, i) => "
         "[i + ' ' + (c.querySelector('h2')?.firstChild.textContent ?? ''), c.getBoundingClientRect().top + scrollY]))"
     )
 
