@@ -3,9 +3,11 @@
 import re
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
+from playwright.sync_api import Page
 
 from study import trials
 from study.compare.decay import decays_of
@@ -64,6 +66,24 @@ def test_a_page_shows_what_the_test_can_show(kind: str) -> None:
     for name, source in columns.items():
         if name not in ("shown", "constancy", "would_time", "would_spectrum", "would_u", "would_v", "would_plane"):
             assert all(len(column) for column in source.values()), name
+
+
+@pytest.mark.parametrize("kind", [DRIVEN, PRESCRIBED, FREE])
+def test_a_browser_draws_every_panel_of_it(kind: str, page: Page, tmp_path: Path) -> None:
+    (tmp_path / "page.html").write_bytes(saved(begun(kind)))
+    wrong: list[str] = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("console", lambda m: wrong.append(m.text) if m.type in ("error", "warning") else None)
+    page.goto((tmp_path / "page.html").as_uri())
+    page.wait_for_function("window.study && window.study.ready")
+    page.click("[data-act=logarithm]")
+    page.wait_for_timeout(300)
+    wide = page.evaluate("[...document.querySelectorAll('[data-panel]')].map((p) => p.getBoundingClientRect().width)")
+    assert min(wide) > 150.0
+    drawn = page.evaluate("Object.keys(window.study.DRAWN)")  # what can be had as a file
+    shown = page.evaluate("[...document.querySelectorAll('[data-panel]')].map((p) => p.dataset.panel)")
+    assert set(shown) - {"difference"} <= set(drawn)  # that of the response's panel
+    assert wrong == []
 
 
 def test_a_component_shows_its_dynamic_stiffness() -> None:
