@@ -2,14 +2,14 @@
 import sys
 from pathlib import Path
 
-from study.reproduction.config import load
-from study.support.workflow_step import alone, one_sentence, sweep
+from study.reproduction.config import load_config
+from study.support.workflow_step import alone, one_sentence, remove_half_written
 
 with one_sentence():
-    STUDY = load(Path("config"))
+    STUDY = load_config(Path("config"))
     if workflow.is_main_process and not workflow.dryrun:
         LOCK = alone(Path(".snakemake/running"))  # held until this process ends
-        sweep(Path("results"), Path("figures"))
+        remove_half_written(Path("results"), Path("figures"))
 
 
 report: "rules/captions/workflow.rst"

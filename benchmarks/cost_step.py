@@ -58,7 +58,9 @@ def channels(path: Path, samples: int) -> Iterator[list[np.ndarray]]:
 def miso_in_pieces(path: Path, samples: int) -> None:
     """Read, cross-spectra, MI/SO, coefficients."""
     matrix = cross_spectra_in_pieces(channels(path, samples), DT, SETTINGS.segments)
-    coefficients.fit(conditioned.analyse(matrix), INPUTS, SETTINGS.band, SETTINGS.segments.line_inflation())
+    coefficients.fit_coefficients(
+        conditioned.analyse(matrix), INPUTS, SETTINGS.band, SETTINGS.segments.line_inflation()
+    )
 
 
 def miso_whole(path: Path, samples: int) -> None:

@@ -21,7 +21,7 @@ from study.identify.estimators.base import Settings
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.record import Record
 from study.records.spectra import Segments
-from study.reproduction.config import load
+from study.reproduction.config import load_config
 from study.reproduction.ensemble import threaded
 from study.support import document
 
@@ -35,7 +35,7 @@ FIRST = 9001
 
 def one(noise: float, seed: int) -> list[dict[str, object]]:
     """Error, standard error and Cramer-Rao bound of each coefficient by each estimator for one record."""
-    sampling = load(ROOT / "config").settings.sampling
+    sampling = load_config(ROOT / "config").settings.sampling
     made = simulate(MODEL, force(Excitation(), sampling.samples, sampling.dt, seed), sampling.dt, Integrator())
     added = displacement_noise(
         made["displacement"], noise, round(1000.0 * noise) * FIRST + seed
@@ -44,7 +44,7 @@ def one(noise: float, seed: int) -> list[dict[str, object]]:
     rows: list[dict[str, object]] = []
     for name in NAMES:
         found = estimators.identify(name, MODEL, record, TOLD)
-        fit = output_error.fit(MODEL, record)
+        fit = output_error.free_run_fit(MODEL, record)
         known = np.sqrt(np.mean(added**2)) / fit.rms  # the bound takes the noise's own variance
         assert found.estimate is not None
         for key in found.estimate.symbols:

@@ -14,8 +14,12 @@ from study.equations.model_file import read_model
 from study.equations.simulate import METHODS, Integrator, simulate
 from study.identify.frequency_domain import coefficients, conditioned
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
-from study.identify.frequency_domain.local_polynomial_fit import fit
-from study.identify.frequency_domain.local_polynomial_method import LocalPolynomial, responses, transform
+from study.identify.frequency_domain.local_polynomial_fit import fit_local_polynomial
+from study.identify.frequency_domain.local_polynomial_method import (
+    LocalPolynomial,
+    local_polynomial_responses,
+    transform,
+)
 from study.records.excitation import Excitation, force
 from study.records.interpolation import between_samples
 from study.records.spectra import Segments, cross_spectra
@@ -100,7 +104,9 @@ def test_local_polynomial(benchmark):
 
     def run():
         lines = transform(data, DT)
-        return responses(lines, LocalPolynomial()), fit(lines, inputs, (0.3, 10.0), LocalPolynomial())
+        return local_polynomial_responses(lines, LocalPolynomial()), fit_local_polynomial(
+            lines, inputs, (0.3, 10.0), LocalPolynomial()
+        )
 
     benchmark.pedantic(run, rounds=3, warmup_rounds=1)
 
@@ -121,4 +127,6 @@ def in_reverse(samples: int):
     """MI/SO with everything that follows from the inputs' time histories."""
     inputs, data = reverse_channels(samples)
     inflation = Segments().line_inflation()
-    return lambda: coefficients.fit(conditioned.analyse(cross_spectra(data, DT)), inputs, (0.3, 10.0), inflation)
+    return lambda: coefficients.fit_coefficients(
+        conditioned.analyse(cross_spectra(data, DT)), inputs, (0.3, 10.0), inflation
+    )

@@ -16,7 +16,7 @@ from study.identify import estimators
 from study.identify.estimators.base import Settings
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.spectra import Segments
-from study.reproduction.config import load
+from study.reproduction.config import load_config
 
 ROOT = Path(__file__).parent.parent
 FIRST = 6000
@@ -27,7 +27,7 @@ def main() -> None:
     options.add_argument("--seeds", type=int, default=40)
     options.add_argument("--noise", type=float, default=0.05, help="mean square over that of the displacement")
     told = options.parse_args()
-    model, sampling = read_model(ROOT / "models" / "dead_band.yaml"), load(ROOT / "config").settings.sampling
+    model, sampling = read_model(ROOT / "models" / "dead_band.yaml"), load_config(ROOT / "config").settings.sampling
     true = model.numbers()["dead_band.u_g"]
     unknown = tuple(replace(t, parameters=(None,)) if t.name == "dead_band" else t for t in model.terms)
     asked = replace(model, terms=unknown)

@@ -1,8 +1,7 @@
 # The report's claims, and the two studies that they rest on: the reading of "unit variance" and the
 # integrator's steps. All work on ensembles of their own seeds, not on results/<case>: they wait for no case, and what
 # takes longest begins first. What they do beside the simulations keeps one core busy, not two.
-from study.reproduction.claims.reported import check_complete, check_systems
-from study.reproduction.claims.reported import load as load_reported
+from study.reproduction.claims.reported import check_complete, check_systems, load_reported
 
 STATEMENTS = "config/reported.tsv"
 

@@ -7,7 +7,7 @@
 from study.commands import measurements
 
 with one_sentence():
-    MEASUREMENTS = measurements.load(
+    MEASUREMENTS = measurements.load_measurements(
         Path("config"), STUDY.cases, {"all", "gallery", "gallery_page", "campaign", *(rule.name for rule in workflow.rules)}
     )
 

@@ -2,7 +2,7 @@
 from study.structure import structure_study
 
 with one_sentence():
-    STRUCTURES = structure_study.load(Path("config"), list(STUDY.cases))
+    STRUCTURES = structure_study.load_structures(Path("config"), list(STUDY.cases))
 
 CODE["structure"] = rests_on(Path("scripts/structure_case.py"))
 CODE["structure_summary"] = rests_on(Path("scripts/structure_summary.py"))

@@ -17,14 +17,14 @@ from study.support.workflow_step import one_sentence
 def main(models: str, statements: str, steps: str, settings: dict[str, Any], csv: str, page: str) -> None:
     rows = cast(list[dict[str, Any]], pd.read_csv(steps).to_dict("records"))
     found = evidence.Evidence(ClaimSettings.model_validate(settings), evidence.models_of(Path(models)), rows)
-    stated = reported.load(Path(statements))
+    stated = reported.load_reported(Path(statements))
 
     def progress(number: int, claim: Claim) -> None:
         print(f"{number} of {len(claims_table.CLAIMS)}: {claim.id}: {claim.verdict}", file=sys.stderr, flush=True)
 
     judged = claims_table.judge_all(found, stated, progress)
-    tables.write_csv(judged, Path(csv))
-    replace_file(Path(page), claims_table.page(judged).encode())
+    tables.write_table(judged, Path(csv))
+    replace_file(Path(page), claims_table.claims_page(judged).encode())
 
 
 if "snakemake" in globals():

@@ -16,12 +16,12 @@ from study.support.workflow_step import one_sentence
 def main(inputs: Mapping[str, str], outputs: Mapping[str, Sequence[str]], told: Mapping[str, Any]) -> None:
     files = {name: Path(path) for name, path in inputs.items()}
     wanted = {kind: [Path(p) for p in paths] for kind, paths in outputs.items()}
-    identified_figures.draw(
+    identified_figures.draw_identified(
         files["record"], files["responses"], files["coherences"],
         {kind: paths for kind, paths in wanted.items() if kind in IDENTIFIED}, title=told["title"],
         style=files["style"], drawn=told["drawn"], parameters_csv=files["parameters"],
     )  # fmt: skip
-    preliminary_figures.draw(
+    preliminary_figures.draw_preliminary(
         preliminary_figures.Source(files["record"], files["model"], told["title"]),
         {kind: paths for kind, paths in wanted.items() if kind not in IDENTIFIED}, style=files["style"],
         segments=SegmentSettings.model_validate(told["segments"]).segments(),

@@ -14,7 +14,7 @@ from study.support.workflow_step import one_sentence
 
 def main(table: Path, style: Path, cases: Sequence[str], outputs: Sequence[Path]) -> None:
     with styles.context(style):
-        figure = error_dots.errors(pd.read_csv(table), cases)
+        figure = error_dots.error_dots(pd.read_csv(table), cases)
         for path in outputs:
             replace_file(path, page.rendered(figure, path.suffix[1:]))
 

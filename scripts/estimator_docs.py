@@ -5,7 +5,7 @@ from pathlib import Path
 import pandas as pd
 
 from study.reproduction import error_pages
-from study.reproduction.config import load
+from study.reproduction.config import load_config
 from study.support import document
 from study.support.errors import StudyError
 from study.support.files import replace_file
@@ -18,9 +18,9 @@ def main(page: Path, table: Path, picture: Path, noise: dict[str, float]) -> Non
             raise StudyError(f"{path}: there is no such file; run 'snakemake -j2 estimators' first")
     errors = pd.read_csv(table)
     for mark, block in {
-        "sentences": document.Bullets(error_pages.sentences(errors, noise)),
+        "sentences": document.Bullets(error_pages.error_sentences(errors, noise)),
         "about": document.Text(error_pages.about(errors)),
-        "errors": error_pages.overview(errors),
+        "errors": error_pages.error_overview(errors),
         "bias": error_pages.bias_overview(errors, noise),
     }.items():
         document.put(page, mark, [block])
@@ -30,7 +30,7 @@ def main(page: Path, table: Path, picture: Path, noise: dict[str, float]) -> Non
 
 if __name__ == "__main__":
     with one_sentence():
-        study = load(Path("config"))
+        study = load_config(Path("config"))
         stem = f"estimators_{study.settings.estimator_errors.many}"
         main(
             Path("docs/estimators.md"), Path(f"results/{stem}.csv"), Path(f"figures/{stem}.png"),

@@ -11,8 +11,8 @@ from study.support.workflow_step import one_sentence
 
 def main(models: str, statements: str, settings: dict[str, Any], output: str) -> None:
     found = evidence.Evidence(ClaimSettings.model_validate(settings), evidence.models_of(Path(models)), [])
-    stated = reported.load(Path(statements))
-    tables.write_csv(excitation_reading.study(found, stated), Path(output))
+    stated = reported.load_reported(Path(statements))
+    tables.write_table(excitation_reading.both_readings(found, stated), Path(output))
 
 
 if "snakemake" in globals():

@@ -10,7 +10,7 @@ from study.support.workflow_step import one_sentence
 
 def main(records: dict[str, list[str]], output: Any) -> None:
     target = Path(output.page)
-    replace_file(target, gallery_page.page(gallery_page.entries(Path("config"), target.parent, records)))
+    replace_file(target, gallery_page.gallery_page(gallery_page.entries(Path("config"), target.parent, records)))
 
 
 if "snakemake" in globals():

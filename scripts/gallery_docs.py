@@ -18,7 +18,7 @@ WIDTH, COLOURS = 720, 64  # of a kept picture, in pixels, and of its palette
 
 def main(config: Path, results: Path, docs: Path) -> None:
     records: dict[str, list[str]] = {}
-    for name, row in measurements.load(config).items():
+    for name, row in measurements.load_measurements(config).items():
         if (results / name / "history.json").is_file():
             records.setdefault(row.entry, []).append(name)
         else:

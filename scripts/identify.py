@@ -16,10 +16,10 @@ def main(model: str, record: str, outputs: dict[str, str], settings: Identificat
     found = identify_case(system, read_csv(Path(record)), settings)
     for note in (f.note for f in found.values() if f.note):
         print(f"{settings.case}: {note}", file=sys.stderr)
-    tables.write_csv(tables.frequency_responses(system, found), Path(outputs["responses"]))
-    tables.write_csv(tables.coherences(found), Path(outputs["coherences"]))
-    tables.write_csv(tables.noise_spectra(found), Path(outputs["noise"]))
-    tables.write_csv(tables.parameters(settings.case, system, found, settings), Path(outputs["parameters"]))
+    tables.write_table(tables.response_table(system, found), Path(outputs["responses"]))
+    tables.write_table(tables.coherence_table(found), Path(outputs["coherences"]))
+    tables.write_table(tables.noise_spectra(found), Path(outputs["noise"]))
+    tables.write_table(tables.parameter_table(settings.case, system, found, settings), Path(outputs["parameters"]))
 
 
 if "snakemake" in globals():

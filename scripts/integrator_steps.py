@@ -23,12 +23,12 @@ def main(models: str, settings: dict[str, Any], csv: str, page: str) -> None:
     own = record.excitation.reading or READINGS[0]
     readings = [own, *(r for r in READINGS if r != own)]
     known = models_of(Path(models))
-    table = integrator_study.study(
+    table = integrator_study.integrator_study(
         {name: known[name] for name in SYSTEMS if name in known},
         record, Settings(told.segments.segments(), (low, high)), range(first, first + count), readings,
     )  # fmt: skip
-    tables.write_csv(table, Path(csv))
-    replace_file(Path(page), integrator_study.page(table).encode())
+    tables.write_table(table, Path(csv))
+    replace_file(Path(page), integrator_study.integrator_page(table).encode())
 
 
 if "snakemake" in globals():

@@ -17,4 +17,4 @@ if __name__ == "__main__":
         kept = Path("docs/trials_by_test.csv")
         for name in sys.argv[1:]:
             replace_file(kept, Path(name).read_bytes())
-        kind_rates.put(Path("docs/kinds_of_tests.md"), pd.read_csv(kept))
+        kind_rates.write_rates(Path("docs/kinds_of_tests.md"), pd.read_csv(kept))

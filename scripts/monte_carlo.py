@@ -12,7 +12,7 @@ from study.reproduction.settings import IdentificationSettings, RecordSettings
 from study.support.workflow_step import one_sentence
 
 EVERY = 100  # seeds between two signs of life
-JUDGED = {"rates": ensemble.rates, "errors": estimator_errors.errors}
+JUDGED = {"rates": ensemble.tolerance_rates, "errors": estimator_errors.errors}
 
 
 def main(
@@ -29,7 +29,7 @@ def main(
 
     judge = JUDGED[judged]
     parts = [judge(found(*told)) for told in zip(models, records, identifications, strict=True)]
-    tables.write_csv(pd.concat(parts, ignore_index=True), Path(output))
+    tables.write_table(pd.concat(parts, ignore_index=True), Path(output))
 
 
 if "snakemake" in globals():

@@ -11,7 +11,7 @@ from study.support.workflow_step import one_sentence
 
 
 def main(rates: str, noise: dict[str, float], output: str) -> None:
-    page = ensemble.page(pd.read_csv(rates), noise)
+    page = ensemble.ensemble_page(pd.read_csv(rates), noise)
     replace_file(Path(output), page.encode())
     print(page, file=sys.stderr)
 

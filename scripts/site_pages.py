@@ -14,7 +14,7 @@ import numpy as np
 from study.equations.model import Model, ModelTerm
 from study.equations.term import Term
 from study.equations.terms import LIBRARY
-from study.identify.frequency_domain.inputs import history, reverse_inputs
+from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.records.record import Record
 from study.support.arrays import Floats
 
@@ -95,7 +95,7 @@ def force_of(term: Term) -> tuple[Floats, Floats, Floats]:
     entry = ModelTerm(term, (1.0,) * len(term.components), tuple(TYPICAL[p.quantity] for p in term.parameters))
     total = np.zeros_like(u)
     for item in reverse_inputs(Model(term.name, (entry,))):
-        shape = history(item, Record(dt, motion))
+        shape = input_history(item, Record(dt, motion))
         for part in item.parts:
             values = shape
             for _order in range(part.order):

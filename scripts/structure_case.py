@@ -37,7 +37,7 @@ def main(
     record = make_structure_record(structure, case, settings)
     made, figures = (as_measured if case.measured else in_reverse)(structure, record, case, settings)
     for name, table in made.items():
-        tables.write_csv(table, outputs[name])
+        tables.write_table(table, outputs[name])
     with replacing(outputs["record"]) as beside:
         write_structure_csv(record, beside)
     with styles.context(style):

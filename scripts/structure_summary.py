@@ -16,10 +16,10 @@ def main(
 ) -> None:
     joined = pd.concat([pd.read_csv(path) for path in parameters], ignore_index=True)
     said = pd.concat([pd.read_csv(path, keep_default_na=False) for path in claims], ignore_index=True)
-    tables.write_csv(joined, Path(table))
-    tables.write_csv(said, Path(claimed))
+    tables.write_table(joined, Path(table))
+    tables.write_table(said, Path(claimed))
     found = structure_pages.Structures(joined, said, titles)
-    shown = [document.Heading("Structures of several coordinates", 1), *structure_pages.blocks(found)]
+    shown = [document.Heading("Structures of several coordinates", 1), *structure_pages.structure_blocks(found)]
     replace_file(Path(page), document.markdown(shown).encode())
 
 

@@ -29,9 +29,9 @@ def main(
     counts = {
         "effects": structure_rates.confusion_of_effects(rows), "places": structure_rates.confusion_of_places(rows),
     }  # fmt: skip
-    found = {"trials": table, "rates": pd.DataFrame(structure_rates.rates(rows)), **counts}
+    found = {"trials": table, "rates": pd.DataFrame(structure_rates.structure_rates(rows)), **counts}
     for name, path in outputs.items():
-        tables.write_csv(found[name], Path(path))
+        tables.write_table(found[name], Path(path))
     print(found["rates"].to_string(index=False), file=sys.stderr)
     with styles.context(style):
         for name, paths in drawings.items():
@@ -44,7 +44,7 @@ def _confusion(title: str, counts: pd.DataFrame) -> Figure:
     down, across = counts.shape
     figure = Figure(figsize=(4.4 + 0.42 * max(across, 9), 2.6 + 0.32 * down), layout="constrained")
     axes = figure.subplots()
-    trial_pictures.confusion(axes, counts)
+    trial_pictures.confusion_panel(axes, counts)
     figure.suptitle(title, fontweight="bold", fontsize=10)
     return figure
 

@@ -19,7 +19,7 @@ def main(count: int, number: int, jobs: int, output: str) -> None:
         rows.append(structure_runs.run_structure(order))
         if done % EVERY == 0 or done == len(orders):
             print(f"part {number}: {done} of {len(orders)} trials of structures", file=sys.stderr, flush=True)
-    tables.write_csv(pd.DataFrame(rows, columns=list(structure_runs.COLUMNS)), Path(output))
+    tables.write_table(pd.DataFrame(rows, columns=list(structure_runs.COLUMNS)), Path(output))
 
 
 if "snakemake" in globals():

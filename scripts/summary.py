@@ -40,15 +40,15 @@ def main(
             told["structures"],
         ),
     )
-    blocks = summary.blocks(tables)
+    blocks = summary.summary_blocks(tables)
     replace_file(Path(outputs["page"]), document.markdown(blocks).encode())
-    replace_file(Path(outputs["html"]), document.page(study_page.TITLE, blocks).encode())
-    replace_file(Path(outputs["estimators"]), document.markdown(summary.estimators(tables)).encode())
+    replace_file(Path(outputs["html"]), document.document_page(study_page.TITLE, blocks).encode())
+    replace_file(Path(outputs["estimators"]), document.markdown(summary.estimator_blocks(tables)).encode())
     pictures = [
         Picture(p["system"], p["number"], p["shows"], Path(file).read_bytes())
         for p, file in zip(told["pictures"], drawn, strict=True)
     ]
-    replace_file(Path(outputs["study"]), study_page.page(tables, pictures))
+    replace_file(Path(outputs["study"]), study_page.study_page(tables, pictures))
 
 
 NAMES = ("claims", "reading", "errors", "structures", "structure_claims")  # of inputs that are one table each

@@ -15,7 +15,7 @@ def main(tables: Sequence[str], pages: Sequence[str], titles: Mapping[str, str])
         title = titles[Path(table).stem]
         rows = pd.read_csv(table, keep_default_na=False, dtype=str)
         blocks = [document.Heading(title, 1), document.table([str(c) for c in rows.columns], rows.to_numpy().tolist())]
-        replace_file(Path(page), document.page(title, blocks).encode())
+        replace_file(Path(page), document.document_page(title, blocks).encode())
 
 
 if "snakemake" in globals():

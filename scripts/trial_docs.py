@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from study.reproduction.config import load
+from study.reproduction.config import load_config
 from study.support import document
 from study.support.errors import StudyError
 from study.support.files import replace_file
@@ -31,5 +31,5 @@ def main(page: Path, wanted: Mapping[str, Sequence[float]], newest: Sequence[Pat
 
 if __name__ == "__main__":
     with one_sentence():
-        targets = load(Path("config")).settings.trials.wanted.plain()
+        targets = load_config(Path("config")).settings.trials.wanted.plain()
         main(Path("docs/tool.md"), targets, [Path(name) for name in sys.argv[1:]])

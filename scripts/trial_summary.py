@@ -22,13 +22,17 @@ def main(
     drawings: Mapping[str, Sequence[str]], style: Path,
 ) -> None:  # fmt: skip
     table = pd.concat([pd.read_csv(path) for path in parts], ignore_index=True).sort_values("seed")
-    summary, confusion, ladder = reach.summary(table, wanted), reach.confusion(table), reach.ladder(table)
+    summary, confusion, ladder = (
+        reach.target_summary(table, wanted),
+        reach.confusion(table),
+        reach.error_by_noise(table),
+    )
     found = {
         "trials": table, "summary": summary, "confusion": confusion, "ladder": ladder,
         "alpha": constants_table.against_alpha(table), "k": constants_table.against_k(table),
     }  # fmt: skip
     for name, path in outputs.items():
-        tables.write_csv(found[name], Path(path))
+        tables.write_table(found[name], Path(path))
     print(summary.to_string(index=False), file=sys.stderr)
     with styles.context(style):
         figures = {"confusion": _confusion(confusion), "ladder": _ladder(ladder)}
@@ -41,19 +45,19 @@ def _confusion(counts: pd.DataFrame) -> Figure:
     figure = Figure(figsize=(10.2, 8.6), layout="constrained")
     axes = figure.subplots()
     axes.set_title("Trials: which effect was hidden, and what diagnose said (% of each row)", fontweight="bold")
-    trial_pictures.confusion(axes, counts)
+    trial_pictures.confusion_panel(axes, counts)
     return figure
 
 
 def _ladder(rows: pd.DataFrame) -> Figure:
-    figure, axes = page.page(
+    figure, axes = page.empty_page(
         "Trials with hidden effects", "Mean held-out response error, with 95 % intervals", columns=2,
         width=page.width(2), panel=2.9, legend_rows=1,
     )  # fmt: skip
     for panel, kind in zip(axes, KINDS, strict=True):
-        trial_pictures.ladder(panel, rows[rows["kind"] == kind])
+        trial_pictures.error_by_noise_panel(panel, rows[rows["kind"] == kind])
     page.letter(axes, list(KINDS.values()))
-    page.legend(figure, axes[1:])
+    page.shared_legend(figure, axes[1:])
     return figure
 
 

@@ -17,10 +17,10 @@ def main(settings: TrialSettings, number: int, output: str) -> None:
     orders = runs.chunk(runs.orders(settings), number, settings.jobs)
     rows: list[runs.Row] = []
     for done, order in enumerate(orders, start=1):
-        rows.append(runs.run(order))
+        rows.append(runs.run_trial(order))
         if done % EVERY == 0 or done == len(orders):
             print(f"part {number}: {done} of {len(orders)} trials", file=sys.stderr, flush=True)
-    tables.write_csv(pd.DataFrame(rows, columns=list(runs.COLUMNS)), Path(output))
+    tables.write_table(pd.DataFrame(rows, columns=list(runs.COLUMNS)), Path(output))
 
 
 if "snakemake" in globals():

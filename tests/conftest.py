@@ -116,7 +116,7 @@ def value_of() -> Callable[..., Floats]:
     def value(text: str, **columns: Floats | float) -> Floats:
         graph = Graph()
         known = {name: graph.input(name) for name in columns}
-        program = with_registers(graph.program([formulas.build(graph, text, known)]), {})
+        program = with_registers(graph.program([formulas.add_formula(graph, text, known)]), {})
         data = np.column_stack([np.atleast_1d(np.asarray(c, dtype=float)) for c in columns.values()])
         out = np.empty((len(data), 1))
         positions = np.array([program.inputs[name] for name in columns], dtype=np.int64)

@@ -1,4 +1,4 @@
-"""The house: imports run one way through the packages, and no file name stands for two things."""
+"""The house: imports run one way through the packages, and no name stands for two things."""
 
 import ast
 from collections import Counter
@@ -13,6 +13,19 @@ FLOORS = (
 )  # fmt: skip
 FILES = sorted(STUDY.rglob("*.py"))
 LOOSE = {"__init__", "__main__", "cli"}
+
+# What a notebook calls a record is a record below too: the class of the interface wraps or extends the one it names.
+WRAPPED = {"Diagnosis", "Model", "Record", "Term"}
+# One call for many modules of a kind (readers, estimators), and what a notebook calls as the command line does.
+SHARED_CALLS = {
+    "compare": ("compare/", "interface/"),
+    "identify": ("identify/estimators/", "interface/"),
+    "read": ("records/readers/", "interface/"),
+    "simulate": ("equations/", "interface/"),
+}
+# The pages of a single mass and of a structure answer the same calls; a panel is called after what it draws.
+PAGES = "explore/"
+PANELS = {"explore/plots.py", "explore/placed_panels.py", "explore/check_plots.py"}
 
 
 def imported(path: Path) -> set[str]:
@@ -54,3 +67,41 @@ def test_no_file_name_stands_for_two_things():
     # A command's file is called as the command is, and calls what it is named after.
     names = Counter(path.stem for path in FILES if path.stem != "__init__" and path.parent.name != "commands")
     assert [name for name, count in names.items() if count > 1] == []
+
+
+def top_level(path: Path, kind: type[ast.stmt] | tuple[type[ast.stmt], ...]) -> list[str]:
+    """Public names of this kind that stand at the top of a module."""
+    return [
+        node.name
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, kind) and not node.name.startswith("_")
+    ]
+
+
+def homes(kind: type[ast.stmt] | tuple[type[ast.stmt], ...]) -> dict[str, set[str]]:
+    """Modules that define each public name of a kind."""
+    found: dict[str, set[str]] = {}
+    for path in FILES:
+        for name in top_level(path, kind):
+            found.setdefault(name, set()).add(path.relative_to(STUDY).as_posix())
+    return found
+
+
+def test_no_class_name_stands_for_two_things():
+    twice = {name: where for name, where in homes(ast.ClassDef).items() if len(where) > 1}
+    assert {
+        name for name, where in twice.items() if len(where) == 2 and any("interface/" in w for w in where)
+    } == WRAPPED
+    assert {name: where for name, where in twice.items() if name not in WRAPPED} == {}
+
+
+def test_no_function_name_stands_for_two_things():
+    twice: dict[str, set[str]] = {}
+    for name, where in homes((ast.FunctionDef, ast.AsyncFunctionDef)).items():
+        distinct = {PAGES if w.startswith(PAGES) else w for w in where - PANELS}
+        if len(distinct) > 1:
+            twice[name] = distinct
+    assert {name: where for name, where in twice.items() if name not in SHARED_CALLS} == {}
+    for name, packages in SHARED_CALLS.items():
+        assert len(twice[name]) > 1
+        assert all(where.startswith(packages) for where in twice[name])

@@ -57,11 +57,11 @@ def _run(arguments: argparse.Namespace) -> None:
 def _added(arguments: argparse.Namespace, model: "Model", term: "Term", text: str, folder: Path) -> None:
     """Fit without and with the term, write model and history, and say what was reached."""
     from study.compare import history
-    from study.compare.comparison_report import as_json, document, history_step, summary
+    from study.compare.comparison_report import as_json, comparison_document, comparison_summary, history_step
     from study.diagnose.adding import added
     from study.diagnose.needless import needless, of_records
 
-    steps = history.read(arguments.model)
+    steps = history.read_history(arguments.model)
     records = read_records(arguments)
     pairs: list[tuple[Comparison, Comparison]] = []
     unneeded: list[tuple[Needless, ...]] = []
@@ -75,10 +75,10 @@ def _added(arguments: argparse.Namespace, model: "Model", term: "Term", text: st
             step("")
     said = of_records([record.name for record in records], unneeded, any_more=True)
     for before, after in pairs:
-        steps = history.climbed(steps, history_step(before), history_step(after, term.name))
-    written_together(arguments, text, steps, as_json(document([after for _, after in pairs])), folder)
-    print(summary([after for _, after in pairs]))
-    print("\n" + history.table(steps) + (f"\n\n{said}" if said else ""))
+        steps = history.with_step(steps, history_step(before), history_step(after, term.name))
+    written_together(arguments, text, steps, as_json(comparison_document([after for _, after in pairs])), folder)
+    print(comparison_summary([after for _, after in pairs]))
+    print("\n" + history.history_table(steps) + (f"\n\n{said}" if said else ""))
 
 
 def _term(arguments: argparse.Namespace) -> "Term":

@@ -8,9 +8,9 @@ from study.commands.parser import parser
 from study.commands.record_arguments import accounted_together, read_records
 from study.commands.structure_climb import SAVED, structure_climb
 from study.compare import history
-from study.compare.history_picture import files as history_pictures
+from study.compare.history_picture import history_files as history_pictures
 from study.diagnose import diagnosis_report
-from study.diagnose.diagnosis_files import files as diagnosis_files
+from study.diagnose.diagnosis_files import diagnosis_files
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, Diagnosis
 from study.equations.model_file import WANTED, parse_model
@@ -52,7 +52,7 @@ def climb(
     write_files(folder, {SAVED: saved.pop(PAGE), "history.json": history.as_bytes(session.steps)})
     write_files(folder, history_pictures(session.steps, model.stem))
     write_files(work, saved)
-    print(history.table(session.steps))
+    print(history.history_table(session.steps))
     return session.steps
 
 
@@ -81,7 +81,7 @@ def _diagnosed(session: Session, folder: Path) -> tuple[Session, Diagnosis]:
     """The session with its present model diagnosed, printed and written into a folder; and the diagnosis."""
     now, diagnosis = sessions.examined(session)
     print(f"{now.label}: {diagnosis.verdict.replace('_', ' ')}")
-    print(diagnosis_report.table(diagnosis))
+    print(diagnosis_report.candidate_table(diagnosis))
     print(f"\n{now.said}\n", flush=True)
     write_files(folder, diagnosis_files(diagnosis, now.said, now.unneeded or ()))
     return sessions.with_stage(session, now), diagnosis

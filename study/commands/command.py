@@ -42,7 +42,7 @@ def progress(unit: str, total: int | None = None, name: str = "") -> Generator[C
         yield step
 
 
-def number(above: float = -math.inf, least: float = -math.inf, most: float = math.inf) -> Callable[[str], float]:
+def finite_number(above: float = -math.inf, least: float = -math.inf, most: float = math.inf) -> Callable[[str], float]:
     """A reader of finite numbers above one limit, not below the other and not beyond the last."""
 
     def read(text: str) -> float:
@@ -59,7 +59,7 @@ def number(above: float = -math.inf, least: float = -math.inf, most: float = mat
     return read
 
 
-def whole(least: int, most: int) -> Callable[[str], int]:
+def whole_number(least: int, most: int) -> Callable[[str], int]:
     """A reader of whole numbers within limits."""
 
     def read(text: str) -> int:

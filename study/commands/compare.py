@@ -36,19 +36,19 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> None:
     from study.compare import each_record
-    from study.compare.comparison import STEPS, across
-    from study.compare.comparison_pictures import level_pictures, pictures
-    from study.compare.comparison_report import as_json, document, summary, tables
-    from study.compare.each_record import by_record
+    from study.compare.comparison import STEPS, across_records
+    from study.compare.comparison_pictures import comparison_pictures, level_pictures
+    from study.compare.comparison_report import as_json, comparison_document, comparison_summary, tables
+    from study.compare.each_record import levels_by_record
     from study.equations.model_file import read_model
-    from study.faults.fault import fields
+    from study.faults.fault import fault_fields
     from study.support.extras import lacking
     from study.support.file_sets import write_files
 
     folder = out_folder(arguments)
     model = read_model(arguments.model)
     if model.coordinates:
-        structures.compare(arguments, model)
+        structures.compare_command(arguments, model)
         return
     records = read_records(arguments)
     model, marked, separate = separated_records(arguments, model, records)
@@ -64,18 +64,18 @@ def _run(arguments: argparse.Namespace) -> None:
         for comparison in comparisons:
             step("pictures")
             prefix = f"{comparison.record.name}_" if many else ""
-            own = pictures(comparison) | ({} if unpaged else _page(comparison))
+            own = comparison_pictures(comparison) | ({} if unpaged else _page(comparison))
             files |= {prefix + name: content for name, content in own.items()}
-    measurement = [{"record": a.comparison.record.name, **fields(f)} for a in accounted for f in a.faults]
-    levels = across(comparisons)
+    measurement = [{"record": a.comparison.record.name, **fault_fields(f)} for a in accounted for f in a.faults]
+    levels = across_records(comparisons)
     files |= level_pictures(levels, comparisons[0].record.units.get("force", "N"))
     files |= {f"{name}.csv": content for name, content in tables(comparisons, levels).items()}
-    content = document(comparisons, levels) | {"measurement": measurement}
-    said = summary(comparisons, levels)
+    content = comparison_document(comparisons, levels) | {"measurement": measurement}
+    said = comparison_summary(comparisons, levels)
     if separate:
-        each = by_record(comparisons[0], separate, records)
+        each = levels_by_record(comparisons[0], separate, records)
         content["coefficients_by_record"] = each_record.rows(each, records)
-        said = f"{each_record.table(each, records)}\n\n{said}"
+        said = f"{each_record.record_table(each, records)}\n\n{said}"
     files["comparison.json"] = as_json(content)
     write_files(folder, files, inputs_of(arguments))
     print(said)

@@ -47,7 +47,7 @@ def _run(arguments: argparse.Namespace) -> None:
     folder = out_folder(arguments)
     model = read_model(arguments.model)
     if model.coordinates:
-        structures.diagnose(arguments, model)
+        structures.diagnose_command(arguments, model)
         return
     own = own_candidates(arguments.candidate, model)
     for name in arguments.without:
@@ -70,14 +70,14 @@ def _diagnosed(
 ) -> dict[str, bytes]:  # fmt: skip
     """Diagnose one record, or several together, print the diagnosis, and give the files' contents."""
     from study.compare import each_record
-    from study.compare.each_record import by_record
+    from study.compare.each_record import levels_by_record
     from study.diagnose import diagnosis_report
     from study.diagnose.confirmed_faults import confirmed
-    from study.diagnose.diagnosis_files import files, in_words, unneeded_in_words
+    from study.diagnose.diagnosis_files import diagnosis_files, diagnosis_in_words, unneeded_in_words
     from study.diagnose.force_between import diagnose_as_read
     from study.diagnose.needless import needless
     from study.diagnose.user_candidates import check_on, unfitted
-    from study.faults.fault import paragraph
+    from study.faults.fault import faults_in_words
 
     name = ", ".join(record.name for record in records)
     with progress(" candidates", name=name) as step:
@@ -88,20 +88,20 @@ def _diagnosed(
         diagnosis = diagnose_as_read(accounted.comparison, extra=own, without=without, progress=lambda _: step(""))
         unneeded = needless(accounted.comparison)
         untried = unfitted(diagnosis, own)
-        words, faults = in_words(diagnosis), confirmed(accounted.faults, diagnosis)
+        words, faults = diagnosis_in_words(diagnosis), confirmed(accounted.faults, diagnosis)
     print(f"{name}: {diagnosis.verdict.replace('_', ' ')}")
-    print(diagnosis_report.table(diagnosis))
+    print(diagnosis_report.candidate_table(diagnosis))
     for effect, why in untried.items():
         print(f"{effect} could not be fitted: {why}")
-    levels = by_record(accounted.comparison, separate, records)
+    levels = levels_by_record(accounted.comparison, separate, records)
     if levels:
-        print(f"\nCoefficients of the model as it was given, by record:\n{each_record.table(levels, records)}")
+        print(f"\nCoefficients of the model as it was given, by record:\n{each_record.record_table(levels, records)}")
     print("\n" + words)
     if faults:
-        print("\n" + paragraph(faults))
+        print("\n" + faults_in_words(faults))
     if unneeded:
         print(f"\n{unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
-    return files(diagnosis, words, unneeded, faults, untried, each_record.rows(levels, records))
+    return diagnosis_files(diagnosis, words, unneeded, faults, untried, each_record.rows(levels, records))
 
 
 COMMAND = Command(

@@ -61,18 +61,18 @@ def _placed(arguments: argparse.Namespace, model: "Model") -> str:
 
     where: dict[object, object] = {"at": arguments.at} if arguments.at else {}
     where |= {"between": arguments.between} if arguments.between else {}
-    place = layout.place_of(where, arguments.term, model.coordinates) if where else None
+    place = layout.place_of_entry(where, arguments.term, model.coordinates) if where else None
     return term_at(model, arguments.term, place)
 
 
 def _dropped(arguments: argparse.Namespace, model: "Model", text: str, folder: Path) -> None:
     """Fit with and without the term, write model and history, and say what was reached."""
     from study.compare import history
-    from study.compare.comparison_report import as_json, document, history_step, summary
-    from study.diagnose.dropping import dropped
+    from study.compare.comparison_report import as_json, comparison_document, comparison_summary, history_step
+    from study.diagnose.dropping import compared_without
     from study.diagnose.needless import needless, of_records
 
-    steps, name = history.read(arguments.model), arguments.term
+    steps, name = history.read_history(arguments.model), arguments.term
     records = read_records(arguments)
     pairs: list[tuple[Comparison, Comparison]] = []
     unneeded: list[tuple[Needless, ...]] = []
@@ -80,16 +80,16 @@ def _dropped(arguments: argparse.Namespace, model: "Model", text: str, folder: P
         for record, path in zip(records, sources(arguments), strict=True):
             before = accounted_for(arguments, model, record, path).comparison
             step("")
-            pairs.append((before, dropped(before, name)))
+            pairs.append((before, compared_without(before, name)))
             step("")
             unneeded.append(needless(pairs[-1][1]))
             step("")
     said = of_records([record.name for record in records], unneeded)
     for before, after in pairs:
-        steps = history.climbed(steps, history_step(before), history_step(after, dropped=name))
-    written_together(arguments, text, steps, as_json(document([after for _, after in pairs])), folder)
-    print(summary([after for _, after in pairs]))
-    print("\n" + history.table(steps) + (f"\n\n{said}" if said else ""))
+        steps = history.with_step(steps, history_step(before), history_step(after, dropped=name))
+    written_together(arguments, text, steps, as_json(comparison_document([after for _, after in pairs])), folder)
+    print(comparison_summary([after for _, after in pairs]))
+    print("\n" + history.history_table(steps) + (f"\n\n{said}" if said else ""))
 
 
 COMMAND = Command(

@@ -4,7 +4,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from study.commands import structures
-from study.commands.command import Command, progress, whole
+from study.commands.command import Command, progress, whole_number
 from study.commands.record_arguments import (
     accounted_for,
     accounted_together,
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def _arguments(parser: argparse.ArgumentParser) -> None:
     add_record_arguments(parser, out="folder that Save writes to")
     add_each_record_argument(parser)
-    parser.add_argument("--port", type=whole(0, 65535), help="of the page; 0 for any (default 5006 if free)")
+    parser.add_argument("--port", type=whole_number(0, 65535), help="of the page; 0 for any (default 5006 if free)")
     parser.add_argument("--no-browser", action="store_true", help="say the address and open nothing")
 
 
@@ -44,7 +44,7 @@ def _run(arguments: argparse.Namespace) -> None:
 
     folder = out_folder(arguments)
     keep([arguments.model], [folder / arguments.model.name])
-    text, steps = read_text(arguments.model, WANTED), history.read(arguments.model)
+    text, steps = read_text(arguments.model, WANTED), history.read_history(arguments.model)
     model = parse_model(text, arguments.model)
     place = arguments.model, text, folder, inputs_of(arguments)
     desk: Desk[Any]

@@ -16,17 +16,17 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.equations.model_file import read_model
 
     read_model(arguments.model)
-    steps = history.read(arguments.model)
+    steps = history.read_history(arguments.model)
     if not steps:
         print(f"{arguments.model}: nothing was added yet; 'study add' begins the history")
         return
-    print(history.table(steps))
+    print(history.history_table(steps))
     if arguments.out is not None:
-        from study.compare.history_picture import files
+        from study.compare.history_picture import history_files
         from study.support.file_sets import check_folder, write_files
 
         check_folder(arguments.out)
-        found = files(steps, arguments.model.stem) | {"history.json": history.as_bytes(steps)}
+        found = history_files(steps, arguments.model.stem) | {"history.json": history.as_bytes(steps)}
         write_files(arguments.out, found, [arguments.model, history.path_of(arguments.model)])
 
 

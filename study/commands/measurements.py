@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field
 
 from study.commands.parser import parser
 from study.equations.model_file import read_model
-from study.support.config_files import Row, Text, read_rows
+from study.support.config_files import TableRow, Text, read_rows
 from study.support.errors import StudyError, at, expect
 
 VARIABLE = "$STUDY_DATA"  # at the beginning of a path: the folder that this environment variable names
@@ -45,7 +45,7 @@ def _words(text: object) -> object:
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*\Z", max_length=64, description=NAME)]
 
 
-class Measurement(Row):
+class Measurement(TableRow):
     """One row of ``config/measurements.tsv``."""
 
     record: Name
@@ -56,7 +56,9 @@ class Measurement(Row):
     options: Annotated[tuple[str, ...], BeforeValidator(_words)]  # of ``study compare``
 
 
-def load(folder: Path, cases: Collection[str] = (), targets: Collection[str] = ()) -> Mapping[str, Measurement]:
+def load_measurements(
+    folder: Path, cases: Collection[str] = (), targets: Collection[str] = ()
+) -> Mapping[str, Measurement]:
     """Read ``measurements.tsv`` of a folder; whether the data are there is not asked.
 
     No record, nor the target of its climb, nor its entry, may have one of the names of ``cases`` or of the workflow's
@@ -87,7 +89,7 @@ def load(folder: Path, cases: Collection[str] = (), targets: Collection[str] = (
 
 
 def is_structure(row: Measurement) -> bool:
-    """Whether the model of a row has coordinates; it was read by :func:`load`."""
+    """Whether the model of a row has coordinates; it was read by :func:`load_measurements`."""
     return bool(read_model(Path(row.model)).coordinates)
 
 

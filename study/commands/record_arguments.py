@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from study.commands.command import number, whole
+from study.commands.command import finite_number, whole_number
 from study.support.errors import StudyError
 
 if TYPE_CHECKING:
@@ -65,13 +65,13 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     reading.add_argument("--unit", action="append", default=[], metavar="ROLE=UNIT", help="such as force=kN")
     rate = reading.add_mutually_exclusive_group()
-    rate.add_argument("--fs", type=number(above=0.0), help="sampling rate in Hz, if there is no column of times")
-    rate.add_argument("--dt", type=number(above=0.0), help="sampling interval in s, instead of --fs")
+    rate.add_argument("--fs", type=finite_number(above=0.0), help="sampling rate in Hz, if there is no column of times")
+    rate.add_argument("--dt", type=finite_number(above=0.0), help="sampling interval in s, instead of --fs")
     reading.add_argument(
         "--group", action="append", default=[],
         help="folder or structure of an HDF5 or MATLAB file; several are a record each",
     )  # fmt: skip
-    reading.add_argument("--period", type=whole(2, 2**40), help="samples in a period of a periodic excitation")
+    reading.add_argument("--period", type=whole_number(2, 2**40), help="samples in a period of a periodic excitation")
     reading.add_argument(
         "--accept-saturated", action="store_true", help="take a channel that rests at its extreme for what it is"
     )
@@ -93,17 +93,17 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     judging = parser.add_argument_group("fitting and judging")
     judging.add_argument("--fit", type=span, metavar="A:B", help="samples to fit, A to B - 1 (default: the first half)")
     judging.add_argument(
-        "--judge", type=judged, metavar="A:B",
+        "--judge", type=judged_samples, metavar="A:B",
         help=f"samples to judge (default: the second half), or '{ALTERNATE}': the default of free decays, "
         "components, several stretches, and sweeps whose halves have other frequencies",
     )  # fmt: skip
     judging.add_argument(
-        "--use", action="append", type=times, default=[], metavar="S:T",
+        "--use", action="append", type=time_span, default=[], metavar="S:T",
         help="use the record from S to T seconds alone; several such stretches are fitted and judged together",
     )  # fmt: skip
     judging.add_argument("--response", choices=MOTIONS, help="the measured motion that free runs are held against")
     judging.add_argument(
-        "--cutoff", type=number(above=0.0), metavar="HZ",
+        "--cutoff", type=finite_number(above=0.0), metavar="HZ",
         help="integrate measured accelerations above this frequency and judge nothing below (default: from the record)",
     )  # fmt: skip
 
@@ -119,12 +119,12 @@ def span(text: str) -> Span:
     return first or 0, last
 
 
-def judged(text: str) -> Span | str:
+def judged_samples(text: str) -> Span | str:
     """Samples to judge, or the name of a way to choose them."""
     return ALTERNATE if text.strip() == ALTERNATE else span(text)
 
 
-def times(text: str) -> tuple[float, float | None]:
+def time_span(text: str) -> tuple[float, float | None]:
     """``2.0:9.5`` as two times in seconds; an end left out is that of the record."""
     begin, separator, end = text.strip().partition(":")
     try:
@@ -138,7 +138,7 @@ def times(text: str) -> tuple[float, float | None]:
     return found
 
 
-def read_options(arguments: argparse.Namespace, group: str | None = None) -> "ReadOptions":
+def given_options(arguments: argparse.Namespace, group: str | None = None) -> "ReadOptions":
     """What the user says about the files; of several groups, the one that is to be read."""
     from study.records.readers import ReadOptions, assignments
 
@@ -159,7 +159,7 @@ def read_records(arguments: argparse.Namespace) -> list["Record"]:
     groups: list[str | None] = list(arguments.group) or [None]
     for group in (g for g in groups if groups.count(g) > 1):
         raise StudyError(f"--group {group} is given twice; expected each group once")
-    return list(distinct([read_record(p, read_options(arguments, g)) for p in arguments.records for g in groups]))
+    return list(distinct([read_record(p, given_options(arguments, g)) for p in arguments.records for g in groups]))
 
 
 def sources(arguments: argparse.Namespace) -> list[Path]:
@@ -261,10 +261,10 @@ def out_folder(arguments: argparse.Namespace) -> Path:
 def inputs_of(arguments: argparse.Namespace) -> list[Path]:
     """What a command reads, which nothing may be written over: records, what stands beside them, and the model."""
     from study.compare.history import path_of
-    from study.records.readers.options import beside
+    from study.records.readers.options import options_beside
 
     model: Path = arguments.model
-    return [*arguments.records, *(beside(path) for path in arguments.records), model, path_of(model)]
+    return [*arguments.records, *(options_beside(path) for path in arguments.records), model, path_of(model)]
 
 
 def written_together(

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from study.commands.command import Command, number, whole
+from study.commands.command import Command, finite_number, whole_number
 
 if TYPE_CHECKING:
     from study.equations.model import Model
@@ -19,19 +19,25 @@ TURN = 0.05  # rad
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", type=Path, help="model file (YAML) with every value given")
     parser.add_argument(
-        "--level", type=number(least=0.0, most=1e50), default=1.0,
+        "--level", type=finite_number(least=0.0, most=1e50), default=1.0,
         help="mean square of the white force in N^2, before its low-pass (default %(default)s)",
     )  # fmt: skip
     parser.add_argument(
-        "--cutoff", type=number(least=1e-15, most=1e15), default=12.5, help="low-pass in Hz (default %(default)s)"
+        "--cutoff",
+        type=finite_number(least=1e-15, most=1e15),
+        default=12.5,
+        help="low-pass in Hz (default %(default)s)",
     )
-    parser.add_argument("--seed", type=whole(0, 2**63 - 1), default=1, help="the same seed gives the same bytes")
-    parser.add_argument("--samples", type=whole(16, MOST_SAMPLES), default=8192, help="default %(default)s")
+    parser.add_argument("--seed", type=whole_number(0, 2**63 - 1), default=1, help="the same seed gives the same bytes")
+    parser.add_argument("--samples", type=whole_number(16, MOST_SAMPLES), default=8192, help="default %(default)s")
     parser.add_argument(
-        "--dt", type=number(least=1e-15, most=1e15), default=0.02, help="sampling interval in s (default %(default)s)"
+        "--dt",
+        type=finite_number(least=1e-15, most=1e15),
+        default=0.02,
+        help="sampling interval in s (default %(default)s)",
     )
     parser.add_argument(
-        "--steps", type=whole(1, 10_000),
+        "--steps", type=whole_number(1, 10_000),
         help="steps per sample (default: 8, or more where the system's own frequency asks for them)",
     )  # fmt: skip
     parser.add_argument("--out", type=Path, default=Path("record.csv"), help="where to (default %(default)s)")

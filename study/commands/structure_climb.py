@@ -7,7 +7,8 @@ from typing import Any
 from study.commands.structures import prepared_structures
 from study.compare import history
 from study.compare.comparison_report import as_json
-from study.compare.history_picture import files as history_pictures
+from study.compare.history_picture import history_files as history_pictures
+from study.diagnose.verdict import MISSING
 from study.equations.model import Model
 from study.equations.model_file import WANTED
 from study.explore import placed_session as sessions
@@ -16,7 +17,6 @@ from study.explore.saved_files import PAGE
 from study.structure import structure_report
 from study.structure.structure_comparison import compare_structure
 from study.structure.structure_pictures import diagnosis_pictures
-from study.structure.structure_verdict import MISSING
 from study.support.file_sets import write_files
 from study.support.files import read_text
 
@@ -36,9 +36,9 @@ def structure_climb(arguments: argparse.Namespace, model: Model, steps: int, fol
         stage = sessions.examined(session)
         session, diagnosis = sessions.with_stage(session, stage), stage.diagnosis
         assert diagnosis is not None, "a stage that was examined has a diagnosis"
-        fields = as_json(structure_report.fields(diagnosis, stage.unneeded))
+        fields = as_json(structure_report.structure_fields(diagnosis, stage.unneeded))
         write_files(work / f"step_{number}", {"diagnosis.json": fields} | diagnosis_pictures(diagnosis))
-        print(f"{structure_report.table(diagnosis)}\n\n{stage.said}\n", flush=True)
+        print(f"{structure_report.placed_candidate_table(diagnosis)}\n\n{stage.said}\n", flush=True)
         if diagnosis.verdict != MISSING or number == steps:
             break
         session = sessions.with_placed(session, diagnosis.candidates[0].name)
@@ -46,5 +46,5 @@ def structure_climb(arguments: argparse.Namespace, model: Model, steps: int, fol
     write_files(folder, {SAVED: saved.pop(PAGE), "history.json": history.as_bytes(session.steps)})
     write_files(folder, history_pictures(session.steps, model.name))
     write_files(work, saved)
-    print(history.table(session.steps))
+    print(history.history_table(session.steps))
     return session.steps

@@ -4,7 +4,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from study.commands.command import progress
-from study.commands.record_arguments import inputs_of, out_folder, read_options, refuse_groups, written_together
+from study.commands.record_arguments import given_options, inputs_of, out_folder, refuse_groups, written_together
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,7 +25,7 @@ def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[
     refuse_groups(arguments)
     made: list[PreparedStructure] = []
     for path in arguments.records:
-        record = read_structure(path, model, read_options(arguments))
+        record = read_structure(path, model, given_options(arguments))
         parts = [_within(span, len(record)) for span in (arguments.fit, arguments.judge)]
         with at(path):
             made.append(prepare_structure(record, model, parts[0], parts[1], arguments.cutoff))
@@ -36,12 +36,12 @@ def _within(span: "tuple[int, int | None] | None", samples: int) -> tuple[int, i
     return None if span is None else (span[0], samples if span[1] is None else span[1])
 
 
-def compare(arguments: argparse.Namespace, model: "Model") -> None:
+def compare_command(arguments: argparse.Namespace, model: "Model") -> None:
     """``study compare`` of a structure."""
     from study.compare.comparison_report import as_json
-    from study.structure.structure_comparison import compare_structure, document, summary
+    from study.structure.structure_comparison import compare_structure, structure_document, structure_summary
     from study.structure.structure_page import PAGE, structure_page
-    from study.structure.structure_pictures import pictures
+    from study.structure.structure_pictures import structure_pictures
     from study.support.file_sets import write_files
 
     folder = out_folder(arguments)
@@ -54,11 +54,11 @@ def compare(arguments: argparse.Namespace, model: "Model") -> None:
     prefix = [f"{c.prepared.record.name}_" if len(ready) > 1 else "" for c in comparisons]
     files: dict[str, bytes] = {}
     for before, comparison in zip(prefix, comparisons, strict=True):
-        made = {PAGE: structure_page(comparison), "comparison.json": as_json(document(comparison))}
-        made |= pictures(comparison)
+        made = {PAGE: structure_page(comparison), "comparison.json": as_json(structure_document(comparison))}
+        made |= structure_pictures(comparison)
         files |= {before + name: content for name, content in made.items()}
     write_files(folder, files, inputs_of(arguments))
-    print("\n\n".join(summary(c) for c in comparisons))
+    print("\n\n".join(structure_summary(c) for c in comparisons))
     print(f"\n{folder}: {_listed(files)}")
 
 
@@ -86,16 +86,22 @@ def refuse_measured(model: "Model", command: str) -> None:
     expect(not model.measured, f"{command} knows no {model.name!r} with 'linear: measured' yet; {like}")
 
 
-def diagnose(arguments: argparse.Namespace, model: "Model") -> None:
+def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
     """``study diagnose`` of a structure."""
     from study.compare.comparison_report import as_json
+    from study.diagnose.diagnosis_files import unneeded_in_words
     from study.diagnose.user_candidates import own_candidates
     from study.equations import terms
     from study.structure.placed_needless import placed_needless
     from study.structure.structure_comparison import compare_structure
     from study.structure.structure_page import PAGE, structure_page
     from study.structure.structure_pictures import diagnosis_pictures
-    from study.structure.structure_report import fields, in_words, modes_before_and_after, table, unneeded_in_words
+    from study.structure.structure_report import (
+        modes_before_and_after,
+        placed_candidate_table,
+        structure_diagnosis_in_words,
+        structure_fields,
+    )
     from study.structure.structure_verdict import diagnose_structure
     from study.support.file_sets import write_files
 
@@ -114,11 +120,20 @@ def diagnose(arguments: argparse.Namespace, model: "Model") -> None:
             diagnosis = diagnose_structure(comparison, own, arguments.without, progress=step)
             unneeded = placed_needless(comparison)
         print(f"{prepared.record.name}: {diagnosis.verdict.replace('_', ' ')}")
-        print(table(diagnosis) + "\n\n" + modes_before_and_after(diagnosis) + "\n\n" + in_words(diagnosis))
+        print(
+            placed_candidate_table(diagnosis)
+            + "\n\n"
+            + modes_before_and_after(diagnosis)
+            + "\n\n"
+            + structure_diagnosis_in_words(diagnosis)
+        )
         if unneeded:
             print(f"\n{unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
         prefix = f"{prepared.record.name}_" if len(ready) > 1 else ""
-        made = {PAGE: structure_page(comparison, diagnosis), "diagnosis.json": as_json(fields(diagnosis, unneeded))}
+        made = {
+            PAGE: structure_page(comparison, diagnosis),
+            "diagnosis.json": as_json(structure_fields(diagnosis, unneeded)),
+        }
         made |= diagnosis_pictures(diagnosis)
         files |= {prefix + name: content for name, content in made.items()}
     write_files(folder, files, inputs_of(arguments))
@@ -158,7 +173,12 @@ def add(arguments: argparse.Namespace, model: "Model") -> None:
     from study.equations import layout, terms
     from study.equations.model import free
     from study.equations.model_file import text_with
-    from study.structure.structure_comparison import compare_structure, document, history_step, summary
+    from study.structure.structure_comparison import (
+        compare_structure,
+        structure_document,
+        structure_history_step,
+        structure_summary,
+    )
     from study.structure.structure_verdict import added_term
     from study.support.errors import at
     from study.support.transaction import locked
@@ -168,11 +188,11 @@ def add(arguments: argparse.Namespace, model: "Model") -> None:
     with at(arguments.model):
         where: dict[object, object] = {"at": arguments.at} if arguments.at else {}
         where |= {"between": arguments.between} if arguments.between else {}
-        place = layout.place_of(where, term.name, model.coordinates)
+        place = layout.place_of_entry(where, term.name, model.coordinates)
         entry = free(term, place)
         layout.check(model.with_term(entry))
     with locked(arguments.model):  # another run may have changed it meanwhile
-        text, steps = text_with(arguments.model, entry), history.read(arguments.model)
+        text, steps = text_with(arguments.model, entry), history.read_history(arguments.model)
         if model.measured:
             _add_measured(arguments, model, entry, text, steps)
             return
@@ -180,11 +200,13 @@ def add(arguments: argparse.Namespace, model: "Model") -> None:
         for prepared in prepared_structures(arguments, model):
             before = compare_structure(model, prepared)
             comparisons.append(added_term(before, entry))
-            steps = history.climbed(steps, history_step(before), history_step(comparisons[-1], entry.name))
-        page = as_json(document(comparisons[-1]))
+            steps = history.with_step(
+                steps, structure_history_step(before), structure_history_step(comparisons[-1], entry.name)
+            )
+        page = as_json(structure_document(comparisons[-1]))
         written_together(arguments, text, steps, page, folder)
-    print("\n\n".join(summary(c) for c in comparisons))
-    print("\n" + history.table(steps))
+    print("\n\n".join(structure_summary(c) for c in comparisons))
+    print("\n" + history.history_table(steps))
 
 
 def _add_measured(
@@ -205,10 +227,10 @@ def _add_measured(
     for prepared in prepared_structures(arguments, model):
         before = compare_measured(model, prepared)
         comparisons.append(compare_measured(model.with_term(entry), prepared))
-        steps = history.climbed(steps, measured_step(before), measured_step(comparisons[-1], entry.name))
+        steps = history.with_step(steps, measured_step(before), measured_step(comparisons[-1], entry.name))
     written_together(arguments, text, steps, as_json(measured_document(comparisons[-1])), out_folder(arguments))
     print("\n\n".join(measured_summary(c) for c in comparisons))
-    print("\n" + history.table(steps))
+    print("\n" + history.history_table(steps))
 
 
 def drop(arguments: argparse.Namespace, model: "Model", name: str, text: str) -> None:
@@ -216,17 +238,24 @@ def drop(arguments: argparse.Namespace, model: "Model", name: str, text: str) ->
     from study.compare import history
     from study.compare.comparison_report import as_json
     from study.structure.placed_dropping import dropped_term
-    from study.structure.structure_comparison import compare_structure, document, history_step, summary
+    from study.structure.structure_comparison import (
+        compare_structure,
+        structure_document,
+        structure_history_step,
+        structure_summary,
+    )
 
-    folder, steps = out_folder(arguments), history.read(arguments.model)
+    folder, steps = out_folder(arguments), history.read_history(arguments.model)
     comparisons: list[StructureComparison] = []
     for prepared in prepared_structures(arguments, model):
         before = compare_structure(model, prepared)
         comparisons.append(dropped_term(before, name))
-        steps = history.climbed(steps, history_step(before), history_step(comparisons[-1], dropped=name))
-    written_together(arguments, text, steps, as_json(document(comparisons[-1])), folder)
-    print("\n\n".join(summary(c) for c in comparisons))
-    print("\n" + history.table(steps))
+        steps = history.with_step(
+            steps, structure_history_step(before), structure_history_step(comparisons[-1], dropped=name)
+        )
+    written_together(arguments, text, steps, as_json(structure_document(comparisons[-1])), folder)
+    print("\n\n".join(structure_summary(c) for c in comparisons))
+    print("\n" + history.history_table(steps))
 
 
 def session(arguments: argparse.Namespace, model: "Model", steps: "list[dict[str, Any]]") -> "PlacedSession":

@@ -23,11 +23,13 @@ def _run(arguments: argparse.Namespace) -> None:
 
     found = tuple(terms.LIBRARY.values())
     if arguments.name:
-        found = (terms.LIBRARY[arguments.name],) if arguments.name in terms.LIBRARY else terms.search(arguments.name)
-    print(details(found[0]) if len(found) == 1 else table(found))
+        found = (
+            (terms.LIBRARY[arguments.name],) if arguments.name in terms.LIBRARY else terms.find_terms(arguments.name)
+        )
+    print(details(found[0]) if len(found) == 1 else terms_table(found))
 
 
-def table(library: "tuple[Term, ...]", width: int | None = None) -> str:
+def terms_table(library: "tuple[Term, ...]", width: int | None = None) -> str:
     """The terms as a table, the two columns of prose wrapped so that it fits the width in characters."""
     from tabulate import tabulate
 

@@ -26,7 +26,7 @@ class Level:
     change: float  # largest less smallest estimate, over the size of their weighted mean
 
 
-def levels(force: Sequence[float], records: Sequence[Sequence[Coefficient]]) -> tuple[Level, ...]:
+def across_levels(force: Sequence[float], records: Sequence[Sequence[Coefficient]]) -> tuple[Level, ...]:
     """Hold the estimates of several records against each other; what was held is left out.
 
     ``force`` is the rms force of each record's fitting part, ``records`` the same model's coefficients in each.

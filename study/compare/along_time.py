@@ -16,7 +16,7 @@ APART = 6.0  # correlation times in a block, at least: then neighbours are nearl
 
 
 @dataclass(frozen=True)
-class Stretch:
+class JudgedStretch:
     """A stretch of the judging part."""
 
     begin: float  # in seconds
@@ -30,7 +30,7 @@ class Stretch:
 class AlongTime:
     """The stretches and the test."""
 
-    stretches: tuple[Stretch, ...]  # in order of time
+    stretches: tuple[JudgedStretch, ...]  # in order of time
     p_value: float  # of such differences between stretches of equal level; 1 with too few blocks for a test
     growth: float  # exponent with which the power of the residual grows with the power of the response, block by block
     growth_error: float  # its standard error
@@ -97,11 +97,11 @@ def _slope(x: Floats, y: Floats) -> tuple[float, float]:
 
 def _stretch(
     prediction: Prediction, residual: Floats, response: Floats, k: int, ratios: Floats, group: NDArray[np.int64]
-) -> Stretch:
+) -> JudgedStretch:
     bounds = np.linspace(0, len(residual), STRETCHES + 1).round().astype(int)
     first, last = int(bounds[k]), int(bounds[k + 1])
     begin = float(prediction.time[first])
-    return Stretch(
+    return JudgedStretch(
         begin, begin + (last - first) * prediction.dt,
         float(np.sqrt(np.mean(residual[first:last] ** 2))) / prediction.size,
         float(np.sqrt(np.mean(response[first:last] ** 2))) / prediction.size,

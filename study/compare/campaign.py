@@ -57,7 +57,7 @@ class Measured:
         )
 
 
-def measured(name: str, rig: str, comparison: Mapping[str, Any], diagnosis: Mapping[str, Any]) -> list[Measured]:
+def measured_of_row(name: str, rig: str, comparison: Mapping[str, Any], diagnosis: Mapping[str, Any]) -> list[Measured]:
     """What the files of a row tell: one record, or each of several that were diagnosed together."""
     parts: Sequence[Mapping[str, Any]] = comparison.get("records", ())
     if not parts:
@@ -68,7 +68,7 @@ def measured(name: str, rig: str, comparison: Mapping[str, Any], diagnosis: Mapp
     ]
 
 
-def blocks(records: Iterable[Measured]) -> list[document.Block]:
+def campaign_blocks(records: Iterable[Measured]) -> list[document.Block]:
     """The page: a table of verdicts, then the coefficients of each rig, its records in the order of their level."""
     rigs = _by_rig(records)
     every = [record for rig in rigs.values() for record in rig]
@@ -118,7 +118,7 @@ def _coefficients(rows: Sequence[Measured]) -> list[document.Block]:
     columns = [", ".join(filter(None, (record.name, record.shown_level))) for record in rows]
     if len(rows) == 1:
         return [document.table(("coefficient", *columns, "unit"), [(c.key, _value(c), c.unit) for c in own[0]])]
-    judged = {level.key: level for level in across_levels.levels([record.level for record in rows], own)}
+    judged = {level.key: level for level in across_levels.across_levels([record.level for record in rows], own)}
     lines = [
         (key[0].key, *map(_value, key), key[0].unit, *_judged(judged.get(key[0].key))) for key in zip(*own, strict=True)
     ]

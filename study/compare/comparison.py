@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from study.compare.across_levels import Level, levels
+from study.compare.across_levels import Level, across_levels
 from study.compare.along_time import AlongTime, along_time
 from study.compare.bands import Band, bands
 from study.compare.by_estimator import FREE_RUN, fit_by
@@ -147,7 +147,7 @@ def on_each_record(comparison: Comparison) -> tuple[Comparison, ...]:
     return tuple(alone)
 
 
-def across(comparisons: Sequence[Comparison]) -> tuple[Level, ...]:
+def across_records(comparisons: Sequence[Comparison]) -> tuple[Level, ...]:
     """The coefficients of several records by level, none of one record; a ``StudyError`` if the units differ."""
     if len(comparisons) < 2:
         return ()
@@ -160,7 +160,7 @@ def across(comparisons: Sequence[Comparison]) -> tuple[Level, ...]:
                     f"{channel} is in {first.units.get(channel)} in {first.name} and in "
                     f"{other.record.units.get(channel)} in {other.record.name}; expected the same unit in all records"
                 )
-    return levels([c.level for c in ordered], [c.coefficients for c in ordered])
+    return across_levels([c.level for c in ordered], [c.coefficients for c in ordered])
 
 
 def distinct(records: Sequence[Record]) -> tuple[Record, ...]:

@@ -25,14 +25,14 @@ Floats = NDArray[np.float64]
 WIDE = 7.2  # inches
 
 
-def pictures(comparison: Comparison) -> dict[str, bytes]:
+def comparison_pictures(comparison: Comparison) -> dict[str, bytes]:
     """Every picture of one record by file name."""
     drawn: Mapping[str, Callable[[Comparison], Figure]] = {
-        "response": response, "force_error": force_error, "missing_force": missing_force,
-        "error_in_time": error_in_time,
+        "response": response_figure, "force_error": force_error_figure, "missing_force": missing_force_figure,
+        "error_in_time": error_in_time_figure,
     }  # fmt: skip
     with in_style():
-        return page.files({name: draw(comparison) for name, draw in drawn.items()} | _of_its_kind(comparison))
+        return page.image_files({name: draw(comparison) for name, draw in drawn.items()} | _of_its_kind(comparison))
 
 
 def _of_its_kind(comparison: Comparison) -> dict[str, Figure]:
@@ -41,9 +41,9 @@ def _of_its_kind(comparison: Comparison) -> dict[str, Figure]:
 
     prepared, prediction = comparison.prepared, comparison.prediction
     if prepared.response == FORCE:
-        return {"loops": kind_pictures.loops(comparison, loops(prediction))}
+        return {"loops": kind_pictures.loops_figure(comparison, loops(prediction))}
     found = decays_of(comparison)
-    return {} if found is None else {"decay": kind_pictures.decay(comparison, found)}
+    return {} if found is None else {"decay": kind_pictures.decay_figure(comparison, found)}
 
 
 def level_pictures(moving: Sequence[Level], force_unit: str) -> dict[str, bytes]:
@@ -51,87 +51,87 @@ def level_pictures(moving: Sequence[Level], force_unit: str) -> dict[str, bytes]
     if not moving:
         return {}
     with in_style():
-        return page.files({"coefficients_by_level": by_level(moving, force_unit)})
+        return page.image_files({"coefficients_by_level": by_level(moving, force_unit)})
 
 
-def response(comparison: Comparison) -> Figure:
+def response_figure(comparison: Comparison) -> Figure:
     """Measured and predicted response, their difference, and a close-up where that is largest."""
     prediction, unit = comparison.prediction, comparison.record.units.get(comparison.plan.response, "")
     about = f"error {percent(prediction.error)} of the rms response, noise floor {percent(prediction.floor)}"
-    figure, axes = page.page(
+    figure, axes = page.empty_page(
         f"{comparison.record.name}: {comparison.plan.response}", f"model {comparison.model.name}; {about}",
         rows=3, width=WIDE, panel=1.8, legend_rows=2, share=False,
     )  # fmt: skip
-    panels.response(axes[0], prediction.time, prediction.measured, prediction.predicted, unit)
+    panels.response_panel(axes[0], prediction.time, prediction.measured, prediction.predicted, unit)
     panels.residual(axes[1], prediction.time, prediction.residual, comparison.prediction.noise.rms, unit)
     near = prediction.closeup
-    panels.response(axes[2], prediction.time[near], prediction.measured[near], prediction.predicted[near], unit)
+    panels.response_panel(axes[2], prediction.time[near], prediction.measured[near], prediction.predicted[near], unit)
     page.letter(axes, ("all that was predicted", "the difference", "close-up of (a) where the difference is largest"))
-    page.legend(figure, axes, columns=2)
+    page.shared_legend(figure, axes, columns=2)
     return figure
 
 
-def force_error(comparison: Comparison) -> Figure:
+def force_error_figure(comparison: Comparison) -> Figure:
     """Unexplained share of the force by frequency, and what each input explains."""
     force = comparison.force
     highest = force.highest
     low, high = force.frequency[force.band][[0, -1]]
     about = f"{percent(force.total)} of its power from {low:.3g} to {high:.3g} Hz"
-    figure, axes = page.page(
+    figure, axes = page.empty_page(
         f"{comparison.record.name}: error of the force", f"model {comparison.model.name}; unexplained is {about}",
         rows=2, width=WIDE, panel=2.3, legend_rows=2, share=False,
     )  # fmt: skip
-    panels.force_error(axes[0], force, highest)
+    panels.force_error_panel(axes[0], force, highest)
     keep = (force.frequency > 0.0) & (force.frequency <= highest)
     shares = [
         InputCoherence(i.shape, " + ".join(i.terms), force.frequency[keep], c[keep])
         for i, c in zip(force.inputs, force.cumulative, strict=True)
     ]
-    coherence.cumulative(axes[1], shares)
+    coherence.cumulative_panel(axes[1], shares)
     axes[1].set_xlim(0.0, highest)
     axes[1].set_ylabel("cumulative coherence")  # in full it is longer than the panel
     axes[1].legend(loc="lower left", frameon=True, framealpha=0.85, edgecolor="none")
     page.letter(axes, ("what is left of the force", "what the inputs explain, one after the other"))
-    page.legend(figure, axes[:1], columns=2)
+    page.shared_legend(figure, axes[:1], columns=2)
     return figure
 
 
-def missing_force(comparison: Comparison) -> Figure:
+def missing_force_figure(comparison: Comparison) -> Figure:
     """The force that the model lacks over the (u, v) plane and against each of them."""
     lacking, unit = comparison.missing_force, dict(comparison.record.units)
     band = lacking.frequency[lacking.gate]
     about = "the difference is noise" if not len(band) else f"seen in bands from {band[0]:.3g} to {band[-1]:.3g} Hz"
-    figure, axes = page.page(
+    figure, axes = page.empty_page(
         f"{comparison.record.name}: the force that the model lacks", f"model {comparison.model.name}; {about}", rows=3,
         width=WIDE, panel=2.3, share=False,
     )  # fmt: skip
     u, v, force = (x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force))
-    panels.missing_force(axes[0], surface(u, v, force), unit)
+    panels.missing_force_panel(axes[0], surface(u, v, force), unit)
     panels.force_curve(axes[1], curve(u, force), "displacement", unit)
     panels.force_curve(axes[2], curve(v, force), "velocity", unit)
     page.letter(axes, ("mean over the plane of motion", "against displacement", "against velocity"))
-    page.legend(figure, axes)
+    page.shared_legend(figure, axes)
     return figure
 
 
-def error_in_time(comparison: Comparison) -> Figure:
+def error_in_time_figure(comparison: Comparison) -> Figure:
     """Error along the judging part."""
     chance = f"differences between stretches of equal level: p = {comparison.time.p_value:.2g}"
-    figure, axes = page.page(
+    figure, axes = page.empty_page(
         f"{comparison.record.name}: error along the record", f"model {comparison.model.name}; {chance}",
         rows=2, width=WIDE, panel=2.0, share=False,
     )  # fmt: skip
     panels.error_in_time(axes[0], comparison.time, comparison.prediction.floor)
     panels.error_beyond_level(axes[1], comparison.time)
     page.letter(axes, ("error and response", "beyond what the level accounts for"))
-    page.legend(figure, axes[:1])
+    page.shared_legend(figure, axes[:1])
     return figure
 
 
 def by_level(moving: Sequence[Level], force_unit: str) -> Figure:
     """Every fitted coefficient against the level of the force."""
     columns = 2 if len(moving) > 1 else 1
-    figure, axes = page.page(
+    figure, axes = page.empty_page(
         "Coefficients by level of excitation", "with 95 % intervals; the right model's do not move",
         rows=-(-len(moving) // columns), columns=columns, width=1.25 * WIDE, panel=1.9, legend_rows=0, share=False,
     )  # fmt: skip

@@ -13,7 +13,7 @@ from tabulate import tabulate
 from study.compare.across_levels import Level
 from study.compare.by_estimator import FREE_RUN
 from study.compare.comparison import Comparison
-from study.compare.comparison_sentences import says, says_of_all
+from study.compare.comparison_sentences import comparison_in_words, says_of_all
 from study.compare.decay import decays_of
 from study.compare.fitted_coefficients import Coefficient
 from study.compare.force_map import curve, surface
@@ -23,7 +23,7 @@ from study.support.numbers import percent
 Row = dict[str, Any]
 
 
-def document(comparisons: Sequence[Comparison], moving: Sequence[Level] = ()) -> Row:
+def comparison_document(comparisons: Sequence[Comparison], moving: Sequence[Level] = ()) -> Row:
     """What ``comparison.json`` holds.
 
     Of several records, ``error`` and ``noise_floor`` are root mean squares over the records, and
@@ -83,7 +83,7 @@ def _of_record(comparison: Comparison) -> Row:
             }
         },
         "notes": list(comparison.notes),
-        "says": says(comparison),
+        "says": comparison_in_words(comparison),
         **({"decay": found.plain()} if (found := decays_of(comparison)) else {}),
     }  # fmt: skip
 
@@ -243,7 +243,7 @@ def _by_level(level: Level, names: Sequence[str]) -> pd.DataFrame:
     )  # fmt: skip
 
 
-def summary(comparisons: Sequence[Comparison], moving: Sequence[Level] = ()) -> str:
+def comparison_summary(comparisons: Sequence[Comparison], moving: Sequence[Level] = ()) -> str:
     """The table that a person reads in ten seconds, and the sentences below it."""
     first = comparisons[0]
     heads = ["", "response error", "in units", "noise floor", "force error", "noise alone"]

@@ -26,7 +26,7 @@ NAMES = {0: "constant size", 2: "square", 3: "cube", 4: "fourth power", 5: "fift
 PARITY = {"odd": "odd in it", "even": "even in it"}
 
 
-def says(comparison: Comparison) -> str:
+def comparison_in_words(comparison: Comparison) -> str:
     """What a user should know of one record, in two or three sentences."""
     sentences = [_how_good(comparison)]
     if comparison.prediction.error >= HOPELESS:
@@ -158,11 +158,12 @@ def _along(along: AlongTime) -> str:
 def says_of_all(comparisons: Sequence[Comparison], moving: Sequence[Level]) -> str:
     """The same of several records: the worst of them, and whether the coefficients move between levels."""
     if len(comparisons) == 1:
-        return says(comparisons[0])
+        return comparison_in_words(comparisons[0])
     worst = max(comparisons, key=lambda c: c.prediction.structure)
     moved = [level for level in moving if level.moves]
     names = ", ".join(f"{level.key} by {percent(level.change)}" for level in moved)
     levels = f"coefficients move with the level: {names}" if moved else "no coefficient moves with the level"
     if not moving:
         levels = "no coefficient was fitted"
-    return f"{worst.record.name} (the worst of {len(comparisons)}): {says(worst)} {levels[0].upper() + levels[1:]}."
+    which = f"{worst.record.name} (the worst of {len(comparisons)})"
+    return f"{which}: {comparison_in_words(worst)} {levels[0].upper() + levels[1:]}."

@@ -70,7 +70,7 @@ def separated(
     return model, marked, tuple(separate)
 
 
-def by_record(
+def levels_by_record(
     comparison: Comparison, separate: Sequence[Separate], records: Sequence[Record]
 ) -> tuple[Level, ...]:  # fmt: skip
     """The separate coefficients by record, in the order of the records, each with its standard error.
@@ -100,7 +100,7 @@ def rows(levels: Sequence[Level], records: Sequence[Record]) -> list[dict[str, A
     ]  # fmt: skip
 
 
-def table(levels: Sequence[Level], records: Sequence[Record]) -> str:
+def record_table(levels: Sequence[Level], records: Sequence[Record]) -> str:
     """The same for people: a row a coefficient, a column a record."""
     heads = ["", *(record.name for record in records), "differs?", "unit"]
     body = [

@@ -17,7 +17,7 @@ MODEL: dict[str, Any] = {"color": "C0", "linewidth": 1.3, "label": "model"}
 BAND: dict[str, Any] = {"color": "black", "linestyle": (0, (1.0, 1.5)), "linewidth": 1.2}
 
 
-def magnitude(axes: Axes, functions: ResponseFunctions, unit: str, highest: float) -> Axes:
+def response_magnitude(axes: Axes, functions: ResponseFunctions, unit: str, highest: float) -> Axes:
     """|H(f)| measured, with the 95 % band of its random error, and predicted."""
     measured, predicted = functions.magnitude
     half = 1.96 * functions.error
@@ -34,7 +34,7 @@ def magnitude(axes: Axes, functions: ResponseFunctions, unit: str, highest: floa
     return _frequencies(axes, highest)
 
 
-def phase(axes: Axes, functions: ResponseFunctions, highest: float) -> Axes:
+def response_phase(axes: Axes, functions: ResponseFunctions, highest: float) -> Axes:
     """Phase of H(f) in degrees."""
     for values, look in zip(functions.phase, (MEASURED, MODEL), strict=True):
         gaps = np.concatenate([[False], np.abs(np.diff(values)) > 180.0])
@@ -45,7 +45,7 @@ def phase(axes: Axes, functions: ResponseFunctions, highest: float) -> Axes:
     return _frequencies(axes, highest)
 
 
-def coherence(axes: Axes, functions: ResponseFunctions, highest: float) -> Axes:
+def coherence_panel(axes: Axes, functions: ResponseFunctions, highest: float) -> Axes:
     """Ordinary coherence of force and response, of the record and of the model's free run."""
     axes.plot(functions.frequency, functions.coherence, **MEASURED)
     axes.plot(functions.frequency, functions.coherence_predicted, **MODEL)
@@ -80,7 +80,7 @@ def _banded(axes: Axes, band: float, label: str) -> Axes:
     return axes
 
 
-def histogram(axes: Axes, checks: ResidualChecks) -> Axes:
+def residual_histogram(axes: Axes, checks: ResidualChecks) -> Axes:
     """Distribution of the residual beside the normal density of its standard deviation."""
     axes.stairs(checks.counts, checks.edges, fill=True, color="0.8", label="residual")
     x = np.linspace(float(checks.edges[0]), float(checks.edges[-1]), 201).astype(np.float64)

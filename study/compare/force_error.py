@@ -75,7 +75,7 @@ def force_error(model: Model, prediction: Prediction) -> ForceError:
     prepared, noise = prediction.prepared, prediction.noise
     record, (first, last) = prepared.record, prepared.inner(prepared.plan.judge)
     inputs = reverse_inputs(model)
-    if prepared.free:  # its inertia force is what the others have to balance
+    if prepared.free or not np.any(record["force"][first:last]):  # the inertia force is what the others balance
         inputs = without_inertia(inputs)
         record = record.with_channels({"force": -model.numbers()["m"] * record["acceleration"]})
     channels = [h[first:last] for h in histories(inputs, record)]

@@ -13,7 +13,7 @@ REACH = 0.001  # quantile at each end where map and curves end
 
 
 @dataclass(frozen=True)
-class Curve:
+class ForceCurve:
     """Mean missing force in classes of a quantity; arrays of shape (classes,)."""
 
     at: Floats  # mean of the quantity in the class
@@ -31,7 +31,7 @@ class Surface:
     error: Floats  # standard error of the mean; shape (cells, cells)
 
 
-def curve(at: Floats, force: Floats) -> Curve:
+def curve(at: Floats, force: Floats) -> ForceCurve:
     """Mean force against a quantity, in classes of equal width that hold enough visits."""
     bounds = edges(at, CLASSES)
     place = np.searchsorted(bounds, at) - 1
@@ -39,7 +39,7 @@ def curve(at: Floats, force: Floats) -> Curve:
     mean, error, visits = _means(place, force, inside, CLASSES)
     centre = _means(place, at, inside, CLASSES)[0]
     keep = visits >= FEWEST
-    return Curve(centre[keep], mean[keep], error[keep])
+    return ForceCurve(centre[keep], mean[keep], error[keep])
 
 
 def surface(u: Floats, v: Floats, force: Floats, cells: int | None = None) -> Surface:

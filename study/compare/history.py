@@ -11,7 +11,7 @@ from typing import Any, cast
 from study.support.errors import StudyError
 from study.support.files import read_text
 from study.support.numbers import percent
-from study.support.transaction import recovered
+from study.support.transaction import recover
 from study.support.yaml_text import shown
 
 Step = dict[str, Any]
@@ -38,12 +38,12 @@ def name_for(model: str) -> str:
     return f"{stem if stem and ending == 'yaml' else f'{stem}.{ending}'}.history.json"
 
 
-def read(model: Path) -> list[Step]:
+def read_history(model: Path) -> list[Step]:
     """The steps so far, oldest first, none where nothing was added; a ``StudyError`` if the file is no history.
 
     What a killed run has left half changed is put back first.
     """
-    recovered(model)
+    recover(model)
     path = path_of(model)
     if not os.path.exists(path):  # noqa: PTH110  (false also for a name that no file can have)
         return []
@@ -94,7 +94,7 @@ def as_bytes(steps: list[Step]) -> bytes:
     return (json.dumps({"steps": steps}, indent=1) + "\n").encode()
 
 
-def climbed(steps: list[Step], before: Step, after: Step) -> list[Step]:
+def with_step(steps: list[Step], before: Step, after: Step) -> list[Step]:
     """The history with a step more; it begins with the model before it, unless that is where it stands."""
     known = steps and steps[-1]["terms"] == before["terms"] and steps[-1]["record"] == before["record"]
     return [*steps, *([] if known else [before]), after]
@@ -117,7 +117,7 @@ def _listed(names: list[str]) -> str:
     )
 
 
-def table(steps: list[Step]) -> str:
+def history_table(steps: list[Step]) -> str:
     """The history for people, one line a model."""
     from tabulate import tabulate
 

@@ -33,13 +33,13 @@ def errors_by_step(axes: Axes, steps: Sequence[dict[str, Any]]) -> Axes:
     return axes
 
 
-def files(steps: Sequence[dict[str, Any]], name: str) -> dict[str, bytes]:
+def history_files(steps: Sequence[dict[str, Any]], name: str) -> dict[str, bytes]:
     """The picture by file name, in the project's style."""
     with in_style():
-        figure, (axes,) = page.page(
+        figure, (axes,) = page.empty_page(
             f"The history of {name}", "every model so far, judged on what was not fitted", panel=3.0, headed=False
         )
         figure.subplots_adjust(bottom=0.26)
         errors_by_step(axes, steps)
-        page.legend(figure, [axes])
-        return page.files({"history": figure})
+        page.shared_legend(figure, [axes])
+        return page.image_files({"history": figure})

@@ -16,10 +16,10 @@ from study.figures import page
 WIDE = 7.2  # inches
 
 
-def decay(comparison: Comparison, found: Decays) -> Figure:
+def decay_figure(comparison: Comparison, found: Decays) -> Figure:
     """Frequency and damping ratio against amplitude, measured and of the fitted model."""
     unit = comparison.record.units.get(comparison.plan.response, "")
-    figure, axes = page.page(
+    figure, axes = page.empty_page(
         f"{comparison.record.name}: free decay", f"model {comparison.model.name}; windows of the analytic signal",
         rows=2, width=WIDE, panel=2.2,
     )  # fmt: skip
@@ -32,7 +32,7 @@ def decay(comparison: Comparison, found: Decays) -> Figure:
         axis.set_ylabel(name)
     axes[1].set_xlabel(f"amplitude of the {comparison.plan.response} ({dimensions.pretty(unit)})")
     page.letter(axes, ("frequency", "damping ratio"))
-    page.legend(figure, axes)
+    page.shared_legend(figure, axes)
     return figure
 
 
@@ -44,12 +44,12 @@ def _points(axis: panels.Axes, found: Decay, what: str) -> None:
     )  # fmt: skip
 
 
-def loops(comparison: Comparison, found: Loops) -> Figure:
+def loops_figure(comparison: Comparison, found: Loops) -> Figure:
     """Force over displacement and over velocity, measured and predicted, and the energy that each cycle takes."""
     record, prediction = comparison.record, comparison.prediction
     part = record.part(*comparison.plan.judge)
     units = {name: dimensions.pretty(record.units.get(name, "")) for name in ("force", "displacement", "velocity")}
-    figure, axes = page.page(
+    figure, axes = page.empty_page(
         f"{record.name}: loops", f"model {comparison.model.name}; the judging part",
         rows=1, columns=3, width=1.45 * WIDE, panel=2.9, share=False,
     )  # fmt: skip
@@ -64,5 +64,5 @@ def loops(comparison: Comparison, found: Loops) -> Figure:
     axes[2].set_xlabel(f"stroke of a cycle ({units['displacement']})")
     axes[2].set_ylabel(f"energy ({units['force']} {units['displacement']})")
     page.letter(axes, ("force over displacement", "over velocity", "dissipated in a cycle"))
-    page.legend(figure, axes)
+    page.shared_legend(figure, axes)
     return figure

@@ -19,7 +19,7 @@ from study.compare.noise import Noise
 from study.compare.prediction import Prediction
 from study.equations import kernels
 from study.equations.model import Model, forward_graph, named_channels, with_registers
-from study.identify.frequency_domain.inputs import history, reverse_inputs
+from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.identify.frequency_domain.starting_values import oscillator
 from study.records.completion import SETTLED, derivative
 from study.records.prepared import FORCE, Prepared
@@ -61,7 +61,7 @@ def missing_force(model: Model, keys: Sequence[str], prediction: Prediction) -> 
     if prediction.prepared.response == FORCE:
         return _along_a_known_motion(keys, prediction)
     noise, prepared = prediction.noise, prediction.prepared
-    gate = above_noise(noise, prepared.band[0])
+    gate = lines_above_noise(noise, prepared.band[0])
     motion = _motion(prediction, gate, noise.frequency)
     part = prepared.record.part(*prepared.plan.judge)
     named = part.with_channels(dict(zip(MOTIONS, motion, strict=True)))
@@ -94,7 +94,7 @@ def _edge(prediction: Prediction, width: float) -> int:
     return min(round(max(memory, settling)), len(prediction.measured) // 8)
 
 
-def above_noise(noise: Noise, low: float) -> NDArray[np.bool_]:
+def lines_above_noise(noise: Noise, low: float) -> NDArray[np.bool_]:
     """Lines on which the residual, averaged over a few of them, surely stands above the noise."""
     few = np.ones(SMOOTH)
     level = np.convolve(noise.residual, few, "same") / np.convolve(np.ones_like(noise.residual), few, "same")
@@ -134,7 +134,9 @@ def unbalanced_force(model: Model, keys: Sequence[str], record: Record) -> Float
     )
     columns = [record["displacement"], record["velocity"], record.time, record["force"]]  # as the registers begin
     columns += [record[name] for name in channels]
-    columns += [history(item, record) for item in reverse_inputs(model) if item.state is not None]  # their memories
+    columns += [
+        input_history(item, record) for item in reverse_inputs(model) if item.state is not None
+    ]  # their memories
     out = np.empty((len(record), 1 + len(keys)))
     kernels.evaluate(
         program.code, program.first, program.registers.copy(), np.arange(len(columns)),

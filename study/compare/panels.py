@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from study.compare.across_levels import Level
 from study.compare.along_time import AlongTime
 from study.compare.force_error import ForceError
-from study.compare.force_map import Curve, Surface
+from study.compare.force_map import ForceCurve, Surface
 from study.equations import dimensions
 from study.figures import labels
 
@@ -30,7 +30,7 @@ NOISE: dict[str, Any] = {"color": "black", "linestyle": (0, (1.0, 1.5)), "linewi
 FLOOR = 1e-6  # shares below are drawn there
 
 
-def history(axes: Axes, time: Floats, values: Floats, look: dict[str, Any], **more: Any) -> Axes:
+def time_history(axes: Axes, time: Floats, values: Floats, look: dict[str, Any], **more: Any) -> Axes:
     """A history, or, if it is long, the band between its extremes in each column of the picture."""
     if len(values) <= 2 * COLUMNS:
         style: dict[str, Any] = {"linewidth": 0.9, **look, **more}
@@ -43,26 +43,26 @@ def history(axes: Axes, time: Floats, values: Floats, look: dict[str, Any], **mo
     return axes
 
 
-def response(axes: Axes, time: Floats, measured: Floats, predicted: Floats, unit: str) -> Axes:
+def response_panel(axes: Axes, time: Floats, measured: Floats, predicted: Floats, unit: str) -> Axes:
     """Measured and predicted response."""
     factor, shown = labels.prefixed(unit, float(np.max(np.abs(measured))))
     close = len(time) <= CLOSE
-    history(axes, *broken(time, measured / factor), MEASURED, linewidth=2.6 if close else 0.6)
+    time_history(axes, *with_breaks(time, measured / factor), MEASURED, linewidth=2.6 if close else 0.6)
     dashed = {"linestyle": (0, (3.0, 1.2)), "linewidth": 1.3} if close else {"alpha": 0.75, "linewidth": 0.6}
-    history(axes, *broken(time, predicted / factor), PREDICTED, **dashed)
+    time_history(axes, *with_breaks(time, predicted / factor), PREDICTED, **dashed)
     return _time_axis(axes, time, f"response ({dimensions.pretty(shown)})")
 
 
 def residual(axes: Axes, time: Floats, difference: Floats, noise: float, unit: str) -> Axes:
     """What the model misses, beside twice the noise floor."""
     factor, shown = labels.prefixed(unit, float(np.max(np.abs(difference))))
-    history(axes, *broken(time, difference / factor), RESIDUAL)
+    time_history(axes, *with_breaks(time, difference / factor), RESIDUAL)
     for k, side in enumerate((-2.0, 2.0)):
         axes.axhline(side * noise / factor, label="twice the rms of the noise" if k else None, zorder=3.0, **NOISE)
     return _time_axis(axes, time, f"difference ({dimensions.pretty(shown)})")
 
 
-def broken(time: Floats, values: Floats) -> tuple[Floats, Floats]:
+def with_breaks(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Times and values with one that is none wherever time is left out, so that no line is drawn across."""
     steps = np.diff(time)
     places = 1 + np.flatnonzero(np.abs(steps - np.median(steps)) > 0.5 * np.median(steps))
@@ -76,7 +76,7 @@ def _time_axis(axes: Axes, time: Floats, label: str) -> Axes:
     return axes
 
 
-def force_error(axes: Axes, error: ForceError, highest: float) -> Axes:
+def force_error_panel(axes: Axes, error: ForceError, highest: float) -> Axes:
     """Unexplained share of the force, line by line; shaded where the motion stands above its noise."""
     keep = (error.frequency > 0.0) & (error.frequency <= highest)
     f = error.frequency[keep]
@@ -106,7 +106,7 @@ def _shown(share: Floats) -> Floats:
     return np.maximum(share, FLOOR)
 
 
-def missing_force(axes: Axes, plane: Surface, unit: dict[str, str]) -> Axes:
+def missing_force_panel(axes: Axes, plane: Surface, unit: dict[str, str]) -> Axes:
     """Mean missing force over displacement and velocity; a dot marks a cell whose mean may be noise."""
     factor, shown = labels.prefixed(unit["displacement"], float(np.max(np.abs(plane.displacement))))
     rate, rate_shown = _rate(unit["velocity"], plane.velocity)
@@ -131,7 +131,7 @@ def missing_force(axes: Axes, plane: Surface, unit: dict[str, str]) -> Axes:
     return axes
 
 
-def force_curve(axes: Axes, curve: Curve, against: str, unit: dict[str, str]) -> Axes:
+def force_curve(axes: Axes, curve: ForceCurve, against: str, unit: dict[str, str]) -> Axes:
     """Mean missing force against displacement or velocity, with 95 % intervals."""
     largest = float(np.max(np.abs(curve.at), initial=0.0))
     scaled = labels.prefixed(unit[against], largest) if against == "displacement" else _rate(unit[against], curve.at)

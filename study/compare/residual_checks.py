@@ -42,8 +42,8 @@ def residual_checks(prediction: Prediction) -> ResidualChecks:
     force = prepared.record[drive_of(prepared)][slice(*prepared.plan.judge)]
     force = force - np.mean(force)
     n, lags = len(residual), min(LAGS, len(residual) // 4)
-    own, drive = correlation(residual, residual, lags), correlation(force, force, lags)
-    both = correlation(residual, force, lags)
+    own, drive = cross_correlation(residual, residual, lags), cross_correlation(force, force, lags)
+    both = cross_correlation(residual, force, lags)
     quantile = float(ndtri(0.5 + LEVEL / 2.0))
     # n times the variance of an estimated cross-correlation is the sum of the autocorrelations' products (Ljung, 16.6)
     spread = max(float(np.sum(own * drive)), 0.0)
@@ -57,7 +57,7 @@ def residual_checks(prediction: Prediction) -> ResidualChecks:
     )  # fmt: skip
 
 
-def correlation(later: Floats, earlier: Floats, lags: int) -> Floats:
+def cross_correlation(later: Floats, earlier: Floats, lags: int) -> Floats:
     """Correlation of two signals without mean at lags from -(lags - 1) to lags - 1 samples, shape (2 lags - 1,).
 
     At a positive lag the first follows the second. Each lag's sum is over n, as for the estimate with least error.

@@ -23,7 +23,7 @@ NEVER_CANDIDATES = ("inertia",)
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class FittedCandidate:
     """A candidate as fitted."""
 
     term: Term  # the effect
@@ -44,11 +44,11 @@ def candidate_terms(base: Baseline, extra: Sequence[Term] = (), without: Sequenc
 
 def try_all(
     terms: Sequence[Term], base: Baseline, prepared: Prepared, progress: Callable[[int], None] | None = None
-) -> list[Candidate]:
+) -> list[FittedCandidate]:
     """Fit and judge every candidate; those that cannot be fitted are left out."""
-    done: list[Candidate] = []
+    done: list[FittedCandidate] = []
 
-    def fitted(term: Term) -> Candidate | None:
+    def fitted(term: Term) -> FittedCandidate | None:
         return attempt(term, base, prepared)
 
     with ThreadPoolExecutor(cores()) as pool:
@@ -60,16 +60,16 @@ def try_all(
     return done
 
 
-def attempt(term: Term, base: Baseline, prepared: Prepared) -> Candidate | None:
+def attempt(term: Term, base: Baseline, prepared: Prepared) -> FittedCandidate | None:
     """The model with a candidate as a search fits it; None where it has no finite response."""
     found = _attempt(free(term), base, prepared)
     plainer = _plainer(term) if prepared.response == FORCE and (found is None or found.unphysical) else None
     return found if plainer is None else _attempt(plainer, base, prepared) or found
 
 
-def _attempt(entry: ModelTerm, base: Baseline, prepared: Prepared) -> Candidate | None:
+def _attempt(entry: ModelTerm, base: Baseline, prepared: Prepared) -> FittedCandidate | None:
     try:
-        return judged(entry.term, with_term(base.fit, entry, base, prepared), prepared)
+        return judged_candidate(entry.term, with_term(base.fit, entry, base, prepared), prepared)
     except StudyError:
         return None
 
@@ -83,19 +83,19 @@ def _plainer(term: Term) -> ModelTerm | None:
     return replace(free(term), parameters=fixed) if any(value == 0.0 for value in fixed) else None
 
 
-def judged(term: Term, fit: FreeRunFit, prepared: Prepared) -> Candidate | None:
+def judged_candidate(term: Term, fit: FreeRunFit, prepared: Prepared) -> FittedCandidate | None:
     """A fitted candidate with its prediction; None where its free run does not stay finite."""
     prediction = predict(fit, prepared)
-    return None if prediction.diverged else Candidate(term, fit, prediction)
+    return None if prediction.diverged else FittedCandidate(term, fit, prediction)
 
 
-def all_settled(candidates: Sequence[Candidate], prepared: Prepared) -> list[Candidate]:
+def all_settled(candidates: Sequence[FittedCandidate], prepared: Prepared) -> list[FittedCandidate]:
     """Candidates fitted to the whole fitting part and with enough steps, as they would be if they were added."""
 
-    def settle(candidate: Candidate) -> Candidate:
+    def settle(candidate: FittedCandidate) -> FittedCandidate:
         try:
             fit = finished(candidate.fit, prepared)
-            return judged(candidate.term, fit, prepared) or candidate
+            return judged_candidate(candidate.term, fit, prepared) or candidate
         except StudyError:
             return candidate
 

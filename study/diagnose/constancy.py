@@ -28,7 +28,7 @@ BLOCK = 64  # samples: long against a period, short against the swell of the amp
 
 
 @dataclass(frozen=True)
-class Curve:
+class CoefficientCurve:
     """A coefficient along something."""
 
     at: Floats  # centre frequency in Hz, or amplitude relative to the mean; shape (n,)
@@ -50,7 +50,7 @@ class Curve:
         return float(share / abs(mean)) if mean != 0.0 else np.inf
 
 
-def along_frequency(sensitivity: Floats, residual: Floats, coefficient: float, dt: float) -> Curve:
+def along_frequency(sensitivity: Floats, residual: Floats, coefficient: float, dt: float) -> CoefficientCurve:
     """The coefficient in bands that hold equal shares of the sensitivity's power."""
     taper = np.hanning(len(residual))
     s, e = np.asarray(rfft(sensitivity * taper)), np.asarray(rfft(residual * taper))
@@ -59,7 +59,9 @@ def along_frequency(sensitivity: Floats, residual: Floats, coefficient: float, d
     frequency = np.asarray(rfftfreq(len(residual), dt))
     rows = [_band(s[a:b], e[a:b], frequency[a:b]) for a, b in pairwise(edges) if b - a > 3]
     change = np.array([row[1] for row in rows], dtype=np.complex128)
-    return Curve(np.array([row[0] for row in rows]), coefficient + change, np.array([row[2] for row in rows]))
+    return CoefficientCurve(
+        np.array([row[0] for row in rows]), coefficient + change, np.array([row[2] for row in rows])
+    )
 
 
 def _equal_shares(power: Floats, count: int) -> list[int]:
@@ -77,7 +79,7 @@ def _band(s: Complexes, e: Complexes, frequency: Floats) -> tuple[float, complex
     return float(np.sum(np.abs(s) ** 2 * frequency) / power), change, float(error)
 
 
-def along_amplitude(sensitivity: Floats, residual: Floats, coefficient: float) -> Curve:
+def along_amplitude(sensitivity: Floats, residual: Floats, coefficient: float) -> CoefficientCurve:
     """The coefficient in classes of blocks, from those where the effect is weak to those where it is strong."""
     count = len(residual) // BLOCK
     s = sensitivity[: count * BLOCK].reshape(count, BLOCK)
@@ -98,7 +100,7 @@ def along_amplitude(sensitivity: Floats, residual: Floats, coefficient: float) -
         at.append((float(np.mean(own[rows])) / float(np.mean(own))) ** 0.5)
         value.append(coefficient + change)
         error.append(max(float(np.sqrt(np.sum(scatter**2)) / power), float(np.sqrt(noise / power))))
-    return Curve(np.array(at), np.array(value, dtype=np.complex128), np.array(error))
+    return CoefficientCurve(np.array(at), np.array(value, dtype=np.complex128), np.array(error))
 
 
 def _noise(own: Floats, cross: Floats) -> float:
@@ -107,7 +109,9 @@ def _noise(own: Floats, cross: Floats) -> float:
     return float(np.mean((cross - change * own) ** 2 / np.maximum(own, np.finfo(float).tiny)))
 
 
-def curves(fit: FreeRunFit, term: Term, prepared: Prepared, jacobian: Floats) -> tuple[Curve | None, Curve | None]:
+def curves(
+    fit: FreeRunFit, term: Term, prepared: Prepared, jacobian: Floats
+) -> tuple[CoefficientCurve | None, CoefficientCurve | None]:
     """The coefficient of a term in a fitted model along frequency and along amplitude.
 
     ``jacobian`` is :func:`linearise` of the fit. None where the coefficient is zero, or the model's others could do all
@@ -131,11 +135,11 @@ def curves(fit: FreeRunFit, term: Term, prepared: Prepared, jacobian: Floats) ->
     return bands if len(bands.at) else None, classes if len(classes.at) else None
 
 
-def changes(*along: Curve | None) -> float:
+def changes(*along: CoefficientCurve | None) -> float:
     """The largest relative change of a coefficient along any of these; nan where it was followed along none."""
     return max((c.spread() for c in along if c is not None), default=math.nan)
 
 
-def wavers(steady: Curve | None, asked: int) -> bool:
+def wavers(steady: CoefficientCurve | None, asked: int) -> bool:
     """Whether a coefficient, of so many that are asked for, moves with the amplitude, by more than integration does."""
     return steady is not None and steady.p_value() * asked < ALPHA and steady.spread() > TOLERANCE

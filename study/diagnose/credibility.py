@@ -7,7 +7,7 @@ from study.support.numbers import percent
 from study.support.thresholds import ALPHA, TOLERANCE
 
 
-class Judged(Protocol):
+class HeldOutPrediction(Protocol):
     """A held-out prediction."""
 
     @property
@@ -16,7 +16,9 @@ class Judged(Protocol):
         ...
 
 
-def credible(before: Judged, after: Judged, interval: tuple[float, float], p_value: float) -> bool:
+def credible(
+    before: HeldOutPrediction, after: HeldOutPrediction, interval: tuple[float, float], p_value: float
+) -> bool:
     """Whether a model with an effect is better than one without.
 
     Parameters
@@ -31,7 +33,7 @@ def credible(before: Judged, after: Judged, interval: tuple[float, float], p_val
     return certain(before, after, interval, p_value) and percent(before.error) != percent(after.error)
 
 
-def certain(before: Judged, after: Judged, interval: tuple[float, float], p_value: float) -> bool:
+def certain(before: HeldOutPrediction, after: HeldOutPrediction, interval: tuple[float, float], p_value: float) -> bool:
     """The same, whether or not the gain shows in the digits printed: much noise hides there what is no chance.
 
     An effect that is certain but not credible is neither called missing nor, where it is in the model, needless.

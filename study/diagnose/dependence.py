@@ -100,7 +100,7 @@ def explained_by(left: Unexplained) -> dict[str, float]:
     return {name: gain.explained for name, gain in _families(left).items()}
 
 
-def significant(left: Unexplained, level: float) -> float:
+def significant_share(left: Unexplained, level: float) -> float:
     """Largest held-out share that shapes of the motion, its past or time explain, and not by chance.
 
     All families of shapes are asked, and each shape of the motion and its past by itself: one coefficient sees less
@@ -130,7 +130,7 @@ def _one_by_one(left: Unexplained, columns: Floats) -> list[Gain]:
     power = np.sum(early[:, 1:] ** 2, axis=0)
     each = early[:, 1:].T @ early[:, 0] / np.where(power > 0.0, power, np.inf)
     before, beside_own = left.residual[left.split :], _beside_own(left)
-    return [statistics.beside(before, a * late[:, i], beside_own) for i, a in enumerate(each, 1)]
+    return [statistics.gain_beside(before, a * late[:, i], beside_own) for i, a in enumerate(each, 1)]
 
 
 def _formulas(u: float, v: float) -> dict[str, list[str]]:
@@ -209,7 +209,7 @@ def _held_out(left: Unexplained, columns: Floats) -> Gain:
     early, late = design[: left.split], design[left.split :]
     amounts = least_squares(early, left.residual[: left.split], 1e-6)
     amounts[: left.own.shape[1]] -= least_squares(left.own[: left.split], left.residual[: left.split], 1e-6)
-    return statistics.beside(left.residual[left.split :], late @ amounts, _beside_own(left))
+    return statistics.gain_beside(left.residual[left.split :], late @ amounts, _beside_own(left))
 
 
 def _beside_own(left: Unexplained) -> Floats:

@@ -5,36 +5,37 @@ from typing import Any
 
 from study.compare.comparison_report import as_json, where
 from study.diagnose import diagnosis_pages, diagnosis_report
-from study.diagnose.diagnosis_sentences import sentences
+from study.diagnose.diagnosis_pictures import PicturedDiagnosis
+from study.diagnose.diagnosis_sentences import diagnosis_sentences
 from study.diagnose.force_between import reading_in_words
-from study.diagnose.needless import Needless, fields, paragraph
+from study.diagnose.needless import Needless, Unneeded, needless_fields, needless_in_words
 from study.diagnose.separating_test import advice
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
 from study.faults import fault
 from study.faults.fault import Fault
 
 
-def in_words(diagnosis: Diagnosis) -> str:
+def diagnosis_in_words(diagnosis: Diagnosis) -> str:
     """A diagnosis in sentences, with the test that would tell tied candidates apart."""
-    said = sentences(diagnosis)
+    said = diagnosis_sentences(diagnosis)
     if diagnosis.verdict == MISSING:
         said.append(advice(diagnosis.candidates, diagnosis.comparison.prepared))
-    said += [f"{note[0].upper()}{note[1:]}." for note in chosen(diagnosis.comparison.notes)]
+    said += [f"{note[0].upper()}{note[1:]}." for note in choices_in_words(diagnosis.comparison.notes)]
     said.append(reading_in_words(diagnosis.comparison))
     return " ".join(s for s in said if s)
 
 
-def chosen(notes: Sequence[str]) -> list[str]:
+def choices_in_words(notes: Sequence[str]) -> list[str]:
     """What was chosen for the user, who may choose else, and a sampling that is too coarse: said beside the verdict."""
     return [note for note in notes if "(--" in note or "too coarsely" in note]
 
 
-def unneeded_in_words(found: Sequence[Needless], diagnosis: Diagnosis) -> str:
-    """Which terms the diagnosed model does not need, in sentences; empty if it needs all."""
-    return paragraph(found, complete=diagnosis.verdict == NOTHING)
+def unneeded_in_words(found: Sequence[Unneeded], diagnosis: PicturedDiagnosis) -> str:
+    """Which terms the diagnosed model does not need, at a place or without one, in sentences; empty if it needs all."""
+    return needless_in_words(found, complete=diagnosis.verdict == NOTHING)
 
 
-def files(
+def diagnosis_files(
     diagnosis: Diagnosis, words: str, unneeded: Sequence[Needless] = (), faults: Sequence[Fault] = (),
     unfitted: Mapping[str, str] | None = None, by_record: Sequence[Mapping[str, Any]] = (),
 ) -> dict[str, bytes]:  # fmt: skip
@@ -45,12 +46,12 @@ def files(
     ``by_record`` the coefficients that may differ between records.
     """
     comparison = diagnosis.comparison
-    content = diagnosis_report.fields(diagnosis)
+    content = diagnosis_report.diagnosis_fields(diagnosis)
     content |= {"record": comparison.record.name, "where": where(comparison), "says": words}
-    content["not_needed"] = fields(unneeded)
+    content["not_needed"] = needless_fields(unneeded)
     content["not_fitted"] = dict(unfitted or {})
     content |= {"notes": list(comparison.notes), "every_sample": comparison.prepared.every}
-    content |= {"measurement": [fault.fields(f) for f in faults]}
+    content |= {"measurement": [fault.fault_fields(f) for f in faults]}
     if by_record:
         content["coefficients_by_record"] = list(by_record)
-    return {"diagnosis.json": as_json(content)} | diagnosis_pages.files(diagnosis, comparison.record.name)
+    return {"diagnosis.json": as_json(content)} | diagnosis_pages.picture_files(diagnosis, comparison.record.name)

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from matplotlib.axes import Axes
 
-from study.diagnose.constancy import Curve
+from study.diagnose.constancy import CoefficientCurve
 from study.figures.labels import term_names
 from study.support.numbers import percent
 from study.support.statistics import Gain
@@ -19,7 +19,7 @@ LEAST = -30.0  # per cent: a candidate that explains less than nothing is drawn 
 FURTHEST = (-4.0, 6.0)  # of a coefficient, relative to its value: what lies beyond is no constant
 
 
-class Row(Protocol):
+class PicturedCandidate(Protocol):
     """What the pictures show of a candidate, at a place or without one."""
 
     @property
@@ -43,12 +43,12 @@ class Row(Protocol):
         ...
 
     @property
-    def flatness(self) -> Curve | None:
+    def flatness(self) -> CoefficientCurve | None:
         """The coefficient along frequency."""
         ...
 
     @property
-    def steadiness(self) -> Curve | None:
+    def steadiness(self) -> CoefficientCurve | None:
         """The coefficient along amplitude."""
         ...
 
@@ -68,7 +68,7 @@ class _Compared(Protocol):
     def prediction(self) -> _Judged: ...
 
 
-class Found(Protocol):
+class PicturedDiagnosis(Protocol):
     """What they show of a diagnosis, of a structure or of a single mass."""
 
     @property
@@ -77,7 +77,7 @@ class Found(Protocol):
         ...
 
     @property
-    def candidates(self) -> Sequence[Row]:
+    def candidates(self) -> Sequence[PicturedCandidate]:
         """Best first."""
         ...
 
@@ -87,7 +87,7 @@ class Found(Protocol):
         ...
 
 
-def ranking(axes: Axes, diagnosis: Found) -> Axes:
+def ranking(axes: Axes, diagnosis: PicturedDiagnosis) -> Axes:
     """Share of the held-out difference that each candidate explains, with its standard error."""
     rows = diagnosis.candidates[:SHOWN]
     place = np.arange(len(rows))
@@ -110,12 +110,12 @@ def ranking(axes: Axes, diagnosis: Found) -> Axes:
     return axes
 
 
-def _label(row: Row, first: Row) -> str:
+def _label(row: PicturedCandidate, first: PicturedCandidate) -> str:
     tied = row.name in first.tied_with or (row is first and bool(first.tied_with))
     return term_names(row.name) + (" (tie)" if tied else "")
 
 
-def constancy(frequency: Axes, amplitude: Axes, rows: Sequence[Row]) -> None:
+def constancy_panels(frequency: Axes, amplitude: Axes, rows: Sequence[PicturedCandidate]) -> None:
     """The coefficient of the first candidates along frequency and amplitude, relative to its value."""
     followed(frequency, rows, "frequency")
     followed(amplitude, rows, "amplitude")
@@ -125,7 +125,7 @@ def constancy(frequency: Axes, amplitude: Axes, rows: Sequence[Row]) -> None:
     amplitude.set_ylabel("")
 
 
-def followed(axes: Axes, rows: Sequence[Row], along: str) -> Axes:
+def followed(axes: Axes, rows: Sequence[PicturedCandidate], along: str) -> Axes:
     """The coefficient of candidates along ``frequency`` or ``amplitude``, relative to its value."""
     low, high = -0.5, 2.5
     styles = (("o", "-", "0.1"), ("s", "--", "0.45"), ("^", ":", "0.6"))

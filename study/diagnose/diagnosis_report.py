@@ -8,12 +8,13 @@ from tabulate import tabulate
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import Diagnosis
 from study.support.numbers import percent
+from study.support.statistics import Gain
 
 TIES = 2  # ties named in the table; the file names all
 SHOWN = 8  # candidates in the table on the screen
 
 
-def table(diagnosis: Diagnosis) -> str:
+def candidate_table(diagnosis: Diagnosis) -> str:
     """The first candidates as a person reads them in ten seconds."""
     head = ["", "effect", "explains", "error with it", "coefficient", "p", "changes by", "tied with"]
     units = diagnosis.comparison.record.units
@@ -28,10 +29,15 @@ def _shown(place: int, row: Ranked, force: str, length: str) -> list[str]:
     unit = row.term.unit(row.term.symbols[0], force, length)
     half = 1.96 * row.error
     return [
-        str(place), row.name, percent(row.gain.explained, "z.1f", row.gain.error, ".1f"), percent(row.response_error),
+        str(place), row.name, _share(row.gain), percent(row.response_error),
         f"{row.coefficient:.4g} +- {half:.2g} {unit}", f"{row.p_value:.1g}",
         percent(row.unsteadiness, ".0f") if math.isfinite(row.unsteadiness) else "-", _few(row.tied_with),
     ]  # fmt: skip
+
+
+def _share(gain: Gain) -> str:
+    """The share explained; of what leaves twice as much as there was, how much more matters to nobody."""
+    return "below -100 %" if gain.explained < -1.0 else percent(gain.explained, "z.1f", gain.error, ".1f")
 
 
 def _few(names: tuple[str, ...]) -> str:
@@ -39,7 +45,7 @@ def _few(names: tuple[str, ...]) -> str:
     return f"{shown} and {len(names) - TIES} more" if len(names) > TIES else shown
 
 
-def fields(diagnosis: Diagnosis) -> dict[str, Any]:
+def diagnosis_fields(diagnosis: Diagnosis) -> dict[str, Any]:
     """What ``diagnosis.json`` holds of the diagnosis itself; candidates best first."""
     prediction = diagnosis.comparison.prediction
     return {

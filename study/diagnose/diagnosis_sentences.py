@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from study.diagnose.constancy import wavers
-from study.diagnose.held_out import evidence, held_out_of
+from study.diagnose.held_out import held_out_of, residual_held_out
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
 from study.figures.labels import term_names
@@ -16,7 +16,7 @@ NAMED = 3  # effects that cannot be told apart, before the others are counted
 CLOSE = 0.05  # families this close to the best one are named with it
 
 
-def sentences(diagnosis: Diagnosis) -> list[str]:
+def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
     """What to tell the engineer."""
     if diagnosis.verdict == NOTHING:
         return [_nothing(diagnosis)]
@@ -44,7 +44,10 @@ def _before_and_after(diagnosis: Diagnosis, first: Ranked) -> str:
     errors = percent(comparison.prediction.error), percent(first.response_error)
     seen = first.response_error < comparison.prediction.error and errors[0] != errors[1]
     if comparison.record.stretches and not seen:
-        both = evidence(comparison.prediction, held_out_of(comparison)), evidence(first.prediction, first.held_out)
+        both = (
+            residual_held_out(comparison.prediction, held_out_of(comparison)),
+            residual_held_out(first.prediction, first.held_out),
+        )
         return f"{percent(both[0].error)} to {percent(both[1].error)}, of all stretches as the others predict them"
     return f"{errors[0]} to {errors[1]}"
 

@@ -67,7 +67,7 @@ def fitted_without(fit: FreeRunFit, name: str, prepared: Prepared, start: dict[s
             continue
 
 
-def dropped(comparison: Comparison, name: str) -> Comparison:
+def compared_without(comparison: Comparison, name: str) -> Comparison:
     """The comparison of the model without one of its terms, all that it does not hold fitted again.
 
     Raises

@@ -34,35 +34,35 @@ class HeldOut:
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class HeldOutResidual:
     """What a model leaves of samples that it was not fitted to, as far as it counts for or against it."""
 
     residual: Floats
     error: float  # rms of it over that of the response
 
 
-def evidence(prediction: Prediction, held: HeldOut) -> Evidence:
+def residual_held_out(prediction: Prediction, held: HeldOut) -> HeldOutResidual:
     """The judging part's residual; with stretches to fit and to judge in turn, those of both parts.
 
     The first stretch of a decay is the loudest, and is fitted: what shows there alone is seen the other way round.
     """
     prepared = prediction.prepared
     if not (prepared.record.stretches and len(held.fitted)):
-        return Evidence(prediction.residual, prediction.error)
+        return HeldOutResidual(prediction.residual, prediction.error)
     both = np.concatenate([held.judged, held.fitted])
     size = float(np.std(np.concatenate([prediction.above(prepared.judged), prediction.above(prepared.fitted)])))
-    return Evidence(both, float(np.sqrt(np.mean(both**2))) / size)
+    return HeldOutResidual(both, float(np.sqrt(np.mean(both**2))) / size)
 
 
-def evidence_of(fit: FreeRunFit, prediction: Prediction, both: bool = True) -> Evidence:
+def evidence_of(fit: FreeRunFit, prediction: Prediction, both: bool = True) -> HeldOutResidual:
     """The same of a fitted model; of the judging part alone unless ``both`` count."""
     prepared = prediction.prepared
     if not (both and prepared.record.stretches):
-        return Evidence(prediction.residual, prediction.error)
-    return evidence(prediction, held_out(fit, prediction, linearise(fit, prepared), prepared))
+        return HeldOutResidual(prediction.residual, prediction.error)
+    return residual_held_out(prediction, held_out(fit, prediction, linearise(fit, prepared), prepared))
 
 
-def alike(one: Evidence, other: Evidence) -> bool:
+def alike(one: HeldOutResidual, other: HeldOutResidual) -> bool:
     """Whether two models have been judged on the same samples."""
     return len(one.residual) == len(other.residual)
 

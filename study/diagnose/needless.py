@@ -13,7 +13,7 @@ from study.compare.comparison import Comparison
 from study.compare.prediction import Prediction, predict
 from study.diagnose.credibility import certain
 from study.diagnose.dropping import fitted_without, removal
-from study.diagnose.held_out import Evidence, alike, evidence_of
+from study.diagnose.held_out import HeldOutResidual, alike, evidence_of
 from study.equations.model import ModelTerm
 from study.figures.labels import term_names
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -116,7 +116,7 @@ def needless(comparison: Comparison, besides: Collection[str] = ()) -> tuple[Nee
     return tuple(found)
 
 
-def paragraph(found: Sequence[Unneeded], any_more: bool = False, complete: bool = True) -> str:
+def needless_in_words(found: Sequence[Unneeded], any_more: bool = False, complete: bool = True) -> str:
     """What to tell of all of them; empty if there are none. ``complete`` is false where an effect is missing."""
     said = [n.sentence(any_more) for n in found]
     if found and not complete:
@@ -135,13 +135,13 @@ def of_records(names: Sequence[str], found: Sequence[Sequence[Needless]], any_mo
         return ""
     several = len(names) > 1
     said = [
-        (f"{name}: " if several else "") + paragraph([n for n in row if n.name in common], any_more)
+        (f"{name}: " if several else "") + needless_in_words([n for n in row if n.name in common], any_more)
         for name, row in zip(names, found, strict=True)
     ]
     return " ".join([*said, "'study drop' takes a term out."])
 
 
-def fields(found: Sequence[Unneeded]) -> list[dict[str, Any]]:
+def needless_fields(found: Sequence[Unneeded]) -> list[dict[str, Any]]:
     """The same for files, the one whose loss costs least first."""
     return [
         {"term": n.name, "error_with": n.error_with, "error_without": n.error_without, "p_value": n.p_value,
@@ -191,7 +191,7 @@ class _Stage:
                 break
         return None
 
-    def _evidence(self, fit: FreeRunFit, without: Prediction, both: bool) -> list[Evidence]:
+    def _evidence(self, fit: FreeRunFit, without: Prediction, both: bool) -> list[HeldOutResidual]:
         """What a model without a term leaves, this one and the one that was given; of both parts if all have them.
 
         A frequency was picked by the fitting part's own chance, which bears no witness of it then.

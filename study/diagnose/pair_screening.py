@@ -15,7 +15,7 @@ from scipy.fft import rfft, rfftfreq
 
 from study.diagnose.ranked import Ranked
 from study.equations.model import Model, ModelTerm
-from study.identify.frequency_domain.inputs import history, reverse_inputs, without_inertia
+from study.identify.frequency_domain.inputs import input_history, reverse_inputs, without_inertia
 from study.identify.frequency_domain.starting_values import FAINT
 from study.identify.time_domain.shape_search import Baseline, sensitivity
 from study.records.prepared import Prepared
@@ -34,7 +34,7 @@ class PairStart:
     model: Model  # the model with both, every value given
 
 
-def promising(rows: Sequence[Ranked], base: Baseline, prepared: Prepared) -> list[PairStart]:
+def promising_pairs(rows: Sequence[Ranked], base: Baseline, prepared: Prepared) -> list[PairStart]:
     """The best pairs of the reverse system and those of the sensitivities; the same pair may begin at both places.
 
     ``rows`` are the candidates with their shape parameters.
@@ -113,7 +113,7 @@ def _spectra(model: Model, base: Baseline, prepared: Prepared) -> tuple[dict[str
     weight = base.transfer(np.where(omega == 0.0, omega[-1] / len(omega), omega))
     columns: dict[str, Floats] = {}
     for item in inputs:
-        spectrum = np.asarray(rfft(taper * history(item, part)))[keep] * weight
+        spectrum = np.asarray(rfft(taper * input_history(item, part)))[keep] * weight
         for k, power in zip(item.parts, item.powers(frequency[keep]).T, strict=True):
             columns[k.symbol] = _parts(spectrum * power)
     return columns, _parts(force[keep] * weight)

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.compare.prediction import Prediction
-from study.diagnose.candidates import Candidate
-from study.diagnose.constancy import Curve, changes, curves, wavers
+from study.diagnose.candidates import FittedCandidate
+from study.diagnose.constancy import CoefficientCurve, changes, curves, wavers
 from study.diagnose.held_out import HeldOut, held_out
 from study.equations.model import ModelTerm, free
 from study.equations.terms import Term
@@ -36,8 +36,8 @@ class Ranked:
     error: float  # standard error of that
     parameters: dict[str, float]  # shape parameters, and the phase of an effect of any phase
     parameter_errors: dict[str, float]  # their standard errors
-    flatness: Curve | None  # the coefficient along frequency
-    steadiness: Curve | None  # the coefficient along amplitude
+    flatness: CoefficientCurve | None  # the coefficient along frequency
+    steadiness: CoefficientCurve | None  # the coefficient along amplitude
     held_out: HeldOut  # its residuals on both parts of the record
     tied_with: tuple[str, ...] = ()  # candidates that this record cannot tell from it
     distance: float = math.inf  # standard errors by which it leaves more than the first; 0 for the first
@@ -86,7 +86,7 @@ class Ranked:
         return changes(self.flatness, self.steadiness)
 
 
-def wanders(error: float, gain: Gain, unsteadiness: float, steadiness: Curve | None, asked: int) -> bool:
+def wanders(error: float, gain: Gain, unsteadiness: float, steadiness: CoefficientCurve | None, asked: int) -> bool:
     """:meth:`Ranked.wanders` of a candidate that leaves this error of the response."""
     good = error <= GOOD
     if good and gain.explained > 1.0 - NEARLY:
@@ -96,7 +96,7 @@ def wanders(error: float, gain: Gain, unsteadiness: float, steadiness: Curve | N
     return wavers(steadiness, asked)
 
 
-def examined(candidate: Candidate, before: Prediction) -> Ranked:
+def ranked_candidate(candidate: FittedCandidate, before: Prediction) -> Ranked:
     """A candidate with its coefficient's error and constancy; ``before`` is the prediction without it."""
     fit, prepared = candidate.fit, before.prepared
     jacobian = linearise(fit, prepared)

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.compare.comparison import Comparison
-from study.diagnose.candidates import Candidate
-from study.diagnose.held_out import Evidence, alike, evidence, held_out_of
-from study.diagnose.ranked import Ranked, examined
+from study.diagnose.candidates import FittedCandidate
+from study.diagnose.held_out import HeldOutResidual, alike, held_out_of, residual_held_out
+from study.diagnose.ranked import Ranked, ranked_candidate
 from study.equations.term import Term
 from study.support import statistics
 from study.support.autoregression import autoregression
@@ -23,7 +23,7 @@ from study.support.thresholds import ALPHA, NEARLY, K
 Floats = NDArray[np.float64]
 
 
-def rank(candidates: Sequence[Candidate], comparison: Comparison) -> list[Ranked]:
+def rank(candidates: Sequence[FittedCandidate], comparison: Comparison) -> list[Ranked]:
     """Candidates by what they leave of the held-out residual, the simplest first of those that this cannot tell apart.
 
     Residuals are compared as the noise of the record allows: filtered with the autoregressive model of what the best
@@ -33,8 +33,8 @@ def rank(candidates: Sequence[Candidate], comparison: Comparison) -> list[Ranked
         return []
     before = comparison.prediction
 
-    def row(candidate: Candidate) -> Ranked:
-        return examined(candidate, before)
+    def row(candidate: FittedCandidate) -> Ranked:
+        return ranked_candidate(candidate, before)
 
     with ThreadPoolExecutor(cores()) as pool:
         rows = list(pool.map(row, candidates))
@@ -42,7 +42,7 @@ def rank(candidates: Sequence[Candidate], comparison: Comparison) -> list[Ranked
     noise = autoregression(rows[0].fit.residual)
     white = {r.name: r.held_out.white(noise) for r in rows}
     alone = held_out_of(comparison)
-    rows, own = [_gained(r, evidence(before, alone)) for r in rows], alone.white(noise)
+    rows, own = [_gained(r, residual_held_out(before, alone)) for r in rows], alone.white(noise)
     free = before.prepared.free
 
     def chance(row: Ranked) -> float:
@@ -52,7 +52,7 @@ def rank(candidates: Sequence[Candidate], comparison: Comparison) -> list[Ranked
     return [replace(r, distance=away, tied_with=tied) for r, away, tied in in_order(rows, white, len(rows))]
 
 
-class Row(Protocol):
+class Rankable(Protocol):
     """What the order of candidates rests on."""
 
     @property
@@ -100,7 +100,7 @@ class Row(Protocol):
         ...
 
 
-R = TypeVar("R", bound=Row)
+R = TypeVar("R", bound=Rankable)
 
 
 def in_order(rows: Sequence[R], white: Mapping[str, Floats], asked: int) -> list[tuple[R, float, tuple[str, ...]]]:
@@ -115,7 +115,7 @@ def in_order(rows: Sequence[R], white: Mapping[str, Floats], asked: int) -> list
     return [(r, distance(r, first, white), tuple(_tied(r, rows, white))) for r in rows]
 
 
-def distance(row: Row, other: Row, white: Mapping[str, Floats]) -> float:
+def distance(row: Rankable, other: Rankable, white: Mapping[str, Floats]) -> float:
     """By how many standard errors a candidate leaves more than another of samples that neither was fitted to.
 
     Zero for two forms of one equation, whose predictions differ by no more than the numbers' own error. ``white`` holds
@@ -127,9 +127,9 @@ def distance(row: Row, other: Row, white: Mapping[str, Floats]) -> float:
     return statistics.worse(*_common(white[row.name], white[other.name]))
 
 
-def _gained(row: Ranked, before: Evidence) -> Ranked:
+def _gained(row: Ranked, before: HeldOutResidual) -> Ranked:
     """A candidate with what it explains of all that counts of the held-out residual."""
-    after = evidence(row.prediction, row.held_out)
+    after = residual_held_out(row.prediction, row.held_out)
     return replace(row, gain=statistics.gain(before.residual, after.residual)) if alike(before, after) else row
 
 
@@ -153,17 +153,17 @@ def _common(one: Floats, other: Floats) -> tuple[Floats, Floats]:
     return one[:count], other[:count]
 
 
-def _level(one: Row, other: Row, white: Mapping[str, Floats]) -> bool:
+def _level(one: Rankable, other: Rankable, white: Mapping[str, Floats]) -> bool:
     """Whether the record cannot tell two candidates apart."""
     return max(distance(one, other, white), distance(other, one, white)) < K
 
 
-def _tied(row: Row, rows: Sequence[Row], white: Mapping[str, Floats]) -> Iterator[str]:
+def _tied(row: Rankable, rows: Sequence[Rankable], white: Mapping[str, Floats]) -> Iterator[str]:
     if _believable(row):
         yield from (o.name for o in rows if o is not row and _believable(o) and _level(o, row, white))
 
 
-def _believable(row: Row) -> bool:
+def _believable(row: Rankable) -> bool:
     """Whether a candidate explains anything at all with a coefficient that is not zero: others tie with nothing."""
     low, high = row.interval
     return row.gain.explained > 0.0 and row.p_value < ALPHA and not low <= 0.0 <= high
@@ -174,13 +174,13 @@ def _tie(rows: Sequence[R], white: Mapping[str, Floats]) -> list[R]:
     return [r for r in rows if r is rows[0] or (_believable(r) and _level(r, rows[0], white))]
 
 
-def _complexity(row: Row, white: Floats, asked: int) -> tuple[bool, bool, int, float]:
+def _complexity(row: Rankable, white: Floats, asked: int) -> tuple[bool, bool, int, float]:
     """Order among candidates that are tied: one that nothing speaks against, and that with fewest unknowns."""
     unknowns = len(row.term.components) + len(row.term.parameters)
     return *_against(row, asked), unknowns, float(np.mean(white**2))
 
 
-def _against(row: Row, asked: int) -> tuple[bool, bool]:
+def _against(row: Rankable, asked: int) -> tuple[bool, bool]:
     """What speaks against a candidate: values outside of what makes it physical, and a coefficient that wanders."""
     return bool(row.unphysical), row.wanders(asked)
 

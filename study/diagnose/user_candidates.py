@@ -6,7 +6,7 @@ from study.diagnose.verdict import Diagnosis, search_base, search_part
 from study.equations.model import Model, free
 from study.equations.redundancy import repeated_force
 from study.equations.terms import LIBRARY, Term, custom
-from study.identify.frequency_domain.inputs import history, reverse_inputs
+from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.identify.time_domain.fit_model import with_term
 from study.records.record import Record
 from study.support.errors import StudyError, at, expect
@@ -45,7 +45,7 @@ def check_on(record: Record, terms: Sequence[Term]) -> None:
         try:
             for item in reverse_inputs(Model("own", (free(LIBRARY["inertia"]), free(term)))):
                 if term.name in item.terms:
-                    history(item, record)
+                    input_history(item, record)
         except StudyError as error:
             raise StudyError(f"--candidate {term.name}={formula}: {error}") from None
 

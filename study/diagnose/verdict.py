@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from study.compare.comparison import Comparison
 from study.compare.prediction import Prediction
 from study.diagnose import candidates, dependence, pairs
-from study.diagnose.candidates import Candidate
+from study.diagnose.candidates import FittedCandidate
 from study.diagnose.constancy import changes, curves, wavers
 from study.diagnose.credibility import credible
-from study.diagnose.held_out import HeldOut, alike, evidence, held_out_of
+from study.diagnose.held_out import HeldOut, alike, held_out_of, residual_held_out
 from study.diagnose.pairs import Pair
 from study.diagnose.ranked import Ranked
 from study.diagnose.ranking import rank
@@ -97,7 +97,7 @@ def _at_search_steps(fit: FreeRunFit, look: Prepared) -> FreeRunFit:
         return fit_part(fit.model, look, fit.held, steps=fit.steps_per_sample)
 
 
-def with_best_settled(tried: Sequence[Candidate], prepared: Prepared) -> list[Candidate]:
+def with_best_settled(tried: Sequence[FittedCandidate], prepared: Prepared) -> list[FittedCandidate]:
     """The best candidates fitted as they would be if they were added, then the others."""
     ordered = sorted(tried, key=lambda c: (c.unphysical, float(c.prediction.residual @ c.prediction.residual)))
     return candidates.all_settled(ordered[:SETTLED], prepared) + ordered[SETTLED:]
@@ -128,7 +128,7 @@ def _decide(
 
 def believed(row: Ranked, prediction: Prediction, own: HeldOut) -> bool:
     """Whether an effect is believed, by all samples that neither the model with it nor that without was fitted to."""
-    without, with_it = evidence(prediction, own), evidence(row.prediction, row.held_out)
+    without, with_it = residual_held_out(prediction, own), residual_held_out(row.prediction, row.held_out)
     if not alike(without, with_it):
         return credible(prediction, row.prediction, row.interval, row.p_value)
     return credible(without, with_it, row.interval, row.p_value)
@@ -185,4 +185,4 @@ def _left(fit: FreeRunFit, prediction: Prediction) -> float:
     look = prediction.prepared.shortened(min(len(fit.residual), LONG))
     left = dependence.unexplained(shape_search.baseline(continued(fit, look), look), look)
     nameless = 0.1 * ALPHA  # what no candidate explains is believed less easily than what one does
-    return prediction.error * float(np.sqrt(dependence.significant(left, nameless)))
+    return prediction.error * float(np.sqrt(dependence.significant_share(left, nameless)))

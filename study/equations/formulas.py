@@ -67,7 +67,7 @@ def names(text: str) -> list[str]:
     return sorted(used - {"pi"})
 
 
-def build(graph: Graph, text: str, known: Mapping[str, int]) -> int:
+def add_formula(graph: Graph, text: str, known: Mapping[str, int]) -> int:
     """Add a formula to a graph; ``known`` has the node of each name it may use. Returns the node of its value."""
     return _Builder(graph, text, known).node(parse(text))
 

@@ -357,7 +357,7 @@ def _with_side(program: Program, slopes: Program) -> tuple[Program, int]:
     return replace(program, code=code), side
 
 
-def predict(
+def predict_response(
     model: Model,
     record: Record,
     *,

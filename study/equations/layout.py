@@ -87,7 +87,7 @@ def _known(value: object, what: str, names: Sequence[str]) -> str:
     return value
 
 
-def place_of(item: Mapping[object, object], term: object, coordinates: Sequence[str]) -> Place | None:
+def place_of_entry(item: Mapping[object, object], term: object, coordinates: Sequence[str]) -> Place | None:
     """The place in an entry of ``terms``; None in a model of a single coordinate, whose entries have none."""
     ways = [key for key in PLACES if key in item]
     if not coordinates:
@@ -98,10 +98,10 @@ def place_of(item: Mapping[object, object], term: object, coordinates: Sequence[
     kind = cast(Kind, ways[0])
     if kind == "at":
         return Place("at", (_known(item["at"], f"{term} is at", coordinates),))
-    return pair(kind, as_list(item[kind]) or [item[kind]], str(term), coordinates)
+    return place_of_pair(kind, as_list(item[kind]) or [item[kind]], str(term), coordinates)
 
 
-def pair(kind: Kind, given: Sequence[object], term: str, coordinates: Sequence[str]) -> Place:
+def place_of_pair(kind: Kind, given: Sequence[object], term: str, coordinates: Sequence[str]) -> Place:
     """A place between two coordinates, or one of them and the ground.
 
     Raises

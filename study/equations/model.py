@@ -195,7 +195,7 @@ def forward_graph(model: Model, channels: tuple[str, ...] = ()) -> ForwardGraph:
         rate = None
         if entry.term.state is not None:
             names["z"] = states[entry.name]
-            rate = formulas.build(graph, entry.term.state, names)
+            rate = formulas.add_formula(graph, entry.term.state, names)
             rates.append(rate)
         for component in entry.term.components:
             if component.order < 2:
@@ -243,7 +243,7 @@ def unit_forces(model: Model) -> tuple[tuple[str, ...], Program]:
 
 def unit_force(graph: Graph, component: Component, names: Mapping[str, int], rate: int | None) -> int:
     """Force of a component with a unit coefficient: its shape, or the shape's derivative by the chain rule."""
-    shape = formulas.build(graph, component.shape, names)
+    shape = formulas.add_formula(graph, component.shape, names)
     if component.order == 1:
         total = graph.mul(graph.derivative(shape, names["u"]), names["v"])
         total = graph.add(total, graph.derivative(shape, names["t"]))

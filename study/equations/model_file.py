@@ -31,7 +31,7 @@ from study.equations.terms import Term
 from study.support import yaml_text
 from study.support.errors import StudyError
 from study.support.files import read_text, replace_file
-from study.support.transaction import recovered
+from study.support.transaction import recover
 from study.support.yaml_text import as_list, as_mapping, scalar, shown
 
 MOST_TERMS = 200
@@ -50,7 +50,7 @@ def read_model(path: Path) -> Model:
     StudyError
         If the file cannot be read or is no model, naming the file, the value and what was expected.
     """
-    recovered(path)
+    recover(path)
     return parse_model(read_text(path, WANTED), path)
 
 
@@ -204,11 +204,11 @@ def _entry(item: object, number: int, coordinates: Sequence[str]) -> ModelTerm:
     try:
         if isinstance(item, str):
             _refuse_long(item)
-            return free(terms.get(item), layout.place_of({}, item, coordinates))
+            return free(terms.get(item), layout.place_of_entry({}, item, coordinates))
         mapping = as_mapping(item)
         if mapping is None:
             raise StudyError(f"is {shown(item)}; expected a name or a mapping such as {{term: inertia, value: 1.0}}")
-        place = layout.place_of(mapping, mapping.get("term"), coordinates)
+        place = layout.place_of_entry(mapping, mapping.get("term"), coordinates)
         plain = {key: value for key, value in mapping.items() if place is None or key not in layout.PLACES}
         return replace(entry_from(plain), place=place)
     except StudyError as error:

@@ -52,7 +52,7 @@ class Place:
         return {self.kind: self.ends[0] if self.kind == "at" else list(self.ends)}
 
 
-def in_words(place: Place) -> str:
+def place_in_words(place: Place) -> str:
     """``between floor2 and floor3``, ``at floor1``."""
     word = "coupling" if place.kind == "couples" else place.kind
     return f"{word} {' and '.join('the ground' if end == GROUND else end for end in place.ends)}"

@@ -59,7 +59,7 @@ class Search:
 
 
 @dataclass(frozen=True)
-class Parameter:
+class ShapeParameter:
     """A shape parameter.
 
     Attributes
@@ -91,7 +91,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Condition:
+class PhysicalBound:
     """What makes a term physical: a coefficient or shape parameter above a bound.
 
     Attributes
@@ -159,9 +159,9 @@ class Term:
     formula: str
     meaning: str
     cause: str
-    parameters: tuple[Parameter, ...] = ()
+    parameters: tuple[ShapeParameter, ...] = ()
     state: str | None = None
-    conditions: tuple[Condition, ...] = ()
+    conditions: tuple[PhysicalBound, ...] = ()
     reported: tuple[str, ...] = ()
     either_sign: bool = False
     placeless: bool = False
@@ -177,10 +177,12 @@ class Term:
         return self.symbols + tuple(f"{self.name}.{p.name}" for p in self.parameters)
 
     @property
-    def bounds(self) -> tuple[Condition, ...]:
+    def bounds(self) -> tuple[PhysicalBound, ...]:
         """Its conditions, and that parameters without a sign are above zero."""
         own = (
-            Condition(p.name, f"the {p.meaning} is above zero", enforced=True) for p in self.parameters if not p.signed
+            PhysicalBound(p.name, f"the {p.meaning} is above zero", enforced=True)
+            for p in self.parameters
+            if not p.signed
         )
         return (*self.conditions, *own)
 

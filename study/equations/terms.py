@@ -17,14 +17,14 @@ import numpy as np
 from study.equations import formulas
 from study.equations.graph import Graph
 from study.equations.term import QUANTITIES as QUANTITIES
-from study.equations.term import Component, Condition, Parameter, Search, Term
+from study.equations.term import Component, PhysicalBound, Search, ShapeParameter, Term
 from study.support.errors import StudyError
 
 
 def _single(
     name: str, symbol: str, shape: str, *,
     formula: str | None = None, order: int = 0, factor: float = 1.0, meaning: str, cause: str,
-    parameters: tuple[Parameter, ...] = (), state: str | None = None, conditions: tuple[Condition, ...] = (),
+    parameters: tuple[ShapeParameter, ...] = (), state: str | None = None, conditions: tuple[PhysicalBound, ...] = (),
     reported: tuple[str, ...] = (), either_sign: bool = False, placeless: bool = False,
 ) -> Term:  # fmt: skip
     """An effect with one coefficient."""
@@ -39,13 +39,13 @@ def _even(low: float, high: float, count: int) -> tuple[float, ...]:
     return tuple(np.linspace(low, high, count).tolist())
 
 
-def _drains(symbol: str, what: str = "damping") -> tuple[Condition, ...]:
+def _drains(symbol: str, what: str = "damping") -> tuple[PhysicalBound, ...]:
     """Damping that grows with velocity; Van der Pol's, which depends on displacement, may well feed energy in."""
-    return (Condition(symbol, f"{what} takes energy out, so it is zero or more", reached=True),)
+    return (PhysicalBound(symbol, f"{what} takes energy out, so it is zero or more", reached=True),)
 
 
-def _spring(symbol: str, owner: str) -> Condition:
-    return Condition(symbol, f"the stiffness of a {owner} is positive")
+def _spring(symbol: str, owner: str) -> PhysicalBound:
+    return PhysicalBound(symbol, f"the stiffness of a {owner} is positive")
 
 
 AROUND = (-0.35, 0.0, 0.35)  # a line and a third of a line to either side: a fit converges from there
@@ -54,7 +54,7 @@ _TERMS = (
     _single(
         "inertia", "m", "u", formula="d2u/dt2", order=2,
         meaning="mass times acceleration", cause="the moving mass, added mass of the fluid included",
-        conditions=(Condition("m", "a mass is positive", enforced=True),), placeless=True,
+        conditions=(PhysicalBound("m", "a mass is positive", enforced=True),), placeless=True,
     ),
     _single(
         "linear_damping", "c", "u", formula="v", order=1,
@@ -116,7 +116,7 @@ _TERMS = (
         meaning="spring force that stops growing at u_g; with coefficient -k the stiffness k is absent within the gap",
         cause="clearance in joints, a slack mooring",
         parameters=(
-            Parameter(
+            ShapeParameter(
                 "u_g", "length", "half width of the dead band",
                 Search("quantiles of |u|", _even(0.08, 0.97, 14), blunt=True), (0.3, 1.2),
             ),
@@ -132,7 +132,7 @@ _TERMS = (
         "one_sided_contact", "kc", "max(u - gap, 0)",
         meaning="stop that is touched beyond a gap", cause="fenders, snubbers, end stops",
         parameters=(
-            Parameter(
+            ShapeParameter(
                 "gap", "length", "displacement at which contact begins",
                 Search("quantiles of u", _even(0.1, 0.985, 16), blunt=True), (0.3, 1.2), signed=True,
             ),
@@ -146,7 +146,7 @@ _TERMS = (
         "stiffness that varies with time at its own frequency, whatever the motion",
         "fishtailing at a single-point mooring, rotating asymmetric shafts, gear meshing",
         (
-            Parameter(
+            ShapeParameter(
                 "f_m", "frequency", "frequency of the stiffness", Search("lines of the modulation", AROUND), (0.15, 0.9)
             ),
         ),
@@ -157,7 +157,7 @@ _TERMS = (
         meaning="spring and damper in series: stiff when fast, slack when slow (Maxwell element)",
         cause="viscoelastic mounts, fluid-filled bushings, soil",
         parameters=(
-            Parameter(
+            ShapeParameter(
                 "tau", "time", "relaxation time",
                 Search("times of the motion", tuple(np.geomspace(0.05, 20.0, 12).tolist()), blunt=True), (0.3, 3.0),
             ),
@@ -170,18 +170,18 @@ _TERMS = (
         meaning="force that depends on the path by which a displacement was reached (Bouc-Wen)",
         cause="bolted and riveted joints, wire-rope isolators, yielding metal",
         parameters=(
-            Parameter(
+            ShapeParameter(
                 "beta", "1/length", "rate at which the loop closes",
                 Search("per amplitude", (0.15, 0.4, 1.0, 2.5, 6.0)), (0.5, 2.0), signed=True,
             ),
-            Parameter(
+            ShapeParameter(
                 "gamma", "1/length", "roundness of the loop",
                 Search("shares of the one before", (-0.9, -0.3, 0.3, 0.9)), (-0.5, 0.5), signed=True,
             ),
         ),
         conditions=(
             _spring("kz", "Bouc-Wen element"),
-            Condition("beta", "a Bouc-Wen element is passive for |gamma| <= beta", over="gamma", reached=True),
+            PhysicalBound("beta", "a Bouc-Wen element is passive for |gamma| <= beta", over="gamma", reached=True),
         ),
         placeless=True,
     ),
@@ -195,7 +195,11 @@ _TERMS = (
         (Component("fh_cos", "cos(2*pi*f*t)"), Component("fh_sin", "sin(2*pi*f*t)")),
         "cos(2 pi f t + phase)",
         "sinusoidal force that was not measured", "rotating imbalance, mains hum, a neighbouring machine",
-        (Parameter("f", "frequency", "frequency of the force", Search("lines of the residual", AROUND), (0.3, 2.5)),),
+        (
+            ShapeParameter(
+                "f", "frequency", "frequency of the force", Search("lines of the residual", AROUND), (0.3, 2.5)
+            ),
+        ),
         placeless=True,
     ),
 )  # fmt: skip
@@ -212,7 +216,7 @@ def get(name: str) -> Term:
     return LIBRARY[name]
 
 
-def search(word: str) -> tuple[Term, ...]:
+def find_terms(word: str) -> tuple[Term, ...]:
     """The library's terms that a word finds: in the name, or where no name has it, in formula, meaning or cause.
 
     Raises
@@ -240,7 +244,8 @@ def custom(name: str, force: str) -> Term:
     if not name.isidentifier() or not name.isascii():
         raise StudyError(f"{name!r} is not a name for a term; use letters, digits and underscores")
     graph = Graph()
-    formulas.build(graph, force, {n: graph.input(n) for n in formulas.names(force)})  # raises unless it is a formula
+    known = {n: graph.input(n) for n in formulas.names(force)}
+    formulas.add_formula(graph, force, known)  # raises unless it is a formula
     return _single(name, f"q_{name}", force, meaning=f"the user's own force {force}", cause="as the user knows")
 
 

@@ -55,7 +55,7 @@ class Page:
         self.sources["words"].js_on_change("data", CustomJS(code="window.study.words()"))
 
 
-def made(
+def page_of(
     columns: Mapping[str, Columns], frequencies: tuple[float, float], draw: Draw, stores: Sequence[ColumnDataSource]
 ) -> Page:
     """A page of columns by the name of their source, whose panels are drawn from these and an axis of frequency.

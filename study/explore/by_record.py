@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from study.compare import each_record
 from study.compare.across_levels import Level
-from study.compare.comparison import Comparison, across, compare
+from study.compare.comparison import Comparison, across_records, compare
 from study.compare.each_record import Separate
 from study.records.prepared import Prepared
 from study.records.record import Record
@@ -36,7 +36,7 @@ class ByRecord:
 
 def of_own(comparisons: Sequence[Comparison]) -> ByRecord:
     """Comparisons of a model with each record, held against each other as ``study compare`` does."""
-    levels = across(comparisons)
+    levels = across_records(comparisons)
     names = tuple(c.record.name for c in sorted(comparisons, key=lambda c: c.level))
     return ByRecord(names, levels, tuple(c.prediction.error for c in comparisons))
 
@@ -48,7 +48,7 @@ def by_record(several: Several, together: Comparison) -> ByRecord:
     """
     if several.separate:
         names = tuple(record.name for record in several.records)
-        levels = each_record.by_record(together, several.separate, several.records)
+        levels = each_record.levels_by_record(together, several.separate, several.records)
         return ByRecord(names, levels)
     start = together.fit.model.numbers()
     try:

@@ -47,7 +47,7 @@ def build(seen: View, history: Columns, stores: Sequence[ColumnDataSource] = ())
             "constancy": plots.constancy(sources), **check_plots.panels(sources, frequency, seen.kind),
         }  # fmt: skip
 
-    made = any_page.made({**columns(seen, history), **GHOSTS, "history": history}, _frequencies(seen), draw, stores)
+    made = any_page.page_of({**columns(seen, history), **GHOSTS, "history": history}, _frequencies(seen), draw, stores)
     for name, kind in KINDS.items():
         made.panels[name].js_on_event("selectiongeometry", CustomJS(args={"kind": kind}, code=SELECTED))
         made.panels[name].js_on_event("reset", CustomJS(code="window.study.clear()"))

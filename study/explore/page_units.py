@@ -55,7 +55,7 @@ def number(value: float, digits: int = 4) -> str:
     return f"{mantissa}·10{str(int(exponent)).translate(RAISED)}" if sign else text
 
 
-def share(part: float) -> str:
+def in_percent(part: float) -> str:
     """A share in per cent, which no line breaks before its sign: ``3.68·10⁻⁵ %``."""
     return in_sentence(percent(part)).replace(" ", NO_BREAK)
 

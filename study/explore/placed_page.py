@@ -9,7 +9,7 @@ from bokeh.models import ColumnDataSource
 
 from study.compare.comparison_report import as_json
 from study.explore import any_session, placed_panels, placed_session, plots, theme
-from study.explore.any_page import EMPTY, Page, frame, history_columns, history_ends, history_height, made
+from study.explore.any_page import EMPTY, Page, frame, history_columns, history_ends, history_height, page_of
 from study.explore.any_page import variables as any_variables
 from study.explore.axis_scales import Columns
 from study.explore.desk import Deeds, Drawn
@@ -18,8 +18,8 @@ from study.explore.placed_view import PlacedView, placed_view
 from study.explore.saved import as_file, stored
 from study.explore.saved_files import PAGE, beside
 from study.structure import structure_report
-from study.structure.structure_comparison import document
-from study.structure.structure_pictures import diagnosis_pictures, pictures
+from study.structure.structure_comparison import structure_document
+from study.structure.structure_pictures import diagnosis_pictures, structure_pictures
 
 TEMPLATE = "placed.html"
 SHOWN = {  # of all places, sensors and candidates, by the source that the script fills with the selected one's
@@ -64,7 +64,7 @@ def build(seen: PlacedView, lasting: Columns, stores: Sequence[ColumnDataSource]
         }  # fmt: skip
 
     given = {**columns(seen, lasting), **_selected(seen.columns), "history": lasting, "shown": EMPTY}
-    return made(given, _frequencies(seen), draw, stores)
+    return page_of(given, _frequencies(seen), draw, stores)
 
 
 def columns(seen: PlacedView, lasting: Columns) -> dict[str, Columns]:
@@ -119,9 +119,9 @@ def structure_files(
 
 def _drawn(session: PlacedSession) -> dict[str, bytes]:
     now = session.now
-    contents = {"comparison.json": as_json(document(now.comparison))} | pictures(now.comparison)
+    contents = {"comparison.json": as_json(structure_document(now.comparison))} | structure_pictures(now.comparison)
     if now.diagnosis is not None:
-        contents |= {"diagnosis.json": as_json(structure_report.fields(now.diagnosis, now.unneeded))}
+        contents |= {"diagnosis.json": as_json(structure_report.structure_fields(now.diagnosis, now.unneeded))}
         contents |= diagnosis_pictures(now.diagnosis)
     return contents
 

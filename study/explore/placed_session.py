@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from study.diagnose.diagnosis_files import unneeded_in_words
 from study.equations.model import Model, free
 from study.equations.terms import Term
 from study.explore.any_session import chosen, held, holding
@@ -10,8 +11,8 @@ from study.explore.session import Step, joined, own_term
 from study.structure.placed_dropping import dropped_term, term_at
 from study.structure.placed_needless import PlacedNeedless, placed_needless
 from study.structure.prepared_structure import PreparedStructure
-from study.structure.structure_comparison import StructureComparison, compare_structure, history_step
-from study.structure.structure_report import in_words, unneeded_in_words
+from study.structure.structure_comparison import StructureComparison, compare_structure, structure_history_step
+from study.structure.structure_report import structure_diagnosis_in_words
 from study.structure.structure_verdict import StructureDiagnosis, added_term, diagnose_structure
 
 
@@ -51,7 +52,7 @@ class PlacedSession:
     @property
     def steps(self) -> list[Step]:
         """The history, the steps before this session included."""
-        return joined(self.earlier, [history_step(s.comparison, s.added, s.dropped) for s in self.stages])
+        return joined(self.earlier, [structure_history_step(s.comparison, s.added, s.dropped) for s in self.stages])
 
 
 def begin_placed(comparison: StructureComparison, earlier: Sequence[Step] = ()) -> PlacedSession:
@@ -113,7 +114,7 @@ def examined(session: PlacedSession, progress: Callable[[int], None] | None = No
 
     diagnosis = diagnose_structure(now.comparison, session.own, progress=count)
     unneeded = placed_needless(now.comparison)
-    said = f"{in_words(diagnosis)} {unneeded_in_words(unneeded, diagnosis)}".strip()
+    said = f"{structure_diagnosis_in_words(diagnosis)} {unneeded_in_words(unneeded, diagnosis)}".strip()
     return replace(now, diagnosis=diagnosis, said=said, unneeded=unneeded)
 
 

@@ -6,8 +6,8 @@ from html import escape
 from typing import Any
 
 from study.equations.place import Place
-from study.equations.place import in_words as placed
-from study.explore.page_units import in_sentence, in_text, share, with_error
+from study.equations.place import place_in_words as placed
+from study.explore.page_units import in_percent, in_sentence, in_text, with_error
 from study.explore.placed_session import PlacedStage
 from study.explore.words import HEAD, NOT_ASKED, UNKNOWN, VERDICTS, WAITING, bar, figure, gives, in_table, in_words
 from study.figures.labels import power_of_ten
@@ -15,7 +15,7 @@ from study.structure.modes import Modes
 from study.structure.placed_ranking import PlacedRanked
 from study.structure.sketch import Sketch
 from study.structure.sketch_svg import svg
-from study.structure.structure_comparison import PlacedCoefficient, StructureComparison, says
+from study.structure.structure_comparison import PlacedCoefficient, StructureComparison, structure_in_words
 from study.structure.structure_leftover import explained_by_place
 from study.structure.structure_page import terms_there
 from study.support.numbers import percent
@@ -29,7 +29,7 @@ def placed_words(stage: PlacedStage, drawn: Sketch, step: int, live: bool) -> di
     chosen = max(drawn.links, key=lambda link: link.share).place
     fragments = {
         "figures": _figures(comparison),
-        "says": escape(in_sentence(says(comparison))),
+        "says": escape(in_sentence(structure_in_words(comparison))),
         "sketch": svg(drawn, chosen),
         "sketch-hint": escape(_hint(stage)),
         "places": _places(stage, drawn),
@@ -46,11 +46,11 @@ def placed_words(stage: PlacedStage, drawn: Sketch, step: int, live: bool) -> di
 def _figures(comparison: StructureComparison) -> str:
     prediction = comparison.prediction
     worst = max(zip(prediction.errors, prediction.prepared.sensors, strict=True), key=lambda pair: pair[0])
-    about = f"worst {share(worst[0])} at {worst[1].coordinate}"
+    about = f"worst {in_percent(worst[0])} at {worst[1].coordinate}"
     cells = (
-        ("error", "Error of the motions", share(prediction.error), about),
-        ("floor", "Noise floor", share(prediction.floor), "what no model could explain"),
-        ("force", "Error of the forces", share(comparison.forces.share), "of the power of those of inertia"),
+        ("error", "Error of the motions", in_percent(prediction.error), about),
+        ("floor", "Noise floor", in_percent(prediction.floor), "what no model could explain"),
+        ("force", "Error of the forces", in_percent(comparison.forces.share), "of the power of those of inertia"),
     )  # fmt: skip
     return "".join(figure(*cell) for cell in cells)
 
@@ -82,8 +82,9 @@ def _places(stage: PlacedStage, drawn: Sketch) -> str:
         known = [f"<h3>{escape(_capital(placed(link.place)))}</h3><p>{escape(terms_there(comparison, path))}</p>"]
         if path in shares:
             known.append(
-                f"<p>Any force there could make {share(shares[path])} of what stands above the noise; general "
-                f"functions of its own motion explain {share(general.get(path, 0.0))} of what is left, held out.</p>"
+                f"<p>Any force there could make {in_percent(shares[path])} of what stands above the noise; general "
+                f"functions of its own motion explain {in_percent(general.get(path, 0.0))} of what is left, held "
+                "out.</p>"
             )
         own = [r for r in rows if r.entry.place is not None and r.entry.place.path == path]
         if own:
@@ -154,7 +155,8 @@ def _detail(row: PlacedRanked) -> str:
     where = f" {escape(placed(row.entry.place))}" if row.entry.place else ""
     return (
         f"<b>{escape(in_words(row.term.name))}</b>{where} <i>{escape(in_text(row.term.formula))}</i>, coefficient "
-        f"<em>{escape(size)}</em>; error with it {share(row.response_error)}. {escape(_capital(row.term.meaning))}."
+        f"<em>{escape(size)}</em>; error with it {in_percent(row.response_error)}. "
+        f"{escape(_capital(row.term.meaning))}."
         + (f" As fitted it is no physical effect: {escape(row.unphysical)}." if row.unphysical else "")
     )
 

@@ -5,7 +5,7 @@ from html import escape
 
 from study.compare.across_levels import Level
 from study.compare.comparison import Comparison
-from study.explore.page_units import in_text, number, share, with_error
+from study.explore.page_units import in_percent, in_text, number, with_error
 from study.explore.session import Stage
 
 WAITING = "each record is being fitted by itself …"
@@ -28,7 +28,7 @@ def _records(stage: Stage, shown: str) -> str:
     own = stage.by_record.errors if stage.by_record is not None else ()
     names = [c.record.name for c in stage.on_each]
     rows = [
-        _row(_button(i, c.record.name, c.record.name == shown), c, share(own[i]) if own else "–")
+        _row(_button(i, c.record.name, c.record.name == shown), c, in_percent(own[i]) if own else "–")
         for i, c in enumerate(stage.on_each)
     ]
     everything = _row(f"all {len(names)}", stage.comparison, "")
@@ -45,7 +45,13 @@ def _button(place: int, name: str, pressed: bool) -> str:
 def _row(name: str, comparison: Comparison, own: str) -> str:
     judged = comparison.prediction
     level = number(judged_level(comparison), 3)
-    cells = (level, share(judged.error), share(judged.floor), share(comparison.force.total), own)
+    cells = (
+        level,
+        in_percent(judged.error),
+        in_percent(judged.floor),
+        in_percent(comparison.force.total),
+        own,
+    )
     return f"<tr><th>{name}</th>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
 
 

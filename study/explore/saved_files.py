@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 
 from study.compare import history
-from study.compare.comparison_pictures import level_pictures, pictures
-from study.compare.comparison_report import as_json, document, tables
-from study.compare.history_picture import files as history_pictures
-from study.diagnose.diagnosis_files import files as diagnosis_files
+from study.compare.comparison_pictures import comparison_pictures, level_pictures
+from study.compare.comparison_report import as_json, comparison_document, tables
+from study.compare.history_picture import history_files as history_pictures
+from study.diagnose.diagnosis_files import diagnosis_files
 from study.equations import model_file
 from study.equations.model import Model
 from study.explore.any_session import AnySession
@@ -48,12 +48,12 @@ def of_stage(now: Stage, by_level: bool = True) -> dict[str, bytes]:
     each = now.on_each or (now.comparison,)
     levels = now.by_record.levels if now.by_record is not None and by_level else ()
     contents = {
-        "comparison.json": as_json(document(each, levels)),
+        "comparison.json": as_json(comparison_document(each, levels)),
         **{f"{table}.csv": content for table, content in tables(each, levels).items()},
     }
     for comparison in each:
         prefix = f"{comparison.record.name}_" if len(each) > 1 else ""
-        contents |= {prefix + name: content for name, content in pictures(comparison).items()}
+        contents |= {prefix + name: content for name, content in comparison_pictures(comparison).items()}
     contents |= level_pictures(levels, now.comparison.record.units.get("force", "N"))
     if now.diagnosis is not None:
         contents |= diagnosis_files(now.diagnosis, now.said, now.unneeded or ())

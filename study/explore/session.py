@@ -15,8 +15,8 @@ from study.compare.comparison_report import history_step
 from study.compare.missing_force import MissingForce, missing_force
 from study.diagnose import candidates, dropping
 from study.diagnose.adding import added_candidate
-from study.diagnose.candidates import Candidate
-from study.diagnose.diagnosis_files import in_words, unneeded_in_words
+from study.diagnose.candidates import FittedCandidate
+from study.diagnose.diagnosis_files import diagnosis_in_words, unneeded_in_words
 from study.diagnose.force_between import diagnose_as_read
 from study.diagnose.needless import Needless, needless
 from study.diagnose.ranked import Ranked
@@ -156,7 +156,7 @@ def dropped(session: Session, name: str) -> Session:
     StudyError
         If it is not in the model or cannot be left out.
     """
-    comparison = dropping.dropped(session.now.comparison, name)
+    comparison = dropping.compared_without(session.now.comparison, name)
     return replace(session, stages=(*session.stages, stage_of(comparison, f"- {name}", None, dropped=name)))
 
 
@@ -204,7 +204,7 @@ def examined(session: Session, progress: Callable[[int], None] | None = None) ->
     """
     diagnosis = diagnose_as_read(session.now.comparison, extra=session.own, progress=progress)
     now = weighed(session).now
-    said = f"{in_words(diagnosis)} {unneeded_in_words(now.unneeded or (), diagnosis)}".strip()
+    said = f"{diagnosis_in_words(diagnosis)} {unneeded_in_words(now.unneeded or (), diagnosis)}".strip()
     return _foreseen(replace(now, diagnosis=diagnosis, said=said)), diagnosis
 
 
@@ -255,7 +255,7 @@ def own_term(text: str, taken: Collection[str], channels: Collection[str]) -> Te
     return term
 
 
-def _attempted(term: Term, session: Session) -> Candidate | None:
+def _attempted(term: Term, session: Session) -> FittedCandidate | None:
     """The present model with a term, fitted as the candidates of its diagnosis were; None if it cannot run."""
     prepared = session.prepared
     attempt = candidates.attempt(term, search_base(session.now.comparison), search_part(prepared))
@@ -277,7 +277,7 @@ def tried(session: Session, text: str) -> Session:
     term = own_term(text, taken, session.prepared.record.extra)
     if now.diagnosis is None:
         raise StudyError("the present model is still being diagnosed; a formula can be tried when that is done")
-    known = [Candidate(r.term, r.fit, r.prediction) for r in now.diagnosis.candidates]
+    known = [FittedCandidate(r.term, r.fit, r.prediction) for r in now.diagnosis.candidates]
     silent = f"the expression {term.components[0].shape!r} has no finite response on this record"
     try:
         with np.errstate(all="ignore"):  # a formula may overflow: then it has no finite response

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from study.compare.comparison import Comparison
-from study.compare.comparison_sentences import says
+from study.compare.comparison_sentences import comparison_in_words
 from study.compare.fitted_coefficients import Coefficient
 from study.compare.force_map import FEWEST, surface
 from study.compare.modal import modal
@@ -17,7 +17,7 @@ from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
 from study.equations.terms import LIBRARY
 from study.explore.axis_scales import within
-from study.explore.page_units import Scale, in_sentence, in_text, length, mass, number, rate, share, with_error
+from study.explore.page_units import Scale, in_percent, in_sentence, in_text, length, mass, number, rate, with_error
 from study.explore.session import Stage
 from study.figures.labels import power_of_ten, term_names
 from study.support.statistics import Gain
@@ -46,7 +46,7 @@ def words(stage: Stage, rows: Sequence[Ranked], step: int, live: bool, force_uni
     comparison = stage.comparison
     fragments = {
         "figures": _figures(comparison),
-        "says": escape(in_sentence(says(comparison))),
+        "says": escape(in_sentence(comparison_in_words(comparison))),
         "verdict": _verdict(stage, live),
         "candidates": _candidates(stage, rows, live),
         "coefficients": _coefficients(stage, live),
@@ -94,11 +94,12 @@ def _figures(comparison: Comparison) -> str:
     size = comparison.prediction.error * comparison.prediction.size
     scaled = length if comparison.plan.response == "displacement" else rate
     shown = scaled(comparison.record.units.get(comparison.plan.response, ""), size)
-    rms = f"rms {number(size / shown.factor, 3)} {in_text(shown.unit)}; fit {share(1.0 - comparison.prediction.error)}"
+    fit = in_percent(1.0 - comparison.prediction.error)
+    rms = f"rms {number(size / shown.factor, 3)} {in_text(shown.unit)}; fit {fit}"
     cells = (
-        ("error", "Error of the response", share(comparison.prediction.error), rms, PREDICTED),
-        ("floor", "Noise floor", share(comparison.prediction.floor), "what no model could explain", FLOOR),
-        ("force", "Error of the force", share(comparison.force.total), "of its power unexplained", FORCE),
+        ("error", "Error of the response", in_percent(comparison.prediction.error), rms, PREDICTED),
+        ("floor", "Noise floor", in_percent(comparison.prediction.floor), "what no model could explain", FLOOR),
+        ("force", "Error of the force", in_percent(comparison.force.total), "of its power unexplained", FORCE),
     )
     return "".join(
         figure(key, title, value, about, f' title="{escape(meaning)}"') for key, title, value, about, meaning in cells
@@ -169,7 +170,7 @@ def _row(place: int, row: Ranked, stage: Stage, live: bool) -> str:
     found = f" Found in {escape(row.term.cause)}." if row.name in LIBRARY else ""
     detail = (
         f"<b>{words}</b> <i>{formula}</i>, coefficient <em>{escape(size)}</em>; explains {explained[:-2]} ± "
-        f"{100.0 * row.gain.error:.1f} %, error with it {share(row.response_error)}. {escape(meaning)}.{found}"
+        f"{100.0 * row.gain.error:.1f} %, error with it {in_percent(row.response_error)}. {escape(meaning)}.{found}"
     )
     return (
         f"<li class='candidate' data-candidate='{place}' data-label='{escape(_label(row, unit))}' tabindex='0' "

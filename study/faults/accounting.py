@@ -7,12 +7,12 @@ from study.compare.by_estimator import FREE_RUN
 from study.compare.comparison import Comparison, compare
 from study.equations.model import Model
 from study.faults.correction import corrected
-from study.faults.drift import slow_response
-from study.faults.fault import DRIFT, FORCE_NOISE, Fault
+from study.faults.drift import mean_response, slow_response
+from study.faults.fault import DRIFT, FORCE_NOISE, OFFSET, Fault
 from study.faults.force_noise import force_noise
 from study.faults.imposed import FAULTS
-from study.faults.leftover import better, leftover
-from study.faults.search import first_faults, search
+from study.faults.leftover import leaves_less, leftover
+from study.faults.search import first_faults, search_faults
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.settling import settled
@@ -82,9 +82,9 @@ def accounted(
     if not asked:
         return _compared(model, fewer, faults, None, estimator, progress)
     fit = fit_model(model, fewer)
-    found, near = search(prepared, fit if fewer is first else _on_all(fit, first), faults, asked)
-    if DRIFT in asked:
-        found, near = _beneath_a_drift(model, prepared, faults, asked, (found, near))
+    found, near = search_faults(prepared, fit if fewer is first else _on_all(fit, first), faults, asked)
+    for begin in _begins(first, fit, asked):
+        found, near = _beneath(begin, model, prepared, faults, asked, (found, near))
     if found == faults:
         return _compared(model, fewer, found, fit, estimator, progress)
     final = corrected(prepared, found)
@@ -93,27 +93,33 @@ def accounted(
     return _compared(model, kept, found, best, estimator, progress)
 
 
-def _beneath_a_drift(
-    model: Model, prepared: Prepared, faults: Sequence[Fault], asked: Sequence[str],
+def _begins(prepared: Prepared, fit: FreeRunFit, asked: Sequence[str]) -> list[Fault]:
+    """What may lie beneath the motion and lead its fit astray: the slowest lines, and its mean where a fit is lost."""
+    slow = slow_response(prepared, len(asked)) if DRIFT in asked else None
+    mean = [] if fit.converged or OFFSET not in asked else [mean_response(prepared)]
+    return mean if slow is None else [slow]
+
+
+def _beneath(
+    begin: Fault, model: Model, prepared: Prepared, faults: Sequence[Fault], asked: Sequence[str],
     plain: tuple[tuple[Fault, ...], FreeRunFit],
 ) -> tuple[tuple[Fault, ...], FreeRunFit]:  # fmt: skip
-    """The better end of two searches for faults: the plain one, and one that a large drift cannot lead astray.
+    """The better end of two searches for faults: the plain one, and one that a drift or an offset cannot lead astray.
 
-    The second begins with the model fitted to the response without its slowest lines, where these stand out.
+    The second begins with the model fitted to the response without what may lie beneath it.
     """
-    slow = slow_response(corrected(prepared, faults), len(asked))
-    if slow is None or slow.waveform is None:
+    if begin.waveform is None:
         return plain
     try:
-        begun = fit_model(model, corrected(prepared, (*faults, slow)))
+        begun = fit_model(model, corrected(prepared, (*faults, begin)))
     except StudyError:
         return plain
-    whole = replace(begun, residual=begun.residual + slow.waveform[slice(*begun.span)])  # of the record as it is
-    other = search(prepared, whole, faults, asked)
+    whole = replace(begun, residual=begun.residual + begin.waveform[slice(*begun.span)])  # of the record as it is
+    other = search_faults(prepared, whole, faults, asked)
     ends = [leftover(fit, corrected(prepared, found)) for found, fit in (plain, other)]
-    if ends[1] is None or not any(fault.fault == DRIFT for fault in other[0]):
+    if ends[1] is None or not any(fault.fault in (DRIFT, OFFSET) for fault in other[0]):
         return plain
-    return other if ends[0] is None or better(ends[0], ends[1], 1) else plain
+    return other if ends[0] is None or leaves_less(ends[0], ends[1], 1) else plain
 
 
 def _all_samples(prepared: Prepared) -> Prepared:

@@ -6,7 +6,7 @@ import numpy as np
 
 from study.faults.fault import DELAY, GAIN_CHANGE, HIGH_PASS, OFFSET
 from study.faults.imposed import high_passed, shifted
-from study.faults.leftover import Leftover
+from study.faults.leftover import FittedResidual
 from study.records.completion import derivative
 from study.records.states import angular_rate
 from study.support.arrays import Floats
@@ -21,7 +21,7 @@ def unit(fault: str, response_unit: str) -> str:
     return {DELAY: "samples", GAIN_CHANGE: "1", HIGH_PASS: "Hz"}.get(fault, response_unit)
 
 
-def columns(fault: str, left: Leftover, value: float = 0.0) -> Columns:
+def fault_columns(fault: str, left: FittedResidual, value: float = 0.0) -> Columns:
     """Derivative of the response by the fault's value on both parts, shapes (n, k) and (m, k); the first column.
 
     Others stand for what is not known of the channel at its first sample. ``value`` is what the record has been
@@ -43,7 +43,7 @@ def columns(fault: str, left: Leftover, value: float = 0.0) -> Columns:
     return np.column_stack([first, fall]), np.column_stack([second, np.zeros(len(judged))])
 
 
-def undone(fault: str, values: Floats, value: float, dt: float) -> Floats:
+def without_fault(fault: str, values: Floats, value: float, dt: float) -> Floats:
     """A channel without the fault, shape (n,)."""
     if fault == OFFSET:
         return values - value
@@ -56,7 +56,7 @@ def undone(fault: str, values: Floats, value: float, dt: float) -> Floats:
     return np.cumsum((1.0 + half) * centred + (half - 1.0) * np.concatenate([[0.0], centred[:-1]]))
 
 
-def sensible(fault: str, value: float, left: Leftover) -> bool:
+def sensible(fault: str, value: float, left: FittedResidual) -> bool:
     """Whether a value is one that the fault can have: a gain stays positive, a cut-off lies below half the rate."""
     if fault == GAIN_CHANGE:
         return -0.9 < value < 9.0
@@ -67,7 +67,7 @@ def sensible(fault: str, value: float, left: Leftover) -> bool:
     return True
 
 
-def _along(left: Leftover, change: Callable[[Floats], Floats]) -> Columns:
+def _along(left: FittedResidual, change: Callable[[Floats], Floats]) -> Columns:
     """A linear change of the predicted response, along both parts at once where they follow each other."""
     fitted, judged = left.predicted
     if left.fit.span[1] != left.prepared.plan.judge[0]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from study.faults.adjustable import undone
+from study.faults.adjustable import without_fault
 from study.faults.fault import DELAY, GAIN_CHANGE, HIGH_PASS, OFFSET, Fault
 from study.records.prepared import Prepared, prepare_record
 from study.records.record import MOTIONS, Record
@@ -33,7 +33,7 @@ def corrected(prepared: Prepared, faults: Sequence[Fault]) -> Prepared:
     for name in (OFFSET, GAIN_CHANGE, HIGH_PASS, DELAY):
         for fault in wanted:
             if fault.fault == name:
-                values = undone(name, values, fault.value, prepared.dt)
+                values = without_fault(name, values, fault.value, prepared.dt)
                 if fault.waveform is not None:
                     values = values - fault.waveform
     late = sum(abs(fault.value) for fault in wanted if fault.fault == DELAY)

@@ -9,7 +9,7 @@ from scipy.fft import dct, idct
 from scipy.special import fdtrc
 
 from study.faults.fault import DRIFT, Fault
-from study.faults.leftover import Leftover
+from study.faults.leftover import FittedResidual
 from study.records.prepared import FORCE, Prepared
 from study.support.arrays import Floats
 from study.support.thresholds import ALPHA, TOLERANCE
@@ -18,7 +18,7 @@ SLOWEST, BESIDE = 8, 32  # cosines, of half a period each more than the one befo
 FEWEST = 256  # samples that show both
 
 
-def drift(left: Leftover, asked: int) -> Fault | None:
+def drift(left: FittedResidual, asked: int) -> Fault | None:
     """A drift of the response, None where the slowest lines hold no more than those beside them.
 
     The F test of both groups of lines, of which a smooth spectrum makes independent numbers of one variance.
@@ -55,6 +55,12 @@ def slow_response(prepared: Prepared, asked: int) -> Fault | None:
     return Fault(DRIFT, prepared.response, float(np.std(waveform)), waveform=waveform)
 
 
+def mean_response(prepared: Prepared) -> Fault:
+    """The mean of the response, where a fit that cannot follow it may begin; as a drift that stays the same."""
+    mean = float(np.mean(np.concatenate([prepared.fitted, prepared.judged])))
+    return Fault(DRIFT, prepared.response, mean, waveform=np.full(len(prepared.record), mean))
+
+
 def _slow_lines(values: Floats, asked: int) -> tuple[int, float] | None:
     """How many of the slowest lines stand above the next, and the mean power of these; None without any."""
     if len(values) < FEWEST:
@@ -66,7 +72,7 @@ def _slow_lines(values: Floats, asked: int) -> tuple[int, float] | None:
     return count, float(np.mean(lines[count + 1 : 3 * count + SLOWEST + 1] ** 2))
 
 
-def slow_part(left: Leftover, count: int) -> Floats:
+def slow_part(left: FittedResidual, count: int) -> Floats:
     """The ``count`` slowest cosines of a residual along the whole record, without their mean, shape (n,)."""
     return _slow(*_in_time(left), count, len(left.prepared.record))
 
@@ -79,7 +85,7 @@ def _slow(places: Floats, values: Floats, count: int, length: int) -> Floats:
     return np.pad(np.asarray(idct(lines, norm="ortho"), dtype=np.float64), (first, length - 1 - last), "edge")
 
 
-def _in_time(left: Leftover) -> tuple[Floats, Floats]:
+def _in_time(left: FittedResidual) -> tuple[Floats, Floats]:
     """Places and residual of both parts in the order of time."""
     places, residual = np.concatenate(left.samples), np.concatenate(left.residual)
     order = np.argsort(places)

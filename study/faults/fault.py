@@ -87,7 +87,7 @@ class Fault:
         return replace(self, rivals=names)
 
 
-def fields(fault: Fault) -> dict[str, Any]:
+def fault_fields(fault: Fault) -> dict[str, Any]:
     """A fault as ``diagnosis.json`` holds it."""
     return {
         "fault": fault.fault, "channel": fault.channel, "value": fault.value, "interval": list(fault.interval),
@@ -96,7 +96,7 @@ def fields(fault: Fault) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def paragraph(faults: tuple[Fault, ...]) -> str:
+def faults_in_words(faults: tuple[Fault, ...]) -> str:
     """All faults in sentences; empty without any."""
     return " ".join(fault.says for fault in faults)
 

@@ -56,7 +56,7 @@ def example(model: Model, fault: str, samples: int = SAMPLES) -> Example:
     StudyError
         If there is no such fault, or another is found.
     """
-    clean = measured(model, RESPONSES.get(fault, "displacement"), samples)
+    clean = measured_example(model, RESPONSES.get(fault, "displacement"), samples)
     response = next(name for name in clean.channels if name != "force")
     faulty, known = impose(clean, response, fault, np.random.default_rng(SEED))
     unknown = model.with_values(dict.fromkeys(model.values, None))
@@ -66,7 +66,7 @@ def example(model: Model, fault: str, samples: int = SAMPLES) -> Example:
     return Example(clean, faulty, float(known["value"]), faults[0])
 
 
-def measured(model: Model, response: str, samples: int = SAMPLES) -> Record:
+def measured_example(model: Model, response: str, samples: int = SAMPLES) -> Record:
     """Force and one motion of a system, with noise on the motion."""
     whole = simulate(model, force(FORCE, samples, DT, seed=SEED), DT, Integrator("rk4", 8))
     factor, unit = MILLIMETRES.get(response, (1.0, whole.units[response]))

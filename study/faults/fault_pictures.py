@@ -53,16 +53,16 @@ def picture(example: Example) -> Figure:
     The caller applies the style sheet.
     """
     found = example.found
-    figure, (signal, difference) = page.page(
+    figure, (signal, difference) = page.empty_page(
         f"{TITLES[found.fault]} (in truth {_truth(example)})", f"found: {found.note.split(';')[0]}",
         rows=2, width=WIDTH, panel=PANEL, headed=False,
     )  # fmt: skip
-    first, last = stretch(example)
-    pair(signal, example, first, last)
+    first, last = shown_samples(example)
+    example_panel(signal, example, first, last)
     change(difference, example, first, last)
     signal.set_xlabel("")
     figure.align_ylabels([signal, difference])
-    page.legend(figure, [signal])
+    page.shared_legend(figure, [signal])
     return figure
 
 
@@ -72,7 +72,7 @@ def _truth(example: Example) -> str:
     return f"{100.0 * example.size:.3g} %" if unit == "1" else f"{example.size:.3g} {dimensions.pretty(unit)}"
 
 
-def stretch(example: Example) -> tuple[int, int]:
+def shown_samples(example: Example) -> tuple[int, int]:
     """First sample that is shown and the one after the last: where the fault is seen."""
     n, fault = len(example.clean), example.found.fault
     if fault in WHOLE:
@@ -89,7 +89,7 @@ def stretch(example: Example) -> tuple[int, int]:
     return first, first + length
 
 
-def pair(axes: Axes, example: Example, first: int, last: int) -> Axes:
+def example_panel(axes: Axes, example: Example, first: int, last: int) -> Axes:
     """The channel as it is, and as it is read."""
     time = example.clean.time[first:last]
     dots: dict[str, Any] = {"marker": "o", "markersize": 3.0} if last - first <= FEW else {}

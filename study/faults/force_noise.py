@@ -11,7 +11,7 @@ import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
 from study.faults.fault import FORCE_NOISE, Fault
-from study.faults.leftover import Leftover
+from study.faults.leftover import FittedResidual
 from study.identify.time_domain.part_fit import run_of
 from study.records.prepared import FORCE, Prepared
 from study.support.arrays import Floats
@@ -51,7 +51,7 @@ class _Noise:
         return self.error / float(np.sqrt(max(self.amount, 1e-300))) / 2.0
 
 
-def force_noise(left: Leftover, asked: int) -> Fault | None:
+def force_noise(left: FittedResidual, asked: int) -> Fault | None:
     """Noise on the force; None where noise on the response is as likely, by the ratio of the likelihoods."""
     residual = np.concatenate(left.residual)
     power = _periodogram(residual)
@@ -88,7 +88,7 @@ def _rms(found: list[_Noise]) -> tuple[float, float]:
     return value, float(np.sqrt(weights @ (np.where(weights > 1e-6, errors, 0.0) ** 2 + (sizes - value) ** 2)))
 
 
-def _passed(left: Leftover, memory: float, size: float) -> Floats | None:
+def _passed(left: FittedResidual, memory: float, size: float) -> Floats | None:
     """Spectrum of the response to noise of unit mean square and first order on the force, shape (lines,).
 
     The mean over runs with noise of this rms, of some neighbouring lines: a nonlinear structure answers noise of each
@@ -125,7 +125,7 @@ def _periodogram(values: Floats) -> Floats:
     return np.abs(np.asarray(rfft(values * bell)))[1:-1] ** 2 / float(np.sum(bell**2))
 
 
-def _response(left: Leftover, prepared: Prepared) -> Floats:
+def _response(left: FittedResidual, prepared: Prepared) -> Floats:
     """Response of the fitted model on both parts of a record, shape (n + m,)."""
     fitted = run_of(left.fit, prepared).respond({}, left.fit.initial)[0]
     assert left.prediction.run is not None, "what does not run leaves nothing to look at"

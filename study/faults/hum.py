@@ -9,7 +9,7 @@ from scipy.fft import rfft
 from scipy.special import fdtrc
 
 from study.faults.fault import HUM, Fault
-from study.faults.leftover import Leftover, share
+from study.faults.leftover import FittedResidual, share
 from study.support.arrays import Floats
 from study.support.thresholds import ALPHA
 
@@ -21,7 +21,7 @@ NEAREST = 3  # of them, left out: a line between two shows in its neighbours
 SLOWEST = 12  # lines from zero that are drift, not hum
 
 
-def hum(left: Leftover, asked: int) -> Fault | None:
+def hum(left: FittedResidual, asked: int) -> Fault | None:
     """The strongest line of the residual, None where none stands out of its neighbours by more than chance."""
     frequency = strongest_line(left, ALPHA / asked)
     if frequency is None:
@@ -41,7 +41,7 @@ def hum(left: Leftover, asked: int) -> Fault | None:
     )
 
 
-def is_of_the_mains(frequency: float, left: Leftover) -> bool:
+def is_of_the_mains(frequency: float, left: FittedResidual) -> bool:
     """Whether a frequency is that of the mains or a multiple, or what the sampling makes of these, to a line."""
     dt = left.prepared.dt
     line = 1.0 / (dt * (len(left.fit.residual) + len(left.residual[1])))
@@ -54,14 +54,14 @@ def is_of_the_mains(frequency: float, left: Leftover) -> bool:
     return False
 
 
-def line(frequency: float, left: Leftover) -> tuple[Floats, Floats]:
+def line(frequency: float, left: FittedResidual) -> tuple[Floats, Floats]:
     """Cosine and sine on both parts."""
     turns = [2.0 * np.pi * frequency * left.prepared.dt * places for places in left.samples]
     first, second = (np.column_stack([np.cos(turn), np.sin(turn)]) for turn in turns)
     return first, second
 
 
-def strongest_line(left: Leftover, level: float) -> float | None:
+def strongest_line(left: FittedResidual, level: float) -> float | None:
     """Frequency in hertz of the line that stands highest over its neighbours, by the F test of all lines."""
     residual = np.concatenate(left.residual)
     n = len(residual)
@@ -81,7 +81,7 @@ def strongest_line(left: Leftover, level: float) -> float | None:
     return best / (n * left.prepared.dt) if p_value < level else None
 
 
-def _refined(frequency: float, left: Leftover) -> float:
+def _refined(frequency: float, left: FittedResidual) -> float:
     """The frequency at which the line takes most of both parts, within a line to either side."""
     resolution = 1.0 / (left.prepared.dt * (len(left.residual[0]) + len(left.residual[1])))
     places, residual = np.concatenate(left.samples), np.concatenate(left.residual)

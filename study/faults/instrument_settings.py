@@ -5,12 +5,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from study.faults.fault import HOLDABLE, NAMES
-from study.records.readers.options import beside, read_options
+from study.records.readers.options import options_beside, read_options
 from study.support.errors import at, expect
 
 
 @dataclass(frozen=True)
-class Settings:
+class FaultSettings:
     """Faults with a value that is known, faults that are not looked for, and whether all samples are used."""
 
     held: Mapping[str, float] = field(default_factory=dict[str, float])
@@ -18,10 +18,10 @@ class Settings:
     as_sampled: bool = False
 
 
-NOTHING_ASKED = Settings(switched_off=NAMES)
+NOTHING_ASKED = FaultSettings(switched_off=NAMES)
 
 
-def settings_beside(record: Path) -> Settings:
+def settings_beside(record: Path) -> FaultSettings:
     """The settings in the file that may stand beside a record, under ``measurement``.
 
     Raises
@@ -29,17 +29,17 @@ def settings_beside(record: Path) -> Settings:
     StudyError
         If it names a fault that is not known, or holds one at a value that one number does not describe.
     """
-    path = beside(record)
+    path = options_beside(record)
     if not path.is_file():
-        return Settings()
+        return FaultSettings()
     options = read_options(path)
     with at(path):
-        asked = settings_of(options.measurement) if options.measurement else Settings()
+        asked = settings_of(options.measurement) if options.measurement else FaultSettings()
     asked = NOTHING_ASKED if options.measurement == {} else asked
     return replace(asked, as_sampled=options.as_sampled)
 
 
-def settings_of(given: Mapping[str, float | None]) -> Settings:
+def settings_of(given: Mapping[str, float | None]) -> FaultSettings:
     """Settings from values by name of the fault; None for a fault that is not looked for."""
     for name, value in given.items():
         expect(name in NAMES, f"measurement names {name!r}; expected one of {', '.join(NAMES)}")
@@ -48,4 +48,4 @@ def settings_of(given: Mapping[str, float | None]) -> Settings:
         expect(name != "high_pass" or value is None or value > 0.0, f"high_pass is {value}; expected a cut-off above 0")
         expect(name != "gain_change" or value is None or value > -1.0, f"gain_change is {value}; expected it above -1")
     held = {name: value for name, value in given.items() if value is not None and value != 0.0}
-    return Settings(held, tuple(name for name in given if name not in held))
+    return FaultSettings(held, tuple(name for name in given if name not in held))

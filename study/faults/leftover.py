@@ -12,14 +12,14 @@ from study.identify.time_domain.part_fit import linearise, run_of
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
 from study.support.least_squares import least_squares
-from study.support.statistics import Gain, beside, clustered_covariance, gain
+from study.support.statistics import Gain, clustered_covariance, gain, gain_beside
 from study.support.thresholds import ALPHA, BLOCKS, TOLERANCE
 
 INDISTINCT = 1e-5  # share of a column's length that the model's own coefficients leave of it
 
 
 @dataclass(frozen=True, eq=False)
-class Leftover:
+class FittedResidual:
     """Residual of a fitted model on the fitting and on the judging part; n and m samples, p keys."""
 
     fit: FreeRunFit
@@ -56,7 +56,7 @@ class Leftover:
     def beside_own(self) -> Floats:
         """Residual of the judging part beside what the model's own coefficients, fitted to both parts, take, (m,).
 
-        A change of the prediction is held against this (``study.support.statistics.beside``).
+        A change of the prediction is held against this (``study.support.statistics.gain_beside``).
         """
         design = np.vstack(self.own)
         return self.residual[1] - self.own[1] @ least_squares(design, np.concatenate(self.residual), 1e-9)
@@ -95,15 +95,15 @@ class Share:
         return p_value * asked < ALPHA and self.power > TOLERANCE**2
 
 
-def leftover(fit: FreeRunFit, prepared: Prepared) -> Leftover | None:
+def leftover(fit: FreeRunFit, prepared: Prepared) -> FittedResidual | None:
     """What a fit leaves; None where its free run is no smooth function of its coefficients, or none at all."""
     if fit.restarts:
         return None
     prediction = predict(fit, prepared)
-    return None if prediction.diverged else Leftover(fit, prediction, prepared)
+    return None if prediction.diverged else FittedResidual(fit, prediction, prepared)
 
 
-def share(left: Leftover, columns: tuple[Floats, Floats], leading: bool = False) -> Share | None:
+def share(left: FittedResidual, columns: tuple[Floats, Floats], leading: bool = False) -> Share | None:
     """Joint regression of the residual on the model's own sensitivities and more columns.
 
     ``columns`` are those of a fault or an effect on both parts, shapes (n, k) and (m, k). They get only what the
@@ -122,7 +122,7 @@ def share(left: Leftover, columns: tuple[Floats, Floats], leading: bool = False)
     power = float(np.mean((apart @ whole) ** 2)) / left.size**2
     tested = slice(1) if leading else slice(None)
     return Share(whole, covariance, _p_value(whole[tested], covariance[tested, tested]),
-                 beside(left.residual[1], change, left.beside_own), power)  # fmt: skip
+                 gain_beside(left.residual[1], change, left.beside_own), power)  # fmt: skip
 
 
 def _taken(own: Floats, columns: Floats) -> Floats:
@@ -137,14 +137,14 @@ def _p_value(amounts: Floats, covariance: Floats) -> float:
     return float(fdtrc(count, freedom - count + 1, wald * (freedom - count + 1) / (count * freedom)))
 
 
-def better(before: Leftover, after: Leftover, asked: int) -> bool:
+def leaves_less(before: FittedResidual, after: FittedResidual, asked: int) -> bool:
     """Whether a fit leaves less of the judging part than another by no chance, so many having been tried."""
     power = float(np.mean(before.residual[1] ** 2) - np.mean(after.residual[1] ** 2)) / before.size**2
     held_out = gain(before.residual[1], after.residual[1])
     return held_out.p_value * asked < ALPHA and power > TOLERANCE**2
 
 
-def amounts_on_both(left: Leftover, columns: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+def amounts_on_both(left: FittedResidual, columns: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
     """Amounts of the columns, shape (k,), and their clustered covariance, from both parts of the record together."""
     fitted, judged = left.known(columns)
     count = fitted.shape[1]

@@ -8,7 +8,7 @@ import numpy as np
 
 from study.equations.model import ModelTerm, free
 from study.equations.terms import LIBRARY, Term
-from study.faults.leftover import Leftover, better, leftover, share
+from study.faults.leftover import FittedResidual, leaves_less, leftover, share
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -25,7 +25,7 @@ CHANCE = 2.0  # standard errors by which one effect may leave more than another 
 RUNS = 20  # free runs of such a fit
 
 
-def asks_for_more(left: Leftover) -> bool:
+def asks_for_more(left: FittedResidual) -> bool:
     """Whether any effect of the library explains a part of what is left, as far as small amounts of it show.
 
     One free run with the sensitivities of all effects without shape parameters.
@@ -37,7 +37,7 @@ def asks_for_more(left: Leftover) -> bool:
     return any(f is not None and f.significant(len(found)) for f in found)
 
 
-def missing(left: Leftover) -> Leftover | None:
+def missing(left: FittedResidual) -> FittedResidual | None:
     """What is left beside the effect that explains most; None if none explains any of it.
 
     One outside of what makes it physical, which is another effect or a fault in disguise, only where no other does.
@@ -52,9 +52,9 @@ def missing(left: Leftover) -> Leftover | None:
         return None
 
     def begun(term: Term) -> list[shape_search.Start]:
-        return shape_search.starts(term, base, look)
+        return shape_search.shape_starts(term, base, look)
 
-    def fitted(start: tuple[Term, list[shape_search.Start]]) -> Leftover | None:
+    def fitted(start: tuple[Term, list[shape_search.Start]]) -> FittedResidual | None:
         return _fitted(start[0], base, look, prepared)
 
     with ThreadPoolExecutor(cores()) as pool:
@@ -64,7 +64,7 @@ def missing(left: Leftover) -> Leftover | None:
     names = [t.name for t in terms]
     for group in ([t for t in tried if not unphysical(t.fit, names)], tried):
         best = _simplest_of_the_best(group)
-        if best is not None and better(left, best, len(terms)):
+        if best is not None and leaves_less(left, best, len(terms)):
             return best
     return None
 
@@ -74,7 +74,7 @@ def unphysical(fit: FreeRunFit, names: Sequence[str]) -> bool:
     return any(e.term.physical(fit.model.values) for e in fit.model.terms if e.name in names)
 
 
-def _simplest_of_the_best(tried: Sequence[Leftover]) -> Leftover | None:
+def _simplest_of_the_best(tried: Sequence[FittedResidual]) -> FittedResidual | None:
     """Of those that are not worse than the best by what chance makes of it, the one with the fewest unknowns."""
     best = min(tried, key=lambda t: float(np.sum(t.residual[1] ** 2)), default=None)
     if best is None:
@@ -108,7 +108,7 @@ def without_effect(fit: FreeRunFit, name: str, prepared: Prepared) -> FreeRunFit
         return None
 
 
-def _fitted(term: Term, base: shape_search.Baseline, look: Prepared, prepared: Prepared) -> Leftover | None:
+def _fitted(term: Term, base: shape_search.Baseline, look: Prepared, prepared: Prepared) -> FittedResidual | None:
     """What the model with an effect leaves, fitted as any candidate is; None where it does not run."""
     try:
         near = with_term(base.fit, free(term), base, look)
@@ -121,7 +121,7 @@ def _fitted(term: Term, base: shape_search.Baseline, look: Prepared, prepared: P
     return leftover(fit, prepared)
 
 
-def _sensitivities(left: Leftover) -> tuple[Floats, Floats] | None:
+def _sensitivities(left: FittedResidual) -> tuple[Floats, Floats] | None:
     """What small amounts of plain effects add to the response on both parts; None where that run fails."""
     fit, model, keys = left.fit, left.fit.model, list[str]()
     run = left.prediction.run

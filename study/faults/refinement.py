@@ -11,7 +11,7 @@ from study.faults.correction import corrected
 from study.faults.drift import slow_part
 from study.faults.fault import DELAY, HIGH_PASS, HUM, Fault
 from study.faults.hum import hum
-from study.faults.leftover import Leftover, amounts_on_both, leftover
+from study.faults.leftover import FittedResidual, amounts_on_both, leftover
 from study.faults.physics import refitted
 from study.records.prepared import Prepared
 from study.support import statistics
@@ -27,11 +27,11 @@ class Refined:
     """A fault with its value, and what the model leaves of the record that is corrected for it."""
 
     fault: Fault
-    left: Leftover
+    left: FittedResidual
 
 
 def refined(
-    name: str, given: Prepared, faults: Sequence[Fault], left: Leftover, value: float = 0.0
+    name: str, given: Prepared, faults: Sequence[Fault], left: FittedResidual, value: float = 0.0
 ) -> Refined | None:  # fmt: skip
     """Search a fault's value by correcting the record, fitting the model again and correcting what is left of it.
 
@@ -45,7 +45,7 @@ def refined(
     if name == DELAY and value == 0.0:
         value, left = _coarse(given, faults, left)
     for _ in range(STEPS):
-        amounts, covariance = amounts_on_both(left, adjustable.columns(name, left, value))
+        amounts, covariance = amounts_on_both(left, adjustable.fault_columns(name, left, value))
         step, error = float(amounts[0]), math.sqrt(max(float(covariance[0, 0]), 0.0))
         value += step
         if not adjustable.sensible(name, value, left):
@@ -66,12 +66,12 @@ def refined(
     return Refined(replace(found, explained=explained, error=error), left)
 
 
-def _coarse(given: Prepared, faults: Sequence[Fault], left: Leftover) -> tuple[float, Leftover]:
+def _coarse(given: Prepared, faults: Sequence[Fault], left: FittedResidual) -> tuple[float, FittedResidual]:
     """Where the search for a delay begins: at zero, or at the best of some whole samples if it is more than a part.
 
     A model that is fitted to a record late by a good part of a period finds a minimum of its own.
     """
-    step = float(amounts_on_both(left, adjustable.columns(DELAY, left))[0][0])
+    step = float(amounts_on_both(left, adjustable.fault_columns(DELAY, left))[0][0])
     best = 0.0, left
     for late in COARSE if abs(step) > 0.5 else ():
         tried = _left(given, (*faults, Fault(DELAY, given.response, late)), left)
@@ -80,13 +80,13 @@ def _coarse(given: Prepared, faults: Sequence[Fault], left: Leftover) -> tuple[f
     return best
 
 
-def relative_power(left: Leftover) -> float:
+def relative_power(left: FittedResidual) -> float:
     """Power of what is left over that of the response: a correction of the gain scales both."""
     measured = left.prepared.fitted, left.prepared.judged
     return sum(float(np.sum(r**2)) / float(np.sum(m**2)) for r, m in zip(left.residual, measured, strict=True))
 
 
-def _corrected(fault: Fault, given: Prepared, faults: Sequence[Fault], left: Leftover) -> Refined | None:
+def _corrected(fault: Fault, given: Prepared, faults: Sequence[Fault], left: FittedResidual) -> Refined | None:
     """A fault of this value, and what the model leaves when it is corrected."""
     again = _left(given, (*faults, fault), left)
     if again is None or fault.fault != HIGH_PASS:
@@ -99,7 +99,7 @@ def _corrected(fault: Fault, given: Prepared, faults: Sequence[Fault], left: Lef
     return None if final is None else Refined(whole, final)
 
 
-def _left(given: Prepared, faults: Sequence[Fault], left: Leftover) -> Leftover | None:
+def _left(given: Prepared, faults: Sequence[Fault], left: FittedResidual) -> FittedResidual | None:
     prepared = corrected(given, faults)
     fit = refitted(left.fit, prepared)
     return None if fit is None else leftover(fit, prepared)

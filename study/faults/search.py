@@ -17,11 +17,11 @@ from study.faults.drift import drift
 from study.faults.fault import CLIPPING, DRIFT, DROP_OUTS, FORCE_NOISE, HUM, OFFSET, SPIKES, Fault
 from study.faults.force_noise import force_noise
 from study.faults.hum import hum, is_of_the_mains, line
-from study.faults.leftover import Leftover, better, leftover, share
+from study.faults.leftover import FittedResidual, leaves_less, leftover, share
 from study.faults.refinement import Refined, refined, relative_power
 from study.faults.spikes import spikes
 from study.faults.spotted import drop_outs, spotted, widened
-from study.faults.stage import Stage, fitted_again
+from study.faults.stage import SearchStage, fitted_again
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.settling import settled
 from study.records.prepared import Prepared, limited
@@ -43,7 +43,7 @@ def first_faults(prepared: Prepared, held: Mapping[str, float], asked: Sequence[
     return (*given, *spotted(prepared, asked))
 
 
-def search(
+def search_faults(
     given: Prepared, fit: FreeRunFit, faults: Sequence[Fault], asked: Sequence[str]
 ) -> tuple[tuple[Fault, ...], FreeRunFit]:  # fmt: skip
     """All faults of a record, those that are known first, and the model fitted to the corrected record.
@@ -70,7 +70,7 @@ def search(
     return stage.faults, stage.left.fit
 
 
-def _values_again(stage: Stage) -> Stage:
+def _values_again(stage: SearchStage) -> SearchStage:
     """The stage with the values of its faults found again, beside the effects and the other faults known by now."""
     for fault in stage.faults:
         if fault.fault in adjustable.ADJUSTABLE and fault.corrected and not fault.held:
@@ -85,14 +85,14 @@ def _values_again(stage: Stage) -> Stage:
 
 def _searched(
     given: Prepared, fit: FreeRunFit, rich: FreeRunFit, faults: Sequence[Fault], asked: Sequence[str]
-) -> Stage | None:  # fmt: skip
+) -> SearchStage | None:  # fmt: skip
     """Where a search ends; None where the model does not run. ``rich`` is the model with the effects known by now."""
     prepared = corrected(given, faults)
     left = leftover(fit, prepared)
     more = left if rich is fit else leftover(rich, prepared)
     if left is None or more is None:
         return None
-    stage = _beyond_the_limits(Stage(given, tuple(faults), left, more))
+    stage = _beyond_the_limits(SearchStage(given, tuple(faults), left, more))
     for _ in range(ROUNDS):
         following = _next(stage, asked)
         if following is None:
@@ -101,16 +101,16 @@ def _searched(
     return _needed(stage, len(asked))
 
 
-def _beyond_the_limits(stage: Stage) -> Stage:
+def _beyond_the_limits(stage: SearchStage) -> SearchStage:
     """Without the samples near a limit that clips, which noise may have kept within it."""
     faults = [widened(f, stage.given, stage.left) if f.fault == CLIPPING else f for f in stage.faults]
     if not any(f.fault == CLIPPING for f in faults):
         return stage
     left = fitted_again(stage.left, corrected(stage.given, faults))
-    return stage if left is None else Stage(stage.given, tuple(faults), left, left)
+    return stage if left is None else SearchStage(stage.given, tuple(faults), left, left)
 
 
-def _next(stage: Stage, asked: Sequence[str]) -> Stage | None:
+def _next(stage: SearchStage, asked: Sequence[str]) -> SearchStage | None:
     """The stage with one fault more; None if there is none."""
     found = [f.fault for f in stage.faults]
     names = [name for name in asked if name not in found or name in (HUM, SPIKES)]
@@ -120,7 +120,7 @@ def _next(stage: Stage, asked: Sequence[str]) -> Stage | None:
     return _contested(stage, [n for n in names if n not in [f.fault for f in stage.faults if f.rivals]], len(asked))
 
 
-def _plain(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
+def _plain(stage: SearchStage, names: Sequence[str], asked: int) -> SearchStage | None:
     """One fault more of those that no physics imitates: drop-outs, spikes, drift, and hum of the mains."""
     if DROP_OUTS in names:
         fault = drop_outs(stage.rich, asked)
@@ -150,7 +150,7 @@ def _merged(faults: Sequence[Fault], spike: Fault) -> Fault:
     return replace(before, value=before.value + spike.value, error=error, lost=lost)
 
 
-def _contested(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
+def _contested(stage: SearchStage, names: Sequence[str], asked: int) -> SearchStage | None:
     """One fault more of those that have a look-alike in the library, or one effect more that the record asks for."""
     name = _best(stage.rich, [n for n in names if n in (*adjustable.ADJUSTABLE, HUM)], asked)
     one = None if name is None else refined(name, stage.given, stage.faults, stage.rich)
@@ -169,16 +169,16 @@ def _contested(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
     return _accepted(stage, one)
 
 
-def _no_effect(effect: Leftover, stage: Stage) -> bool:
+def _no_effect(effect: FittedResidual, stage: SearchStage) -> bool:
     """Whether what the record asks for most lies outside of what makes it physical."""
     return physics.unphysical(effect.fit, _added(effect, stage))
 
 
-def _added(effect: Leftover, stage: Stage) -> list[str]:
+def _added(effect: FittedResidual, stage: SearchStage) -> list[str]:
     return [e.name for e in effect.fit.model.terms if e.name not in stage.rich.fit.model]
 
 
-def _noisy_force(stage: Stage, names: Sequence[str], asked: int) -> Stage | None:
+def _noisy_force(stage: SearchStage, names: Sequence[str], asked: int) -> SearchStage | None:
     """The stage with noise on the force, which is said of what no effect explains; None if it is not seen or known."""
     if FORCE_NOISE not in names or force_noise(stage.rich, asked) is None:
         return None
@@ -196,18 +196,18 @@ def _may_be_none(fault: Fault, asked: int) -> bool:
     return fault.error > 0.0 and 2.0 * float(ndtr(-abs(fault.value) / fault.error)) * asked >= ALPHA
 
 
-def _effect(stage: Stage, one: Refined | None) -> Leftover | None:
+def _effect(stage: SearchStage, one: Refined | None) -> FittedResidual | None:
     """The effect that the record asks for most beside those that it has asked for already."""
     if len(stage.effects) >= EFFECTS or (one is None and not physics.asks_for_more(stage.rich)):
         return None
     return physics.missing(stage.rich)
 
 
-def _columns(fault: Fault, left: Leftover) -> tuple[Floats, Floats]:
-    return line(fault.frequency, left) if fault.fault == HUM else adjustable.columns(fault.fault, left)
+def _columns(fault: Fault, left: FittedResidual) -> tuple[Floats, Floats]:
+    return line(fault.frequency, left) if fault.fault == HUM else adjustable.fault_columns(fault.fault, left)
 
 
-def _best(left: Leftover, names: Sequence[str], asked: int) -> str | None:
+def _best(left: FittedResidual, names: Sequence[str], asked: int) -> str | None:
     """The fault that explains most of what is left, and that not by chance; None without any."""
     power: dict[str, float] = {}
     for name in names:
@@ -216,13 +216,13 @@ def _best(left: Leftover, names: Sequence[str], asked: int) -> str | None:
             if fault is not None:
                 power[name] = fault.explained * float(np.mean(left.residual[1] ** 2)) / left.size**2
             continue
-        found = share(left, adjustable.columns(name, left), leading=True)
+        found = share(left, adjustable.fault_columns(name, left), leading=True)
         if found is not None and found.significant(asked) and adjustable.sensible(name, float(found.amounts[0]), left):
             power[name] = found.power
     return max(power, key=lambda name: power[name], default=None)
 
 
-def _accepted(stage: Stage, one: Refined) -> Stage | None:
+def _accepted(stage: SearchStage, one: Refined) -> SearchStage | None:
     """The stage with a fault corrected.
 
     An effect that imitated the fault is no longer needed then; the value is found again without it.
@@ -234,16 +234,16 @@ def _accepted(stage: Stage, one: Refined) -> Stage | None:
     return following if again is None else stage.without(_explaining(again.fault, stage.rich, again.left))
 
 
-def _beside(effect: Leftover, stage: Stage) -> Stage:
+def _beside(effect: FittedResidual, stage: SearchStage) -> SearchStage:
     """The stage with an effect more, and the values of its faults found again beside it: its lack has moved them."""
     return _values_again(replace(stage, rich=effect))
 
 
-def _explaining(fault: Fault, before: Leftover, after: Leftover) -> Fault:
+def _explaining(fault: Fault, before: FittedResidual, after: FittedResidual) -> Fault:
     return replace(fault, explained=gain(before.residual[1], after.residual[1]).explained)
 
 
-def _tied(stage: Stage, one: Refined, effect: Leftover) -> Stage | None:
+def _tied(stage: SearchStage, one: Refined, effect: FittedResidual) -> SearchStage | None:
     """What becomes of a fault and an effect neither of which is needed beside the other: the fault is mentioned.
 
     Not so beside an effect that is none, as a Maxwell element of negative stiffness, which hastens what is late.
@@ -257,13 +257,13 @@ def _tied(stage: Stage, one: Refined, effect: Leftover) -> Stage | None:
     return replace(stage, faults=(*stage.faults, fault), rich=effect)
 
 
-def _needs(one: Refined, effect: Leftover) -> bool:
+def _needs(one: Refined, effect: FittedResidual) -> bool:
     """Whether the effect explains anything beside the corrected fault."""
     both = fitted_again(effect, one.left.prepared)
-    return both is not None and better(one.left, both, 1)
+    return both is not None and leaves_less(one.left, both, 1)
 
 
-def _beyond_reason(stage: Stage, effect: Leftover) -> bool:
+def _beyond_reason(stage: SearchStage, effect: FittedResidual) -> bool:
     """Whether a harmonic force would have to be larger than the whole measured one."""
     values = effect.fit.model.numbers()
     harmonic = [e.term.symbols for e in effect.fit.model.terms if len(e.term.symbols) == 2]  # a force of any phase
@@ -271,7 +271,7 @@ def _beyond_reason(stage: Stage, effect: Leftover) -> bool:
     return any(math.hypot(*(values[s] for s in symbols)) > largest for symbols in harmonic)
 
 
-def _needed(stage: Stage, asked: int) -> Stage:
+def _needed(stage: SearchStage, asked: int) -> SearchStage:
     """Without the faults that the effects found after them have made needless."""
     for fault in stage.faults:
         if fault.fault in (*adjustable.ADJUSTABLE, DRIFT) and fault.corrected and not fault.held:
@@ -281,13 +281,13 @@ def _needed(stage: Stage, asked: int) -> Stage:
             if left is None or rich is None:
                 continue
             if not _still_there(fault, rich, asked):
-                stage = Stage(stage.given, others, left, rich)
+                stage = SearchStage(stage.given, others, left, rich)
     return stage
 
 
-def _still_there(fault: Fault, rich: Leftover, asked: int) -> bool:
+def _still_there(fault: Fault, rich: FittedResidual, asked: int) -> bool:
     """Whether the record shows a fault beside all effects that it asks for."""
     if fault.fault == DRIFT:
         return drift(rich, asked) is not None
-    needed = share(rich, adjustable.columns(fault.fault, rich), leading=True)
+    needed = share(rich, adjustable.fault_columns(fault.fault, rich), leading=True)
     return needed is not None and needed.significant(asked)

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtr
 
 from study.faults.fault import SPIKES, Fault
-from study.faults.leftover import Leftover
+from study.faults.leftover import FittedResidual
 from study.identify.time_domain.part_fit import run_of
 from study.support.arrays import Floats
 from study.support.thresholds import ALPHA, TOLERANCE
@@ -14,14 +14,14 @@ NEIGHBOURS = 8  # samples on either side that tell how much a sample differs fro
 ROUNDS = 4  # of looking again beside what was found: a spike hides a smaller one near it
 
 
-def spikes(left: Leftover, asked: int) -> Fault | None:
+def spikes(left: FittedResidual, asked: int) -> Fault | None:
     """Spikes on both parts of the record, None without any."""
     record, prepared = left.prepared.record, left.prepared
     lost = np.zeros(len(record), dtype=np.bool_)
     spans = left.fit.span, prepared.plan.judge
     for span, residual, reversed_ in zip(spans, left.residual, reversals(left), strict=True):
         known = (prepared.known(np.ones(len(residual)), span) > 0.0) & ~reversed_
-        lost[slice(*span)] = alone(residual, known, ALPHA / asked)
+        lost[slice(*span)] = isolated(residual, known, ALPHA / asked)
     if not np.any(lost):
         return None
     power = np.concatenate(left.residual) ** 2
@@ -35,7 +35,7 @@ def spikes(left: Leftover, asked: int) -> Fault | None:
     return Fault(SPIKES, prepared.response, count, error, "1", explained, lost=beside)
 
 
-def reversals(left: Leftover) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def reversals(left: FittedResidual) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Samples beside which dry friction makes the acceleration jump, on both parts; none of another response.
 
     An error of the model moves such a jump past a sample, which then stands alone as a spike does.
@@ -53,7 +53,7 @@ def _turning(velocity: Floats) -> NDArray[np.bool_]:
     return np.concatenate([turns, [False]]) | np.concatenate([[False], turns])
 
 
-def alone(residual: Floats, known: NDArray[np.bool_], level: float) -> NDArray[np.bool_]:
+def isolated(residual: Floats, known: NDArray[np.bool_], level: float) -> NDArray[np.bool_]:
     """Samples that differ from the mean of their neighbours by more than chance, and stand alone with it, shape (n,).
 
     The bend ``r_i - (r_(i-1) + r_(i+1)) / 2`` of a sample is compared with the bends near it, and with those of the

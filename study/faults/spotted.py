@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc
 
 from study.faults.fault import CLIPPING, CONVERTER_STEPS, DROP_OUTS, Fault
-from study.faults.leftover import Leftover
+from study.faults.leftover import FittedResidual
+from study.records.moving import moving
 from study.records.prepared import Prepared
 from study.support.arrays import Floats, Ints
 from study.support.thresholds import ALPHA, TOLERANCE
@@ -86,7 +87,7 @@ def _switches(values: Floats) -> bool:
     return len(np.unique(values[:4096])) <= 3
 
 
-def drop_outs(left: Leftover, asked: int) -> Fault | None:
+def drop_outs(left: FittedResidual, asked: int) -> Fault | None:
     """Samples in runs of one value, which noise does not repeat; None without any.
 
     A system at rest, as one that friction holds, stands still too. Without noise a run counts where the model says that
@@ -96,8 +97,13 @@ def drop_outs(left: Leftover, asked: int) -> Fault | None:
     prepared, values = left.prepared, left.prepared.record[left.prepared.response]
     if converter_step(values) is not None:
         return None
-    mask, runs = _standing(values)
     places = np.concatenate(left.samples).astype(np.int64)
+    used = np.zeros(len(values), dtype=np.bool_)
+    used[places] = True
+    begun, over = moving(values)
+    used[: begun + 1], used[over:] = False, False  # at rest before or behind
+    mask, runs = _standing(values)
+    mask &= used
     power = np.concatenate(left.residual) ** 2
     if not 0.0 < float(np.mean(mask[places])) < STANDING:
         return None
@@ -115,7 +121,7 @@ def drop_outs(left: Leftover, asked: int) -> Fault | None:
     ):
         return None
     explained = float(np.sum(power[there]) / np.sum(power))
-    return Fault(DROP_OUTS, prepared.response, float(np.mean(mask)), unit="1", explained=explained, lost=mask)
+    return Fault(DROP_OUTS, prepared.response, float(np.mean(there)), unit="1", explained=explained, lost=mask)
 
 
 def _at_rest(response: str, standing: Floats) -> bool:
@@ -150,7 +156,7 @@ def _standing(values: Floats) -> tuple[NDArray[np.bool_], int]:
     return mask, count
 
 
-def widened(fault: Fault, given: Prepared, left: Leftover) -> Fault:
+def widened(fault: Fault, given: Prepared, left: FittedResidual) -> Fault:
     """Clipping with all samples lost whose true motion may be beyond the limit, as the free run tells.
 
     Noise decides whether a sample near the limit is clipped. If those that are not were kept, their noise would not

@@ -5,47 +5,47 @@ from dataclasses import dataclass, replace
 from study.faults import physics
 from study.faults.correction import corrected
 from study.faults.fault import SPIKES, Fault
-from study.faults.leftover import Leftover, better, leftover
+from study.faults.leftover import FittedResidual, leaves_less, leftover
 from study.records.prepared import Prepared
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class SearchStage:
     """Where a search stands: the record as given, the faults found, and the model fitted to the corrected record."""
 
     given: Prepared
     faults: tuple[Fault, ...]
-    left: Leftover  # of the model
-    rich: Leftover  # of the model and the effects that the record asks for
+    left: FittedResidual  # of the model
+    rich: FittedResidual  # of the model and the effects that the record asks for
 
     @property
     def effects(self) -> list[str]:
         """The effects that the record asks for."""
         return [e.name for e in self.rich.fit.model.terms if e.name not in self.left.fit.model]
 
-    def named(self, fault: Fault) -> "Stage":
+    def named(self, fault: Fault) -> "SearchStage":
         """The stage with a fault that nothing is corrected for."""
         return replace(self, faults=(*self.faults, fault))
 
-    def without(self, *faults: Fault) -> "Stage | None":
+    def without(self, *faults: Fault) -> "SearchStage | None":
         """The stage with these faults corrected; None where a model does not run any more."""
         known = (*(f for f in self.faults if f.fault not in [g.fault for g in faults if f.fault == SPIKES]), *faults)
         prepared = corrected(self.given, known)
         left, rich = (fitted_again(one, prepared) for one in (self.left, self.rich))
-        return None if left is None or rich is None else Stage(self.given, known, left, _pruned(rich, left))
+        return None if left is None or rich is None else SearchStage(self.given, known, left, _pruned(rich, left))
 
 
-def _pruned(rich: Leftover, left: Leftover) -> Leftover:
+def _pruned(rich: FittedResidual, left: FittedResidual) -> FittedResidual:
     """Without the effects that the corrected record no longer asks for, the last one first."""
     for name in reversed([e.name for e in rich.fit.model.terms if e.name not in left.fit.model]):
         fit = physics.without_effect(rich.fit, name, rich.prepared)
         fewer = None if fit is None else leftover(fit, rich.prepared)
-        if fewer is not None and not better(fewer, rich, 1):
+        if fewer is not None and not leaves_less(fewer, rich, 1):
             rich = fewer
     return left if len(rich.fit.model.terms) == len(left.fit.model.terms) else rich
 
 
-def fitted_again(left: Leftover, prepared: Prepared) -> Leftover | None:
+def fitted_again(left: FittedResidual, prepared: Prepared) -> FittedResidual | None:
     """A model fitted again to a record that was corrected."""
     fit = physics.refitted(left.fit, prepared)
     return None if fit is None else leftover(fit, prepared)

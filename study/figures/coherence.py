@@ -19,7 +19,7 @@ ALL = ("C0", "-")  # the last curve is the multiple coherence: what the whole mo
 OTHER_MOTION = {"instrumental": "fitted model's own motion"}  # near one whatever the model: it is no test
 
 
-def cumulative(axes: Axes, shares: Sequence[InputCoherence]) -> Axes:
+def cumulative_panel(axes: Axes, shares: Sequence[InputCoherence]) -> Axes:
     """Cumulative coherences (4.29) to (4.38): each curve adds one conditioned input to those below it.
 
     The area under a curve, down to the one below, is what its input adds.
@@ -41,7 +41,7 @@ def cumulative(axes: Axes, shares: Sequence[InputCoherence]) -> Axes:
     return axes
 
 
-def beside(axes: Axes, shares: Sequence[InputCoherence], estimator: str) -> Axes:
+def marks_of_another(axes: Axes, shares: Sequence[InputCoherence], estimator: str) -> Axes:
     """Cumulative coherences of a further estimator as marks on a hair line, one label for each curve."""
     whose = OTHER_MOTION.get(estimator, look(estimator).label)
     for index, share in enumerate(shares):

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from study.figures.styles import rank
+from study.figures.styles import legend_place
 from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
@@ -18,7 +18,7 @@ TWO_SIDED_95 = NormalDist().inv_cdf(0.975)
 
 
 @dataclass(frozen=True)
-class Curve:
+class ResponseCurve:
     """One estimator's A_j(f); arrays of shape (lines,)."""
 
     estimator: str  # its name, by which styles knows it
@@ -41,7 +41,7 @@ class InputResponse:
 
     number: int  # j, counted from 1
     shape: str  # formula of the input, such as u**3
-    curves: tuple[Curve, ...]  # one for each estimator
+    curves: tuple[ResponseCurve, ...]  # one for each estimator
     frequency: Floats  # lines of the exact function, in hertz
     exact: Complexes | None  # the exact function; None where the record is a measured one
 
@@ -56,7 +56,9 @@ class InputCoherence:
     cumulative: Floats  # coherence of this and all earlier conditioned inputs with the output, shape (lines,)
 
 
-def responses(table: pd.DataFrame, highest: float, drawn: Sequence[str] | None = None) -> tuple[InputResponse, ...]:
+def input_responses(
+    table: pd.DataFrame, highest: float, drawn: Sequence[str] | None = None
+) -> tuple[InputResponse, ...]:
     """Frequency response functions of ``frequency_response.csv``, one entry an input.
 
     Lines above ``highest`` (in hertz) are left out, as is the line at zero, which has no phase. ``drawn`` names the
@@ -69,8 +71,8 @@ def responses(table: pd.DataFrame, highest: float, drawn: Sequence[str] | None =
 def _response(number: int, part: pd.DataFrame) -> InputResponse:
     groups = _groups(part, "estimator")
     curves = [
-        Curve(name, _column(rows, "frequency"), _complex(rows, "real", "imag"), _column(rows, "standard_error"))
-        for name, rows in sorted(groups, key=lambda group: rank(group[0]))
+        ResponseCurve(name, _column(rows, "frequency"), _complex(rows, "real", "imag"), _column(rows, "standard_error"))
+        for name, rows in sorted(groups, key=lambda group: legend_place(group[0]))
     ]
     _, first = groups[0]
     exact = _complex(first, "exact_real", "exact_imag")

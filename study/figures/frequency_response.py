@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from study.equations import dimensions
 from study.figures import labels
-from study.figures.curves import Curve, InputResponse
+from study.figures.curves import InputResponse, ResponseCurve
 from study.figures.styles import EXACT, look
 
 Floats = NDArray[np.float64]
@@ -24,7 +24,7 @@ OPPOSITE = "opposite sign"
 Part = Callable[[Complexes], Floats]
 
 
-def magnitude(axes: Axes, response: InputResponse, unit: str) -> Axes:
+def magnitude_panel(axes: Axes, response: InputResponse, unit: str) -> Axes:
     """|A_j(f)| of every estimator on a logarithmic scale, with 95 % bands and the exact function."""
     for curve in response.curves:
         _size(axes, curve, np.abs(curve.values))
@@ -38,7 +38,7 @@ def magnitude(axes: Axes, response: InputResponse, unit: str) -> Axes:
     return _frequency_axis(axes, response)
 
 
-def phase(axes: Axes, response: InputResponse) -> Axes:
+def phase_panel(axes: Axes, response: InputResponse) -> Axes:
     """Phase of A_j(f) in degrees, from -90 to 270: neither 0 nor 180 is where it would wrap."""
     turns: list[Floats] = []
     for curve in response.curves:
@@ -130,18 +130,18 @@ def _logarithmic(axes: Axes, response: InputResponse, span: float) -> None:
     _decades(axes, [*middle, exact])
 
 
-def _within(curve: Curve, span: float) -> Curve:
+def _within(curve: ResponseCurve, span: float) -> ResponseCurve:
     """The curve with gaps where its 95 % band is higher than the panel: the record says nothing about A_j there."""
     unknown = 2.0 * curve.half_width > span
     return replace(curve, values=np.where(unknown, complex("nan+nanj"), curve.values))
 
 
-def _size(axes: Axes, curve: Curve, size: Floats) -> None:
+def _size(axes: Axes, curve: ResponseCurve, size: Floats) -> None:
     """A size with its 95 % band, for a logarithmic scale: the band ends a hundredfold below the curve."""
     _curve(axes, curve, size, np.maximum(size - curve.half_width, 1e-2 * size), size + curve.half_width)
 
 
-def _curve(axes: Axes, curve: Curve, values: Floats, low: Floats, high: Floats) -> None:
+def _curve(axes: Axes, curve: ResponseCurve, values: Floats, low: Floats, high: Floats) -> None:
     """Values of a curve and a band about them, in the estimator's look."""
     style = look(curve.estimator)
     axes.fill_between(curve.frequency, low, high, color=style.colour, zorder=style.level - 1.0, **BAND)

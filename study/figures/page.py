@@ -31,7 +31,7 @@ def width(columns: int) -> float:
     return WIDTH if columns == 1 else 0.7 * WIDTH * columns
 
 
-def page(
+def empty_page(
     title: str, subtitle: str, rows: int = 1, columns: int = 1, *,
     width: float = WIDTH, panel: float = 2.1, legend_rows: int = 1,
     headed: bool = True, share: bool = True,
@@ -68,7 +68,7 @@ def rows_for(entries: int) -> int:
     return 1 if entries <= 4 else -(-entries // 3)
 
 
-def legend(figure: Figure, axes: Sequence[Axes], columns: int | None = None, *, bands: bool = False) -> None:
+def shared_legend(figure: Figure, axes: Sequence[Axes], columns: int | None = None, *, bands: bool = False) -> None:
     """One legend for all panels, between the title and the first of them; equal labels stand once.
 
     With ``bands`` it explains the shade about a curve.
@@ -136,6 +136,6 @@ def rendered(figure: Figure, kind: str) -> bytes:
     return target.getvalue()
 
 
-def files(figures: Mapping[str, Figure]) -> dict[str, bytes]:
+def image_files(figures: Mapping[str, Figure]) -> dict[str, bytes]:
     """Figures, by the stem of their file name, as the content of files: each as PNG and as SVG."""
     return {f"{stem}.{kind}": rendered(figure, kind) for stem, figure in figures.items() for kind in ("png", "svg")}

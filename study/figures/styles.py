@@ -40,7 +40,7 @@ def look(estimator: str) -> LineLook:
     return ESTIMATORS.get(estimator, fallback)
 
 
-def rank(estimator: str) -> int:
+def legend_place(estimator: str) -> int:
     """Place of an estimator in legends: as in the table above, unknown ones last."""
     names = list(ESTIMATORS)
     return names.index(estimator) if estimator in names else len(names)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from study.compare import history
-from study.gallery.findings_of_record import Beside, Fields, Found
+from study.gallery.findings_of_record import Beside, Fields, RecordFindings
 from study.gallery.known import Literature
 from study.support import document
 from study.support.document import Block, Text
@@ -13,7 +13,7 @@ MISSING, NOTHING = "missing_effect", "nothing_missing"  # verdicts of diagnoses
 SHOWN = 5  # candidates
 
 
-def told(known: Literature, found: Sequence[Found], values: Sequence[Beside]) -> list[Block]:
+def told(known: Literature, found: Sequence[RecordFindings], values: Sequence[Beside]) -> list[Block]:
     """What stands in the literature, what each of the records shows, and published values beside those found."""
     blocks: list[Block] = [Text(f"{known.test}. {known.source}"), Text(f"**In the literature.** {known.known}")]
     for one in found:
@@ -23,18 +23,18 @@ def told(known: Literature, found: Sequence[Found], values: Sequence[Beside]) ->
     return blocks
 
 
-def of_record(found: Found, named: bool) -> list[Block]:
+def of_record(found: RecordFindings, named: bool) -> list[Block]:
     """The ladder of one record: from the model as given to the one reached, and what is left of the response."""
     begins = ", ".join(_spoken(name) for name in found.steps[0]["terms"])
     name = f"**`{found.record}`.** " if named else ""
     return [
         Text(f"{name}The model is given as {begins}. **What is found.** {found.first['says']}"),
-        ladder(found),
+        climb_block(found),
         Text(f"**What is left.** {left(found)}"),
     ]
 
 
-def ladder(found: Found) -> Block:
+def climb_block(found: RecordFindings) -> Block:
     """Every model of the climb with its held-out error."""
     rows = [
         ("as given" if number == 0 else _spoken(history.label(step)), percent(step["error"]["response"]),
@@ -44,7 +44,7 @@ def ladder(found: Found) -> Block:
     return document.table(("model", "held-out error", "rms", "noise floor"), rows)
 
 
-def left(found: Found) -> str:
+def left(found: RecordFindings) -> str:
     """What the model reached leaves, and whether that is noise."""
     last, step = found.last, found.steps[-1]
     size = f"{percent(step['error']['response'])} of the response"
@@ -65,7 +65,7 @@ def left(found: Found) -> str:
     )
 
 
-def _still(found: Found) -> str:
+def _still(found: RecordFindings) -> str:
     first = found.last["candidates"][0]
     tied = [_effect(t) for t in first.get("tied_with", ())]
     also = f", which the record cannot tell from {', '.join(tied)}," if tied else ""
@@ -75,7 +75,7 @@ def _still(found: Found) -> str:
     )
 
 
-def candidates(found: Found) -> Block:
+def candidates(found: RecordFindings) -> Block:
     """The first candidates of the model as given."""
     rows = [
         (_effect(c), percent(c["explained"]), percent(c["response_error"]), _changes(c),

@@ -14,7 +14,7 @@ QUIET = 4  # a quarter of the windows of a decay, the quietest, gives the values
 
 
 @dataclass(frozen=True)
-class Found:
+class RecordFindings:
     """What was found of one row of ``config/measurements.tsv``."""
 
     record: str
@@ -39,7 +39,7 @@ class Beside:
     interval: tuple[float, float] | None  # 95 %
 
 
-def read(folder: Path, record: str) -> Found:
+def read_findings(folder: Path, record: str) -> RecordFindings:
     """What the climb of a record left in ``folder``.
 
     Raises
@@ -52,7 +52,7 @@ def read(folder: Path, record: str) -> Found:
     if not diagnoses:
         raise StudyError(f"{folder}/climb holds no diagnosis; expected what 'snakemake {record}_climb' leaves there")
     reached = _json(folder / "climb" / "comparison.json")
-    return Found(record, tuple(steps), _json(diagnoses[0]), _json(diagnoses[-1]), reached, folder)
+    return RecordFindings(record, tuple(steps), _json(diagnoses[0]), _json(diagnoses[-1]), reached, folder)
 
 
 def _json(path: Path) -> Fields:
@@ -62,7 +62,7 @@ def _json(path: Path) -> Fields:
         raise StudyError(f"{path}: line {error.lineno} is not JSON") from None
 
 
-def beside(row: Published, found: Found) -> Beside:
+def found_beside(row: Published, found: RecordFindings) -> Beside:
     """The value found of what a row of published values names."""
     what, _, where = row.key.partition(".")
     if what in ("frequency", "damping") and where in ("loudest", "largest", "quiet"):

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study.gallery import blocks
-from study.gallery.findings_of_record import Beside, Found, beside, read
+from study.gallery.findings_of_record import Beside, RecordFindings, found_beside, read_findings
 from study.gallery.known import Literature, literature, published
 from study.support import document, picture_page
 from study.support.document import Block, Fold, Heading, Image
 from study.support.numbers import percent
-from study.support.picture_page import Picture, Section
+from study.support.picture_page import PageSection, Picture
 
 TITLE = "Measured records"
 PICTURES: Mapping[str, str] = {  # of a climb's folder, and what they show
@@ -39,7 +39,7 @@ class Entry:
     """One entry of the gallery."""
 
     known: Literature
-    found: tuple[Found, ...]  # a record each
+    found: tuple[RecordFindings, ...]  # a record each
     values: tuple[Beside, ...]
 
 
@@ -54,20 +54,20 @@ def entries(config: Path, results: Path, records: Mapping[str, Sequence[str]]) -
     values = published(config)
     made: list[Entry] = []
     for name, known in literature(config).items():
-        found = tuple(read(results / record, record) for record in records.get(name, []))
-        own = tuple(beside(row, one) for one in found for row in values if row.record == one.record)
+        found = tuple(read_findings(results / record, record) for record in records.get(name, []))
+        own = tuple(found_beside(row, one) for one in found for row in values if row.record == one.record)
         if found:
             made.append(Entry(known, found, own))
     return made
 
 
-def page(shown: Sequence[Entry]) -> bytes:
+def gallery_page(shown: Sequence[Entry]) -> bytes:
     """Everything on one page, with thumbnails that open."""
-    first = Section("all", "All of them", document.fragment([overview(shown)]))
-    return picture_page.page(TITLE, [first, *(_section(entry) for entry in shown)])
+    first = PageSection("all", "All of them", document.fragment([climb_overview(shown)]))
+    return picture_page.picture_page(TITLE, [first, *(_section(entry) for entry in shown)])
 
 
-def overview(shown: Sequence[Entry]) -> Block:
+def climb_overview(shown: Sequence[Entry]) -> Block:
     """One line a record: where the climb begins, what it adds, and where it ends."""
     rows = [
         (f"`{f.record}`", e.known.test, percent(f.steps[0]["error"]["response"]), _added(f),
@@ -79,22 +79,23 @@ def overview(shown: Sequence[Entry]) -> Block:
     return document.table(head, rows)
 
 
-def _added(found: Found) -> str:
+def _added(found: RecordFindings) -> str:
     names = [s["added"] for s in found.steps if s.get("added")]
     gone = {s["dropped"] for s in found.steps if s.get("dropped")}
     return ", ".join(n.replace("_", " ") + (" (taken out again)" if n in gone else "") for n in names) or "nothing"
 
 
-def _section(entry: Entry) -> Section:
+def _section(entry: Entry) -> PageSection:
     told = blocks.told(entry.known, entry.found, entry.values)
     folds = [Fold(f"{f.record}: the first candidates", (blocks.candidates(f),)) for f in entry.found]
     shown = "".join(
-        (f"<h3>{f.record}</h3>" if len(entry.found) > 1 else "") + picture_page.grid(pictures(f)) for f in entry.found
+        (f"<h3>{f.record}</h3>" if len(entry.found) > 1 else "") + picture_page.thumbnails(climb_pictures(f))
+        for f in entry.found
     )
-    return Section(entry.known.entry, entry.known.title, document.fragment([*told, *folds]) + shown)
+    return PageSection(entry.known.entry, entry.known.title, document.fragment([*told, *folds]) + shown)
 
 
-def pictures(found: Found) -> list[Picture]:
+def climb_pictures(found: RecordFindings) -> list[Picture]:
     """Those that the climb made."""
     return [
         Picture(found.record, found.record, shows, (found.folder / name).read_bytes())
@@ -103,19 +104,19 @@ def pictures(found: Found) -> list[Picture]:
     ]
 
 
-def kept(found: Found) -> list[str]:
+def kept(found: RecordFindings) -> list[str]:
     """Names of the pictures that the documentation keeps of a record."""
     return [name for name in KEPT if (found.folder / name).is_file()][:MOST]
 
 
-def picture_name(found: Found, name: str) -> str:
+def picture_name(found: RecordFindings, name: str) -> str:
     """What such a picture is called in the documentation."""
     return f"{found.record}_{name.rpartition('/')[2]}"
 
 
 def documented(shown: Sequence[Entry], folder: str) -> list[Block]:
     """The gallery for the documentation; ``folder`` holds its pictures."""
-    parts: list[Block] = [overview(shown)]
+    parts: list[Block] = [climb_overview(shown)]
     for entry in shown:
         parts.append(Heading(entry.known.title))
         parts += blocks.told(entry.known, entry.found, entry.values)

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from study.support.config_files import Row, Text, read_rows
+from study.support.config_files import TableRow, Text, read_rows
 from study.support.errors import expect
 
 
@@ -13,7 +13,7 @@ def _number(text: object) -> object:
     return float(text) if isinstance(text, str) else text
 
 
-class Literature(Row):
+class Literature(TableRow):
     """One row of ``config/literature.tsv``: an entry of the gallery."""
 
     entry: Text
@@ -23,7 +23,7 @@ class Literature(Row):
     known: Text  # of the structure, before anything is fitted here
 
 
-class Published(Row):
+class Published(TableRow):
     """One row of ``config/published.tsv``: a value that others give.
 
     ``key`` names a coefficient as histories do, a quotient of two with a stroke between, or of a free decay

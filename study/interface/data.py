@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from study.interface.showing import pairs_html, panels
+from study.interface.showing import drawing_axes, pairs_html
 from study.records import record as records
 from study.support.errors import StudyError
 
@@ -95,7 +95,7 @@ class Record(records.Record):
             If there is no such channel.
         """
         name = self._known(channel or next(m for m in records.MOTIONS if m in self))
-        with panels(ax) as (axes,):
+        with drawing_axes(ax) as (axes,):
             axes.plot(self.time, self[name], linewidth=0.8)
             axes.set(xlabel="time (s)", ylabel=f"{name} ({self.units.get(name, '')})", title=self.name)
         return axes
@@ -113,7 +113,7 @@ class Record(records.Record):
 
         values = self[self._known(channel)]
         frequency, density = autospectrum(values, self.dt, segments_of(len(values)))
-        with panels(ax) as (axes,):
+        with drawing_axes(ax) as (axes,):
             axes.semilogy(frequency[1:], np.sqrt(density[1:]), linewidth=1.0)
             unit = f"{self.units.get(channel, '')}/" + r"$\sqrt{\mathrm{Hz}}$"
             axes.set(xlabel="frequency (Hz)", ylabel=f"{channel} ({unit})", title=self.name)

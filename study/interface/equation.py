@@ -70,7 +70,7 @@ def library(word: str = "") -> "pd.DataFrame":
     """
     import pandas as pd
 
-    found = terms.search(word) if word else tuple(terms.LIBRARY.values())
+    found = terms.find_terms(word) if word else tuple(terms.LIBRARY.values())
     rows = [
         {"term": t.name, "formula": t.formula, "parameters": ", ".join(p.name for p in t.parameters),
          "meaning": t.meaning, "cause": t.cause} for t in found

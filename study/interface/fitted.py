@@ -14,7 +14,7 @@ from study.compare.response_functions import ResponseFunctions
 from study.equations.model import ModelTerm
 from study.faults.accounting import accounted
 from study.faults.fault import Fault
-from study.faults.instrument_settings import NOTHING_ASKED, Settings, settings_beside, settings_of
+from study.faults.instrument_settings import NOTHING_ASKED, FaultSettings, settings_beside, settings_of
 from study.interface.data import Record
 from study.interface.equation import Model, term
 from study.interface.forces import Force, simulate
@@ -126,9 +126,9 @@ class Fit(FitPictures):
     @property
     def says(self) -> Words:
         """What to know of it, in two or three sentences."""
-        from study.compare.comparison_sentences import says
+        from study.compare.comparison_sentences import comparison_in_words
 
-        return Words(says(self.comparison))
+        return Words(comparison_in_words(self.comparison))
 
     def response_functions(self) -> ResponseFunctions:
         """Response over force by frequency, measured and predicted, with coherences."""
@@ -144,9 +144,9 @@ class Fit(FitPictures):
 
     def summary(self) -> Words:
         """The lines that ``study compare`` prints."""
-        from study.compare.comparison_report import summary
+        from study.compare.comparison_report import comparison_summary
 
-        return Words(summary([self.comparison]))
+        return Words(comparison_summary([self.comparison]))
 
     def to_frame(self) -> "pd.DataFrame":
         """The coefficients, one row a key: term, value, standard error, 95 % interval, unit, held or not."""
@@ -226,9 +226,9 @@ class Fit(FitPictures):
 
     def drop(self, name: str) -> "Fit":
         """The fit of the model without one of its terms; a ``StudyError`` if it cannot go."""
-        from study.diagnose.dropping import dropped
+        from study.diagnose.dropping import compared_without
 
-        return replace(self, comparison=dropped(self.comparison, name))
+        return replace(self, comparison=compared_without(self.comparison, name))
 
     def across(self, records: "Sequence[Record]") -> "Across":
         """The same model fitted to several records: do its coefficients move with the level?
@@ -304,9 +304,9 @@ def prepared_part(
     return prepare_record(record, plan, cutoff)
 
 
-def _settings(record: Record, measurement: Mapping[str, float | None] | bool | None) -> Settings:
+def _settings(record: Record, measurement: Mapping[str, float | None] | bool | None) -> FaultSettings:
     if measurement is None or measurement is True:
-        return settings_beside(record.source) if record.source is not None else Settings()
+        return settings_beside(record.source) if record.source is not None else FaultSettings()
     if measurement is False:
         return NOTHING_ASKED
     try:

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 from study.diagnose import diagnosis_report
 from study.diagnose import verdict as verdicts
 from study.diagnose.confirmed_faults import confirmed
-from study.diagnose.diagnosis_files import in_words
+from study.diagnose.diagnosis_files import diagnosis_in_words
 from study.diagnose.ranked import Ranked
 from study.equations import terms
 from study.faults.fault import Fault
 from study.interface.fitted import Fit
-from study.interface.showing import Words, html_table, panels
+from study.interface.showing import Words, drawing_axes, html_table
 from study.support.errors import expect
 from study.support.numbers import percent
 
@@ -132,7 +132,7 @@ class Diagnosis:
 
     def table(self) -> Words:
         """The first candidates as ``study diagnose`` prints them."""
-        return Words(diagnosis_report.table(self.result))
+        return Words(diagnosis_report.candidate_table(self.result))
 
     def to_frame(self) -> "pd.DataFrame":
         """Every candidate, best first, indexed by name."""
@@ -154,7 +154,7 @@ class Diagnosis:
         """Share of the held-out difference that each of the first candidates explains."""
         from study.diagnose.diagnosis_pictures import ranking
 
-        with panels(ax) as (axes,):
+        with drawing_axes(ax) as (axes,):
             return ranking(axes, self.result)
 
     def plot_constancy(self, ax: "Axes | None" = None, *, along: str = "amplitude") -> "Axes":
@@ -166,7 +166,7 @@ class Diagnosis:
         from study.diagnose.diagnosis_pictures import followed
 
         expect(along in ("amplitude", "frequency"), f"along is {along!r}; expected amplitude or frequency")
-        with panels(ax) as (axes,):
+        with drawing_axes(ax) as (axes,):
             return followed(axes, self.result.candidates[:FOLLOWED], along)
 
     def __repr__(self) -> str:
@@ -190,4 +190,4 @@ def diagnosed(fit: Fit, own: Mapping[str, str], without: Sequence[str]) -> Diagn
         terms.get(name)
     extra = [terms.custom(name, formula) for name, formula in own.items()]
     result = verdicts.diagnose(fit.comparison, extra=extra, without=tuple(without))
-    return Diagnosis(result, confirmed(fit.faults, result), Words(in_words(result)))
+    return Diagnosis(result, confirmed(fit.faults, result), Words(diagnosis_in_words(result)))

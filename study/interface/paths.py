@@ -15,7 +15,7 @@ from study.identify.estimators.base import Identified, Settings
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.interface.data import Record
 from study.interface.equation import Model
-from study.interface.showing import html_table, panels
+from study.interface.showing import drawing_axes, html_table
 from study.records.prepared import prepare_record
 from study.records.spectra import Segments
 from study.support.errors import StudyError, expect
@@ -105,12 +105,12 @@ class Identification:
 
         expect(part in ("magnitude", "phase"), f"part is {part!r}; expected magnitude or phase")
         curve, units = self._curve(number), self.record.units
-        with panels(ax) as (axes,):
+        with drawing_axes(ax) as (axes,):
             if part == "phase":
-                frequency_response.phase(axes, curve)
+                frequency_response.phase_panel(axes, curve)
             else:
                 unit = response_unit(curve.shape, units.get("force", "N"), units.get("displacement", "m"))
-                frequency_response.magnitude(axes, curve, unit)
+                frequency_response.magnitude_panel(axes, curve, unit)
             axes.set_xlim(0.0, self.heard)
             axes.set_title(f"{self.record.name}: input {formula(curve.shape)} by {self.estimator.replace('_', ' ')}")
         return axes
@@ -134,8 +134,8 @@ class Identification:
             InputCoherence(item.shape, " + ".join(item.terms), analysis.frequency[kept], analysis.cumulative[j][kept])
             for j, item in enumerate(self.result.inputs)
         ]
-        with panels(ax) as (axes,):
-            coherence.cumulative(axes, shares)
+        with drawing_axes(ax) as (axes,):
+            coherence.cumulative_panel(axes, shares)
             axes.set_xlim(0.0, self.heard)
             axes.set_ylabel("cumulative coherence")
             axes.legend(loc="lower left")
@@ -152,14 +152,14 @@ class Identification:
         return found if isinstance(found, MisoResult) else None
 
     def _curve(self, number: int) -> "InputResponse":
-        from study.figures.curves import Curve, InputResponse
+        from study.figures.curves import InputResponse, ResponseCurve
 
         count = len(self.inputs)
         expect(1 <= number <= count, f"there is no input {number}; expected 1 to {count}: {', '.join(self.inputs)}")
         found, j = self._responses(), number - 1
         kept = (found.frequency > 0.0) & (found.frequency <= self.heard)
         error = np.sqrt(np.maximum(found.covariance[kept, j, j].real, 0.0))
-        curve = Curve(self.estimator, found.frequency[kept], found.response[j][kept], error)
+        curve = ResponseCurve(self.estimator, found.frequency[kept], found.response[j][kept], error)
         return InputResponse(number, self.inputs[j], (curve,), found.frequency[kept], None)
 
     def __repr__(self) -> str:

@@ -6,7 +6,7 @@
 from typing import TYPE_CHECKING
 
 from study.equations import dimensions
-from study.interface.showing import panels
+from study.interface.showing import drawing_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,12 +21,14 @@ class FitPictures:
 
     def plot(self, ax: "Axes | None" = None, *, closeup: bool = False) -> "Axes":
         """Measured and predicted response of the judging part, or some cycles where the model misses most."""
-        from study.compare.panels import response
+        from study.compare.panels import response_panel
 
         prediction = self.comparison.prediction
         part = prediction.closeup if closeup else slice(None)
-        with panels(ax) as (axes,):
-            response(axes, prediction.time[part], prediction.measured[part], prediction.predicted[part], self._unit())
+        with drawing_axes(ax) as (axes,):
+            response_panel(
+                axes, prediction.time[part], prediction.measured[part], prediction.predicted[part], self._unit()
+            )
             axes.legend(loc="upper right")
             axes.set_title(f"{self.comparison.record.name}: model {self.comparison.model.name}")
         return axes
@@ -36,7 +38,7 @@ class FitPictures:
         from study.compare.panels import residual
 
         prediction = self.comparison.prediction
-        with panels(ax) as (axes,):
+        with drawing_axes(ax) as (axes,):
             residual(axes, prediction.time, prediction.residual, prediction.noise.rms, self._unit())
             axes.legend(loc="upper right")
         return axes
@@ -53,19 +55,21 @@ class FitPictures:
 
         expect(part in ("magnitude", "phase", "coherence"), f"part is {part!r}; expected magnitude, phase or coherence")
         functions, highest = response_functions(self.comparison.prediction), self.comparison.force.highest
-        with panels(ax) as (axes,):
+        with drawing_axes(ax) as (axes,):
             if part == "magnitude":
                 drive = drive_of(self.comparison.prepared)
                 unit = f"{self._unit()}/{self.comparison.record.units.get(drive, '')}"
-                return fit_panels.magnitude(axes, functions, unit, highest)
-            return (fit_panels.phase if part == "phase" else fit_panels.coherence)(axes, functions, highest)
+                return fit_panels.response_magnitude(axes, functions, unit, highest)
+            return (fit_panels.response_phase if part == "phase" else fit_panels.coherence_panel)(
+                axes, functions, highest
+            )
 
     def plot_autocorrelation(self, ax: "Axes | None" = None) -> "Axes":
         """Autocorrelation of the held-out residual with the 99 % band of white noise."""
         from study.compare import fit_panels
         from study.compare.residual_checks import residual_checks
 
-        with panels(ax) as (axes,):
+        with drawing_axes(ax) as (axes,):
             return fit_panels.autocorrelation(axes, residual_checks(self.comparison.prediction))
 
     def plot_force_correlation(self, ax: "Axes | None" = None) -> "Axes":
@@ -73,7 +77,7 @@ class FitPictures:
         from study.compare import fit_panels
         from study.compare.residual_checks import residual_checks
 
-        with panels(ax) as (axes,):
+        with drawing_axes(ax) as (axes,):
             return fit_panels.with_force(axes, residual_checks(self.comparison.prediction))
 
     def plot_histogram(self, ax: "Axes | None" = None) -> "Axes":
@@ -81,8 +85,8 @@ class FitPictures:
         from study.compare import fit_panels
         from study.compare.residual_checks import residual_checks
 
-        with panels(ax) as (axes,):
-            return fit_panels.histogram(axes, residual_checks(self.comparison.prediction))
+        with drawing_axes(ax) as (axes,):
+            return fit_panels.residual_histogram(axes, residual_checks(self.comparison.prediction))
 
     def plot_missing_force(self, against: str = "displacement", ax: "Axes | None" = None) -> "Axes":
         """Mean force that the model lacks against ``displacement`` or ``velocity``, with 95 % intervals."""
@@ -93,15 +97,15 @@ class FitPictures:
         expect(against in ("displacement", "velocity"), f"against is {against!r}; expected displacement or velocity")
         lacking, units = self.comparison.missing_force, dict(self.comparison.record.units)
         motion = lacking.displacement if against == "displacement" else lacking.velocity
-        with panels(ax) as (axes,):
+        with drawing_axes(ax) as (axes,):
             return force_curve(axes, curve(motion[lacking.inner], lacking.force[lacking.inner]), against, units)
 
     def plot_force_error(self, ax: "Axes | None" = None) -> "Axes":
         """Unexplained share of the force by frequency."""
-        from study.compare.panels import force_error
+        from study.compare.panels import force_error_panel
 
-        with panels(ax) as (axes,):
-            drawn = force_error(axes, self.comparison.force, self.comparison.force.highest)
+        with drawing_axes(ax) as (axes,):
+            drawn = force_error_panel(axes, self.comparison.force, self.comparison.force.highest)
             drawn.legend(loc="upper right")
         return drawn
 

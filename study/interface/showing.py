@@ -40,7 +40,7 @@ def pairs_html(caption: str, pairs: Mapping[str, str]) -> str:
 
 
 @contextmanager
-def panels(ax: "Axes | None", rows: int = 1) -> "Generator[list[Axes]]":
+def drawing_axes(ax: "Axes | None", rows: int = 1) -> "Generator[list[Axes]]":
     """The axes to draw on, in the project's style: those given, or those of a new figure of pyplot."""
     from study.figures.sheet import in_style
 

@@ -12,7 +12,7 @@ import numpy as np
 from study.compare import comparison as comparisons
 from study.compare.across_levels import Level
 from study.interface.fitted import Fit
-from study.interface.showing import html_table, panels
+from study.interface.showing import drawing_axes, html_table
 from study.support import statistics
 from study.support.errors import expect
 from study.support.numbers import percent
@@ -62,7 +62,7 @@ class Across:
         expect(found, "every coefficient was held; expected a model that leaves one open")
         name = key or min(self.levels, key=lambda level: level.p_value).key
         expect(name in found, f"{name!r} was not fitted; expected one of {', '.join(found)}")
-        with panels(ax) as (axes,):
+        with drawing_axes(ax) as (axes,):
             unit = self.fits[0].record.units.get("force", "N")
             return coefficient_by_level(axes, found[name], unit)
 
@@ -84,11 +84,11 @@ def across(fits: Sequence[Fit]) -> Across:
     """Fits of one model to several records, held against each other."""
     expect(len(fits) > 1, f"{len(fits)} record is given; expected two or more")
     ordered = sorted(fits, key=lambda fit: fit.comparison.level)
-    return Across(tuple(ordered), comparisons.across([fit.comparison for fit in ordered]))
+    return Across(tuple(ordered), comparisons.across_records([fit.comparison for fit in ordered]))
 
 
 @dataclass(frozen=True)
-class Row:
+class RankedModel:
     """One model of :func:`compare`."""
 
     name: str  # of the model, told apart by its terms
@@ -112,7 +112,7 @@ class Ranking:
         In this order; the first is what the others are held against.
     """
 
-    rows: tuple[Row, ...]
+    rows: tuple[RankedModel, ...]
 
     def to_frame(self) -> "pd.DataFrame":
         """One row a model, indexed by its name."""
@@ -122,7 +122,7 @@ class Ranking:
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Held-out error of each model with its noise floor, in per cent on a logarithmic scale."""
-        with panels(ax) as (axes,):
+        with drawing_axes(ax) as (axes,):
             place = np.arange(len(self.rows))
             axes.plot([100.0 * row.error for row in self.rows], place, "o", color="C0", label="held-out error")
             floors = [100.0 * row.floor for row in self.rows]
@@ -174,13 +174,13 @@ def _told_apart(fit: Fit, names: Sequence[str], common: Set[str]) -> str:
     return " + ".join([fit.given.name, *own])
 
 
-def _row(fit: Fit, best: Fit, name: str) -> Row:
+def _row(fit: Fit, best: Fit, name: str) -> RankedModel:
     explained = error = p_value = float("nan")
     one, other = fit.comparison.prediction, best.comparison.prediction
     if fit is not best and len(one.measured) == len(other.measured) and np.array_equal(one.measured, other.measured):
         gain = statistics.gain(one.residual, other.residual)
         explained, error, p_value = gain.explained, gain.error, gain.p_value
-    return Row(
+    return RankedModel(
         name, fit.record.name, fit.error, fit.floor, fit.force_error, len(fit.comparison.fit.keys), explained, error,
         p_value,
     )  # fmt: skip

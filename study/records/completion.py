@@ -131,7 +131,7 @@ def derivative(values: Floats, dt: float, order: int, cutoff: float = 0.0) -> Fl
     """
     reach = max(SHORTEST, int(np.ceil(RINGING / (cutoff * dt)))) if cutoff > 0.0 else SHORTEST
     mean = float(np.mean(values))
-    longer = continued(values - mean, min(reach, 8 * len(values)))
+    longer = with_continuations(values - mean, min(reach, 8 * len(values)))
     size = next_fast_len(len(longer), real=True)
     spectrum = rfft(longer, size)
     frequency = np.asarray(rfftfreq(size, dt))
@@ -153,7 +153,7 @@ def _pass_above(frequency: Floats, cutoff: float) -> Floats:
     return 0.5 - 0.5 * np.cos(np.pi * rise)
 
 
-def continued(values: Floats, reach: int) -> Floats:
+def with_continuations(values: Floats, reach: int) -> Floats:
     """The record between two continuations of ``reach`` samples that fade to zero, shape (n + 2 reach,)."""
     after = _predicted(values, reach)
     before = _predicted(values[::-1], reach)[::-1]

@@ -63,7 +63,7 @@ def _reflected(values: Floats, edge: int) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class ContinuousRun:
     """Samples of a record along which one motion runs: stretches that continue each other, and what lies between."""
 
     source: Record
@@ -75,15 +75,15 @@ class Run:
         return self.last - self.first
 
 
-def runs_of(record: Record) -> tuple[tuple[Run, ...], Ints]:
+def runs_of(record: Record) -> tuple[tuple[ContinuousRun, ...], Ints]:
     """The motions of a record that is strung together, and the place of each of its samples in them, shape (n,)."""
-    runs, places, begin = list[Run](), list[Ints](), 0
+    runs, places, begin = list[ContinuousRun](), list[Ints](), 0
     for stretch in record.stretches:
         if stretch.continues and runs:
-            runs[-1] = Run(runs[-1].source, runs[-1].first, stretch.last)
+            runs[-1] = ContinuousRun(runs[-1].source, runs[-1].first, stretch.last)
         else:
             begin += len(runs[-1]) if runs else 0
-            runs.append(Run(stretch.source, stretch.first, stretch.last))
+            runs.append(ContinuousRun(stretch.source, stretch.first, stretch.last))
         places.append(begin - runs[-1].first + np.arange(stretch.first, stretch.last))
     return tuple(runs), np.concatenate(places)
 

@@ -15,9 +15,15 @@ def rests(values: Floats) -> bool:
 
 
 def moving(values: Floats) -> tuple[int, int]:
-    """First sample of a channel's motion and the one after the last: what it rests at before and behind is cut off."""
+    """First sample of a channel's motion and the one after the last: what it rests at before and behind is cut off.
+
+    Of the rest behind all: a channel that is over jumps to it, and the sample after the jump shows no motion.
+    """
     changes = np.flatnonzero(np.diff(values))
-    return (int(changes[0]), int(changes[-1]) + 2) if len(changes) else (0, 0)
+    if not len(changes):
+        return 0, 0
+    last = int(changes[-1]) + 1
+    return int(changes[0]), last if last < len(values) - 1 else len(values)
 
 
 def halves(record: Record, response: str) -> tuple[tuple[int, int], tuple[int, int]]:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 from scipy.special import gammaincc
 
-from study.records.completion import CompletedRecord, continued
+from study.records.completion import CompletedRecord, with_continuations
 from study.records.interpolation import BAND_LIMITED, closes
 from study.records.plan import Plan
 from study.records.prepared import FORCE, Prepared
@@ -200,7 +200,7 @@ def decimated(record: Record, factor: int) -> Record:
 def _filtered(values: Floats, factor: int, between: str) -> Floats:
     mean = float(np.mean(values))
     reach = 0 if _goes_round(values) else min(4 * EDGE * factor, len(values) // 2)
-    longer = values - mean if reach == 0 else continued(values - mean, reach)
+    longer = values - mean if reach == 0 else with_continuations(values - mean, reach)
     cycles = np.asarray(rfftfreq(len(longer)))  # of a sample
     low = irfft(np.asarray(rfft(longer)) * _gain(2.0 * factor * cycles) * _held(cycles, between), len(longer))
     return np.asarray(low[reach : reach + len(values)][::factor] + mean)

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field
 
 from study.reproduction import case_names, preconditions
 from study.reproduction.settings import IdentificationSettings, Positive, RecordSettings, StudySettings
-from study.support.config_files import Row, Text, read_rows, read_yaml
+from study.support.config_files import TableRow, Text, read_rows, read_yaml
 from study.support.errors import StudyError, at, expect
 
 IDENTIFIED = ("linear", "nonlinear", "coherence", "histogram")  # drawn of every case
@@ -21,7 +21,7 @@ Name = Annotated[  # a dot elsewhere is that of a file or of a rule
 Number = Annotated[Annotated[int, Field(ge=1)] | None, BeforeValidator(lambda cell: cell or None)]
 
 
-class Case(Row):
+class Case(TableRow):
     """One row of ``config/cases.tsv``; the numbers are those of the report's figures."""
 
     case: Name
@@ -98,7 +98,7 @@ class StudyConfig:
         return list(drawn.with_noise if self.cases[case].noise > 0.0 else drawn.without_noise)
 
 
-def load(folder: Path) -> StudyConfig:
+def load_config(folder: Path) -> StudyConfig:
     """Read ``config.yaml`` and ``cases.tsv`` of a folder, and the models that they name, and check them all.
 
     Nothing that passes here can be refused by a job for the way it is configured.

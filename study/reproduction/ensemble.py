@@ -45,7 +45,7 @@ def estimates(
     model: Model, record: RecordSettings, identification: IdentificationSettings, seeds: Iterable[int],
     *, workers: int | None = None, progress: Callable[[int], None] | None = None,
 ) -> pd.DataFrame:  # fmt: skip
-    """Every parameter of every estimator for every seed, as ``tables.parameters`` with a column ``seed``.
+    """Every parameter of every estimator for every seed, as ``tables.parameter_table`` with a column ``seed``.
 
     A seed whose run diverges leaves one row with the parameter ``diverged`` and the time as its estimate.
     """
@@ -57,12 +57,12 @@ def estimates(
             lost = {"case": record.case, "parameter": "diverged", "estimate": error.time}
             return pd.DataFrame([lost], columns=tables.PARAMETER_COLUMNS).assign(seed=seed)
         found = identify_case(model, measured, identification)
-        return tables.parameters(record.case, model, found, identification).assign(seed=seed)
+        return tables.parameter_table(record.case, model, found, identification).assign(seed=seed)
 
     return pd.concat([f for f in threaded(one, list(seeds), progress, workers) if len(f)], ignore_index=True)
 
 
-def rates(table: pd.DataFrame) -> pd.DataFrame:
+def tolerance_rates(table: pd.DataFrame) -> pd.DataFrame:
     """How often each tolerance is met, with the mean and scatter of each estimate.
 
     A seed that gives no estimate, because its run diverges or the recipe finds nothing, does not meet the
@@ -87,8 +87,8 @@ def rates(table: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def page(table: pd.DataFrame, noise: Mapping[str, float]) -> str:
-    """What :func:`rates` found as a page: which MI/SO estimates of noise-free cases meet their tolerance too seldom.
+def ensemble_page(table: pd.DataFrame, noise: Mapping[str, float]) -> str:
+    """What :func:`tolerance_rates` found: which MI/SO estimates of noise-free cases meet their tolerance too seldom.
 
     ``noise`` is that of each case.
     """

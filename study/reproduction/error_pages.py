@@ -28,15 +28,24 @@ def opening(errors: pd.DataFrame, noise: Mapping[str, float]) -> list[Block]:
     )
     noisy = errors[(errors["case"].map(noise) > 0.0) & (errors["seeds"] >= ENOUGH)]
     picture = Image("Errors of the estimators by parameter and case", "../figures/estimators.png")
-    blocks: list[Block] = [Text(WHO), Bullets(sentences(errors, noise)), picture, Text(note), by_parameter(errors)]
+    blocks: list[Block] = [
+        Text(WHO),
+        Bullets(error_sentences(errors, noise)),
+        picture,
+        Text(note),
+        by_parameter(errors),
+    ]
     if len(noisy):
-        blocks += [Text("Under noise on the displacement, bias ± scatter of one estimate, both in %:"), biases(noisy)]
+        blocks += [
+            Text("Under noise on the displacement, bias ± scatter of one estimate, both in %:"),
+            bias_table(noisy),
+        ]
     return blocks
 
 
-def sentences(errors: pd.DataFrame, noise: Mapping[str, float]) -> tuple[str, ...]:
+def error_sentences(errors: pd.DataFrame, noise: Mapping[str, float]) -> tuple[str, ...]:
     """For each estimator but MI/SO, without noise and with it: how often it is nearer, and by how much."""
-    others = [name for name in estimator_errors.estimators(errors) if name != estimator_errors.BASIS]
+    others = [name for name in estimator_errors.estimator_names(errors) if name != estimator_errors.BASIS]
     noisy = errors["case"].map(noise) > 0.0
     parts = (("without noise", errors[~noisy]), ("with noise on the displacement", errors[noisy]))
     lines: list[str] = []
@@ -47,7 +56,7 @@ def sentences(errors: pd.DataFrame, noise: Mapping[str, float]) -> tuple[str, ..
 
 
 def about(errors: pd.DataFrame) -> str:
-    """What the numbers of :func:`overview` are, and from how many records they come."""
+    """What the numbers of :func:`error_overview` are, and from how many records they come."""
     seeds, noted = int(errors["seeds"].max()), errors[errors["noted"] > 0].groupby(["case", "estimator"])["noted"].max()
     trouble = f"{int(noted.sum())} searches did not converge" if len(noted) else "every search converged"
     return (
@@ -79,7 +88,7 @@ def _wide(
     errors: pd.DataFrame, keys: Sequence[str], shown: pd.DataFrame, cell: Callable[["pd.Series[Any]"], str]
 ) -> Block:
     """The table of :func:`by_estimator` under the names of all estimators of ``errors``."""
-    names = estimator_errors.estimators(errors)
+    names = estimator_errors.estimator_names(errors)
     return table([*keys, *(look(name).label for name in names)], by_estimator(shown, keys, names, cell))
 
 
@@ -90,20 +99,20 @@ def by_parameter(errors: pd.DataFrame) -> Block:
 
 def _error_and_gain(row: "pd.Series[Any]") -> str:
     scale, unit = (100.0, " %") if row["kind"] == "relative" else (1.0, "")
-    size = f"{short(scale * row['median_error'])}{unit}" if math.isfinite(row["median_error"]) else "none"
+    size = f"{two_digits(scale * row['median_error'])}{unit}" if math.isfinite(row["median_error"]) else "none"
     return size if row["estimator"] == estimator_errors.BASIS else f"{size} ({factor(row['gain'])})"
 
 
-def biases(errors: pd.DataFrame) -> Block:
+def bias_table(errors: pd.DataFrame) -> Block:
     """One row a case and parameter with a true value: bias and scatter in % by estimator."""
     relative = errors[errors["kind"] == "relative"]
     return _wide(
         errors, ["case", "parameter"], relative,
-        lambda row: f"{short(100.0 * row['bias'])} ± {short(100.0 * row['scatter'])}",
+        lambda row: f"{two_digits(100.0 * row['bias'])} ± {two_digits(100.0 * row['scatter'])}",
     )  # fmt: skip
 
 
-def overview(errors: pd.DataFrame) -> Block:
+def error_overview(errors: pd.DataFrame) -> Block:
     """One row a case, one column an estimator: the median of its parameters' errors, and of their gains."""
     return _wide(errors, ["case"], estimator_errors.by_case(errors).assign(kind="relative"), _error_and_gain)
 
@@ -111,15 +120,15 @@ def overview(errors: pd.DataFrame) -> Block:
 def bias_overview(errors: pd.DataFrame, noise: Mapping[str, float]) -> Block:
     """One row a case with noise, one column an estimator: the largest bias over scatter, and whose it is."""
     worst = estimator_errors.worst_bias(errors[errors["case"].map(noise) > 0.0])
-    return _wide(errors, ["case"], worst, lambda row: f"{short(row['ratio'])} ({row['parameter']})")
+    return _wide(errors, ["case"], worst, lambda row: f"{two_digits(row['ratio'])} ({row['parameter']})")
 
 
 def factor(gain: float) -> str:
     """A gain as ``x 3.2``; a dash where there is none to compare with."""
-    return "-" if math.isnan(gain) else f"x {short(gain)}"
+    return "-" if math.isnan(gain) else f"x {two_digits(gain)}"
 
 
-def short(number: float) -> str:
+def two_digits(number: float) -> str:
     """Two digits, without an exponent from 0.01 to 9999: ``0.034``, ``1600``, ``2e4``."""
     if not 99.5 <= abs(number) < LARGE:
         return f"{number:.2g}".replace("e+0", "e").replace("e-0", "e-").replace("e+", "e")

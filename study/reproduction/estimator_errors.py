@@ -46,7 +46,7 @@ def errors(estimates: pd.DataFrame) -> pd.DataFrame:
     return with_gains(pd.DataFrame(rows, columns=COLUMNS))
 
 
-def differing(own: pd.DataFrame, kept: pd.DataFrame) -> list[str]:
+def differing_cases(own: pd.DataFrame, kept: pd.DataFrame) -> list[str]:
     """Cases whose first seeds do not come out as those of a kept table did: other settings or other code show there.
 
     Both are as :func:`errors` gives them; ``kept`` may have cases and estimators that ``own`` lacks. A case differs
@@ -101,6 +101,6 @@ def worst_bias(table: pd.DataFrame) -> pd.DataFrame:
     return ratios.loc[highest, ["case", "estimator", "parameter", "ratio", "ratio_error"]].reset_index(drop=True)
 
 
-def estimators(table: pd.DataFrame) -> Sequence[str]:
+def estimator_names(table: pd.DataFrame) -> Sequence[str]:
     """Names of the estimators in the order of the table."""
     return list(dict.fromkeys(str(name) for name in table["estimator"]))

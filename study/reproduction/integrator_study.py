@@ -28,14 +28,14 @@ STUDIED = [IntegratorSettings(method=m, steps_per_sample=s) for m in ("abm4", "r
 
 
 @dataclass(frozen=True)
-class Run:
+class IntegratorRun:
     """Parameters that one record gives, or the time at which it diverged."""
 
     values: Mapping[str, float]
     diverged: float | None = None
 
 
-def study(
+def integrator_study(
     models: Mapping[str, Model],
     record: RecordSettings,
     estimation: Settings,
@@ -65,20 +65,22 @@ def study(
 
 def _runs(
     model: Model, record: RecordSettings, integrator: IntegratorSettings, estimation: Settings, seeds: Iterable[int]
-) -> list[Run]:
+) -> list[IntegratorRun]:
     stepped = record.model_copy(update={"integrator": integrator})
 
-    def run(seed: int) -> Run:
+    def run(seed: int) -> IntegratorRun:
         try:
             simulated = make_record(model, stepped, seed=seed)
         except DivergenceError as error:
-            return Run({}, error.time)
-        return Run({p.name: p.value for p in miso.identify(model, simulated, estimation).parameters})
+            return IntegratorRun({}, error.time)
+        return IntegratorRun({p.name: p.value for p in miso.identify(model, simulated, estimation).parameters})
 
     return threaded(run, list(seeds))
 
 
-def _rows(about: Table, truth: Table, fine: list[Run], runs: list[Run], seeds: Sequence[int]) -> list[dict[str, Any]]:
+def _rows(
+    about: Table, truth: Table, fine: list[IntegratorRun], runs: list[IntegratorRun], seeds: Sequence[int]
+) -> list[dict[str, Any]]:
     lost = [f"{s} at {r.diverged:.4g} s" for s, r in zip(seeds, runs, strict=True) if r.diverged is not None]
     kept = [(f.values, r.values) for f, r in zip(fine, runs, strict=True) if f.values and r.values]
     names = [n for n in kept[0][0] if n in truth] if kept else []
@@ -100,7 +102,7 @@ def _errors(name: str, true: float, kept: list[tuple[Mapping[str, float], Mappin
     }  # fmt: skip
 
 
-def page(table: pd.DataFrame) -> str:
+def integrator_page(table: pd.DataFrame) -> str:
     """The table as a page: one block a system, relative errors in percent."""
     parts = [
         "# What the integrator's setting does to the recovered parameters",

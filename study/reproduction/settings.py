@@ -95,7 +95,7 @@ class LocalPolynomialSettings(Section):
     half_width: Count
 
 
-class Drawn(Section):
+class DrawnEstimators(Section):
     """Estimators that the figures show."""
 
     without_noise: Names
@@ -176,7 +176,7 @@ class StudySettings(Section):
     local_polynomial: LocalPolynomialSettings
     settle_periods: Seed
     estimators: Names
-    drawn: Drawn
+    drawn: DrawnEstimators
     tolerances: Tolerances
     monte_carlo: MonteCarlo
     estimator_errors: EstimatorErrors

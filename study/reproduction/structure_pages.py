@@ -26,7 +26,7 @@ class Structures:
     titles: Mapping[str, str]  # of each case by name, in the order of the page
 
 
-def blocks(found: Structures) -> list[Block]:
+def structure_blocks(found: Structures) -> list[Block]:
     """What is claimed of each case with its conditions, and every parameter."""
     made: list[Block] = [document.Text(ABOUT)]
     for case, title in found.titles.items():
@@ -55,7 +55,7 @@ def count(found: Structures) -> str:
     )
 
 
-def failing(found: Structures) -> list[Block]:
+def failing_structures(found: Structures) -> list[Block]:
     """The claims on structures that do not hold, or partly; empty if all do."""
     rest = found.claims[found.claims["verdict"] != HOLDS]
     if not len(rest):

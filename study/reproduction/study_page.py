@@ -6,26 +6,30 @@ from study.reproduction import structure_pages, summary
 from study.reproduction.claims.claim_pages import conditions
 from study.support import document, picture_page
 from study.support.document import Text
-from study.support.picture_page import Picture, Section, fragment
+from study.support.picture_page import PageSection, Picture, fragment_without_images
 
 TITLE = "The report, run again"
 
 
-def page(tables: summary.Tables, pictures: Sequence[Picture]) -> bytes:
+def study_page(tables: summary.Tables, pictures: Sequence[Picture]) -> bytes:
     """The page; ``pictures`` in the order in which they stand."""
     sections = [
-        ("verdict", "Verdict", fragment([*summary.counts(tables), Text(summary.INTRODUCTION)])),
+        ("verdict", "Verdict", fragment_without_images([*summary.counts(tables), Text(summary.INTRODUCTION)])),
         ("figures", "Figures", picture_page.groups(pictures)),
-        ("failing", "Not reproduced, or only partly", fragment(summary.failing(tables))),
-        ("numbers", "The report's numbers beside ours", fragment(summary.numbers(tables))),
+        ("failing", "Not reproduced, or only partly", fragment_without_images(summary.failing_claims(tables))),
+        ("numbers", "The report's numbers beside ours", fragment_without_images(summary.numbers(tables))),
         ("claims", "Every claim", _claims(tables)),
-        ("parameters", "Parameters by case", fragment(summary.parameters(tables))),
-        ("structures", "Structures of several coordinates", fragment(structure_pages.blocks(tables.structures))),
-        ("estimators", "How far each estimator is off", fragment(summary.estimators(tables)[1:])),
-        ("reading", 'What "unit variance" refers to', fragment(summary.reading(tables))),
-        ("times", "Run times", fragment(summary.run_times(tables))),
+        ("parameters", "Parameters by case", fragment_without_images(summary.parameter_blocks(tables))),
+        (
+            "structures",
+            "Structures of several coordinates",
+            fragment_without_images(structure_pages.structure_blocks(tables.structures)),
+        ),
+        ("estimators", "How far each estimator is off", fragment_without_images(summary.estimator_blocks(tables)[1:])),
+        ("reading", 'What "unit variance" refers to', fragment_without_images(summary.reading(tables))),
+        ("times", "Run times", fragment_without_images(summary.run_times(tables))),
     ]
-    return picture_page.page(TITLE, [Section(*section) for section in sections])
+    return picture_page.picture_page(TITLE, [PageSection(*section) for section in sections])
 
 
 def _claims(tables: summary.Tables) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 
 from study.reproduction import error_pages, structure_pages
-from study.reproduction.claims.claim_pages import shortened, verdict
+from study.reproduction.claims.claim_pages import shortened, verdict_sentence
 from study.reproduction.claims.judgement import REPRODUCED
 from study.reproduction.structure_pages import Structures
 from study.support.document import Block, Bullets, Heading, Text, table
@@ -54,13 +54,13 @@ class Tables:
     structures: Structures
 
 
-def blocks(tables: Tables) -> list[Block]:
+def summary_blocks(tables: Tables) -> list[Block]:
     """The whole page."""
     sections: list[tuple[str, Callable[[Tables], list[Block]]]] = [
-        ("What is not reproduced, or only partly, and why", failing),
+        ("What is not reproduced, or only partly, and why", failing_claims),
         ("The report's numbers beside ours", numbers),
-        ("Parameters by case", parameters),
-        ("Structures of several coordinates", lambda t: structure_pages.blocks(t.structures)),
+        ("Parameters by case", parameter_blocks),
+        ("Structures of several coordinates", lambda t: structure_pages.structure_blocks(t.structures)),
         ('What "unit variance" refers to', reading),
         ("Where everything is", lambda _: [table(["where", "what"], FILES)]),
         ("Run times", run_times),
@@ -71,7 +71,7 @@ def blocks(tables: Tables) -> list[Block]:
     return page
 
 
-def estimators(tables: Tables) -> list[Block]:
+def estimator_blocks(tables: Tables) -> list[Block]:
     """The page of the estimators: how far each is off."""
     return [Heading("How far each estimator is off", 1), *error_pages.opening(tables.errors, tables.noise)]
 
@@ -82,7 +82,7 @@ def counts(tables: Tables) -> list[Block]:
     quiet = own[own["case"].map(tables.noise) == 0.0]
     noisy = own[own["case"].map(tables.noise) > 0.0]
     lines = [
-        f"{verdict(tables.claims)} Each that is not has its reason below.",
+        f"{verdict_sentence(tables.claims)} Each that is not has its reason below.",
         f"Without noise, MI/SO recovers {_met(quiet)} parameters of {quiet['case'].nunique()} cases within "
         "tolerances that were set before looking.",
     ]
@@ -118,7 +118,7 @@ def statements(claims: pd.DataFrame) -> Block:
     return table(["where", "what", "report", "ours", "verdict"], columns.to_numpy().tolist())
 
 
-def parameters(tables: Tables) -> list[Block]:
+def parameter_blocks(tables: Tables) -> list[Block]:
     """One row a parameter, one column an estimator: estimate, standard error, error, verdict."""
     names = list(dict.fromkeys(tables.parameters["estimator"]))
     worded = {
@@ -154,10 +154,13 @@ def _tolerance(row: "pd.Series[Any]") -> str:
     return percent(row["tolerance"]) if row["true"] != 0.0 else f"{row['tolerance']:g}"
 
 
-def failing(tables: Tables) -> list[Block]:
+def failing_claims(tables: Tables) -> list[Block]:
     """What is not reproduced, or partly, and why."""
     failed = tables.claims[tables.claims["verdict"] != REPRODUCED].sort_values("verdict", kind="stable")
-    return [_columns(failed, "verdict", "where", "claim", "why"), *structure_pages.failing(tables.structures)]
+    return [
+        _columns(failed, "verdict", "where", "claim", "why"),
+        *structure_pages.failing_structures(tables.structures),
+    ]
 
 
 def _columns(frame: pd.DataFrame, *names: str) -> Block:

@@ -27,7 +27,7 @@ COHERENCE_COLUMNS = [
 NOISE_COLUMNS = ["frequency", "estimator", "noise"]
 
 
-class Judged(Protocol):
+class AllowedErrors(Protocol):
     """What an estimate may be off by name: relative, absolute where the true value is zero."""
 
     @property
@@ -41,7 +41,7 @@ class Judged(Protocol):
         ...
 
 
-def parameters(
+def parameter_table(
     case: str, model: Model, estimates: Mapping[str, Identified], settings: IdentificationSettings
 ) -> pd.DataFrame:
     """Every parameter of every estimator, one row each (``PARAMETER_COLUMNS``).
@@ -57,12 +57,12 @@ def parameters(
             if name in ("f_n", "zeta") and name not in truth:
                 continue  # a system without stiffness has neither
             true = truth.get(name, 0.0)
-            judged = judge(name, true, value, settings).values()
+            judged = judge_estimate(name, true, value, settings).values()
             rows.append((case, estimator, name, true, value, error, *judged, identified.note))
     return pd.DataFrame(rows, columns=PARAMETER_COLUMNS)
 
 
-def judge(name: str, true: float, estimate: float, settings: Judged) -> dict[str, Any]:
+def judge_estimate(name: str, true: float, estimate: float, settings: AllowedErrors) -> dict[str, Any]:
     """Relative error, tolerance and verdict of one estimate."""
     relative = (estimate - true) / true if true else math.nan
     tolerance = (settings.relative if true else settings.absolute).get(name, math.nan)
@@ -70,7 +70,7 @@ def judge(name: str, true: float, estimate: float, settings: Judged) -> dict[str
     return {"relative_error": relative, "tolerance": tolerance, "within_tolerance": within}
 
 
-def frequency_responses(model: Model, estimates: Mapping[str, Identified]) -> pd.DataFrame:
+def response_table(model: Model, estimates: Mapping[str, Identified]) -> pd.DataFrame:
     """A_j(f) of each estimator that has it, with its standard error and the exact function, in long form."""
     values = {key: value for key, value in model.values.items() if value is not None}
     parts: list[Sequence[Any]] = []
@@ -88,7 +88,7 @@ def frequency_responses(model: Model, estimates: Mapping[str, Identified]) -> pd
     return stacked(RESPONSE_COLUMNS, parts)
 
 
-def coherences(estimates: Mapping[str, Identified]) -> pd.DataFrame:
+def coherence_table(estimates: Mapping[str, Identified]) -> pd.DataFrame:
     """Ordinary, partial, nonlinear and cumulative coherence of each input, in long form; some estimators have none."""
     parts: list[Sequence[Any]] = []
     for estimator, identified in estimates.items():
@@ -116,7 +116,7 @@ def stacked(columns: list[str], parts: Sequence[Sequence[Any]]) -> pd.DataFrame:
     return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=columns)
 
 
-def write_csv(table: pd.DataFrame, path: Path) -> None:
+def write_table(table: pd.DataFrame, path: Path) -> None:
     """Write a table with twelve significant digits: more than any estimate has, fewer than rounding has."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as beside:

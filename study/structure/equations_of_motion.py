@@ -162,7 +162,7 @@ class Builder:
             force, rate = self.force(entry)
             if rate is not None:
                 rates.append(rate)
-            for i, weight in enumerate(place_of(entry).direction(self.model.coordinates)):
+            for i, weight in enumerate(term_place(entry).direction(self.model.coordinates)):
                 if weight != 0.0 and entry.term.name != "inertia":
                     left[i] = (self.graph.sub if weight > 0.0 else self.graph.add)(left[i], force)
         return left, rates
@@ -170,14 +170,14 @@ class Builder:
     def force(self, entry: ModelTerm) -> tuple[int, int | None]:
         """Force of a term on the second end of its place, and the rate of its own state."""
         u, v, time = self.motion
-        place = place_of(entry)
+        place = term_place(entry)
         names = {"u": self.along(place, u), "v": self.along(place, v), "t": time}
         names |= {n: self.channels[n] for n in entry.term.channels}
         names |= {p.name: self.values[f"{entry.name}.{p.name}"] for p in entry.term.parameters}
         rate = None
         if entry.term.state is not None:
             names["z"] = self.states[entry.name]
-            rate = formulas.build(self.graph, entry.term.state, names)
+            rate = formulas.add_formula(self.graph, entry.term.state, names)
         force = self.graph.const(0.0)
         for component, key in zip(entry.term.components, entry.symbols, strict=True):
             if component.order < 2:
@@ -201,7 +201,7 @@ def mass_entries(model: Model) -> list[tuple[int, int, float, str]]:
     for entry in model.terms:
         if entry.term.name != "inertia":
             continue
-        place, key = place_of(entry), entry.symbols[0]
+        place, key = term_place(entry), entry.symbols[0]
         if place.kind == "couples":
             i, j = (model.coordinates.index(end) for end in place.ends)
             found += [(i, j, 1.0, key), (j, i, 1.0, key)]
@@ -212,7 +212,7 @@ def mass_entries(model: Model) -> list[tuple[int, int, float, str]]:
     return found
 
 
-def place_of(entry: ModelTerm) -> Place:
+def term_place(entry: ModelTerm) -> Place:
     """Where a term of a structure acts."""
     assert entry.place is not None, "every term of a structure has a place"
     return entry.place
@@ -241,7 +241,7 @@ def _sides(model: Model, graph: Graph, builder: Builder, slopes: Sequence[int]) 
     needed = graph.needed(slopes)
     table: list[tuple[int, int]] = []
     rows: list[tuple[float, ...]] = []
-    for place in dict.fromkeys(place_of(t) for t in model.terms):
+    for place in dict.fromkeys(term_place(t) for t in model.terms):
         velocity = builder.along(place, builder.motion[1])
         sgn = next((n for n in needed if graph.nodes[n] == (Op.SGN, velocity, velocity)), None)
         if sgn is not None and all(sgn != known for known, _ in table):

@@ -14,7 +14,7 @@ from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares
 
 
-def decay_start(model: Model, prepared: PreparedStructure, held: Mapping[str, float]) -> dict[str, float]:
+def free_decay_start(model: Model, prepared: PreparedStructure, held: Mapping[str, float]) -> dict[str, float]:
     """Linear coefficients that are not held, by least squares along the fitting part.
 
     Raises

@@ -31,7 +31,7 @@ DRAWN, STARTS, BATCH = 200, 40, 10  # structures drawn; those that start a searc
 
 
 @dataclass(frozen=True, eq=False)
-class Responses:
+class SensorResponses:
     """Frequency response functions at the sensors.
 
     Attributes
@@ -49,7 +49,7 @@ class Responses:
     error: Floats
 
 
-def frequency_responses(prepared: PreparedStructure, model: Model) -> Responses:
+def frequency_responses(prepared: PreparedStructure, model: Model) -> SensorResponses:
     """The best linear approximation of the sensors by the forces on the fitting part.
 
     Raises
@@ -82,7 +82,7 @@ def frequency_responses(prepared: PreparedStructure, model: Model) -> Responses:
     noise = own * np.maximum(1.0 - coherence, CLEAN) / max(matrix.averages - n, 1.0)
     error = np.sqrt(noise[:, :, None] * np.einsum("fkk->fk", inverse).real[:, None, :])
     thin = np.flatnonzero(keep)[:: max(1, np.count_nonzero(keep) // LINES)]
-    return Responses(omega[thin], response[thin], error[thin])
+    return SensorResponses(omega[thin], response[thin], error[thin])
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +170,7 @@ def _problem(model: Model, prepared: PreparedStructure, held: Mapping[str, float
     ), free  # fmt: skip
 
 
-def linear_start(model: Model, prepared: PreparedStructure, held: Mapping[str, float]) -> dict[str, float]:
+def structure_linear_start(model: Model, prepared: PreparedStructure, held: Mapping[str, float]) -> dict[str, float]:
     """Linear coefficients that are not held, from the frequency response functions of the fitting part.
 
     Raises

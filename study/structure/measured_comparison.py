@@ -9,8 +9,8 @@ import numpy as np
 
 from study.equations import model_file
 from study.equations.model import Model, ModelTerm
-from study.equations.place import in_words
-from study.structure.measured_fit import MeasuredFit, fit_measured, grown
+from study.equations.place import place_in_words
+from study.structure.measured_fit import MeasuredFit, fit_measured, fit_with_term
 from study.structure.measured_prediction import MeasuredPrediction, predict_measured
 from study.structure.measured_screening import screened_by_lines
 from study.structure.measured_spectra import CoefficientSpectrum, coefficient_spectra
@@ -104,7 +104,7 @@ def _beside_minima(known: Model, entry: ModelTerm, prepared: PreparedStructure) 
     for factor in (1.0, *ASIDE):
         shape = tuple(factor * (value or 0.0) for value in entry.parameters)
         with suppress(DivergenceError):
-            fits.append(grown(known, replace(entry, parameters=shape), prepared))
+            fits.append(fit_with_term(known, replace(entry, parameters=shape), prepared))
     expect(fits, f"no values of {entry.name} let it follow {prepared.record.name!r}; expected them in the model file")
     return min(fits, key=lambda fit: float(np.mean((fit.residual / prepared.scale) ** 2)))
 
@@ -187,9 +187,9 @@ def measured_says(comparison: MeasuredComparison) -> str:
     for spectrum in comparison.spectra:
         (mean, error), (imaginary, wrong), (trend, slope) = spectrum.mean, spectrum.imaginary, spectrum.trend
         said.append(
-            f"Line by line {spectrum.key} {in_words(spectrum.place)} is {mean:.4g} +- {error:.2g}, its imaginary part "
-            f"{imaginary:.2g} +- {wrong:.2g} and its rise over the band {trend:.2g} +- {slope:.2g}, which are zero for "
-            "a term that is the right one at the right place."
+            f"Line by line {spectrum.key} {place_in_words(spectrum.place)} is {mean:.4g} +- {error:.2g}, "
+            f"its imaginary part {imaginary:.2g} +- {wrong:.2g} and its rise over the band {trend:.2g} +- {slope:.2g}, "
+            "which are zero for a term that is the right one at the right place."
         )
     return " ".join(said)
 

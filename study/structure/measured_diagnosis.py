@@ -14,18 +14,18 @@ import numpy as np
 from study.diagnose import ranked
 from study.diagnose.credibility import credible
 from study.diagnose.ranking import in_order
+from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
 from study.equations.model import Model, ModelTerm
 from study.equations.term import Term
 from study.records import noise_floor
 from study.structure.measured_comparison import MeasuredComparison
-from study.structure.measured_fit import MeasuredFit, grown, modal_run
+from study.structure.measured_fit import MeasuredFit, fit_with_term, modal_run
 from study.structure.measured_prediction import MeasuredPrediction, predict_measured
 from study.structure.measured_screening import Screened, measured_entries, screened_by_lines
 from study.structure.measured_spectra import CoefficientSpectrum, coefficient_spectra
 from study.structure.placed_candidates import physical
 from study.structure.placed_ranking import HeldOutTest, orthonormal
 from study.structure.structure_fit import noise_left
-from study.structure.structure_verdict import MISSING, NOTHING, UNKNOWN
 from study.support import statistics
 from study.support.arrays import Floats
 from study.support.cores import cores
@@ -151,7 +151,7 @@ def _shaped(comparison: MeasuredComparison) -> Model:
 def _tried(item: Screened, comparison: MeasuredComparison) -> MeasuredRanked | None:
     prepared, before = comparison.prepared, comparison.prediction
     try:
-        fit = grown(_shaped(comparison), item.entry, prepared)
+        fit = fit_with_term(_shaped(comparison), item.entry, prepared)
         prediction = predict_measured(fit, prepared)
     except StudyError:
         return None
@@ -201,17 +201,17 @@ def _derivatives(comparison: MeasuredComparison) -> Floats:
 def _decide(rows: list[MeasuredRanked], comparison: MeasuredComparison, asked: int) -> MeasuredDiagnosis:
     believed = [r for r in rows if credible(comparison.prediction, r.prediction, r.interval, r.p_value)]
     if not believed:
-        left = above_noise(comparison.prediction)
+        left = rms_above_noise(comparison.prediction)
         verdict = UNKNOWN if left > TOLERANCE else NOTHING
         return MeasuredDiagnosis(verdict, comparison, tuple(rows), asked, left)
     first = believed[0]
-    left = above_noise(first.prediction)
+    left = rms_above_noise(first.prediction)
     enough = first.gain.explained >= ENOUGH or left <= GOOD or not first.wanders(asked)
     ordered = (first, *(r for r in rows if r is not first))
     return MeasuredDiagnosis(MISSING if enough else UNKNOWN, comparison, ordered, asked, left)
 
 
-def above_noise(prediction: MeasuredPrediction) -> float:
+def rms_above_noise(prediction: MeasuredPrediction) -> float:
     """Rms over that of the motion of what stands above white noise at any sensor, beyond chance; zero if nothing does.
 
     What no model could explain is white here; a mode that the fit has not is above it as well.

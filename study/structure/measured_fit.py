@@ -183,20 +183,20 @@ def fit_measured(model: Model, prepared: PreparedStructure) -> MeasuredFit:
     return coupled if _criterion(coupled, prepared) < _criterion(best, prepared) else best
 
 
-def grown(model: Model, entry: ModelTerm, prepared: PreparedStructure) -> MeasuredFit:
+def fit_with_term(model: Model, entry: ModelTerm, prepared: PreparedStructure) -> MeasuredFit:
     """A model with a term more, whose shape parameters have values: fitted with these, then with them free.
 
     Raises as :func:`fit_measured`.
     """
     fit, shapes = fit_measured(model.with_term(entry), prepared), entry.keys[len(entry.symbols) :]
     return (
-        refined(fit, prepared, [k for k in fit.model.values if k not in fit.keys and k not in shapes])
+        refined_fit(fit, prepared, [k for k in fit.model.values if k not in fit.keys and k not in shapes])
         if shapes
         else fit
     )
 
 
-def refined(fit: MeasuredFit, prepared: PreparedStructure, held: Collection[str]) -> MeasuredFit:
+def refined_fit(fit: MeasuredFit, prepared: PreparedStructure, held: Collection[str]) -> MeasuredFit:
     """A fit gone on with from where it ended, with what it held beside ``held`` free; its modes stay as many.
 
     Raises

@@ -3,11 +3,11 @@
 import math
 from typing import Any
 
-from study.equations.place import in_words as placed
+from study.diagnose.verdict import MISSING, NOTHING
+from study.equations.place import place_in_words as placed
 from study.figures.labels import term_names
 from study.structure.measured_comparison import measured_document, measured_says
 from study.structure.measured_diagnosis import MeasuredDiagnosis, MeasuredRanked
-from study.structure.structure_verdict import MISSING, NOTHING
 from study.support.numbers import percent
 
 SHOWN, TIES = 8, 2  # candidates in the table on the screen; ties named there

@@ -17,12 +17,12 @@ from study.equations.model import Model, ModelTerm, free
 from study.equations.place import GROUND, Place
 from study.equations.term import Term
 from study.equations.terms import LIBRARY
-from study.identify.frequency_domain.inputs import history, reverse_inputs
+from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.identify.time_domain.shape_search import values_to_try
 from study.records.record import Record
 from study.structure.measured_start import line_fits
 from study.structure.placed_candidates import external, one_sided
-from study.structure.placed_lines import residual_lines
+from study.structure.placed_lines import placed_residual_lines
 from study.structure.prepared_structure import PreparedStructure
 from study.support.arrays import Floats
 from study.support.cores import cores
@@ -73,7 +73,7 @@ def _linear(term: Term) -> bool:
 
     def forces(times: float) -> list[Floats]:
         motion = {"force": 0.0 * u, "displacement": times * u, "velocity": times * v}
-        return [history(item, Record(0.1, motion)) for item in reverse_inputs(model)]
+        return [input_history(item, Record(0.1, motion)) for item in reverse_inputs(model)]
 
     return all(np.allclose(b, 2.0 * a) for a, b in zip(forces(1.0), forces(2.0), strict=True))
 
@@ -94,7 +94,7 @@ def screened_by_lines(
     ``residual`` is what the free run leaves of the fitting part, shape (samples, sensors): lines that stand out of it
     are tried as the frequencies of periodic effects. ``modes`` is how many there may be at most.
     """
-    lines = residual_lines(residual / prepared.scale) / (len(residual) * prepared.dt)
+    lines = placed_residual_lines(residual / prepared.scale) / (len(residual) * prepared.dt)
     alone = _left(model, prepared, modes)
 
     def best(entry: ModelTerm) -> Screened | None:

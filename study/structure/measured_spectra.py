@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from study.equations.model import Model
 from study.equations.place import Place
 from study.identify.frequency_domain import instruments
-from study.identify.frequency_domain.inputs import Input, history, reverse_inputs
+from study.identify.frequency_domain.inputs import Input, input_history, reverse_inputs
 from study.identify.frequency_domain.responses import Responses
 from study.records import spectra
 from study.records.record import MOTIONS, Record
@@ -95,8 +95,8 @@ def coefficient_spectra(fit: MeasuredFit, prepared: PreparedStructure) -> tuple[
     for place, inputs in groups:
         e = place.direction(model.coordinates)
         seen, free = (_relative(prepared, model, e, motion) for motion in (measured, clean))
-        instrument += [history(item, free) for item in inputs]
-        corrected += instruments.corrected(inputs, seen, free)
+        instrument += [input_history(item, free) for item in inputs]
+        corrected += instruments.inputs_without_noise(inputs, seen, free)
     cut = Segments(length=min(LONGEST, 2 ** int(np.log2(max((last - first) // SHARE, 16)))))
     by_sensor = {
         sensor.coordinate: _responses(sensor, [*instrument, *corrected, y[first:last]], prepared.dt, cut)
@@ -143,7 +143,7 @@ def _relative(
 def _responses(sensor: Sensor, channels: Sequence[Floats], dt: float, cut: Segments) -> Responses:
     """Displacement at a sensor by every input."""
     matrix = spectra.cross_spectra([x - np.mean(x) for x in channels], dt, cut)
-    found = instruments.responses(matrix)
+    found = instruments.instrumental_responses(matrix)
     order = (2j * np.pi * np.maximum(found.frequency, found.frequency[1])) ** MOTIONS.index(sensor.motion)
     size = np.abs(order)[:, None, None] ** 2
     return replace(found, response=found.response / order, covariance=found.covariance / size)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.fft import rfft
 
 from study.equations.model import Model
-from study.identify.frequency_domain.inputs import history
+from study.identify.frequency_domain.inputs import input_history
 from study.identify.frequency_domain.subspace import observability
 from study.records.record import MOTIONS, Record
 from study.structure.missing_forces import placed_inputs
@@ -31,7 +31,7 @@ TRIALS = 60
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
+class DrivenLines:
     """Lines of a record in the band that its forces drive.
 
     Attributes
@@ -55,7 +55,7 @@ class Lines:
     order: Complexes
 
 
-def lines_of(model: Model, prepared: PreparedStructure) -> Lines:
+def lines_of(model: Model, prepared: PreparedStructure) -> DrivenLines:
     """Lines of the fitting part, through a Hann window.
 
     Raises
@@ -84,7 +84,7 @@ def lines_of(model: Model, prepared: PreparedStructure) -> Lines:
     order = np.stack([s ** MOTIONS.index(x.motion) for x in prepared.sensors], axis=1) / prepared.scale
     outputs = np.stack([spectrum(x)[keep] for x in prepared.measured.T], axis=1) / prepared.scale
     columns = np.stack(unit, axis=1) if unit else np.zeros((len(keep), 0), dtype=np.complex128)
-    return Lines(s, forces[keep], columns, outputs.astype(np.complex128), order.astype(np.complex128))
+    return DrivenLines(s, forces[keep], columns, outputs.astype(np.complex128), order.astype(np.complex128))
 
 
 def unit_histories(model: Model, prepared: PreparedStructure) -> list[Floats]:
@@ -108,7 +108,7 @@ def unit_histories(model: Model, prepared: PreparedStructure) -> list[Floats]:
         relative = Record(record.dt, channels, name=record.name, start=record.start)
         by_symbol: dict[str, Floats] = {}
         for item in placed_inputs(entry):
-            values = history(item, relative)
+            values = input_history(item, relative)
             for part in item.parts:
                 unit = part.factor * (np.gradient(values, record.dt) if part.order else values)
                 by_symbol[part.symbol] = by_symbol.get(part.symbol, 0.0) + unit
@@ -123,7 +123,7 @@ class _Modal:
     Unknown are w2 and g of each mode, amplitudes by point, then coefficients.
     """
 
-    lines: Lines
+    lines: DrivenLines
     modal: ModalKeys
     at: Floats  # (points, sensors): which point each sensor is at
     drives: Floats  # (points, forces)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from study.equations.model import Model
 from study.figures import frequency_response, page
-from study.figures.curves import Curve, InputResponse
+from study.figures.curves import InputResponse, ResponseCurve
 from study.records.record import MOTIONS
 from study.records.spectra import cross_spectra
 from study.reproduction.tables import PARAMETER_COLUMNS, stacked
@@ -115,7 +115,7 @@ def modal_transfer(fit: MeasuredFit, places: list[str], where: str, frequency: F
 def measured_figure(table: pd.DataFrame, title: str) -> Figure:
     """Every coefficient by frequency, which must be real and flat, and the linear part at every sensor."""
     groups = dict.fromkeys((str(q), str(p)) for q, p in zip(table["quantity"], table["place"], strict=True))
-    figure, axes = page.page(
+    figure, axes = page.empty_page(
         title, "Coefficients line by line, and transfer functions of the linear part", rows=len(groups), columns=2,
         width=page.width(2), legend_rows=page.rows_for(5), share=False,
     )  # fmt: skip
@@ -128,23 +128,25 @@ def measured_figure(table: pd.DataFrame, title: str) -> Figure:
             frequency_response.real_and_imaginary(left, right, item, unit, frequency_response.common_span([item]))
             names += [f"{place}: real part", "imaginary part"]
         else:
-            frequency_response.magnitude(left, item, "m/N")
+            frequency_response.magnitude_panel(left, item, "m/N")
             left.set_ylabel("|H| (m/N)")
-            frequency_response.phase(right, item)
+            frequency_response.phase_panel(right, item)
             right.set_ylabel("phase (deg)")
             names += [f"shaker to {place}: magnitude", "phase"]
         for panel in (left, right):
             panel.set_xlabel("frequency (Hz)" if k == len(groups) - 1 else "")
     page.letter(axes, names)
-    page.legend(figure, axes, bands=True)
+    page.shared_legend(figure, axes, bands=True)
     return figure
 
 
 def _item(rows: pd.DataFrame, number: int) -> InputResponse:
-    curves: list[Curve] = []
+    curves: list[ResponseCurve] = []
     for name in dict.fromkeys(str(e) for e in rows["estimator"]):
         own = rows[rows["estimator"] == name]
-        curves.append(Curve(name, _of(own, "frequency"), _pair(own, ""), np.nan_to_num(_of(own, "standard_error"))))
+        curves.append(
+            ResponseCurve(name, _of(own, "frequency"), _pair(own, ""), np.nan_to_num(_of(own, "standard_error")))
+        )
     first = rows[rows["estimator"] == str(rows["estimator"].iloc[0])]
     return InputResponse(number, "u", tuple(curves), _of(first, "frequency"), _pair(first, "exact_"))
 

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
-from study.compare.force_map import Curve, curve
+from study.compare.force_map import ForceCurve, curve
 from study.compare.noise import SIGNIFICANT
 from study.equations import kernels
 from study.equations.model import Model, ModelTerm
 from study.equations.place import Place
-from study.identify.frequency_domain.inputs import Input, history, reverse_inputs
+from study.identify.frequency_domain.inputs import Input, input_history, reverse_inputs
 from study.records import noise_floor
 from study.records.completion import derivative
 from study.records.record import MOTIONS, Record
@@ -68,7 +68,7 @@ class MissingForces:
     size: Floats
     matrix: Floats
     aligned: tuple[tuple[Place, float], ...]
-    curves: dict[str, Curve]
+    curves: dict[str, ForceCurve]
 
     @property
     def rms(self) -> Floats:
@@ -173,7 +173,7 @@ def unbalanced_forces(model: Model, motion: Floats, prediction: StructurePredict
 def _state(entry: ModelTerm, model: Model, motion: Floats, dt: float) -> Floats:
     """A term's own state along a motion, from rest."""
     item = next(i for i in placed_inputs(entry) if i.state is not None)
-    return history(item, relative_record(entry.place, model, motion, dt))
+    return input_history(item, relative_record(entry.place, model, motion, dt))
 
 
 def placed_inputs(entry: ModelTerm) -> tuple[Input, ...]:
@@ -213,9 +213,9 @@ def _aligned(model: Model, prediction: StructurePrediction) -> tuple[tuple[Place
     return tuple(sorted(found, key=lambda item: -item[1]))
 
 
-def _maps(places: Sequence[Place], names: list[str], displacement: Floats, residual: Floats) -> dict[str, Curve]:
+def _maps(places: Sequence[Place], names: list[str], displacement: Floats, residual: Floats) -> dict[str, ForceCurve]:
     """Missing restoring force over relative displacement of each place, as the two equations that it is in have it."""
-    found: dict[str, Curve] = {}
+    found: dict[str, ForceCurve] = {}
     for place in places:
         e = np.array(place.direction(names))
         found[place.label] = curve(displacement @ e, -(residual @ e) / float(e @ e))

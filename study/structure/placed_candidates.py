@@ -12,10 +12,10 @@ from study.equations.model import Model, ModelTerm, free, with_registers
 from study.equations.place import Place
 from study.equations.term import Term
 from study.equations.terms import LIBRARY
-from study.structure.placed_search import PlacedBaseline, PlacedStart, starts, with_placed_term
+from study.structure.placed_search import PlacedBaseline, PlacedStart, placed_starts, with_placed_term
 from study.structure.places import connections
 from study.structure.prepared_structure import PreparedStructure
-from study.structure.structure_fit import StructureFit, settled
+from study.structure.structure_fit import StructureFit, settled_structure
 from study.structure.structure_prediction import StructurePrediction, predict_structure
 from study.support.cores import cores
 from study.support.errors import StudyError
@@ -68,7 +68,7 @@ def one_sided(term: Term) -> bool:
     for component in term.components:
         graph = Graph()
         nodes = {n: graph.input(n) for n in ("u", "v", "t", "z", *values, *term.channels)}
-        program = graph.program([formulas.build(graph, component.shape, nodes)])
+        program = graph.program([formulas.add_formula(graph, component.shape, nodes)])
         forces = [
             _value(program, {**values, "u": s * u, "v": s * v, "z": s * u}) for u, v in motions for s in (1.0, -1.0)
         ]
@@ -108,14 +108,14 @@ def screened(entries: Sequence[ModelTerm], base: PlacedBaseline) -> list[tuple[M
 
     def points(entry: ModelTerm) -> tuple[ModelTerm, list[PlacedStart]]:
         assert entry.place is not None, "every candidate of a structure has a place"
-        return entry, starts(entry.term, entry.place, base)
+        return entry, placed_starts(entry.term, entry.place, base)
 
     with ThreadPoolExecutor(cores()) as pool:
         tried = list(pool.map(points, entries))
     return sorted((item for item in tried if item[1]), key=lambda item: -item[1][0].share)
 
 
-def promising(
+def worth_fitting(
     ordered: Sequence[tuple[ModelTerm, list[PlacedStart]]],
 ) -> list[tuple[ModelTerm, list[PlacedStart]]]:
     """Those worth a fit in free run: the first of all, of each place and of each effect."""
@@ -152,7 +152,7 @@ def elsewhere(
     ]
 
 
-def try_all(
+def try_placed(
     chosen: Sequence[tuple[ModelTerm, list[PlacedStart]]], base: PlacedBaseline, progress: Progress
 ) -> list[PlacedCandidate]:
     """Fit and judge candidates; those that cannot be fitted are left out, of two sides of a place the better stays."""
@@ -184,13 +184,13 @@ def one_side(candidates: Sequence[PlacedCandidate]) -> list[PlacedCandidate]:
     return list(best.values())
 
 
-def with_best_settled(tried: Sequence[PlacedCandidate], prepared: PreparedStructure) -> list[PlacedCandidate]:
+def with_best_placed_settled(tried: Sequence[PlacedCandidate], prepared: PreparedStructure) -> list[PlacedCandidate]:
     """The best candidates fitted as they would be if they were added, then the others."""
     ordered = sorted(tried, key=lambda c: (bool(c.unphysical), c.left))
 
     def settle(candidate: PlacedCandidate) -> PlacedCandidate:
         try:
-            fit = settled(candidate.fit, prepared)
+            fit = settled_structure(candidate.fit, prepared)
         except StudyError:
             return candidate
         prediction = predict_structure(fit, prepared)

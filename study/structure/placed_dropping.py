@@ -6,7 +6,7 @@ from study.equations.layout import check
 from study.equations.model import Model
 from study.equations.place import Place
 from study.structure.structure_comparison import StructureComparison, compare_structure
-from study.structure.structure_fit import StructureFit, fit_structure, settled
+from study.structure.structure_fit import StructureFit, fit_structure, settled_structure
 from study.structure.structure_start import first_fit
 from study.support.errors import StudyError, expect
 
@@ -51,4 +51,4 @@ def dropped_term(comparison: StructureComparison, name: str) -> StructureCompari
         fits.append(first_fit(given, prepared))
     expect(fits, f"{given.name!r} without {name} has no finite motion under the forces of {prepared.record.name!r}")
     best = min(fits, key=lambda f: f.cost)
-    return compare_structure(given, prepared, settled(best, prepared))
+    return compare_structure(given, prepared, settled_structure(best, prepared))

@@ -10,12 +10,12 @@ PEAKS = 8  # lines that are tried as the frequency of a periodic effect
 RARE = 1e-3  # of the largest: lines at which a modulation could hardly show
 
 
-def residual_lines(residual: Floats) -> Floats:
+def placed_residual_lines(residual: Floats) -> Floats:
     """Lines that stand out of the residuals' own spectra; ``residual`` has shape (samples, sensors)."""
     return np.array(highest_lines(np.sum([np.abs(windowed(x)) ** 2 for x in residual.T], axis=0)))
 
 
-def modulation_lines(u: Floats, path: Complexes, residual: Floats) -> Floats:
+def placed_modulation_lines(u: Floats, path: Complexes, residual: Floats) -> Floats:
     """Lines at which a stiffness of a place that varies with time would explain most, by a matched filter.
 
     ``path`` leads from a force at the place to the sensors, shape (lines, sensors), ``residual`` and the relative

@@ -13,12 +13,19 @@ from study.diagnose.credibility import certain
 from study.diagnose.needless import DOUBLED, is_open, relative_interval, sentence
 from study.equations.layout import check
 from study.equations.model import Model, ModelTerm
-from study.equations.place import in_words
+from study.equations.place import place_in_words
 from study.figures.labels import term_names
 from study.structure.placed_ranking import held_out_parts, held_out_test
 from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_comparison import StructureComparison
-from study.structure.structure_fit import StructureFit, covariance_of, fit_structure, flat, linearise, noise_left
+from study.structure.structure_fit import (
+    StructureFit,
+    fit_structure,
+    flat,
+    linearise_structure,
+    noise_left,
+    structure_covariance,
+)
 from study.structure.structure_prediction import StructurePrediction, predict_structure
 from study.support.arrays import Floats
 from study.support.cores import cores
@@ -47,7 +54,7 @@ class PlacedNeedless:
     def sentence(self, any_more: bool = False) -> str:
         """What to tell the engineer; ``any_more`` if a term was added after it."""
         words = term_names(self.entry.term.name)
-        words += f" {in_words(self.entry.place)}" if self.entry.place else ""
+        words += f" {place_in_words(self.entry.place)}" if self.entry.place else ""
         return sentence(words, self.error_with, self.error_without, any_more)
 
 
@@ -76,8 +83,8 @@ def _each_alone(
     asked: int,
 ) -> list[PlacedNeedless]:  # fmt: skip
     """Those of the terms that this model does not need, each for itself, of so many that were asked for."""
-    jacobian = linearise(fit, prepared)
-    covariance = covariance_of(fit, prepared, jacobian)
+    jacobian = linearise_structure(fit, prepared)
+    covariance = structure_covariance(fit, prepared, jacobian)
     parts = held_out_parts(fit, prediction, jacobian, prepared.fit)
 
     def answer(entry: ModelTerm) -> PlacedNeedless | None:

@@ -8,12 +8,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from study.diagnose import ranked
-from study.diagnose.constancy import Curve, along_amplitude, along_frequency, changes
+from study.diagnose.constancy import CoefficientCurve, along_amplitude, along_frequency, changes
 from study.diagnose.ranking import in_order
 from study.equations.model import ModelTerm
 from study.equations.term import Term
 from study.structure.placed_candidates import PlacedCandidate, physical
-from study.structure.structure_fit import SensorNoise, StructureFit, covariance_of, linearise, noise_left
+from study.structure.structure_fit import (
+    SensorNoise,
+    StructureFit,
+    linearise_structure,
+    noise_left,
+    structure_covariance,
+)
 from study.structure.structure_prediction import StructurePrediction
 from study.support import statistics
 from study.support.arrays import Floats
@@ -37,8 +43,8 @@ class PlacedRanked:
     error: float  # standard error of that
     parameters: dict[str, float]  # shape parameters, and the phase of an effect of any phase
     parameter_errors: dict[str, float]
-    flatness: Curve | None  # the coefficient along frequency, at the sensor that sees most of it
-    steadiness: Curve | None  # along amplitude, at all sensors
+    flatness: CoefficientCurve | None  # the coefficient along frequency, at the sensor that sees most of it
+    steadiness: CoefficientCurve | None  # along amplitude, at all sensors
     parts: tuple[Floats, Floats]  # held-out residuals of judging and fitting part, each shape (samples, sensors)
     p_value: float = 1.0  # of what it explains, with the number of candidates accounted for (Bonferroni)
     tied_with: tuple[str, ...] = ()
@@ -148,7 +154,7 @@ class HeldOutTest:
 
 def held_out_test(fit: StructureFit, before: StructurePrediction, noise: SensorNoise) -> HeldOutTest:
     """The test of whatever a fitted structure lacks, in noise as the best candidate leaves it."""
-    jacobian = linearise(fit, before.prepared)
+    jacobian = linearise_structure(fit, before.prepared)
     parts = held_out_parts(fit, before, jacobian, before.prepared.fit)
     try:
         columns = [before.derivatives(fit), jacobian] if not before.diverged else []
@@ -191,8 +197,8 @@ def held_out_parts(
 
 def _examined(candidate: PlacedCandidate, before: StructurePrediction) -> PlacedRanked:
     fit, prepared = candidate.fit, candidate.prediction.prepared
-    jacobian = linearise(fit, prepared)
-    covariance = covariance_of(fit, prepared, jacobian)
+    jacobian = linearise_structure(fit, prepared)
+    covariance = structure_covariance(fit, prepared, jacobian)
     coefficient, error, parameters, errors = ranked.amount(candidate.entry, fit.keys, fit.values, covariance)
     flatness, steadiness = _curves(
         fit, candidate.entry, prepared.dt, jacobian / prepared.scale[:, None], prepared.scale
@@ -208,7 +214,7 @@ def _examined(candidate: PlacedCandidate, before: StructurePrediction) -> Placed
 
 def _curves(
     fit: StructureFit, entry: ModelTerm, dt: float, jacobian: Floats, scale: Floats
-) -> tuple[Curve | None, Curve | None]:
+) -> tuple[CoefficientCurve | None, CoefficientCurve | None]:
     """The coefficient along frequency and along amplitude (``diagnose.constancy``); sensors one after the other."""
     columns = [fit.keys.index(s) for s in entry.symbols]
     direction = fit.values[columns]

@@ -17,15 +17,15 @@ from scipy.fft import irfft, rfft, rfftfreq
 from study.equations.model import Model, ModelTerm
 from study.equations.place import Place
 from study.equations.term import Term
-from study.identify.frequency_domain.inputs import history
+from study.identify.frequency_domain.inputs import input_history
 from study.identify.time_domain.shape_search import MODULATION, values_to_try
 from study.records.record import MOTIONS, Record
 from study.structure.mass_matrix import LINEAR, linear_keys, matrices, patterns
 from study.structure.missing_forces import corrected_motion, placed_inputs, relative_record
-from study.structure.placed_lines import modulation_lines, residual_lines
+from study.structure.placed_lines import placed_modulation_lines, placed_residual_lines
 from study.structure.places import transfer
 from study.structure.prepared_structure import PreparedStructure
-from study.structure.structure_fit import StructureFit, fit_structure, flat, linearise
+from study.structure.structure_fit import StructureFit, fit_structure, flat, linearise_structure
 from study.structure.structure_record import Sensor
 from study.structure.structure_run import prepare_run
 from study.support.arrays import Complexes, Floats
@@ -94,9 +94,9 @@ class PlacedBaseline:
         return self.residual.reshape(len(self.fit.residual), -1)
 
     def modulation(self, u: Floats, place: Place) -> Floats:
-        """:func:`modulation_lines` of a place with the relative displacement u."""
+        """:func:`placed_modulation_lines` of a place with the relative displacement u."""
         e = np.array(place.direction(self.fit.model.coordinates))
-        return modulation_lines(u, (self.paths @ e)[::2] / self.fit.noise.deviation, self.by_sensor)
+        return placed_modulation_lines(u, (self.paths @ e)[::2] / self.fit.noise.deviation, self.by_sensor)
 
     def dated(self, record: Record) -> Record:
         """A relative motion with the time at which it was."""
@@ -136,7 +136,7 @@ def placed_baseline(fit: StructureFit, prepared: PreparedStructure) -> PlacedBas
     paths = transfer(matrices(model, model.numbers()), prepared.sensors, model.coordinates, prepared.dt, size)
     left = flat(fit, fit.residual)
     bare = PlacedBaseline(fit, prepared, motion, paths, size, free, free, left, left)
-    columns = flat(fit, linearise(fit, prepared))  # right for the initial state and for shape parameters
+    columns = flat(fit, linearise_structure(fit, prepared))  # right for the initial state and for shape parameters
     for i, column in _own_columns(bare).items():
         columns[:, i] = column
     scale = np.linalg.norm(columns, axis=0)
@@ -184,7 +184,7 @@ def _drifted(base: PlacedBaseline, free: Floats) -> Floats:
     return total
 
 
-def starts(term: Term, place: Place, base: PlacedBaseline, given: ModelTerm | None = None) -> list[PlacedStart]:
+def placed_starts(term: Term, place: Place, base: PlacedBaseline, given: ModelTerm | None = None) -> list[PlacedStart]:
     """Points of the search over a term's shape parameters, best first; ``given`` are those that are known."""
     model = base.fit.model
     record = base.dated(relative_record(place, model, base.motion, base.prepared.dt))
@@ -216,7 +216,7 @@ def unit_lines(entry: ModelTerm, record: Record, base: PlacedBaseline) -> list[C
     """Lines of the force of each component with a unit coefficient along a motion."""
     by_symbol: dict[str, Complexes] = {}
     for item in placed_inputs(entry):
-        values = base.lines(record["displacement"] if item.shape == "u" else history(item, record))
+        values = base.lines(record["displacement"] if item.shape == "u" else input_history(item, record))
         for part in item.parts:
             by_symbol[part.symbol] = values * part.factor * base.omega**part.order
     return [by_symbol[symbol] for symbol in entry.term.symbols]
@@ -226,7 +226,7 @@ def _grid(
     term: Term, place: Place, u: Floats, base: PlacedBaseline, known: Sequence[float | None]
 ) -> list[tuple[float, ...]]:
     def lines(kind: str, shifts: Floats) -> Floats:
-        found = base.modulation(u, place) if kind == MODULATION else residual_lines(base.by_sensor)
+        found = base.modulation(u, place) if kind == MODULATION else placed_residual_lines(base.by_sensor)
         return np.add.outer(found, shifts).ravel() / (len(u) * base.prepared.dt)
 
     points: list[tuple[float, ...]] = [()]
@@ -253,7 +253,7 @@ def with_placed_term(
     """
     assert entry.place is not None, "every term of a structure has a place"
     base = base or placed_baseline(fit, prepared)
-    tried = list(points or starts(entry.term, entry.place, base, entry))[:STARTS]
+    tried = list(points or placed_starts(entry.term, entry.place, base, entry))[:STARTS]
     given = {key: value for key, value in entry.values.items() if value is not None}
     grown = fit.model.with_term(entry)
     shapes = tuple(key for key in entry.keys[len(entry.symbols) :] if key not in given)

@@ -17,7 +17,7 @@ ROOM = 2.4  # inches beside a panel for its legend
 def connections_figure(table: pd.DataFrame, title: str, highest: float = HIGHEST) -> Figure:
     """Real and imaginary part of every A_j(f), each in the equation where its input depends least on the others."""
     shown = _chosen(table, highest)
-    figure, axes = page.page(
+    figure, axes = page.empty_page(
         title, "Frequency response functions $A_j(f)$ of every connection", rows=len(shown), columns=2,
         width=page.width(2), legend_rows=page.rows_for(len(shown[0][1].curves) + 3), share=False,
     )  # fmt: skip
@@ -30,7 +30,7 @@ def connections_figure(table: pd.DataFrame, title: str, highest: float = HIGHEST
         for panel in (real, imaginary):
             panel.set_xlabel("frequency (Hz)" if k == len(shown) - 1 else "")
     page.letter(axes, names)
-    page.legend(figure, axes, bands=True)
+    page.shared_legend(figure, axes, bands=True)
     return figure
 
 
@@ -54,7 +54,7 @@ def _chosen(table: pd.DataFrame, highest: float) -> list[tuple[str, curves.Input
     found: list[tuple[str, curves.InputResponse, float]] = []
     for (_, shape), (share, place, equation) in best.items():
         own = inside[(inside["equation"] == equation) & (inside["place"] == place) & (inside["shape"] == shape)]
-        item = curves.responses(own.assign(input=len(found) + 1), highest)[0]
+        item = curves.input_responses(own.assign(input=len(found) + 1), highest)[0]
         found.append((f"{labels.formula(shape)} of {place}: equation of {equation}", item, share))
     return found
 
@@ -67,14 +67,14 @@ def _both_ways(place: str) -> str:
 def coherence_figure(table: pd.DataFrame, title: str, highest: float = HIGHEST) -> Figure:
     """Cumulative coherences of MI/SO, a panel an equation."""
     equations, table = list(dict.fromkeys(str(e) for e in table["equation"])), table.assign(terms=table["place"])
-    figure, axes = page.page(
+    figure, axes = page.empty_page(
         title, "Cumulative coherence of each equation of motion", rows=len(equations), width=page.WIDTH + ROOM,
         legend_rows=0,
     )  # fmt: skip
     figure.subplots_adjust(right=1.0 - ROOM / (page.WIDTH + ROOM))
     for panel, equation in zip(axes, equations, strict=True):
         own = table[table["equation"] == equation]
-        coherence.cumulative(panel, curves.coherences(own, highest))
+        coherence.cumulative_panel(panel, curves.coherences(own, highest))
         panel.set_xlabel("frequency (Hz)" if equation == equations[-1] else "")
         panel.set_ylabel("cumulative coherence")
         panel.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8, borderaxespad=0.0)

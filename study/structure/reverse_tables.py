@@ -11,7 +11,14 @@ import pandas as pd
 
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.identify.frequency_domain.inputs import Input
-from study.reproduction.tables import COHERENCE_COLUMNS, PARAMETER_COLUMNS, RESPONSE_COLUMNS, Judged, judge, stacked
+from study.reproduction.tables import (
+    COHERENCE_COLUMNS,
+    PARAMETER_COLUMNS,
+    RESPONSE_COLUMNS,
+    AllowedErrors,
+    judge_estimate,
+    stacked,
+)
 from study.structure.action_reaction import JointEstimate
 from study.structure.reverse_system import EquationResult, exact_responses
 from study.structure.structure_study import CaseResult
@@ -21,13 +28,13 @@ WHERE = ["equation", "place"]  # what the tables of structures have beside
 REACTION_COLUMNS = ["case", "estimator", "parameter", "first", "second", "in_first", "in_second", "error", "p_value"]
 
 
-def place_of(item: Input) -> str:
+def input_place(item: Input) -> str:
     """Where an input acts: that of its coefficients, ``first-second``; several stand side by side."""
     labels = [p.symbol[p.symbol.index("[") + 1 : -1] for p in item.parts]
     return " and ".join(dict.fromkeys(labels))
 
 
-def structure_parameters(case: str, result: CaseResult, limits: Judged) -> pd.DataFrame:
+def structure_parameters(case: str, result: CaseResult, limits: AllowedErrors) -> pd.DataFrame:
     """Every coefficient of every estimator from all equations together, one row each."""
     rows = [
         (case, estimator, *_judged(symbol, result.model.values[symbol], found.joint, limits), "")
@@ -37,10 +44,10 @@ def structure_parameters(case: str, result: CaseResult, limits: Judged) -> pd.Da
     return pd.DataFrame(rows, columns=PARAMETER_COLUMNS)
 
 
-def _judged(key: str, true: float | None, joint: JointEstimate, limits: Judged) -> tuple[Any, ...]:
+def _judged(key: str, true: float | None, joint: JointEstimate, limits: AllowedErrors) -> tuple[Any, ...]:
     value, error = joint.estimate[key], joint.estimate.error(key)
     known = 0.0 if true is None else true
-    return (key, known, value, error, *judge(key[: key.index("[")], known, value, limits).values())
+    return (key, known, value, error, *judge_estimate(key[: key.index("[")], known, value, limits).values())
 
 
 def structure_reactions(case: str, result: CaseResult) -> pd.DataFrame:
@@ -71,8 +78,8 @@ def _responses(estimator: str, own: EquationResult, values: Mapping[str, float])
         value, error = responses.response[j] * scale, np.sqrt(responses.covariance[:, j, j].real) * scale
         share: Floats | float = np.nan if own.independent is None else own.independent[:, j]
         found.append(
-            (own.coordinate, place_of(item), responses.frequency, estimator, j + 1, item.shape, value.real, value.imag,
-             error, exact.real * scale, exact.imag * scale, share)
+            (own.coordinate, input_place(item), responses.frequency, estimator, j + 1, item.shape, value.real,
+             value.imag, error, exact.real * scale, exact.imag * scale, share)
         )  # fmt: skip
     return found
 
@@ -87,7 +94,7 @@ def structure_coherences(result: CaseResult) -> pd.DataFrame:
                 for j, item in enumerate(own.found.inputs):
                     terms = " + ".join(_words(name) for name in item.terms)
                     parts.append(
-                        (own.coordinate, place_of(item), analysis.frequency, estimator, j + 1, item.shape, terms,
+                        (own.coordinate, input_place(item), analysis.frequency, estimator, j + 1, item.shape, terms,
                          analysis.ordinary[j], analysis.partial[j], analysis.contribution[j], analysis.cumulative[j])
                     )  # fmt: skip
     return stacked([*WHERE, *COHERENCE_COLUMNS], parts)

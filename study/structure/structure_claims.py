@@ -14,7 +14,7 @@ from study.structure.measured_comparison import MeasuredComparison
 from study.structure.places import transfer
 from study.structure.reverse_tables import structure_parameters
 from study.structure.structure_record import Sensor, StructureRecord
-from study.structure.structure_study import CaseResult, Found, StructureCase, StructureSettings
+from study.structure.structure_study import CaseResult, StructureCase, StructureFindings, StructureSettings
 from study.support.numbers import percent
 
 STATEMENTS = {
@@ -104,7 +104,7 @@ def _placed(case: StructureCase, result: CaseResult, settings: StructureSettings
         yield Condition(f"{key} {criterion}", f"{key} {measured}", met)
 
 
-def _reaction(found: Mapping[str, Found], settings: StructureSettings) -> Iterable[Condition]:
+def _reaction(found: Mapping[str, StructureFindings], settings: StructureSettings) -> Iterable[Condition]:
     limit = settings.claims.by_chance
     for name, holds in (("miso", True), ("siso", False)):
         p = found[name].joint.least_p

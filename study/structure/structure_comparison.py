@@ -9,13 +9,13 @@ import numpy as np
 
 from study.equations import dimensions, model_file
 from study.equations.model import Model
-from study.equations.place import Place, in_words
+from study.equations.place import Place, place_in_words
 from study.equations.term import QUANTITIES
 from study.structure.missing_forces import MissingForces, missing_forces
 from study.structure.modes import Modes, modes_of, modes_table
 from study.structure.prepared_structure import PreparedStructure
-from study.structure.structure_fit import StructureFit, covariance_of, linearise, settled
-from study.structure.structure_leftover import Leftover, explained_by_place, left_over
+from study.structure.structure_fit import StructureFit, linearise_structure, settled_structure, structure_covariance
+from study.structure.structure_leftover import FamilyGain, explained_by_place, family_gains
 from study.structure.structure_prediction import StructurePrediction, predict_structure
 from study.structure.structure_start import first_fit
 from study.support.arrays import Floats
@@ -55,9 +55,9 @@ class StructureComparison:
     notes: tuple[str, ...]
 
     @cached_property
-    def leftovers(self) -> tuple[Leftover, ...]:
+    def leftovers(self) -> tuple[FamilyGain, ...]:
         """What general shapes of the motion at each place explain of what is left, held out; asked for when shown."""
-        return tuple(left_over(self.prediction))
+        return tuple(family_gains(self.prediction))
 
 
 def compare_structure(
@@ -80,9 +80,9 @@ def compare_structure(
     expect(not model.measured, f"{sentence}; 'study compare', 'diagnose' and 'add' take this one")
     report("fit")
     if fit is None:
-        fit = settled(first_fit(model, prepared), prepared)
-    jacobian = linearise(fit, prepared)
-    covariance = covariance_of(fit, prepared, jacobian)[: len(fit.keys), : len(fit.keys)]
+        fit = settled_structure(first_fit(model, prepared), prepared)
+    jacobian = linearise_structure(fit, prepared)
+    covariance = structure_covariance(fit, prepared, jacobian)[: len(fit.keys), : len(fit.keys)]
     report("free run")
     prediction = predict_structure(fit, prepared)
     report("where it fails")
@@ -117,7 +117,7 @@ def _units(entry: Any) -> list[str]:
     return own
 
 
-def says(comparison: StructureComparison) -> str:
+def structure_in_words(comparison: StructureComparison) -> str:
     """What a person wants to know, in sentences."""
     prediction, forces = comparison.prediction, comparison.forces
     worst = int(np.argmax(prediction.errors))
@@ -133,11 +133,13 @@ def says(comparison: StructureComparison) -> str:
         said.append(f"The equation of {forces.coordinates[i]} is violated most: {left}.")
     if len(prediction.prepared.sensors) > 1 and forces.aligned:
         place, share = forces.aligned[0]
-        said.append(f"A single force {in_words(place)} could make {percent(share)} of what stands above the noise.")
+        said.append(
+            f"A single force {place_in_words(place)} could make {percent(share)} of what stands above the noise."
+        )
     return " ".join(said)
 
 
-def document(comparison: StructureComparison) -> dict[str, Any]:
+def structure_document(comparison: StructureComparison) -> dict[str, Any]:
     """What ``comparison.json`` holds."""
     prediction, fit, forces = comparison.prediction, comparison.fit, comparison.forces
     explained = explained_by_place(comparison.leftovers)
@@ -155,7 +157,7 @@ def document(comparison: StructureComparison) -> dict[str, Any]:
             "response": prediction.floor,
             "sensors": {str(s): float(e) for s, e in zip(prediction.prepared.sensors, prediction.floors, strict=True)},
         },
-        "coefficients": [coefficient_row(c) for c in comparison.coefficients],
+        "coefficients": [placed_coefficient_row(c) for c in comparison.coefficients],
         "modes": mode_rows(comparison.modes),
         "fit": {
             "samples": list(prediction.prepared.fit), "judged": list(prediction.prepared.judge),
@@ -177,11 +179,11 @@ def document(comparison: StructureComparison) -> dict[str, Any]:
             },
         },
         "notes": list(comparison.notes),
-        "says": says(comparison),
+        "says": structure_in_words(comparison),
     }  # fmt: skip
 
 
-def coefficient_row(c: PlacedCoefficient) -> dict[str, Any]:
+def placed_coefficient_row(c: PlacedCoefficient) -> dict[str, Any]:
     """A coefficient as a plain row."""
     return {
         "key": c.key, "term": c.term, **(c.place.plain() if c.place else {}), "value": c.value,
@@ -202,7 +204,7 @@ def mode_rows(modes: Modes) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def summary(comparison: StructureComparison) -> str:
+def structure_summary(comparison: StructureComparison) -> str:
     """The tables that a person reads first, and the sentences below them."""
     from tabulate import tabulate
 
@@ -220,7 +222,7 @@ def summary(comparison: StructureComparison) -> str:
         tabulate(rows, heads, tablefmt="simple", disable_numparse=True),
         tabulate(values, ["", "value", "95 % interval", "unit"], tablefmt="simple", disable_numparse=True),
         modes_table(comparison.modes, comparison.model.coordinates),
-        says(comparison),
+        structure_in_words(comparison),
     ]
     return "\n\n".join(parts) + (f"\n({'; '.join(comparison.notes)})" if comparison.notes else "")
 
@@ -229,7 +231,7 @@ def _interval(c: PlacedCoefficient) -> str:
     return "held" if c.interval is None else f"{c.interval[0]:.5g} to {c.interval[1]:.5g}"
 
 
-def history_step(
+def structure_history_step(
     comparison: StructureComparison, added: str | None = None, dropped: str | None = None
 ) -> dict[str, Any]:
     """A comparison as a step of the history (``study.compare.history``)."""
@@ -240,5 +242,5 @@ def history_step(
         "error": {"force": comparison.forces.share, "response": prediction.error},
         "rms": float(np.sqrt(np.mean(prediction.residual**2))), "unit": "",
         "noise_floor": {"response": prediction.floor}, "converged": comparison.fit.converged,
-        "coefficients": [coefficient_row(c) for c in comparison.coefficients],
+        "coefficients": [placed_coefficient_row(c) for c in comparison.coefficients],
     }  # fmt: skip

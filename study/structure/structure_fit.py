@@ -157,7 +157,7 @@ def positive_keys(entry: ModelTerm) -> tuple[str, ...]:
     return tuple(own[key] for key in entry.term.positive)
 
 
-def needed_steps(model: Model, dt: float) -> int:
+def structure_steps(model: Model, dt: float) -> int:
     """Steps in each sampling interval with which a search may begin, the linear terms all known."""
     stiffness, damping, mass = matrices(model, {key: value or 0.0 for key, value in model.values.items()})
     try:
@@ -194,7 +194,7 @@ def fit_structure(
     begun = model.with_values(dict(start or {}))
     keys = tuple(key for key in model.values if key not in held)
     values = begun.numbers()
-    steps = steps or needed_steps(begun, prepared.dt)
+    steps = steps or structure_steps(begun, prepared.dt)
     run = prepare_run(begun, prepared.record, keys, sensors=prepared.sensors, steps_per_sample=steps, span=prepared.fit)
     positive = tuple(key for entry in model.terms for key in positive_keys(entry) if key in keys)
     measured = prepared.measured[slice(*prepared.fit)]
@@ -224,7 +224,7 @@ def fitted_run(fit: StructureFit, prepared: PreparedStructure, keys: tuple[str, 
     )
 
 
-def linearise(fit: StructureFit, prepared: PreparedStructure) -> Floats:
+def linearise_structure(fit: StructureFit, prepared: PreparedStructure) -> Floats:
     """Derivatives of the motions on the samples that were fitted, shape (n, sensors, keys + states)."""
     run = fitted_run(fit, prepared, fit.keys)
     values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
@@ -237,19 +237,19 @@ def flat(fit: StructureFit, values: Floats) -> Floats:
     return weighted.reshape(-1, *weighted.shape[2:])
 
 
-def integration_shift(fit: StructureFit, prepared: PreparedStructure, jacobian: Floats) -> Floats:
+def structure_shift(fit: StructureFit, prepared: PreparedStructure, jacobian: Floats) -> Floats:
     """By how much halving the steps would move estimates and initial state, by one step of Gauss and Newton."""
     coarse, fine = (fitted_run(fit, prepared, (), n).respond({}, fit.initial)[0].T for n in (1, 2))
     return least_squares(flat(fit, jacobian), flat(fit, coarse - fine))
 
 
-def covariance_of(fit: StructureFit, prepared: PreparedStructure, jacobian: Floats) -> Floats:
+def structure_covariance(fit: StructureFit, prepared: PreparedStructure, jacobian: Floats) -> Floats:
     """Covariance of estimates and initial state: of whatever is left, in blocks of time, and of the integration.
 
     Variances are those of blocks of time, or of white noise where that has larger ones; correlations are those of white
     noise, as the scatter of a few dozen blocks cannot tell those of as many coefficients as a structure has.
     """
-    moved, columns = integration_shift(fit, prepared, jacobian), flat(fit, jacobian)
+    moved, columns = structure_shift(fit, prepared, jacobian), flat(fit, jacobian)
     length = np.linalg.norm(columns, axis=0)
     scaled = columns / np.where(length > 0.0, length, 1.0)
     white = np.linalg.pinv(scaled.T @ scaled, rcond=1e-12, hermitian=True)
@@ -259,7 +259,7 @@ def covariance_of(fit: StructureFit, prepared: PreparedStructure, jacobian: Floa
         return white / np.outer(size, size) * np.outer(deviation, deviation) + np.outer(moved, moved)
 
 
-def settled(fit: StructureFit, prepared: PreparedStructure) -> StructureFit:
+def settled_structure(fit: StructureFit, prepared: PreparedStructure) -> StructureFit:
     """The fit on the whole fitting part, with enough steps, and weighted with the noise that it leaves.
 
     Weighting stands where it costs nothing of the response and moves no coefficient by more than its error explains, as
@@ -269,8 +269,8 @@ def settled(fit: StructureFit, prepared: PreparedStructure) -> StructureFit:
         begin = fit.initial if fit.first == prepared.fit[0] else None
         fit = fit_structure(fit.model, prepared, fit.held, steps=fit.steps, initial=begin)
     while fit.keys and fit.steps < MOST_STEPS:
-        jacobian = linearise(fit, prepared)
-        moved = np.abs(integration_shift(fit, prepared, jacobian))
+        jacobian = linearise_structure(fit, prepared)
+        moved = np.abs(structure_shift(fit, prepared, jacobian))
         deviations = np.sqrt(np.diag(clustered_covariance(flat(fit, jacobian), flat(fit, fit.residual))))
         if np.all(moved <= SHIFT * deviations):
             break
@@ -288,7 +288,9 @@ def _weighted(fit: StructureFit, prepared: PreparedStructure) -> StructureFit:
         )
     except StudyError:
         return fit
-    deviations = np.sqrt(np.diag(covariance_of(fit, prepared, linearise(fit, prepared))))[: len(fit.keys)]
+    deviations = np.sqrt(np.diag(structure_covariance(fit, prepared, linearise_structure(fit, prepared))))[
+        : len(fit.keys)
+    ]
     alike = np.all(np.abs(again.values - fit.values) <= K * deviations)
     before, after = (np.sqrt(np.mean(f.residual**2, axis=0)) for f in (fit, again))
     good = again.converged and alike and np.all(after <= (1.0 + TOLERANCE) * before)

@@ -14,7 +14,7 @@ from study.diagnose.dependence import DEGREE, TAUS, hysteretic, relaxed
 from study.equations.place import Place
 from study.records.record import MOTIONS
 from study.structure.mass_matrix import matrices
-from study.structure.placed_lines import modulation_lines, residual_lines
+from study.structure.placed_lines import placed_modulation_lines, placed_residual_lines
 from study.structure.places import connections, transfer
 from study.structure.structure_prediction import StructurePrediction
 from study.structure.structure_record import Sensor
@@ -30,7 +30,7 @@ LONGEST = 8192  # samples of either part that are looked at
 
 
 @dataclass(frozen=True)
-class Leftover:
+class FamilyGain:
     """What one family of shapes at one place explains, held out."""
 
     place: Place
@@ -38,7 +38,7 @@ class Leftover:
     gain: Gain
 
 
-def explained_by_place(found: Sequence[Leftover]) -> dict[frozenset[str], float]:
+def explained_by_place(found: Sequence[FamilyGain]) -> dict[frozenset[str], float]:
     """The largest share that any family explains at each place, of those that do so not by chance."""
     shares: dict[frozenset[str], float] = {}
     for item in found:
@@ -47,7 +47,7 @@ def explained_by_place(found: Sequence[Leftover]) -> dict[frozenset[str], float]
     return shares
 
 
-def left_over(prediction: StructurePrediction) -> list[Leftover]:
+def family_gains(prediction: StructurePrediction) -> list[FamilyGain]:
     """What each family of shapes at each place explains of what a fitted structure leaves; none if it diverges."""
     fit, prepared = prediction.fit, prediction.prepared
     model = fit.model
@@ -69,8 +69,8 @@ def left_over(prediction: StructurePrediction) -> list[Leftover]:
     cut, n = split * len(prepared.sensors), len(model.coordinates)
     early = residual[:cut].reshape(split, -1)
     short = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, split) / prepared.scale[:, None]
-    steady = residual_lines(early)
-    found: list[Leftover] = []
+    steady = placed_residual_lines(early)
+    found: list[FamilyGain] = []
     for place in connections(model):
         e = np.array(place.direction(model.coordinates))
         u = free[:, :n] @ e
@@ -79,7 +79,7 @@ def left_over(prediction: StructurePrediction) -> list[Leftover]:
             lines = np.stack([rfft(x, size) for x in shapes], axis=1)
             columns = irfft((paths @ e)[:, :, None] * lines[:, None, :], size, axis=0)[: len(free)]
             gain = statistics.gain(*_held_out(own, columns.reshape(len(residual), -1), residual, cut))
-            found.append(Leftover(place, family, gain))
+            found.append(FamilyGain(place, family, gain))
     return found
 
 
@@ -113,7 +113,7 @@ def _times(u: Floats, path: Complexes, early: Floats, steady: Floats) -> list[Fl
     turn = 2.0 * np.pi * np.arange(len(u)) / len(early)
     x = u / max(float(np.std(u)), 1e-300)
     shapes: list[Floats] = []
-    for line in modulation_lines(u[: len(early)], path, early)[:3]:
+    for line in placed_modulation_lines(u[: len(early)], path, early)[:3]:
         shapes += [x * np.cos(line * turn), x * np.sin(line * turn)]
     for line in steady[:3]:
         shapes += [np.cos(line * turn), np.sin(line * turn)]

@@ -11,8 +11,9 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
 
+from study.diagnose.verdict import MISSING
 from study.equations.place import Place
-from study.equations.place import in_words as placed
+from study.equations.place import place_in_words as placed
 from study.figures import page
 from study.figures.labels import term_names
 from study.figures.sheet import in_style
@@ -20,10 +21,17 @@ from study.structure import structure_panels
 from study.structure.placed_ranking import PlacedRanked
 from study.structure.sketch import Sketch
 from study.structure.sketch_svg import svg
-from study.structure.structure_comparison import StructureComparison, says
-from study.structure.structure_pictures import modes, response, sensors, shared_force, sketch_of, sketch_of_diagnosis
-from study.structure.structure_report import in_words
-from study.structure.structure_verdict import MISSING, StructureDiagnosis
+from study.structure.structure_comparison import StructureComparison, structure_in_words
+from study.structure.structure_pictures import (
+    modes,
+    responses_figure,
+    sensors_figure,
+    shared_force_figure,
+    sketch_of,
+    sketch_of_diagnosis,
+)
+from study.structure.structure_report import structure_diagnosis_in_words
+from study.structure.structure_verdict import StructureDiagnosis
 from study.support.numbers import percent
 
 PAGE = "structure.html"
@@ -33,14 +41,18 @@ def structure_page(comparison: StructureComparison, diagnosis: StructureDiagnosi
     """The page as the content of a file; the same bytes from the same input."""
     drawn = sketch_of(comparison) if diagnosis is None else sketch_of_diagnosis(diagnosis)
     name, model = comparison.prepared.record.name, comparison.model.name
-    said = says(comparison) if diagnosis is None else f"{says(comparison)} {in_words(diagnosis)}"
+    said = (
+        structure_in_words(comparison)
+        if diagnosis is None
+        else f"{structure_in_words(comparison)} {structure_diagnosis_in_words(diagnosis)}"
+    )
     sets = [("as given", comparison.modes)]
     if diagnosis is not None and diagnosis.modes_after is not None:
         sets.append(("with the first candidate", diagnosis.modes_after))
     with in_style():
         figures = {
-            "Error by sensor": sensors(comparison), "Motions": response(comparison),
-            "Shared residual force": shared_force(comparison), "Modes": modes(comparison, sets),
+            "Error by sensor": sensors_figure(comparison), "Motions": responses_figure(comparison),
+            "Shared residual force": shared_force_figure(comparison), "Modes": modes(comparison, sets),
         }  # fmt: skip
         shown = {title: page.rendered(figure, "png") for title, figure in figures.items()}
         maps = _maps(comparison)
@@ -67,11 +79,11 @@ def _maps(comparison: StructureComparison) -> dict[frozenset[str], bytes]:
     for place, _ in comparison.forces.aligned:
         curve = comparison.forces.curves.get(place.label)
         if curve is not None and len(curve.at):
-            figure, (axes,) = page.page(
+            figure, (axes,) = page.empty_page(
                 place.label, "missing force over relative displacement", panel=2.3, headed=False
             )  # fmt: skip
-            structure_panels.restoring_force(axes, comparison.forces, place.label)
-            page.legend(figure, [axes])
+            structure_panels.connection_force(axes, comparison.forces, place.label)
+            page.shared_legend(figure, [axes])
             found[place.path] = page.rendered(figure, "png")
     return found
 

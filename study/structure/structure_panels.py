@@ -66,7 +66,7 @@ def shared_force(axes: Axes, forces: MissingForces) -> Axes:
     return axes
 
 
-def restoring_force(axes: Axes, forces: MissingForces, label: str) -> Axes:
+def connection_force(axes: Axes, forces: MissingForces, label: str) -> Axes:
     """Missing force of one connection against its relative displacement."""
     return force_curve(axes, forces.curves[label], "displacement", {"displacement": "m", "force": "N"})
 

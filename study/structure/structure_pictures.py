@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 
 from study.compare import panels
 from study.diagnose import diagnosis_pages
-from study.equations.place import in_words
+from study.diagnose.verdict import MISSING
+from study.equations.place import place_in_words
 from study.figures import page
 from study.figures.sheet import in_style
 from study.records.record import SI_UNITS
@@ -20,7 +21,7 @@ from study.structure.sketch import Sketch, sketch
 from study.structure.sketch_drawing import structure_sketch
 from study.structure.structure_comparison import StructureComparison
 from study.structure.structure_leftover import explained_by_place
-from study.structure.structure_verdict import MISSING, StructureDiagnosis
+from study.structure.structure_verdict import StructureDiagnosis
 from study.support.arrays import Floats
 from study.support.numbers import percent
 
@@ -28,15 +29,15 @@ WIDE = 7.2  # inches
 MAPS, SENSORS, MODES = 9, 6, 6  # panels on one page at most: the first connections, the worst sensors, slowest modes
 
 
-def pictures(comparison: StructureComparison) -> dict[str, bytes]:
+def structure_pictures(comparison: StructureComparison) -> dict[str, bytes]:
     """Every picture of a comparison by file name."""
     with in_style():
-        return page.files(
+        return page.image_files(
             {
-                "structure": structure(comparison, sketch_of(comparison)),
-                "sensors": sensors(comparison),
-                "response": response(comparison),
-                "shared_force": shared_force(comparison),
+                "structure": structure_figure(comparison, sketch_of(comparison)),
+                "sensors": sensors_figure(comparison),
+                "response": responses_figure(comparison),
+                "shared_force": shared_force_figure(comparison),
                 "modes": modes(comparison, [("fitted", comparison.modes)]),
                 **restoring_forces(comparison),
             }
@@ -49,11 +50,14 @@ def diagnosis_pictures(diagnosis: StructureDiagnosis) -> dict[str, bytes]:
     sets = [("as given", comparison.modes)]
     sets += [("with the first candidate", diagnosis.modes_after)] if diagnosis.modes_after is not None else []
     with in_style():
-        found = {"structure": structure(comparison, sketch_of_diagnosis(diagnosis)), "modes": modes(comparison, sets)}
+        found = {
+            "structure": structure_figure(comparison, sketch_of_diagnosis(diagnosis)),
+            "modes": modes(comparison, sets),
+        }
         if diagnosis.candidates:
             found |= diagnosis_pages.pages(diagnosis, comparison.prepared.record.name)
             found["candidates"].set_size_inches(1.4 * page.WIDTH, found["candidates"].get_figheight())
-        return page.files(found)
+        return page.image_files(found)
 
 
 def sketch_of(comparison: StructureComparison) -> Sketch:
@@ -77,14 +81,14 @@ def sketch_of_diagnosis(diagnosis: StructureDiagnosis) -> Sketch:
     return sketch(comparison.model, comparison.forces.coordinates, shares)
 
 
-def structure(comparison: StructureComparison, drawn: Sketch) -> Figure:
+def structure_figure(comparison: StructureComparison, drawn: Sketch) -> Figure:
     """The sketch on a page."""
     places = [link for link in drawn.links if link.share > 0.0]
     most = max(places, key=lambda link: link.share, default=None)
     about, width = "nothing that is left depends on the motion anywhere", max(WIDE, drawn.width)
     if most is not None:
-        about = f"glowing most: {in_words(most.place)}, explains {percent(most.share)} of what is left"
-    figure, (axes,) = page.page(
+        about = f"glowing most: {place_in_words(most.place)}, explains {percent(most.share)} of what is left"
+    figure, (axes,) = page.empty_page(
         f"{comparison.prepared.record.name}: where a force is missing", f"model {comparison.model.name}; {about}",
         width=width, panel=(width - 1.04) * drawn.height / drawn.width, legend_rows=0, headed=False,
     )  # fmt: skip
@@ -92,10 +96,10 @@ def structure(comparison: StructureComparison, drawn: Sketch) -> Figure:
     return figure
 
 
-def sensors(comparison: StructureComparison) -> Figure:
+def sensors_figure(comparison: StructureComparison) -> Figure:
     """Errors by sensor, and the force left at each coordinate."""
     prediction, count = comparison.prediction, len(comparison.prediction.prepared.sensors)
-    figure, axes = page.page(
+    figure, axes = page.empty_page(
         f"{comparison.prepared.record.name}: error by sensor",
         f"model {comparison.model.name}; all sensors {percent(prediction.error)}, noise {percent(prediction.floor)}",
         columns=2, width=page.width(2), panel=max(1.4, 0.48 * count), share=False,
@@ -104,15 +108,15 @@ def sensors(comparison: StructureComparison) -> Figure:
     structure_panels.sensor_errors(axes[0], prediction)
     structure_panels.coordinate_forces(axes[1], comparison.forces)
     page.letter(axes, ("motions", "equations of motion"))
-    page.legend(figure, axes, columns=4)
+    page.shared_legend(figure, axes, columns=4)
     return figure
 
 
-def response(comparison: StructureComparison) -> Figure:
+def responses_figure(comparison: StructureComparison) -> Figure:
     """Measured and predicted motion of the sensors that are predicted worst, where the difference is largest."""
     prediction = comparison.prediction
     order = np.argsort(-prediction.errors)[:SENSORS]
-    figure, axes = page.page(
+    figure, axes = page.empty_page(
         f"{comparison.prepared.record.name}: motions", f"model {comparison.model.name}; close-up where it fails most",
         rows=len(order), width=WIDE, panel=1.5, share=False,
     )  # fmt: skip
@@ -120,14 +124,14 @@ def response(comparison: StructureComparison) -> Figure:
     names: list[str] = []
     for panel, i in zip(axes, order, strict=True):
         sensor, near = prediction.prepared.sensors[int(i)], closeup(prediction.residual[:, int(i)])
-        panels.response(
+        panels.response_panel(
             panel, time[near], prediction.measured[near, int(i)], prediction.predicted[near, int(i)],
             SI_UNITS[sensor.motion],
         )  # fmt: skip
         panel.set_ylabel(panel.get_ylabel().replace("response", sensor.motion))
         names.append(f"{sensor}: error {percent(float(prediction.errors[int(i)]))}")
     page.letter(axes, names)
-    page.legend(figure, axes, columns=2)
+    page.shared_legend(figure, axes, columns=2)
     return figure
 
 
@@ -140,10 +144,10 @@ def closeup(residual: Floats, samples: int = 300) -> slice:
     return slice(begin, begin + samples)
 
 
-def shared_force(comparison: StructureComparison) -> Figure:
+def shared_force_figure(comparison: StructureComparison) -> Figure:
     """The matrix of shared residual force between places."""
     count = len(comparison.forces.coordinates)
-    figure, (axes,) = page.page(
+    figure, (axes,) = page.empty_page(
         f"{comparison.prepared.record.name}: shared residual force",
         "off the diagonal it acts between two coordinates, on it from outside or the ground",
         panel=max(1.8, 0.5 * count), width=max(WIDE, 2.6 + 0.8 * count), legend_rows=0, headed=False,
@@ -159,25 +163,25 @@ def restoring_forces(comparison: StructureComparison) -> Mapping[str, Figure]:
     if not labels:
         return {}
     columns = min(2, len(labels))
-    figure, axes = page.page(
+    figure, axes = page.empty_page(
         f"{comparison.prepared.record.name}: force that each connection lacks",
         f"model {comparison.model.name}; as both equations have it, those first where a force explains most",
         rows=-(-len(labels) // columns), columns=columns, width=page.width(columns), panel=1.9, share=False,
     )  # fmt: skip
     for panel, label in zip(axes, labels, strict=False):
-        structure_panels.restoring_force(panel, comparison.forces, label)
+        structure_panels.connection_force(panel, comparison.forces, label)
         share = next((s for p, s in comparison.forces.aligned if p.label == label), 0.0)
         panel.set_title(f"{label} ({percent(share)})")
     for panel in axes[len(labels) :]:
         panel.set_visible(False)
-    page.legend(figure, axes[:1])
+    page.shared_legend(figure, axes[:1])
     return {"restoring_forces": figure}
 
 
 def modes(comparison: StructureComparison, sets: list[tuple[str, Modes]]) -> Figure:
     """Natural frequencies, damping ratios and shapes with 95 % intervals, before and after."""
     names, count = comparison.model.coordinates, min(MODES, len(comparison.modes.frequency))
-    figure, axes = page.page(
+    figure, axes = page.empty_page(
         f"{comparison.prepared.record.name}: modes of the underlying linear system",
         f"model {comparison.model.name}; bars are 95 % intervals",
         rows=-(-(count + 1) // 2), columns=2, width=page.width(2), panel=1.8, share=False,
@@ -187,5 +191,5 @@ def modes(comparison: StructureComparison, sets: list[tuple[str, Modes]]) -> Fig
         structure_panels.mode_shapes(axes[1 + number], sets, number, names)
     for panel in axes[1 + count :]:
         panel.set_visible(False)
-    page.legend(figure, axes[:1])
+    page.shared_legend(figure, axes[:1])
     return figure

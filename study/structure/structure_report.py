@@ -6,16 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from study.diagnose import needless
+from study.diagnose.needless import needless_fields
+from study.diagnose.verdict import MISSING, NOTHING
 from study.equations.place import Place
-from study.equations.place import in_words as placed
+from study.equations.place import place_in_words as placed
 from study.figures.labels import term_names
 from study.structure.modes import modes_table
 from study.structure.placed_needless import PlacedNeedless
 from study.structure.placed_ranking import PlacedRanked
-from study.structure.structure_comparison import document, mode_rows
+from study.structure.structure_comparison import mode_rows, structure_document
 from study.structure.structure_record import Sensor
-from study.structure.structure_verdict import MISSING, NOTHING, StructureDiagnosis
+from study.structure.structure_verdict import StructureDiagnosis
 from study.support.numbers import percent
 
 SHOWN, TIES = 8, 2  # candidates in the table on the screen; ties named there
@@ -23,7 +24,7 @@ DEPENDENCE = 0.1  # held-out share from which the unexplained force is said to d
 APART = 2.0  # times the error of the prediction by which two places must differ at a sensor that would tell them
 
 
-def table(diagnosis: StructureDiagnosis) -> str:
+def placed_candidate_table(diagnosis: StructureDiagnosis) -> str:
     """The first candidates as a person reads them in ten seconds."""
     from tabulate import tabulate
 
@@ -47,7 +48,7 @@ def _shown(number: int, row: PlacedRanked) -> list[str]:
     ]  # fmt: skip
 
 
-def in_words(diagnosis: StructureDiagnosis) -> str:
+def structure_diagnosis_in_words(diagnosis: StructureDiagnosis) -> str:
     """What to tell the engineer."""
     if diagnosis.verdict == NOTHING:
         prediction = diagnosis.comparison.prediction
@@ -134,15 +135,10 @@ def _unknown(diagnosis: StructureDiagnosis) -> list[str]:
     return said
 
 
-def unneeded_in_words(found: Sequence[PlacedNeedless], diagnosis: StructureDiagnosis) -> str:
-    """Which terms the diagnosed structure does not need, in sentences; empty if it needs all."""
-    return needless.paragraph(found, complete=diagnosis.verdict == NOTHING)
-
-
-def fields(diagnosis: StructureDiagnosis, unneeded: Sequence[PlacedNeedless] = ()) -> dict[str, Any]:
+def structure_fields(diagnosis: StructureDiagnosis, unneeded: Sequence[PlacedNeedless] = ()) -> dict[str, Any]:
     """What ``diagnosis.json`` holds: candidates best first, and the terms that the structure does not need."""
     comparison = diagnosis.comparison
-    whole = document(comparison)
+    whole = structure_document(comparison)
     rows = {r.name: r for r in diagnosis.candidates}
     after = diagnosis.modes_after
     return {
@@ -159,8 +155,8 @@ def fields(diagnosis: StructureDiagnosis, unneeded: Sequence[PlacedNeedless] = (
         "modes": {"before": whole["modes"], "after": mode_rows(after) if after is not None else None},
         "where": whole["where"],
         "converged": comparison.fit.converged,
-        "not_needed": needless.fields(unneeded),
-        "says": in_words(diagnosis),
+        "not_needed": needless_fields(unneeded),
+        "says": structure_diagnosis_in_words(diagnosis),
     }
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from study.equations.model import Model
-from study.structure.free_decay import decay_start
-from study.structure.linear_start import linear_start
+from study.structure.free_decay import free_decay_start
+from study.structure.linear_start import structure_linear_start
 from study.structure.mass_matrix import linear_keys, loose_motions
 from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_fit import StructureFit, fit_structure
@@ -18,7 +18,7 @@ from study.support.errors import DivergenceError, expect
 def known_linear(model: Model, prepared: PreparedStructure) -> dict[str, float]:
     """The linear terms of a structure: what it holds of them, and the best linear approximation of the rest."""
     held = {key: value for key, value in model.values.items() if value is not None}
-    start = linear_start if model.forces else decay_start
+    start = structure_linear_start if model.forces else free_decay_start
     return {key: held[key] for key in linear_keys(model) if key in held} | start(model, prepared, held)
 
 

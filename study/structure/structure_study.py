@@ -34,7 +34,7 @@ from study.structure.prepared_structure import prepare_structure
 from study.structure.reverse_system import ESTIMATORS, Equation, ReverseSystem, equations_of, reverse_system
 from study.structure.structure_record import Sensor, StructureRecord
 from study.structure.structure_simulation import simulate_structure
-from study.support.config_files import Row, Section, Text, read_rows, read_yaml
+from study.support.config_files import Section, TableRow, Text, read_rows, read_yaml
 from study.support.errors import StudyError, at, expect
 
 
@@ -88,7 +88,7 @@ class StructureSettings(Section):
         )  # fmt: skip
 
 
-class StructureCase(Row):
+class StructureCase(TableRow):
     """One row of ``config/structures.tsv``."""
 
     case: Name
@@ -115,7 +115,7 @@ class StructureCases:
     cases: Mapping[str, StructureCase]
 
 
-def load(folder: Path, taken: Sequence[str] = ()) -> StructureCases:
+def load_structures(folder: Path, taken: Sequence[str] = ()) -> StructureCases:
     """Read ``structures.yaml`` and ``structures.tsv`` of a folder, and check the models that they name.
 
     ``taken`` are the names of other cases.
@@ -190,7 +190,7 @@ def assumed_structure(model: Model, also_assumed: str) -> Model:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class StructureFindings:
     """What one estimator finds in a structure."""
 
     system: ReverseSystem
@@ -203,7 +203,7 @@ class CaseResult:
 
     model: Model
     equations: tuple[Equation, ...]
-    found: Mapping[str, Found]
+    found: Mapping[str, StructureFindings]
 
 
 def identify_structure(
@@ -212,11 +212,11 @@ def identify_structure(
     """Every equation of a case by every estimator of the settings."""
     assumed = assumed_structure(model, case.also_assumed)
     equations, _ = equations_of(assumed, prepare_structure(record, assumed), (0, len(record)))
-    found: dict[str, Found] = {}
+    found: dict[str, StructureFindings] = {}
     for name in settings.estimators:
         system = reverse_system(name, equations, record.dt, settings.for_estimators)
         try:
-            found[name] = Found(system, joint_estimate(system))
+            found[name] = StructureFindings(system, joint_estimate(system))
         except StudyError as error:
             raise StudyError(f"{case.case}, {name}: {error}") from None
     return CaseResult(assumed, equations, found)

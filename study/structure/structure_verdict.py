@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from study.diagnose.credibility import credible
+from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
 from study.equations.model import ModelTerm
 from study.equations.term import Term
 from study.structure.modes import Modes, modes_of
@@ -14,20 +15,25 @@ from study.structure.placed_candidates import (
     candidate_entries,
     elsewhere,
     one_side,
-    promising,
     screened,
-    try_all,
-    with_best_settled,
+    try_placed,
+    with_best_placed_settled,
+    worth_fitting,
 )
 from study.structure.placed_ranking import PlacedRanked, rank_placed
 from study.structure.placed_search import PlacedBaseline, placed_baseline, with_placed_term
 from study.structure.structure_comparison import StructureComparison, compare_structure
-from study.structure.structure_fit import covariance_of, fit_structure, linearise, settled, sized
-from study.structure.structure_leftover import Leftover, left_over
+from study.structure.structure_fit import (
+    fit_structure,
+    linearise_structure,
+    settled_structure,
+    sized,
+    structure_covariance,
+)
+from study.structure.structure_leftover import FamilyGain, family_gains
 from study.structure.structure_prediction import StructurePrediction
 from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE
 
-MISSING, NOTHING, UNKNOWN = "missing_effect", "nothing_missing", "unknown_effect"
 SHORT, LONG = 2048, 8192  # samples: a search uses half of the fitting part, within these limits
 NAMELESS = 0.1 * ALPHA  # what no candidate explains is believed less easily than what one does
 
@@ -41,7 +47,7 @@ class StructureDiagnosis:
     candidates: tuple[PlacedRanked, ...]  # best first
     asked: int  # effects times places
     left: float  # rms of the structure that remains beside the best explanation, over the rms response
-    families: tuple[Leftover, ...]  # for an unknown effect: what general shapes at each place explain, best first
+    families: tuple[FamilyGain, ...]  # for an unknown effect: what general shapes at each place explain, best first
 
     @cached_property
     def modes_after(self) -> Modes | None:
@@ -49,7 +55,7 @@ class StructureDiagnosis:
         if self.verdict != MISSING:
             return None
         fit, prepared = self.candidates[0].fit, self.comparison.prepared
-        covariance = covariance_of(fit, prepared, linearise(fit, prepared))
+        covariance = structure_covariance(fit, prepared, linearise_structure(fit, prepared))
         return modes_of(fit.model, fit.keys, covariance[: len(fit.keys), : len(fit.keys)])
 
 
@@ -64,18 +70,18 @@ def diagnose_structure(
     ``extra`` are the user's own candidates, ``without`` terms of the library to leave out; ``progress`` is called with
     each candidate that was fitted.
     """
-    base = search_base(comparison)
+    base = placed_search_base(comparison)
     entries = candidate_entries(comparison.fit.model, extra, without)
     report: Callable[[str], None] = progress or (lambda _: None)
     ordered = screened(entries, base)
-    tried = try_all(promising(ordered), base, report)
-    tried = one_side([*tried, *try_all(elsewhere(tried, ordered), base, report)])
-    settled_ones = with_best_settled(tried, comparison.prepared)
+    tried = try_placed(worth_fitting(ordered), base, report)
+    tried = one_side([*tried, *try_placed(elsewhere(tried, ordered), base, report)])
+    settled_ones = with_best_placed_settled(tried, comparison.prepared)
     rows = rank_placed(settled_ones, comparison.fit, comparison.prediction, len(entries))
     return _decide(rows, comparison, len(entries))
 
 
-def search_base(comparison: StructureComparison) -> PlacedBaseline:
+def placed_search_base(comparison: StructureComparison) -> PlacedBaseline:
     """The fitted structure as candidates are tried beside it, on no more samples than a search takes."""
     prepared, fit = comparison.prepared, comparison.fit
     first, last = prepared.fit
@@ -93,10 +99,10 @@ def added_term(comparison: StructureComparison, entry: ModelTerm) -> StructureCo
     StudyError
         If the structure with it has no finite motion.
     """
-    base = search_base(comparison)
+    base = placed_search_base(comparison)
     fit = with_placed_term(base.fit, entry, base.prepared, base)
     model = comparison.model.with_term(entry)
-    return compare_structure(model, comparison.prepared, settled(fit, comparison.prepared))
+    return compare_structure(model, comparison.prepared, settled_structure(fit, comparison.prepared))
 
 
 def _decide(rows: list[PlacedRanked], comparison: StructureComparison, asked: int) -> StructureDiagnosis:
@@ -109,7 +115,7 @@ def _decide(rows: list[PlacedRanked], comparison: StructureComparison, asked: in
         verdict = UNKNOWN if hopeless or left > TOLERANCE else NOTHING
         return StructureDiagnosis(verdict, comparison, tuple(rows), asked, left, _ordered(families))
     first = believed[0]
-    families = tuple(left_over(first.prediction))
+    families = tuple(family_gains(first.prediction))
     left = _left(first.prediction, families)
     rows = [first] + [r for r in rows if r is not first]
     enough = first.gain.explained >= ENOUGH or left <= GOOD
@@ -119,11 +125,11 @@ def _decide(rows: list[PlacedRanked], comparison: StructureComparison, asked: in
     return StructureDiagnosis(verdict, comparison, tuple(rows), asked, left, _ordered(families))
 
 
-def _left(prediction: StructurePrediction, families: Sequence[Leftover]) -> float:
+def _left(prediction: StructurePrediction, families: Sequence[FamilyGain]) -> float:
     """Rms over that of the response which general shapes explain of a residual, and not by chance."""
     found = [f.gain.explained for f in families if f.gain.p_value * len(families) < NAMELESS]
     return prediction.error * float(np.sqrt(max((0.0, *found))))
 
 
-def _ordered(families: Sequence[Leftover]) -> tuple[Leftover, ...]:
+def _ordered(families: Sequence[FamilyGain]) -> tuple[FamilyGain, ...]:
     return tuple(sorted(families, key=lambda f: -f.gain.explained))

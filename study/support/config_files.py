@@ -39,7 +39,7 @@ class Section(BaseModel):
         return self.model_dump(mode="json", exclude_none=True)
 
 
-class Row(Section):
+class TableRow(Section):
     """One row of a table, whose cells are text until they are read."""
 
     model_config = ConfigDict(strict=False)
@@ -47,7 +47,7 @@ class Row(Section):
 
 Text = Annotated[str, Field(min_length=1)]
 S = TypeVar("S", bound=Section)
-R = TypeVar("R", bound=Row)
+R = TypeVar("R", bound=TableRow)
 
 
 def read_yaml(path: Path, kind: type[S]) -> S:

@@ -44,7 +44,7 @@ class Bullets:
 
 
 @dataclass(frozen=True)
-class Table:
+class TableBlock:
     """Rows of words under a heading."""
 
     heading: tuple[str, ...]
@@ -68,14 +68,14 @@ class Fold:
     anchor: str = ""
 
 
-Block = Heading | Text | Bullets | Table | Image | Fold
+Block = Heading | Text | Bullets | TableBlock | Image | Fold
 
 
 def table(heading: Sequence[str], rows: Sequence[Sequence[object]]) -> Block:
     """A table, or the word "None." where there are no rows."""
     if not rows:
         return Text("None.")
-    return Table(tuple(heading), tuple(tuple(str(cell) for cell in row) for row in rows))
+    return TableBlock(tuple(heading), tuple(tuple(str(cell) for cell in row) for row in rows))
 
 
 def markdown(blocks: Sequence[Block]) -> str:
@@ -96,7 +96,7 @@ def _markdown(block: Block) -> str:
         case Fold(title, blocks, anchor):
             place = f'<a id="{html.escape(anchor)}"></a>' if anchor else ""
             return f"<details>{place}<summary>{_inline(title)}</summary>\n\n{markdown(blocks)}\n</details>"
-        case Table(heading, rows):
+        case TableBlock(heading, rows):
             cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
             return tabulate(cells, headers=list(heading), tablefmt="pipe", disable_numparse=True)
 
@@ -125,7 +125,7 @@ def put(path: Path, mark: str, blocks: Sequence[Block]) -> None:
     replace_file(path, text.encode())
 
 
-def page(title: str, blocks: Sequence[Block]) -> str:
+def document_page(title: str, blocks: Sequence[Block]) -> str:
     """The page as one HTML file that asks for nothing from anywhere."""
     body = fragment(blocks)
     return (
@@ -152,7 +152,7 @@ def _html(block: Block) -> str:
         case Fold(title, blocks, anchor):
             place = f' id="{html.escape(anchor)}"' if anchor else ""
             return f"<details{place}><summary>{_inline(title)}</summary>\n{fragment(blocks)}\n</details>"
-        case Table(heading, rows):
+        case TableBlock(heading, rows):
             head = "".join(f"<th>{_inline(cell)}</th>" for cell in heading)
             lines = ["<tr>" + "".join(f"<td>{_inline(cell)}</td>" for cell in row) + "</tr>" for row in rows]
             return f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n" + "\n".join(lines) + "\n</tbody>\n</table>"

@@ -24,7 +24,7 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Section:
+class PageSection:
     """A part of the page that the line at its top leads to."""
 
     anchor: str
@@ -32,7 +32,7 @@ class Section:
     content: str  # HTML
 
 
-def page(title: str, sections: Sequence[Section]) -> bytes:
+def picture_page(title: str, sections: Sequence[PageSection]) -> bytes:
     """The page, in UTF-8."""
     links = "".join(f'<a href="#{s.anchor}">{html.escape(s.title)}</a>' for s in sections)
     body = "".join(f'<section id="{s.anchor}"><h2>{html.escape(s.title)}</h2>{s.content}</section>' for s in sections)
@@ -46,7 +46,7 @@ def page(title: str, sections: Sequence[Section]) -> bytes:
     ).encode()
 
 
-def fragment(blocks: Sequence[Block]) -> str:
+def fragment_without_images(blocks: Sequence[Block]) -> str:
     """Blocks without their images, which such a page has as thumbnails."""
     return document.fragment([b for b in blocks if not isinstance(b, document.Image)])
 
@@ -54,10 +54,12 @@ def fragment(blocks: Sequence[Block]) -> str:
 def groups(pictures: Sequence[Picture]) -> str:
     """Thumbnails under the names of their groups."""
     names = dict.fromkeys(picture.group for picture in pictures)
-    return "".join(f"<h3>{html.escape(name)}</h3>{grid([p for p in pictures if p.group == name])}" for name in names)
+    return "".join(
+        f"<h3>{html.escape(name)}</h3>{thumbnails([p for p in pictures if p.group == name])}" for name in names
+    )
 
 
-def grid(pictures: Sequence[Picture]) -> str:
+def thumbnails(pictures: Sequence[Picture]) -> str:
     """Thumbnails side by side; each opens large."""
     return f'<div class="grid">{"".join(map(_thumbnail, pictures))}</div>'
 

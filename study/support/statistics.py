@@ -85,7 +85,7 @@ def _of_even_changes(before: Floats, change: Floats) -> Floats:
     return np.asarray(np.add.reduceat(before * change, edges), dtype=np.float64)
 
 
-def beside(before: Floats, change: Floats, freed: Floats) -> Gain:
+def gain_beside(before: Floats, change: Floats, freed: Floats) -> Gain:
     """What a change of the prediction explains of ``before``, which the model's own coefficients leave, all shape (n,).
 
     These come from other samples with errors, and what errors leave goes with the motion as the change does: by chance

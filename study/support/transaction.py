@@ -104,7 +104,7 @@ def replace_together(path: Path, files: Mapping[Path, bytes], others: Mapping[Pa
         journal.unlink()
 
 
-def recovered(path: Path) -> None:
+def recover(path: Path) -> None:
     """Put back what a killed run left half changed; where it cannot be put back, say so.
 
     Raises

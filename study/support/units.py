@@ -9,7 +9,7 @@ import re
 from dataclasses import dataclass
 
 from study.support.errors import StudyError, expect
-from study.support.yaml_text import short
+from study.support.yaml_text import excerpt
 
 Powers = tuple[int, int, int, int]  # of force, length, time, voltage
 FORCE: Powers = (1, 0, 0, 0)
@@ -93,7 +93,7 @@ def _written(plain: str) -> str:
 
 def _unknown(text: str) -> StudyError:
     known = "N, kN, lbf, m, mm, um, in, m/s, m/s^2, g, s, ms and V are known"
-    return StudyError(f"there is no unit {short(text, 40)!r}; {known}")
+    return StudyError(f"there is no unit {excerpt(text, 40)!r}; {known}")
 
 
 def role_unit(role: str, text: str) -> Unit:

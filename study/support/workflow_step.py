@@ -36,7 +36,7 @@ def alone(path: Path) -> TextIO:
     return lock
 
 
-def sweep(*folders: Path) -> None:
+def remove_half_written(*folders: Path) -> None:
     """Remove what killed runs left half written. Only who runs alone may do this."""
     for folder in folders:
         for path in folder.rglob(f"{BESIDE}*"):

@@ -41,12 +41,12 @@ def read_plain(text: str) -> object:
         problem = (str(error) or type(error).__name__).splitlines()[0]
         if problem.startswith("Exceeds the limit"):  # Python reads no number of thousands of digits
             problem = "a number of too many digits"
-        raise StudyError(f"is not YAML ({short(problem)}); {EXPECTED}") from None
+        raise StudyError(f"is not YAML ({excerpt(problem)}); {EXPECTED}") from None
 
 
 def _problem(error: Any) -> str:
     line = f" in line {error.problem_mark.line + 1}" if error.problem_mark else ""
-    return short(str(error.problem or error.context).splitlines()[0]) + line
+    return excerpt(str(error.problem or error.context).splitlines()[0]) + line
 
 
 def _screen(text: str) -> None:
@@ -61,7 +61,7 @@ def _screen(text: str) -> None:
         if getattr(event, "anchor", None) is not None:  # an alias has one too: the name it repeats
             raise StudyError(f"uses the YAML anchor or alias {event.anchor!r} in line {line}; write the value itself")
         if getattr(event, "tag", None) is not None:
-            tag = short(repr(str(event.tag)))
+            tag = excerpt(repr(str(event.tag)))
             raise StudyError(f"uses the YAML tag {tag} in line {line}; expected plain names and numbers")
         if getattr(event, "version", None) not in (None, (1, 2)):
             raise StudyError(f"asks for another YAML version before line {line}; leave the %YAML line out")
@@ -80,12 +80,12 @@ def as_list(value: object) -> list[object] | None:
 def shown(value: object) -> str:
     """A value from a file as a message shows it."""
     try:
-        return short(repr(value))
+        return excerpt(repr(value))
     except ValueError:  # Python does not print a number of thousands of digits
         return "a number of too many digits"
 
 
-def short(text: str, most: int = 60) -> str:
+def excerpt(text: str, most: int = 60) -> str:
     """A text that fits in a message."""
     return text if len(text) <= most else f"{text[: most - 3]}..."
 

@@ -1,6 +1,6 @@
 """What the constants of a diagnosis do: false alarms against alpha, tie sets against K, after the fact.
 
-A run keeps what each verdict rested on (``findings.evidence``), so that no trial has to be run again.
+A run keeps what each verdict rested on (``findings.evidence_row``), so that no trial has to be run again.
 """
 
 import math

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from study.equations.free_run import predict
+from study.equations.free_run import predict_response
 from study.equations.model import Model, ModelTerm, free
 from study.equations.simulate import Integrator, simulate
-from study.equations.term import Parameter, Term
+from study.equations.term import ShapeParameter, Term
 from study.equations.terms import LIBRARY, get
 from study.records.excitation import displacement_noise, force
 from study.records.record import MOTIONS, Record
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError, StudyError
 from study.trials.experiment import LINEAR, REPORT_LIKE, Experiment, Ranges
-from study.trials.strength import SHARE, grown, share_of
+from study.trials.strength import SHARE, grown_to_share, share_of
 
 HIDDEN = tuple(name for name in LIBRARY if name not in LINEAR)
 NOISES = (0.0, 0.01, 0.05, 0.10)
@@ -196,7 +196,9 @@ def _drowned(truth: Model, drive: Floats, most: float) -> bool:
 def _measured(truth: Model, record: Record, experiment: Experiment, wanted: _Wanted) -> Floats | None:
     """The motion without visible error of integration; None where so many steps do not give it."""
     steps = experiment.steps(STEPS)
-    coarse, fine = (predict(truth, record, response=wanted.response, steps_per_sample=n) for n in (steps // 2, steps))
+    coarse, fine = (
+        predict_response(truth, record, response=wanted.response, steps_per_sample=n) for n in (steps // 2, steps)
+    )
     return fine if float(np.std(fine - coarse)) < wanted.ranges.accurate * float(np.std(fine)) else None
 
 
@@ -215,7 +217,7 @@ def _forgets(model: Model, drive: Floats, experiment: Experiment) -> bool:
 def _grown(
     model: Model, entry: ModelTerm, drive: Floats, experiment: Experiment, target: float
 ) -> tuple[Model, float] | None:
-    return grown(model, entry, drive, experiment.dt, target, experiment.steps(2), secant=experiment.secant)
+    return grown_to_share(model, entry, drive, experiment.dt, target, experiment.steps(2), secant=experiment.secant)
 
 
 def _with_own_nonlinearity(
@@ -260,7 +262,7 @@ def _drawn(rng: np.random.Generator, term: Term, quiet: Record) -> ModelTerm:
     values: list[float] = []
     for parameter in term.parameters:
         share = float(rng.uniform(*parameter.drawn))
-        values.append(share * values[-1] if parameter.relative else scaled(share, parameter, scale, omega))
+        values.append(share * values[-1] if parameter.relative else in_own_unit(share, parameter, scale, omega))
     entry = free(term)
     angle = float(rng.uniform(0.0, 2.0 * np.pi))
     sign = -1.0 if term.either_sign and angle > np.pi else 1.0
@@ -268,7 +270,7 @@ def _drawn(rng: np.random.Generator, term: Term, quiet: Record) -> ModelTerm:
     return replace(entry, coefficients=tuple(float(s) for s in shape), parameters=tuple(values))
 
 
-def scaled(value: float, parameter: Parameter, scale: float, omega: float) -> float:
+def in_own_unit(value: float, parameter: ShapeParameter, scale: float, omega: float) -> float:
     """A value in the unit of its quantity, from one in units of rms displacement and angular rate (rad/s)."""
     match parameter.quantity:
         case "length":

@@ -21,7 +21,7 @@ WHATEVER_ITS_P_VALUE = 0  # effects asked for: a p value times none is below any
 FAR = 20.0  # standard errors: rivals that are farther behind stand in no tie set
 
 
-def accounted(model: Model, prepared: Prepared) -> tuple[Comparison, tuple[Fault, ...]]:
+def accounted_comparison(model: Model, prepared: Prepared) -> tuple[Comparison, tuple[Fault, ...]]:
     """The comparison that a diagnosis begins with, and the faults of the measurement that it accounts for."""
     found = accounting.accounted(model, prepared)
     return found.comparison, found.faults
@@ -35,7 +35,7 @@ def tie_set(diagnosis: Diagnosis) -> tuple[str, ...]:
     return (first.name, *first.tied_with)
 
 
-def evidence(diagnosis: Diagnosis, hidden: Sequence[str]) -> Row:
+def evidence_row(diagnosis: Diagnosis, hidden: Sequence[str]) -> Row:
     """From which false alarms at any alpha, and tie sets at any K, follow.
 
     ``smallest_p`` is the smallest p value (of so many candidates) of those that would be believed if it were small

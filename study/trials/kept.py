@@ -13,7 +13,7 @@ LOOSE = ("left", "smallest_p", "true_p", "distance", "rivals", "error_true")  # 
 ALIKE = 0.01  # relative: numbers of two runs of the same code on two machines
 
 
-def differing(
+def differing_trials(
     own: pd.DataFrame, kept: pd.DataFrame, columns: Sequence[str] = COLUMNS, words: Collection[str] = WORDS,
     loose: Collection[str] = LOOSE,
 ) -> list[str]:  # fmt: skip

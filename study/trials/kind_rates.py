@@ -21,12 +21,12 @@ HEADING = (
 EXACT = ("test", "seed", "noise", "hidden", "verdict", "first", "right")  # whatever lies at the edge of a tie
 
 
-def put(page: Path, trials: pd.DataFrame) -> None:
+def write_rates(page: Path, trials: pd.DataFrame) -> None:
     """Write the rates into a page."""
-    document.put(page, "trials", blocks(trials))
+    document.put(page, "trials", rate_blocks(trials))
 
 
-def blocks(trials: pd.DataFrame) -> list[Block]:
+def rate_blocks(trials: pd.DataFrame) -> list[Block]:
     """The rates by kind of test, and what they are of."""
     kinds = [kind for kind in TESTS if kind in set(trials["test"])]
     failed, noisy = int(trials["trouble"].notna().sum()), f"{100.0 * float(trials['noise'].max()):g} %"

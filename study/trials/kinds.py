@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from study.equations.free_run import predict
+from study.equations.free_run import predict_response
 from study.equations.model import Model, ModelTerm, free
-from study.equations.term import Parameter
+from study.equations.term import ShapeParameter
 from study.equations.terms import LIBRARY, get
 from study.records.excitation import displacement_noise
 from study.records.record import SI_UNITS, Record
@@ -24,7 +24,7 @@ from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares
 from study.trials.draw import NOISES, Trial
-from study.trials.draw import scaled as in_units
+from study.trials.draw import in_own_unit as in_units
 from study.trials.strength import SHARE
 from study.trials.visible import forgets, stands_out
 
@@ -36,7 +36,7 @@ ATTEMPTS = 300
 
 
 @dataclass(frozen=True)
-class Drawn:
+class DrawnTest:
     """A system and how it is tested."""
 
     believed: Model  # without the hidden effect
@@ -45,7 +45,7 @@ class Drawn:
     measured: str  # the channel that noise is added to
 
 
-Maker = Callable[[np.random.Generator, tuple[str, ...]], Drawn]
+Maker = Callable[[np.random.Generator, tuple[str, ...]], DrawnTest]
 
 
 def make_test(test: str, seed: int, hidden: Sequence[str] | None = None, noise: float | None = None) -> Trial:
@@ -105,7 +105,7 @@ def _run(model: Model, force: Floats, dt: float, initial: Sequence[float] = (0.0
     """The motion of a model under a force, friction's switches met exactly."""
     record = Record(dt, {"force": force}, dict(SI_UNITS))
     motion = {
-        name: predict(model, record, response=name, steps_per_sample=STEPS, initial=initial)
+        name: predict_response(model, record, response=name, steps_per_sample=STEPS, initial=initial)
         for name in ("displacement", "velocity", "acceleration")
     }
     return record.with_channels(motion)
@@ -141,7 +141,7 @@ def _shaped(rng: np.random.Generator, name: str, quiet: Record) -> ModelTerm:
     scale = float(np.std(quiet["displacement"]))
     omega = float(np.std(quiet["velocity"])) / scale
     values: list[float] = []
-    parameter: Parameter
+    parameter: ShapeParameter
     for parameter in get(name).parameters:
         share = float(rng.uniform(*parameter.drawn))
         values.append(share * values[-1] if parameter.relative else in_units(share, parameter, scale, omega))
@@ -151,10 +151,10 @@ def _shaped(rng: np.random.Generator, name: str, quiet: Record) -> ModelTerm:
 def _force(entry: ModelTerm, record: Record) -> Floats:
     """The force of an effect with a unit coefficient along a motion, shape (n,)."""
     alone = Model("alone", (replace(entry, coefficients=(1.0,)),))
-    return predict(alone, record, response="force", steps_per_sample=4, initial=(0.0,) * len(alone.states))
+    return predict_response(alone, record, response="force", steps_per_sample=4, initial=(0.0,) * len(alone.states))
 
 
-def _decay(rng: np.random.Generator, hidden: tuple[str, ...]) -> Drawn:
+def _decay(rng: np.random.Generator, hidden: tuple[str, ...]) -> DrawnTest:
     """A structure let go, from a place that nothing else knows; no force."""
     model, frequency, dt = _oscillator(rng, (0.003, 0.03))
     model = _per_unit_mass(model)
@@ -164,10 +164,10 @@ def _decay(rng: np.random.Generator, hidden: tuple[str, ...]) -> Drawn:
     truth = _with_hidden(rng, model, hidden, _run(model, force, dt, start))
     record = _run(truth, force, dt, start)
     _refuse_lost(record)
-    return Drawn(model, truth, _only(record, "displacement"), "displacement")
+    return DrawnTest(model, truth, _only(record, "displacement"), "displacement")
 
 
-def _blows(rng: np.random.Generator, hidden: tuple[str, ...]) -> Drawn:
+def _blows(rng: np.random.Generator, hidden: tuple[str, ...]) -> DrawnTest:
     """Blows of a hammer with decays between them."""
     model, frequency, dt = _oscillator(rng, (0.01, 0.05))
     samples = 4096
@@ -181,10 +181,10 @@ def _blows(rng: np.random.Generator, hidden: tuple[str, ...]) -> Drawn:
     truth = _with_hidden(rng, model, hidden, _run(model, force, dt))
     _refuse_restless(truth, force, dt)
     record = _run(truth, force, dt)
-    return Drawn(model, truth, _only(record, "displacement"), "displacement")
+    return DrawnTest(model, truth, _only(record, "displacement"), "displacement")
 
 
-def _base(rng: np.random.Generator, hidden: tuple[str, ...]) -> Drawn:
+def _base(rng: np.random.Generator, hidden: tuple[str, ...]) -> DrawnTest:
     """A shake table with noise below three times the natural frequency; the response is relative to it."""
     model, frequency, dt = _oscillator(rng, (0.01, 0.08))
     model = _per_unit_mass(model)
@@ -193,10 +193,10 @@ def _base(rng: np.random.Generator, hidden: tuple[str, ...]) -> Drawn:
     _refuse_restless(truth, -base, dt)
     record = _run(truth, -base, dt)
     shown = {"base_acceleration": base, "force": np.zeros(len(base)), "displacement": record["displacement"]}
-    return Drawn(model, truth, Record(dt, shown, {**SI_UNITS, "base_acceleration": "m/s^2"}), "displacement")
+    return DrawnTest(model, truth, Record(dt, shown, {**SI_UNITS, "base_acceleration": "m/s^2"}), "displacement")
 
 
-def _component(rng: np.random.Generator, hidden: tuple[str, ...]) -> Drawn:
+def _component(rng: np.random.Generator, hidden: tuple[str, ...]) -> DrawnTest:
     """A damper or mount in a rig that prescribes its motion: noise in a band; the force is measured."""
     frequency, samples = _evenly(rng, 0.5, 20.0), 3000
     dt = 1.0 / (frequency * float(rng.uniform(30.0, 60.0)))
@@ -210,11 +210,13 @@ def _component(rng: np.random.Generator, hidden: tuple[str, ...]) -> Drawn:
     motion = {"force": np.zeros(samples), "displacement": u, "velocity": v, "acceleration": a}
     record = Record(dt, motion, dict(SI_UNITS))
     truth = _with_hidden(rng, model, hidden, record)
-    force = predict(truth, record, response="force", steps_per_sample=STEPS, initial=(0.0,) * len(truth.states))
-    return Drawn(model, truth, record.with_channels({"force": force}), "force")
+    force = predict_response(
+        truth, record, response="force", steps_per_sample=STEPS, initial=(0.0,) * len(truth.states)
+    )
+    return DrawnTest(model, truth, record.with_channels({"force": force}), "force")
 
 
-def _axis(rng: np.random.Generator, hidden: tuple[str, ...]) -> Drawn:
+def _axis(rng: np.random.Generator, hidden: tuple[str, ...]) -> DrawnTest:
     """A mass without a spring under position control, that moves to and fro with rests between."""
     mass, samples, dt = float(np.exp(rng.uniform(0.0, 5.0))), 4000, 0.005
     omega = 2.0 * np.pi * float(rng.uniform(1.5, 3.0))  # of the control
@@ -228,7 +230,7 @@ def _axis(rng: np.random.Generator, hidden: tuple[str, ...]) -> Drawn:
     truth = _with_hidden(rng, model, hidden, _run(closed, drive, dt))
     record = _run(_closed(truth, control), drive, dt)
     force = drive - stiff * record["displacement"] - damped * record["velocity"]
-    return Drawn(model, truth, _only(record.with_channels({"force": force}), "displacement"), "displacement")
+    return DrawnTest(model, truth, _only(record.with_channels({"force": force}), "displacement"), "displacement")
 
 
 def _closed(model: Model, control: Model) -> Model:

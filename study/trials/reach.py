@@ -135,7 +135,7 @@ SIZES: tuple[tuple[str, Member, str], ...] = (
 HELD = "95 % intervals of coefficients that hold the truth, with noise"
 
 
-def summary(table: pd.DataFrame, wanted: Wanted) -> pd.DataFrame:
+def target_summary(table: pd.DataFrame, wanted: Wanted) -> pd.DataFrame:
     """Each target without and with a fault of the measurement: what was measured, its 95 % interval, and whether met.
 
     A trial that could not be made or diagnosed counts as failed. A rate is reached if its interval reaches it.
@@ -202,7 +202,7 @@ def _said(row: Row) -> str:
     return row["first"] if row["verdict"] == MISSING else row["verdict"]
 
 
-def ladder(table: pd.DataFrame) -> pd.DataFrame:
+def error_by_noise(table: pd.DataFrame) -> pd.DataFrame:
     """Mean held-out response error before and after adding what was found, and that of the true model, by noise."""
     good = table[(table["trouble"].isna() | (table["trouble"] == "")) & (table["faults"] == WITHOUT)]
     rows: list[dict[str, Any]] = []

@@ -17,7 +17,7 @@ from study.compare.prediction import predict
 from study.diagnose.adding import added
 from study.diagnose.confirmed_faults import confirmed
 from study.diagnose.verdict import diagnose
-from study.faults.fault import fields
+from study.faults.fault import fault_fields
 from study.faults.imposed import FAULTS
 from study.identify.time_domain.part_fit import fit_part
 from study.records.prepared import Prepared, prepare_record
@@ -26,7 +26,7 @@ from study.reproduction.settings import TrialSettings
 from study.support.errors import StudyError
 from study.trials.draw import HIDDEN, NO_FAULT, Trial, make_trial
 from study.trials.experiment import WIDE
-from study.trials.findings import Row, accounted, evidence, intervals, measurement, tie_set
+from study.trials.findings import Row, accounted_comparison, evidence_row, intervals, measurement, tie_set
 
 SINGLE, NONE, PAIR, REMOVED, COMPLETED = "single", "none", "pair", "removed", "completed"
 WITHOUT, WITH = "without", "with"  # a fault of the measurement
@@ -89,7 +89,7 @@ def _wanted(
     ]
 
 
-def run(order: Order) -> Row:
+def run_trial(order: Order) -> Row:
     """Make a trial, diagnose it and compare with the answer; a fault a user would be told of is kept in ``trouble``."""
     row: Row = dict.fromkeys(COLUMNS, "")
     row |= {"kind": order.kind, "seed": order.seed, "hidden": "+".join(order.hidden), "faults": order.faults}
@@ -121,7 +121,7 @@ def _answer(trial: Trial) -> Row:
 
 def _judged(order: Order, trial: Trial) -> Row:
     prepared = prepare_record(trial.record)
-    before, faults = accounted(trial.completed if order.kind == COMPLETED else trial.believed, prepared)
+    before, faults = accounted_comparison(trial.completed if order.kind == COMPLETED else trial.believed, prepared)
     diagnosis = diagnose(before, without=order.hidden if order.kind == REMOVED else ())
     named = tie_set(diagnosis)
     after = added(before, diagnosis.candidates[0].term) if named else before
@@ -133,8 +133,8 @@ def _judged(order: Order, trial: Trial) -> Row:
         "error_true": error_of_truth(trial, before.prepared, after.fit.steps_per_sample),
         "noise_floor": before.prediction.floor,
     }  # fmt: skip
-    found = [fields(fault) for fault in confirmed(faults, diagnosis)]
-    row |= evidence(diagnosis, order.hidden) | measurement(found, trial.fault) | intervals(after, trial.truth)
+    found = [fault_fields(fault) for fault in confirmed(faults, diagnosis)]
+    row |= evidence_row(diagnosis, order.hidden) | measurement(found, trial.fault) | intervals(after, trial.truth)
     if named and order.kind == PAIR:
         row |= _second(after, trial)
     if named and order.kind == REMOVED:

@@ -19,16 +19,16 @@ KEYS = {"hidden", "shares", "noise", "fault", "truth"}
 WANTED = "the answer file of a trial, as 'study trial' writes it"
 
 
-def write(trial: Trial, folder: Path) -> tuple[Path, Path, Path]:
+def write_trial(trial: Trial, folder: Path) -> tuple[Path, Path, Path]:
     """Write record, believed model and sealed answer: their paths, or a ``StudyError`` if that cannot be."""
     record = trial.record
-    return write_files(record.name, lambda path: write_csv(record, path), trial.believed, contents(trial), folder)
+    return write_trial_files(record.name, lambda path: write_csv(record, path), trial.believed, contents(trial), folder)
 
 
-def write_files(
+def write_trial_files(
     stem: str, record_to: Callable[[Path], object], believed: Model, content: Mapping[str, Any], folder: Path
 ) -> tuple[Path, Path, Path]:
-    """Write the three files of a trial named ``stem``; ``record_to`` writes its record to a path. As :func:`write`."""
+    """Write the three files of a trial named ``stem``, as :func:`write_trial`; ``record_to`` writes its record."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -107,7 +107,7 @@ KINDS: Mapping[str, Callable[[object], bool]] = {
 }  # fmt: skip
 
 
-def sentences(answer: Mapping[str, Any]) -> str:
+def answer_in_words(answer: Mapping[str, Any]) -> str:
     """An answer for people."""
     hidden = [f"{name} ({100.0 * share:.0f} %)" for name, share in zip(answer["hidden"], answer["shares"], strict=True)]
     what = f"hidden, with the share of the restoring force: {', '.join(hidden)}" if hidden else "nothing is hidden"

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from study.equations.model import Model, ModelTerm
 from study.equations.simulate import Integrator, simulate
-from study.identify.frequency_domain.inputs import Input, history, reverse_inputs
+from study.identify.frequency_domain.inputs import Input, input_history, reverse_inputs
 from study.records.record import Record
 from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares
@@ -21,7 +21,7 @@ FARTHEST = 100.0  # logarithm of what an amount may grow by at once; with far le
 CLOSE = 0.05  # relative distance from the wanted share at which it ends
 
 
-def grown(
+def grown_to_share(
     model: Model, entry: ModelTerm, drive: Floats, dt: float, target: float, steps: int = 2, *, secant: bool = False
 ) -> tuple[Model, float] | None:
     """The model with an effect that carries the target share, by iteration on the simulated motion.
@@ -87,7 +87,7 @@ def _force(entry: ModelTerm, record: Record) -> Floats:
     total = np.zeros(len(record))
     model = Model("alone", (entry,))
     for item in reverse_inputs(model):
-        values = history(item, record)
+        values = input_history(item, record)
         for part in item.parts:
             rate = values if part.order == 0 else _rate(item, record)
             total = total + (model.values[part.symbol] or 0.0) * part.factor * rate
@@ -98,6 +98,6 @@ def _rate(item: Input, record: Record) -> Floats:
     """Time derivative of a shape of displacement alone, by the chain rule on a fine difference."""
     u = record["displacement"]
     step = 1e-6 * float(np.std(u))
-    ahead = history(item, record.with_channels({"displacement": u + step}))
-    behind = history(item, record.with_channels({"displacement": u - step}))
+    ahead = input_history(item, record.with_channels({"displacement": u + step}))
+    behind = input_history(item, record.with_channels({"displacement": u - step}))
     return (ahead - behind) / (2.0 * step) * record["velocity"]

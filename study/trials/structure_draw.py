@@ -9,7 +9,7 @@ from study.equations.model import Model, ModelTerm, free
 from study.equations.place import GROUND, Place
 from study.equations.term import Term
 from study.equations.terms import LIBRARY, get
-from study.identify.frequency_domain.inputs import history
+from study.identify.frequency_domain.inputs import input_history
 from study.records.excitation import Excitation, force
 from study.records.record import MOTIONS
 from study.structure.missing_forces import placed_inputs, relative_record
@@ -89,7 +89,7 @@ def make_structure_trial(
 def _attempt(
     rng: np.random.Generator, seed: int, name: str, noise: float, response: str, coordinates: int | None
 ) -> StructureTrial | None:
-    base = structure(rng, coordinates or int(rng.integers(2, 6)))
+    base = random_structure(rng, coordinates or int(rng.integers(2, 6)))
     frequency = modes_of(base).frequency
     dt = 1.0 / (frequency[-1] * float(rng.uniform(*FASTEST)))
     if frequency[0] * SAMPLES * dt < SLOWEST:
@@ -115,7 +115,7 @@ def _attempt(
     return StructureTrial(record, believed, truth, entry, noise, response, share)
 
 
-def structure(rng: np.random.Generator, count: int) -> Model:
+def random_structure(rng: np.random.Generator, count: int) -> Model:
     """A chain or tree of so many masses, the first on the ground, each other tied to an earlier one, some to both."""
     names = [f"mass{i + 1}" for i in range(count)]
     scale, rate = float(10.0 ** rng.uniform(-1.0, 2.0)), 2.0 * np.pi * float(10.0 ** rng.uniform(-0.5, 1.5))
@@ -174,7 +174,7 @@ def _strength(unit: ModelTerm, base: Model, record: StructureRecord, dt: float) 
     along = relative_record(unit.place, base, motion, dt)
     total = np.zeros(len(record))
     for item in placed_inputs(unit):
-        values = along["displacement"] if item.shape == "u" else history(item, along)
+        values = along["displacement"] if item.shape == "u" else input_history(item, along)
         for part in item.parts:
             coefficient = next(
                 c or 0.0 for c, s in zip(unit.coefficients, unit.term.symbols, strict=True) if s == part.symbol

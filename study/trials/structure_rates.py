@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 import pandas as pd
 
-from study.structure.structure_verdict import NOTHING
+from study.diagnose.verdict import NOTHING
 from study.support.document import Block, Image, Text, table
 from study.trials.rates import NO_TRIALS, Rate, proportion
 from study.trials.structure_draw import NOISES
@@ -23,7 +23,7 @@ EFFECTS, PLACES = "trials_of_structures_effects.png", "trials_of_structures_plac
 SAME, END, OTHER = "the same place", "a place with an end in common", "another place"
 
 
-def rates(rows: Sequence[Row]) -> list[Row]:
+def structure_rates(rows: Sequence[Row]) -> list[Row]:
     """How often effect and place come first, ties hold the truth, and nothing is found where nothing is.
 
     ``rows`` are as ``structure_runs.run_structure`` gives them, or as a table of them reads back; a trial that failed
@@ -70,7 +70,7 @@ def _line(what: str, rate: Rate) -> Row:
 
 
 def confusion_of_effects(rows: Sequence[Row]) -> pd.DataFrame:
-    """Hidden effects down, what was said across, numbers of trials; as ``trial_pictures.confusion`` draws them."""
+    """Hidden effects down, what was said across, numbers of trials, for ``trial_pictures.confusion_panel``."""
     return _counted(rows, _what_hidden, _what_said)
 
 
@@ -127,7 +127,7 @@ def in_document(rows: Sequence[Row]) -> list[Block]:
         f"{len(rows)} trials, seeds {min(seeds)} to {max(seeds)}, {failed} of which could not be made or diagnosed and "
         "count as missed; in brackets 95 % intervals and the number of trials."
     )
-    lines = [(str(line["what"]), _shown(line), _wanted(line)) for line in rates(rows)]
+    lines = [(str(line["what"]), _shown(line), _wanted(line)) for line in structure_rates(rows)]
     return [
         Text(about), table(("", "reached", "wanted"), lines),
         Image("Effects: what was hidden and what was said", EFFECTS),

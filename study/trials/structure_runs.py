@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from study.diagnose.verdict import MISSING, NOTHING
 from study.equations.model import ModelTerm
 from study.structure.placed_ranking import PlacedRanked
 from study.structure.prepared_structure import PreparedStructure, prepare_structure
 from study.structure.structure_comparison import compare_structure
-from study.structure.structure_fit import fit_structure, settled
-from study.structure.structure_verdict import MISSING, NOTHING, StructureDiagnosis, diagnose_structure
+from study.structure.structure_fit import fit_structure, settled_structure
+from study.structure.structure_verdict import StructureDiagnosis, diagnose_structure
 from study.support.errors import StudyError
 from study.trials.structure_draw import HIDDEN, NOISES, StructureTrial, make_structure_trial
 
@@ -102,7 +103,7 @@ def _true(trial: StructureTrial, prepared: PreparedStructure) -> Row:
     """
     model, true = trial.completed, trial.truth.numbers()
     try:
-        fit = settled(fit_structure(model, prepared, (), true), prepared)
+        fit = settled_structure(fit_structure(model, prepared, (), true), prepared)
         comparison = compare_structure(model, prepared, fit)
     except StudyError:
         return {"error_true": math.nan}

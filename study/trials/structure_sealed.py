@@ -4,11 +4,11 @@ from pathlib import Path
 
 from study.equations.model_file import format_model
 from study.structure.structure_record import write_structure_csv
-from study.trials.sealed import write_files
+from study.trials.sealed import write_trial_files
 from study.trials.structure_draw import StructureTrial
 
 
-def write(trial: StructureTrial, folder: Path) -> tuple[Path, Path, Path]:
+def write_structure_trial(trial: StructureTrial, folder: Path) -> tuple[Path, Path, Path]:
     """Write record, believed model and sealed answer: their paths, or a ``StudyError`` if that cannot be."""
     hidden = [trial.hidden.name] if trial.hidden else []
     content: dict[str, object] = {
@@ -16,4 +16,6 @@ def write(trial: StructureTrial, folder: Path) -> tuple[Path, Path, Path]:
         "truth": format_model(trial.truth),
     }  # fmt: skip
     record = trial.record
-    return write_files(record.name, lambda path: write_structure_csv(record, path), trial.believed, content, folder)
+    return write_trial_files(
+        record.name, lambda path: write_structure_csv(record, path), trial.believed, content, folder
+    )

@@ -16,7 +16,7 @@ CONFUSION = "trials_confusion.png"
 
 def reached(trials: pd.DataFrame, wanted: Mapping[str, Sequence[float]]) -> list[Block]:
     """Every target without and with a fault of the measurement, from the table of trials."""
-    lines = _rows(reach.summary(trials, wanted))
+    lines = _rows(reach.target_summary(trials, wanted))
     cells = {(str(line["reach"]), str(line["faults"])): line for line in lines}
     names = list(dict.fromkeys(name for name, _ in cells))
     rows = [

@@ -18,7 +18,7 @@ STEPS = {
 DARK = 0.6  # share from which a number is written in white
 
 
-def confusion(axes: Axes, counts: pd.DataFrame) -> Axes:
+def confusion_panel(axes: Axes, counts: pd.DataFrame) -> Axes:
     """Shares of each row, in per cent: hidden effects down, what was said across.
 
     ``counts`` are as ``reach.confusion`` gives them.
@@ -42,7 +42,7 @@ def confusion(axes: Axes, counts: pd.DataFrame) -> Axes:
     return axes
 
 
-def ladder(axes: Axes, rows: pd.DataFrame) -> Axes:
+def error_by_noise_panel(axes: Axes, rows: pd.DataFrame) -> Axes:
     """Mean held-out error of the response with its standard error, at each noise, for one kind of trial."""
     noises = sorted(rows["noise"].unique())
     place = {noise: i for i, noise in enumerate(noises)}

@@ -7,7 +7,7 @@ which trials there are.
 import numpy as np
 from scipy.special import ndtri
 
-from study.equations.free_run import predict
+from study.equations.free_run import predict_response
 from study.equations.model import Model
 from study.faults.kinds_of_tests import made_ready
 from study.identify.time_domain.part_fit import fit_part, linearise
@@ -69,6 +69,6 @@ def forgets(truth: Model, force: Floats, dt: float, steps: int) -> bool:
     disturbed[begin : begin + PUSH] += SLIGHT * float(np.max(np.abs(force)))
     initial = (0.0,) * (2 + len(truth.states))
     records = [Record(dt, {"force": f}, dict(SI_UNITS)) for f in (force, disturbed)]
-    one, other = (predict(truth, r, steps_per_sample=steps, initial=initial) for r in records)
+    one, other = (predict_response(truth, r, steps_per_sample=steps, initial=initial) for r in records)
     early, late = np.array_split((one - other)[begin:], 2)
     return float(np.std(late)) < float(np.std(early))

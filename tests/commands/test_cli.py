@@ -15,8 +15,8 @@ import pytest
 
 from study import __version__, cli
 from study.commands import parser
-from study.commands.command import Command, number, whole
-from study.commands.terms import table
+from study.commands.command import Command, finite_number, whole_number
+from study.commands.terms import terms_table
 from study.equations.model_file import read_model
 from study.equations.simulate import simulate
 from study.equations.terms import LIBRARY
@@ -94,7 +94,7 @@ def test_terms_lists_the_library(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize("width", [160, 250])
 def test_the_table_fits_the_terminal(width: int) -> None:
-    assert max(map(len, table(tuple(LIBRARY.values()), width).splitlines())) <= width
+    assert max(map(len, terms_table(tuple(LIBRARY.values()), width).splitlines())) <= width
 
 
 @pytest.mark.parametrize("name", LIBRARY)
@@ -304,13 +304,18 @@ def test_an_interrupt_while_it_works() -> None:
 
 @pytest.mark.parametrize(("text", "value"), [("0", 0.0), ("1e-3", 1e-3), ("-0.5", -0.5)])
 def test_numbers(text: str, value: float) -> None:
-    assert number()(text) == value
+    assert finite_number()(text) == value
 
 
 def test_limits_of_numbers() -> None:
-    assert number(above=0.0)("1e-300") == 1e-300
-    assert whole(0, 5)("5") == 5
-    for read, text in ((number(above=0.0), "0"), (number(least=1.0), "0.9"), (number(), "inf"), (whole(0, 5), "6")):
+    assert finite_number(above=0.0)("1e-300") == 1e-300
+    assert whole_number(0, 5)("5") == 5
+    for read, text in (
+        (finite_number(above=0.0), "0"),
+        (finite_number(least=1.0), "0.9"),
+        (finite_number(), "inf"),
+        (whole_number(0, 5), "6"),
+    ):
         with pytest.raises(argparse.ArgumentTypeError, match=text):
             read(text)
 

@@ -49,7 +49,7 @@ def test_diagnose_add_history(rig, capsys):
     text = (rig / "rig.yaml").read_text()
     assert text.endswith("  - quadratic_damping\n")
     assert text.count("# mine") == len(trials.make_trial(911, hidden=["quadratic_damping"]).believed.terms)
-    before, after = history.read(rig / "rig.yaml")
+    before, after = history.read_history(rig / "rig.yaml")
     assert after["added"] == "quadratic_damping"
     assert after["error"]["response"] < before["error"]["response"]
     assert after["error"]["response"] == pytest.approx(after["noise_floor"]["response"], rel=0.15)
@@ -125,7 +125,7 @@ def test_what_is_not_needed_is_said_and_dropped(rig, capsys):
     assert "- quadratic_stiffness" in out
     assert "not needed" not in out
     assert (rig / "rig.yaml").read_text() == text.replace("  # tried", "  - quadratic_damping\n  # tried")
-    steps = history.read(rig / "rig.yaml")
+    steps = history.read_history(rig / "rig.yaml")
     assert [history.label(s) for s in steps[1:]] == [
         "+ quadratic_stiffness",
         "+ quadratic_damping",
@@ -134,7 +134,7 @@ def test_what_is_not_needed_is_said_and_dropped(rig, capsys):
     assert steps[-1]["error"]["response"] == pytest.approx(unneeded["error_without"], rel=1e-3)
     assert "quadratic_stiffness" not in steps[-1]["terms"]
     assert cli.main(drop) == 2
-    assert len(history.read(rig / "rig.yaml")) == len(steps)
+    assert len(history.read_history(rig / "rig.yaml")) == len(steps)
 
 
 def test_a_layout_that_cannot_be_changed_is_refused_before_anything_is_written(rig, capsys, monkeypatch):

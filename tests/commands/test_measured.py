@@ -79,7 +79,7 @@ def test_the_bouc_wen_benchmark_is_hysteresis_and_no_cubic_stiffness():
 
 def test_data_come_from_the_folder_that_the_variable_names(monkeypatch):
     monkeypatch.setenv("STUDY_DATA", "/data")
-    row = measurements.load(ROOT / "config")["silverbox"]
+    row = measurements.load_measurements(ROOT / "config")["silverbox"]
     assert row.paths == ("/data/silverbox/SNLS80mV.mat",)
     assert row.model == str(ROOT / "models" / "believed" / "oscillator.yaml")
     assert row.options[:2] == ("--column", "force=V1")
@@ -91,7 +91,7 @@ def test_data_come_from_the_folder_that_the_variable_names(monkeypatch):
 def test_without_the_variable_a_job_says_what_to_set(monkeypatch):
     """The workflow itself needs no data: the table is read all the same."""
     monkeypatch.delenv("STUDY_DATA", raising=False)
-    row = measurements.load(ROOT / "config")["silverbox"]
+    row = measurements.load_measurements(ROOT / "config")["silverbox"]
     says = r"STUDY_DATA is not set; expected the folder that holds silverbox/SNLS80mV\.mat"
     with pytest.raises(StudyError, match=says):
         measurements.check_present(Path(row.paths[0]))
@@ -121,6 +121,6 @@ def test_faults_of_a_row(tmp_path, old, new, says):
     assert old in text
     (tmp_path / "config" / "measurements.tsv").write_text(text.replace(old, new, 1))
     with pytest.raises(StudyError) as caught:
-        measurements.load(tmp_path / "config")
+        measurements.load_measurements(tmp_path / "config")
     assert str(caught.value).startswith(f"{tmp_path / 'config' / 'measurements.tsv'}, row ")
     assert says in str(caught.value)

@@ -9,7 +9,7 @@ import pytest
 from study import cli
 from study.compare.by_estimator import FREE_RUN
 from study.compare.comparison import CHAOTIC, Comparison, compare
-from study.compare.comparison_report import document, summary
+from study.compare.comparison_report import comparison_document, comparison_summary
 from study.compare.fitted_coefficients import Coefficient
 from study.compare.local_force_error import local_force_error
 from study.compare.prediction import predict
@@ -58,8 +58,8 @@ def test_an_estimator_in_reverse_stands_in_for_the_free_run(local: Comparison) -
     assert all(abs(error) < 4.0 for error in off(local).values()), off(local)
     assert all(c.error is not None and c.error < 0.01 * c.value for c in local.coefficients)
     assert local.prediction.error < 3.0 * local.prediction.floor, "judged in free run, like any other"
-    assert document([local])["fit"]["estimator"] == "local_polynomial"
-    assert "fitted to samples 0 to 4096 by local_polynomial, judged on 4096 to 8192" in summary([local])
+    assert comparison_document([local])["fit"]["estimator"] == "local_polynomial"
+    assert "fitted to samples 0 to 4096 by local_polynomial, judged on 4096 to 8192" in comparison_summary([local])
 
 
 def test_the_error_of_the_force_is_without_leakage() -> None:
@@ -150,7 +150,7 @@ def test_a_search_that_fails_is_told(local: Comparison, monkeypatch: pytest.Monk
     monkeypatch.setattr(estimators, "identify", lambda *_: replace(identified, note="stuck after 9 free runs"))
     comparison = compared(OPEN, local.record, estimator="instrumental")
     assert not comparison.fit.converged
-    assert "did not arrive at a minimum (stuck after 9 free runs)" in summary([comparison])
+    assert "did not arrive at a minimum (stuck after 9 free runs)" in comparison_summary([comparison])
 
 
 def test_lines_that_are_noise_are_left_out() -> None:

@@ -21,7 +21,7 @@ def measured(name, rig, level, stiffness, error=1.0, verdict="missing_effect"):
 
 
 def told(*records):
-    tables = [b for b in campaign.blocks(records) if isinstance(b, document.Table)]
+    tables = [b for b in campaign.campaign_blocks(records) if isinstance(b, document.TableBlock)]
     return tables[0], tables[1:]
 
 
@@ -62,7 +62,7 @@ def test_the_effect_is_named_with_its_ties_where_one_is_missing_and_nowhere_else
 def test_records_that_were_diagnosed_together_are_levels_of_one_rig():
     low, high = (measured("x", "beam", level, 355.0) for level in (1.0, 2.0))
     both = {**low.comparison, "records": [high.comparison, low.comparison]}
-    verdicts, (values,) = told(*campaign.measured("beam", "hall", both, low.diagnosis))
+    verdicts, (values,) = told(*campaign.measured_of_row("beam", "hall", both, low.diagnosis))
     assert [row[:2] for row in verdicts.rows] == [("beam 2", "1 m"), ("beam 1", "2 m")]
     assert values.rows[1][4] == "yes"
 
@@ -70,6 +70,6 @@ def test_records_that_were_diagnosed_together_are_levels_of_one_rig():
 def test_a_comparison_without_one_response_has_no_level():
     whole = measured("x", "frame", 1.0, 355.0)
     comparison = {key: value for key, value in whole.comparison.items() if key not in ("rms", "coefficients")}
-    verdicts, values = told(*campaign.measured("frame", "hall", comparison, whole.diagnosis))
+    verdicts, values = told(*campaign.measured_of_row("frame", "hall", comparison, whole.diagnosis))
     assert verdicts.rows[0][:3] == ("frame", "", "20 %")
     assert not values

@@ -8,10 +8,10 @@ import pytest
 from numpy.typing import NDArray
 
 from study.compare import noise
-from study.compare.across_levels import levels
-from study.compare.comparison import Comparison, across, compare
-from study.compare.comparison_report import summary
-from study.compare.comparison_sentences import says, says_of_all
+from study.compare.across_levels import across_levels
+from study.compare.comparison import Comparison, across_records, compare
+from study.compare.comparison_report import comparison_summary
+from study.compare.comparison_sentences import comparison_in_words, says_of_all
 from study.compare.fitted_coefficients import Coefficient
 from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
@@ -67,7 +67,7 @@ def test_where_nothing_is_missing_the_error_is_the_noise_and_it_says_so(seed: in
     prediction = comparison.prediction
     assert prediction.error == pytest.approx(prediction.floor, abs=4.0 * prediction.noise.error / prediction.size)
     assert prediction.structure == 0.0
-    assert "that is noise" in says(comparison)
+    assert "that is noise" in comparison_in_words(comparison)
     assert comparison.growths is None
 
 
@@ -81,7 +81,7 @@ def test_without_noise_and_without_a_hidden_effect_nothing_is_called_missing() -
     comparison = compared(model(), Record(DT, {"force": record["force"], "displacement": record["displacement"]}))
     assert comparison.prediction.error < 1e-3
     assert comparison.force.total < 0.01
-    assert "unexplained lies" not in says(comparison)
+    assert "unexplained lies" not in comparison_in_words(comparison)
 
 
 # ---- something hidden
@@ -106,7 +106,7 @@ def test_the_missing_force_is_described(
     best = comparison.growths.ways[0]
     assert (best.of, best.parity) == (of, parity)
     assert best.power == pytest.approx(power, abs=0.3)
-    assert words in says(comparison)
+    assert words in comparison_in_words(comparison)
 
 
 @pytest.mark.parametrize("hidden", ["quadratic_damping", "cubic_stiffness"])
@@ -123,7 +123,7 @@ def test_with_noise_the_quantity_and_the_parity_stay_right(hidden: str, seed: in
 
 @pytest.mark.parametrize("hidden", ["relaxation", "periodic_stiffness", "harmonic_force"])
 def test_what_is_no_function_of_the_motion_is_not_called_one(hidden: str) -> None:
-    assert "no power of displacement or velocity accounts for it" in says(trial(hidden, 4, 0.01))
+    assert "no power of displacement or velocity accounts for it" in comparison_in_words(trial(hidden, 4, 0.01))
 
 
 def test_the_true_model_is_as_good_as_the_noise_after_the_effect_is_added() -> None:
@@ -177,13 +177,13 @@ def test_held_values_are_held_and_marked() -> None:
     assert held.value == 400.0
     assert held.interval is None
     assert comparison.fit.keys == ("m", "c")
-    assert "held" in summary([comparison])
+    assert "held" in comparison_summary([comparison])
     assert comparison.prediction.error > 1.5 * compared(model(), record).prediction.error
 
 
 def test_a_stiffness_held_at_a_wrong_value_shows_as_proportional_to_displacement() -> None:
     comparison = compared(model(k=400.0, m=1.0), measured(model(**VALUES), drive(), 0.01))
-    assert "grows in proportion to displacement and is odd" in says(comparison)
+    assert "grows in proportion to displacement and is odd" in comparison_in_words(comparison)
 
 
 def test_the_judged_part_has_no_influence_on_the_fit() -> None:
@@ -210,23 +210,23 @@ def test_the_right_models_coefficients_do_not_move_with_the_level_and_a_wrong_on
     truth = model("cubic_stiffness", **VALUES, k3=2e7)
     records = [measured(truth, drive(s, level=level), 0.02, s) for s, level in ((5, 0.3), (6, 1.0), (7, 3.0))]
     wrong, right = (
-        across([compared(believed, r) for r in records]) for believed in (model(), model("cubic_stiffness"))
+        across_records([compared(believed, r) for r in records]) for believed in (model(), model("cubic_stiffness"))
     )
     assert next(level for level in wrong if level.key == "k").moves
     assert not any(level.moves for level in right)
     comparisons = [compared(model(), r) for r in reversed(records)]
-    assert "k by" in says_of_all(comparisons, across(comparisons))
-    assert list(across(comparisons)[0].force) == sorted(across(comparisons)[0].force)
+    assert "k by" in says_of_all(comparisons, across_records(comparisons))
+    assert list(across_records(comparisons)[0].force) == sorted(across_records(comparisons)[0].force)
 
 
 def test_levels_weigh_by_their_errors() -> None:
     def at(value: float, error: float | None) -> list[Coefficient]:
         return [Coefficient("k", "linear_stiffness", value, error, "N/m")]
 
-    assert not levels([1.0, 2.0], [at(100.0, 1.0), at(102.0, 1.0)])[0].moves
-    assert levels([1.0, 2.0], [at(100.0, 0.1), at(102.0, 0.1)])[0].moves
-    assert not levels([1.0, 2.0], [at(100.0, 1e-9), at(100.01, 1e-9)])[0].moves  # below any numerical error
-    assert levels([1.0, 2.0], [at(1.0, None), at(1.0, None)]) == ()
+    assert not across_levels([1.0, 2.0], [at(100.0, 1.0), at(102.0, 1.0)])[0].moves
+    assert across_levels([1.0, 2.0], [at(100.0, 0.1), at(102.0, 0.1)])[0].moves
+    assert not across_levels([1.0, 2.0], [at(100.0, 1e-9), at(100.01, 1e-9)])[0].moves  # below any numerical error
+    assert across_levels([1.0, 2.0], [at(1.0, None), at(1.0, None)]) == ()
 
 
 # ---- periods
@@ -246,7 +246,7 @@ def test_scatter_between_periods_is_the_noise_whatever_its_spectrum_and_the_mode
     assert comparison.prediction.floor == pytest.approx(0.05, rel=0.1)
     true = compared(model("cubic_stiffness"), periodic, Plan("displacement", (0, 6144), (6144, 10240)))
     assert true.prediction.noise.alone
-    assert "scatter between periods" in says(true)
+    assert "scatter between periods" in comparison_in_words(true)
     wrong = replace(periodic, period=1900)  # not its period: the force does not repeat
     assert compared(model(), wrong).prediction.noise.source == noise.WHITE
 

@@ -140,6 +140,18 @@ def test_a_record_too_short_is_refused(capsys: pytest.CaptureFixture[str]) -> No
     assert "64 samples or more" in refused(capsys, "short.csv", "--model", "rig.yaml")
 
 
+def test_a_blow_with_a_long_rest_behind_it_is_compared_where_no_force_acts() -> None:
+    """The judged half has no force: what it balances there is the force of inertia, as in a free decay."""
+    values = {"m": 1.0, "c": 0.8, "k": 400.0}
+    names = ("inertia", "linear_damping", "linear_stiffness")
+    blow = np.where(np.arange(4096) < 100, force(Excitation(), 4096, 0.01, 1), 0.0)
+    u = simulate(Model("truth", tuple(free(get(n)).with_values(values) for n in names)), blow, 0.01)["displacement"]
+    write_csv(Record(0.01, {"force": blow, "displacement": u}), Path("blow.csv"))
+    assert cli.main(["compare", "blow.csv", "--model", "rig.yaml", "--out", "blow"]) == 0
+    error = json.loads(Path("blow/comparison.json").read_text())["error"]
+    assert 0.0 < error["force"] < 1e-3
+
+
 def test_noise_instead_of_a_response_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     rng = np.random.default_rng(5)
     values = record()

@@ -8,9 +8,9 @@ import pytest
 from numpy.typing import NDArray
 
 from study.compare import along_time
-from study.compare.comparison import Comparison, across, compare
-from study.compare.comparison_report import as_json, document, summary, tables
-from study.compare.comparison_sentences import says
+from study.compare.comparison import Comparison, across_records, compare
+from study.compare.comparison_report import as_json, comparison_document, comparison_summary, tables
+from study.compare.comparison_sentences import comparison_in_words
 from study.equations.model import Model, ModelTerm, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
@@ -75,7 +75,7 @@ def test_units_change_neither_errors_nor_sentences(
     assert other.prediction.error == pytest.approx(one.prediction.error, rel=1e-6)
     assert other.force.total == pytest.approx(one.force.total, rel=1e-6)
     assert other.prediction.floor == pytest.approx(one.prediction.floor, rel=1e-6)
-    assert says(other) == says(one)
+    assert comparison_in_words(other) == comparison_in_words(one)
     assert {c.key: c.unit for c in other.coefficients}["k"] == f"{force_unit}/{length_unit}"
 
 
@@ -83,7 +83,7 @@ def test_records_in_different_units_are_not_held_against_each_other() -> None:
     record = measured(model(**VALUES), drive(), 0.05)
     other = replace(record, units={"force": "kN", "displacement": "m"}, name="other")
     with pytest.raises(StudyError, match="the same unit"):
-        across([compared(model(), record), compared(model(), other)])
+        across_records([compared(model(), record), compared(model(), other)])
 
 
 # ---- documents
@@ -93,7 +93,7 @@ def test_the_document_has_the_fields_of_the_issue_and_is_plain_json() -> None:
     import json
 
     comparison = trial("quadratic_damping", 41, 0.0)
-    content = json.loads(as_json(document([comparison])))
+    content = json.loads(as_json(comparison_document([comparison])))
     assert set(content) >= {"model", "error", "noise_floor", "coefficients", "where", "says"}
     assert content["error"]["response"] == comparison.prediction.error
     assert content["error"]["force"] == comparison.force.total
@@ -107,7 +107,7 @@ def test_the_document_has_the_fields_of_the_issue_and_is_plain_json() -> None:
 
 def test_tables_name_their_record_and_hold_no_text_of_numpy() -> None:
     comparison = trial("quadratic_damping", 41, 0.0)
-    made = tables([comparison, comparison], across([comparison, comparison]))
+    made = tables([comparison, comparison], across_records([comparison, comparison]))
     for name, content in made.items():
         head, *rows = content.decode().splitlines()
         assert "record" in head.split(","), name
@@ -118,7 +118,7 @@ def test_tables_name_their_record_and_hold_no_text_of_numpy() -> None:
 def test_a_fit_that_did_not_arrive_says_so() -> None:
     comparison = trial("quadratic_damping", 41, 0.0)
     stopped = replace(comparison, fit=replace(comparison.fit, converged=False, message="still falling"))
-    assert "did not arrive at a minimum (still falling)" in says(stopped)
+    assert "did not arrive at a minimum (still falling)" in comparison_in_words(stopped)
 
 
 def test_models_that_cannot_run_are_refused_in_one_sentence() -> None:
@@ -137,6 +137,6 @@ def test_a_model_that_runs_away_is_compared_all_the_same() -> None:
     comparison = compared(made.believed, made.record)
     assert comparison.prediction.diverged
     assert comparison.prediction.error == pytest.approx(1.0)
-    assert "mean nothing" in says(comparison)
-    assert "100 %" in summary([comparison])
+    assert "mean nothing" in comparison_in_words(comparison)
+    assert "100 %" in comparison_summary([comparison])
     assert all(b"nan" not in content for content in tables([comparison]).values())

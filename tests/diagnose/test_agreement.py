@@ -6,7 +6,7 @@ import pytest
 
 from study import cli
 from study.compare import history
-from study.compare.comparison_report import document
+from study.compare.comparison_report import comparison_document
 from study.equations.model_file import read_model
 from study.explore import session as sessions
 from study.records.prepared import prepare_record
@@ -14,7 +14,7 @@ from study.records.readers import read_record
 from study.support.numbers import percent
 from study.trials import make_trial
 from study.trials.experiment import REPORT_LIKE, WIDE
-from study.trials.sealed import write
+from study.trials.sealed import write_trial
 
 ALIKE = 1e-9  # relative: the same computation, whoever asks for it
 pytestmark = pytest.mark.usefixtures("numbers_only")
@@ -27,7 +27,7 @@ OVERSAMPLED = 520001, "quadratic_damping", 0.05, "velocity"
 def test_one_error_and_one_floor(seed, hidden, noise, response, tmp_path, capsys):
     fine = seed == OVERSAMPLED[0]
     ranges = WIDE if fine else REPORT_LIKE
-    data, model, _ = write(make_trial(seed, (hidden,), noise, response, ranges=ranges), tmp_path)
+    data, model, _ = write_trial(make_trial(seed, (hidden,), noise, response, ranges=ranges), tmp_path)
 
     def told(*words):
         assert cli.main([str(w) for w in words]) == 0
@@ -45,12 +45,12 @@ def test_one_error_and_one_floor(seed, hidden, noise, response, tmp_path, capsys
     assert first["term"] == hidden
 
     page = sessions.begin(read_model(model), prepare_record(read_record(data)))
-    assert_same(compared, document([page.now.comparison]))
+    assert_same(compared, comparison_document([page.now.comparison]))
     page = sessions.with_stage(page, sessions.examined(page)[0])
-    grown = document([sessions.with_added(page, hidden).now.comparison])
+    grown = comparison_document([sessions.with_added(page, hidden).now.comparison])
 
     told("add", model, hidden, "--data", data, "--out", tmp_path / "added")
-    added, steps = read("added", "comparison.json"), history.read(model)
+    added, steps = read("added", "comparison.json"), history.read_history(model)
     for after in (grown, steps[1]):
         assert_same(added, after)
     assert_same(compared, steps[0])
@@ -69,7 +69,7 @@ def assert_same(one, other):
 
 
 def test_a_cut_off_is_heeded_by_all(tmp_path, capsys):
-    data, model, _ = write(make_trial(32, ("quadratic_damping",), 0.01, "acceleration"), tmp_path)
+    data, model, _ = write_trial(make_trial(32, ("quadratic_damping",), 0.01, "acceleration"), tmp_path)
     errors = {}
     for cutoff in ((), ("--cutoff", "6")):
         for command, name in (("compare", "comparison.json"), ("diagnose", "diagnosis.json")):

@@ -5,7 +5,7 @@ import pytest
 
 from study.diagnose.late_force import late_force
 from study.diagnose.verdict import diagnose
-from study.equations.free_run import predict
+from study.equations.free_run import predict_response
 from study.equations.model import Model, free
 from study.equations.terms import get
 from study.faults.imposed import shifted
@@ -43,7 +43,7 @@ def quintic() -> tuple[Model, Record]:
     values = {"m": 1.0, "c": 0.14, "k": 480.0, "k5": 3.4e12}
     model = Model("hardening", tuple(free(get(n)).with_values(values) for n in names))
     record = Record(0.01, {"force": np.zeros(1980)}, dict(SI_UNITS), "decay")
-    u = predict(model, record, steps_per_sample=8, initial=(0.0035, 0.0))
+    u = predict_response(model, record, steps_per_sample=8, initial=(0.0035, 0.0))
     noise = np.sqrt(0.05 * np.mean(u**2)) * np.random.default_rng(16).standard_normal(len(u))
     return model, record.with_channels({"displacement": u + noise})
 
@@ -60,7 +60,7 @@ def test_a_strongly_hardening_decay_is_fitted_and_predicted_to_its_noise():
 def test_a_loud_noise_is_no_lost_motion_and_a_motion_out_of_step_is():
     model, record = quintic()
     linear = Model("linear", tuple(free(get(t.name)) for t in model.terms[:3]))
-    u = predict(linear.with_values({"m": 1.0, "c": 0.14, "k": 480.0}), record, initial=(0.0035, 0.0))
+    u = predict_response(linear.with_values({"m": 1.0, "c": 0.14, "k": 480.0}), record, initial=(0.0035, 0.0))
     u = u + 0.5 * np.std(u) * np.random.default_rng(17).standard_normal(len(u))
     comparison = accounted_test([record.with_channels({"displacement": u})], linear).comparison
     assert comparison.prediction.error > 0.3

@@ -27,8 +27,8 @@ def test_an_imitator_under_noise_leaves_a_shape_and_the_truth_leaves_none():
     made = trials.make_trial(94181, ("van_der_pol_damping",), 0.05, "displacement")
     imitator = left_by(made.believed.with_term(free(get("displacement_damping"))), made.record)
     truth = left_by(made.believed.with_term(free(get("van_der_pol_damping"))), made.record)
-    assert 0.003 < dependence.significant(imitator, 1e-3) < 0.03
-    assert dependence.significant(truth, 1e-2) == 0.0
+    assert 0.003 < dependence.significant_share(imitator, 1e-3) < 0.03
+    assert dependence.significant_share(truth, 1e-2) == 0.0
     assert max(dependence.explained_by(truth).values()) < 0.01
 
 
@@ -38,7 +38,7 @@ def test_a_shape_is_seen_in_noise_as_rarely_as_its_level_says(systems):
     noise = 0.2 * np.std(clean["displacement"]) * rng.standard_normal((12, 2048))
     model = systems["linear"].with_values(dict.fromkeys(systems["linear"].values))
     records = [Record(clean.dt, {"force": clean["force"], "displacement": clean["displacement"] + n}) for n in noise]
-    alarms = [dependence.significant(left_by(model, record), 0.1) > 0.0 for record in records]
+    alarms = [dependence.significant_share(left_by(model, record), 0.1) > 0.0 for record in records]
     assert np.mean(alarms) <= 0.25  # a tenth is meant: more than three of twelve has a chance of 3 %
 
 
@@ -74,7 +74,7 @@ def test_both_of_two_effects_are_the_best_pair(two_effects):
 
 def test_each_way_of_preselecting_names_the_pair(two_effects):
     made, prepared, base, rows = two_effects
-    starts = pair_screening.promising(rows, base, prepared)
+    starts = pair_screening.promising_pairs(rows, base, prepared)
     assert sum(set(start.names) == set(made.hidden) for start in starts) == 2
     assert all(value is not None for start in starts for value in start.model.values.values())
 

@@ -10,7 +10,7 @@ from study.compare.comparison import compare
 from study.compare.prediction import predict
 from study.diagnose import constancy, diagnosis_report
 from study.diagnose.adding import added
-from study.diagnose.diagnosis_sentences import sentences
+from study.diagnose.diagnosis_sentences import diagnosis_sentences
 from study.diagnose.separating_test import separating_level
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN, Diagnosis, diagnose
 from study.equations.model import Model, ModelTerm
@@ -83,7 +83,7 @@ def test_nothing_missing_is_said_where_nothing_is():
     prediction = diagnosis.comparison.prediction
     assert diagnosis.verdict == NOTHING
     assert prediction.error == pytest.approx(prediction.floor, rel=0.1)
-    assert "Nothing is missing" in sentences(diagnosis)[0]
+    assert "Nothing is missing" in diagnosis_sentences(diagnosis)[0]
 
 
 def test_an_effect_that_is_not_in_the_library_is_unknown_and_its_kind_is_said():
@@ -107,20 +107,20 @@ def test_a_small_effect_is_not_given_the_name_of_what_takes_a_little_of_it(syste
     assert diagnosis.comparison.prediction.error < 0.01
     assert diagnosis.candidates[0].p_value < 0.01
     assert diagnosis.verdict == UNKNOWN
-    assert "changes with the frequency" in " ".join(sentences(diagnosis))
+    assert "changes with the frequency" in " ".join(diagnosis_sentences(diagnosis))
 
 
 def test_the_fields_are_those_of_the_file(of_drag):
-    fields = diagnosis_report.fields(of_drag)
+    fields = diagnosis_report.diagnosis_fields(of_drag)
     assert set(fields) >= {"verdict", "error", "noise_floor", "candidates"}
     wanted = {"term", "parameters", "coefficient", "interval", "response_error", "explained", "p_value", "tied_with"}
     assert all(set(row) >= wanted for row in fields["candidates"])
-    assert "quadratic_damping" in diagnosis_report.table(of_drag)
+    assert "quadratic_damping" in diagnosis_report.candidate_table(of_drag)
 
 
 def test_the_ends_of_a_narrow_interval_are_told_apart(of_drag):
     first = replace(of_drag.candidates[0], error=1e-7 * abs(of_drag.candidates[0].coefficient))
-    said = " ".join(sentences(replace(of_drag, candidates=(first, *of_drag.candidates[1:]))))
+    said = " ".join(diagnosis_sentences(replace(of_drag, candidates=(first, *of_drag.candidates[1:]))))
     low, high = re.search(r"95 % interval (\S+) to (\S+?)\)", said).groups()
     assert float(low) < first.coefficient < float(high)
     assert float(high) - float(low) == pytest.approx(3.92e-7 * abs(first.coefficient), rel=0.2)
@@ -129,7 +129,7 @@ def test_the_ends_of_a_narrow_interval_are_told_apart(of_drag):
 @pytest.mark.parametrize("error", [np.inf, np.nan, 0.0])
 def test_an_interval_without_ends_is_said_all_the_same(of_drag, error):
     first = replace(of_drag.candidates[0], error=error)
-    said = sentences(replace(of_drag, candidates=(first, *of_drag.candidates[1:])))
+    said = diagnosis_sentences(replace(of_drag, candidates=(first, *of_drag.candidates[1:])))
     assert any("95 % interval" in sentence for sentence in said)
 
 
@@ -221,7 +221,7 @@ def test_a_model_that_runs_away_is_diagnosed_all_the_same() -> None:
     assert diagnosis.comparison.prediction.diverged
     assert diagnosis.comparison.prediction.error == pytest.approx(1.0)
     assert set(diagnosis.pair) == {"displacement_damping", "quadratic_damping"}
-    assert "does not stay finite" in sentences(diagnosis)[0]
+    assert "does not stay finite" in diagnosis_sentences(diagnosis)[0]
 
 
 def test_an_imitator_that_leaves_only_noise_is_found_out_by_its_coefficient() -> None:
@@ -230,13 +230,15 @@ def test_an_imitator_that_leaves_only_noise_is_found_out_by_its_coefficient() ->
     diagnosis = diagnosed(made.believed, made.record, without=few)
     assert diagnosis.verdict == UNKNOWN
     assert diagnosis.candidates[0].response_error < 0.5 * diagnosis.comparison.prediction.error
-    assert "changes with the amplitude" in " ".join(sentences(diagnosis))
+    assert "changes with the amplitude" in " ".join(diagnosis_sentences(diagnosis))
 
 
 def test_a_constant_is_a_constant_and_a_moving_coefficient_is_not() -> None:
     rng = np.random.default_rng(3)
     error = np.full(8, 0.1)
-    flat = [constancy.Curve(np.arange(8.0), 5.0 + 0.1 * rng.standard_normal(8) + 0j, error) for _ in range(400)]
+    flat = [
+        constancy.CoefficientCurve(np.arange(8.0), 5.0 + 0.1 * rng.standard_normal(8) + 0j, error) for _ in range(400)
+    ]
     p_values = np.array([curve.p_value() for curve in flat])
     assert np.mean(p_values < 0.1) == pytest.approx(0.1, abs=0.05)
-    assert constancy.Curve(np.arange(8.0), 5.0 + 0.2 * np.arange(8.0) + 0j, error).p_value() < 1e-6
+    assert constancy.CoefficientCurve(np.arange(8.0), 5.0 + 0.2 * np.arange(8.0) + 0j, error).p_value() < 1e-6

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from study.diagnose.constancy import Curve
-from study.diagnose.diagnosis_pictures import constancy
+from study.diagnose.constancy import CoefficientCurve
+from study.diagnose.diagnosis_pictures import constancy_panels
 
 
 @pytest.mark.parametrize("coefficient", [-2.0, 2.0])
 def test_a_constant_coefficient_is_drawn_at_one(coefficient):
     size = abs(coefficient)  # a curve is followed along the sign of its coefficient, as ``constancy.curves`` does
-    curve = Curve(np.array([1.0, 2.0]), np.full(2, size, dtype=np.complex128), np.full(2, 0.1 * size))
+    curve = CoefficientCurve(np.array([1.0, 2.0]), np.full(2, size, dtype=np.complex128), np.full(2, 0.1 * size))
     row = SimpleNamespace(name="van_der_pol_damping", coefficient=coefficient, flatness=curve, steadiness=None)
     axes = Figure().subplots(1, 2)
-    constancy(axes[0], axes[1], [row])  # pyright: ignore[reportArgumentType]
+    constancy_panels(axes[0], axes[1], [row])  # pyright: ignore[reportArgumentType]
     (container,) = axes[0].containers
     assert list(container.lines[0].get_ydata()) == [1.0, 1.0]
     assert container.get_label() == "Van der Pol damping"

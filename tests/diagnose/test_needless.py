@@ -8,8 +8,8 @@ import pytest
 from study.compare.comparison import Comparison, compare
 from study.diagnose import needless as module
 from study.diagnose.adding import added
-from study.diagnose.dropping import dropped
-from study.diagnose.needless import fields, needless, of_records, paragraph
+from study.diagnose.dropping import compared_without
+from study.diagnose.needless import needless, needless_fields, needless_in_words, of_records
 from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import custom, get
@@ -65,7 +65,7 @@ def test_a_superfluous_term_is_named_with_what_its_loss_costs(completed, name):
     assert found.error_with == more.prediction.error
     assert found.p_value > 0.01
     assert name not in found.fit.model
-    after = dropped(more, name)
+    after = compared_without(more, name)
     assert [t.name for t in after.model.terms] == list(DUFFING)
     assert after.prediction.error == pytest.approx(found.error_without, rel=1e-3)
     assert after.prediction.error == pytest.approx(completed.prediction.error, rel=1e-3)
@@ -94,7 +94,7 @@ def test_of_two_that_do_the_same_work_one_is_named(completed, duffing):
     found = needless(more)
     assert len(found) == 1
     assert found[0].name in ("cubic_stiffness", "twin")
-    assert needless(dropped(more, found[0].name)) == ()
+    assert needless(compared_without(more, found[0].name)) == ()
 
 
 def test_two_superfluous_terms_are_named_one_after_the_other(completed):
@@ -104,8 +104,8 @@ def test_two_superfluous_terms_are_named_one_after_the_other(completed):
     first, second = found
     assert second.error_with == first.error_without
     assert [t.name for t in second.fit.model.terms] == list(DUFFING)
-    assert paragraph(found) == f"{first.sentence()} {second.sentence()}"
-    assert [row["term"] for row in fields(found)] == [first.name, second.name]
+    assert needless_in_words(found) == f"{first.sentence()} {second.sentence()}"
+    assert [row["term"] for row in needless_fields(found)] == [first.name, second.name]
 
 
 def test_what_the_user_holds_is_not_asked_for(completed):
@@ -158,7 +158,7 @@ def test_of_several_records_all_must_do_without(completed):
 def test_what_cannot_go_gets_its_sentence(completed, names, gone, said):
     model = opened(*names)
     with pytest.raises(StudyError, match=said):
-        dropped(replace(completed, model=model), gone)
+        compared_without(replace(completed, model=model), gone)
 
 
 FIRST_SEED, TRIALS = 880_000, 24

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from study.equations.formulas import ExpressionError
-from study.equations.free_run import predict, prepare
+from study.equations.free_run import predict_response, prepare
 from study.equations.model import Model, forward_graph, forward_program, free
 from study.equations.model_file import parse_model
 from study.equations.simulate import Integrator, simulate
@@ -102,7 +102,7 @@ def test_a_named_column_is_meant_whatever_it_is_called(name: str, varied: Model,
     column = 0.5 + 0.1 * np.sin(np.arange(SAMPLES))
     model, plain = with_channel(varied, f"{name}*u", 50.0), with_channel(varied, "elsewhere*u", 50.0)
     record = crowded.with_channels({name: column, "elsewhere": column})
-    np.testing.assert_array_equal(predict(model, record), predict(plain, record))
+    np.testing.assert_array_equal(predict_response(model, record), predict_response(plain, record))
     fed = simulate(model, record["force"], DT, Integrator("rk4", 4), extra={name: column, "u": record["u"]})
     same = simulate(plain, record["force"], DT, Integrator("rk4", 4), extra={"elsewhere": column})
     np.testing.assert_array_equal(fed["displacement"], same["displacement"])
@@ -118,9 +118,9 @@ def test_a_model_file_may_name_a_column_that_is_called_as_a_coefficient(name: st
     named, plain = (parse_model(text.format(entry=entry.format(n)), Path("rig.yaml")) for n in (name, "elsewhere"))
     column = 0.5 + 0.1 * np.sin(np.arange(SAMPLES))
     record = bare.with_channels({name: column, "elsewhere": column})
-    np.testing.assert_array_equal(predict(named, record), predict(plain, record))
+    np.testing.assert_array_equal(predict_response(named, record), predict_response(plain, record))
     with pytest.raises(ExpressionError, match=f"the formula of 'drawn' names '{name}'; it may name t, u, v"):
-        predict(named, bare)
+        predict_response(named, bare)
 
 
 def test_a_named_column_drives_the_motion_both_ways(systems: dict[str, Model], report_force: Floats) -> None:

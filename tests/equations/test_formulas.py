@@ -22,7 +22,7 @@ NUMPY: dict[str, object] = {
 
 def build(text: str) -> Graph:
     graph = Graph()
-    formulas.build(graph, text, {name: graph.input(name) for name in ("u", "v", "t")})
+    formulas.add_formula(graph, text, {name: graph.input(name) for name in ("u", "v", "t")})
     return graph
 
 

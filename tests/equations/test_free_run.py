@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from study.equations.free_run import FreeRun, predict, prepare
+from study.equations.free_run import FreeRun, predict_response, prepare
 from study.equations.model import Model
 from study.equations.terms import LIBRARY
 from study.records.record import MOTIONS, Record
@@ -108,9 +108,9 @@ def test_friction_stops_the_mass_where_it_should(rubbing: Model) -> None:
 def test_friction_keeps_the_order_of_the_integrator(make_model: Make, report_force: Floats) -> None:
     model = with_effect(make_model, "coulomb_friction").with_values({"fc": 0.4})
     record = Record(DT, {"force": report_force[:2048]})
-    reference = predict(model, record, steps_per_sample=64)
+    reference = predict_response(model, record, steps_per_sample=64)
     coarse, fine = (
-        np.linalg.norm(predict(model, record, steps_per_sample=steps) - reference) / np.linalg.norm(reference)
+        np.linalg.norm(predict_response(model, record, steps_per_sample=steps) - reference) / np.linalg.norm(reference)
         for steps in (4, 8)
     )
     assert coarse < 1e-4
@@ -121,14 +121,14 @@ def test_free_run_is_the_simulation(systems: dict[str, Model], records: dict[str
     for name, model in systems.items():  # the extreme system multiplies differences of rounding
         record = records[name].part(0, 2048)
         for response in MOTIONS:
-            again = predict(model, records[name], response=response, steps_per_sample=8, span=(0, 2048))
+            again = predict_response(model, records[name], response=response, steps_per_sample=8, span=(0, 2048))
             np.testing.assert_allclose(again, record[response], rtol=0.0, atol=1e-8 * np.std(record[response]))
 
 
 def test_free_run_starts_anywhere(systems: dict[str, Model], records: dict[str, Record]) -> None:
     record = records["mathieu"]
     state = (record["displacement"][700], record["velocity"][700])
-    again = predict(systems["mathieu"], record, steps_per_sample=8, span=(700, 1500), initial=state)
+    again = predict_response(systems["mathieu"], record, steps_per_sample=8, span=(700, 1500), initial=state)
     np.testing.assert_allclose(again, record["displacement"][700:1500], rtol=0.0, atol=1e-12)
 
 

@@ -13,12 +13,12 @@ from study.equations.model import Model
 from study.equations.model_file import read_model
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import custom
-from study.identify.frequency_domain.coefficients import fit
+from study.identify.frequency_domain.coefficients import fit_coefficients
 from study.identify.frequency_domain.conditioned import analyse
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
 from study.records.excitation import Excitation, force
 from study.records.spectra import Segments, cross_spectra
-from study.reproduction.config import load
+from study.reproduction.config import load_config
 from study.reproduction.make_record import make_record
 from study.support.errors import DivergenceError, StudyError
 
@@ -138,7 +138,7 @@ def identified(model: Model, steps: int, seeds: range) -> dict[str, float]:
     for seed in seeds:
         record = simulate(model, force(Excitation(), 8192, DT, seed), DT, Integrator("abm4", steps))
         matrix = cross_spectra([*histories(inputs, record), record["force"]], DT, cut)
-        found.append(fit(analyse(matrix), inputs, (0.3, 10.0), cut.line_inflation()).values)
+        found.append(fit_coefficients(analyse(matrix), inputs, (0.3, 10.0), cut.line_inflation()).values)
     values = np.mean(found, axis=0)
     symbols = [p.symbol for item in inputs for p in item.parts]
     return dict(zip(symbols, values, strict=True))
@@ -187,7 +187,7 @@ def test_the_example_of_the_first_page_stays_at_the_studys_level(seed: int, tmp_
     assert block is not None
     (tmp_path / "softening.yaml").write_text(textwrap.dedent(block[1]), encoding="utf-8")
     model = read_model(tmp_path / "softening.yaml")
-    study = load(ROOT / "config")
+    study = load_config(ROOT / "config")
     told = study.record_settings("duffing").model_copy(update={"case": model.name, "level": 1.0})
     made = make_record(model, told, seed=seed)
     assert len(made["displacement"]) == 8192

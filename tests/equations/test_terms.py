@@ -173,7 +173,7 @@ def test_derivatives_of_shapes_are_exact(name: str, value_of: Callable[..., np.n
         for wrt in columns:
             graph = Graph()
             known = {n: graph.input(n) for n in columns}
-            slope = graph.derivative(formulas.build(graph, text, known), known[wrt])
+            slope = graph.derivative(formulas.add_formula(graph, text, known), known[wrt])
             program, out = graph.program([slope]), np.empty((4, 1))
             kernels.evaluate(
                 program.code, program.first, program.registers.copy(),

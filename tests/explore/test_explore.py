@@ -296,7 +296,7 @@ def test_saving_keeps_the_users_comments(asked, grown, tmp_path):
     for name, content in made.items():
         (tmp_path / name).write_bytes(content)
     assert model_file.read_model(tmp_path / "rig.yaml") == grown.now.model
-    assert len(history.read(tmp_path / "rig.yaml")) == 2
+    assert len(history.read_history(tmp_path / "rig.yaml")) == 2
 
 
 def test_the_desk_does_one_thing_at_a_time_and_says_what_went_wrong(asked, tmp_path):
@@ -344,7 +344,7 @@ def test_what_save_writes_is_drawn_before_it_is_asked_for(asked, tmp_path, monke
 
     for name in ("history_pictures", "diagnosis_files"):
         monkeypatch.setattr(saved_files, name, lambda *_: {})
-    monkeypatch.setattr(saved_files, "pictures", pictures)
+    monkeypatch.setattr(saved_files, "comparison_pictures", pictures)
     text = model_file.format_model(asked.stages[0].model)
     desk, done = Desk(asked, tmp_path / "rig.yaml", text, tmp_path / "out"), threading.Event()
     desk.diagnose()  # known: nothing is asked again, but it is drawn

@@ -251,7 +251,7 @@ def _saved(rig: Path) -> None:
     model = model_file.read_model(rig / "saved" / "rig.yaml")
     assert model.terms[-1].name == "quadratic_damping"
     assert None not in model.values.values(), "the values that were fitted are written"
-    assert [s["added"] for s in history.read(rig / "saved" / "rig.yaml")] == [None, "quadratic_damping"]
+    assert [s["added"] for s in history.read_history(rig / "saved" / "rig.yaml")] == [None, "quadratic_damping"]
 
 
 def _opened_without_a_network(page: Page, rig: Path, given: float, reached: float) -> None:

@@ -139,8 +139,8 @@ def test_a_screen_has_one_format_of_numbers() -> None:
         "from 3.2·10⁻⁵ % it falls; 2.000013·10⁷ N/m³ (2.0000064·10⁷ to -2.0000196·10⁷), of 131072 samples of "
         "trial_1234567."
     )
-    assert page_units.share(3.68e-7) == "3.68·10⁻⁵\u00a0%"
-    assert page_units.share(0.2286) == "22.9\u00a0%"
+    assert page_units.in_percent(3.68e-7) == "3.68·10⁻⁵\u00a0%"
+    assert page_units.in_percent(0.2286) == "22.9\u00a0%"
 
 
 def test_a_map_has_cells_as_fine_as_the_record_allows() -> None:

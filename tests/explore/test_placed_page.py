@@ -73,7 +73,7 @@ def test_a_session_of_a_structure_from_the_verdict_to_the_saved_page(page: Page,
     until(page, "document.querySelector('#verdict h3.nothing_missing')")
     page.click("[data-act=save]")
     until(page, "document.getElementById('notice').textContent.includes('Saved in')")
-    assert [s["added"] for s in history.read(hall / "saved" / "frame.yaml")] == [None, CUBIC]
+    assert [s["added"] for s in history.read_history(hall / "saved" / "frame.yaml")] == [None, CUBIC]
     page.goto((hall / "saved" / "explore.html").as_uri())
     until(page, "window.study && window.study.ready")
     page.locator("#steps button").first.click()

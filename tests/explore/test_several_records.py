@@ -9,7 +9,7 @@ import pytest
 from bokeh.document import Document
 
 from study.compare import panels
-from study.compare.comparison import across, compare, on_each_record
+from study.compare.comparison import across_records, compare, on_each_record
 from study.compare.each_record import separated
 from study.compare.prediction import predict
 from study.diagnose.force_between import diagnose_as_read
@@ -80,7 +80,7 @@ def test_each_record_shows_its_part_of_the_one_free_run(begun):
 
 def test_coefficients_of_their_own_are_those_that_compare_shows(begun, grown):
     own = [compare(BELIEVED, prepared) for prepared in begun.several.apart]
-    for shown, expected in zip(begun.now.by_record.levels, across(own), strict=True):
+    for shown, expected in zip(begun.now.by_record.levels, across_records(own), strict=True):
         assert shown.value == pytest.approx(expected.value, rel=1e-6)
     assert [level.key for level in begun.now.by_record.levels if level.moves] != []
     assert [level.key for level in grown.now.by_record.levels if level.moves] == []
@@ -122,7 +122,7 @@ def test_a_line_breaks_where_time_is_left_out():
         assert np.nanmax(values[:gap]) < 51.0 + 40.0 * (buckets == 20)
         assert np.nanmin(values[gap:]) > 60.0
     assert len(decimate.gaps(np.arange(9.0), np.arange(9.0), 1.0)) == 0
-    drawn = panels.broken(time, time)
+    drawn = panels.with_breaks(time, time)
     assert np.flatnonzero(np.isnan(drawn[1])).tolist() == [50]
     assert np.all(np.isfinite(drawn[0]))
 
@@ -136,7 +136,12 @@ def test_a_close_up_shows_one_stretch_of_time(begun):
 
 
 def test_the_saved_page_and_the_tables_hold_every_record(grown, monkeypatch):
-    for drawn in ("pictures", "level_pictures", "history_pictures", "diagnosis_files"):  # by tests of their own
+    for drawn in (
+        "comparison_pictures",
+        "level_pictures",
+        "history_pictures",
+        "diagnosis_files",
+    ):  # by tests of their own
         monkeypatch.setattr(saved_files, drawn, lambda *_: {"response.png": b""})
     contents = saved_files.files(grown, "rig.yaml", model_file.format_model(BELIEVED))
     assert {"low_response.png", "high_response.png", "coefficients_by_level.csv"} <= set(contents)
@@ -191,7 +196,7 @@ def test_a_coefficient_may_differ_within_the_one_fit(records, monkeypatch):
     (level,) = session.now.by_record.levels
     assert (level.key, session.now.by_record.names) == ("k", NAMES)
     assert level.moves
-    for drawn in ("pictures", "history_pictures"):
+    for drawn in ("comparison_pictures", "history_pictures"):
         monkeypatch.setattr(saved_files, drawn, lambda *_: {})
     text = model_file.format_model(BELIEVED)
     for values in (True, False):

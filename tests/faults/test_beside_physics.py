@@ -82,3 +82,14 @@ def test_spikes_and_drop_outs_beside_friction_are_found(fault):
     faults = accounted(made.completed, prepare_record(record)).faults
     assert [f.fault for f in faults] == [fault]
     assert faults[0].value == pytest.approx(known["value"], rel=0.25)
+
+
+def test_a_record_that_is_over_in_its_middle_has_lost_nothing():
+    """Zeros to the end of the file, where nothing was written, were called 50 % drop-outs."""
+    made = trials.make_trial(520303, (), 0.0, "displacement", "none", WIDE)
+    record = made.record
+    half = len(record) // 2
+    over = {name: np.where(np.arange(len(record)) < half, record[name], 0.0) for name in ("force", "displacement")}
+    prepared = prepare_record(record.with_channels(over))
+    assert prepared.plan.judge[1] == half
+    assert accounted(made.believed, prepared).faults == ()

@@ -8,8 +8,8 @@ import pytest
 from PIL import Image
 
 from study.faults.fault import CLIPPING, DRIFT, DROP_OUTS, FORCE_NOISE, GAIN_CHANGE, NAMES, SPIKES, Fault
-from study.faults.fault_examples import Example, example, measured
-from study.faults.fault_pictures import picture, stretch
+from study.faults.fault_examples import Example, example, measured_example
+from study.faults.fault_pictures import picture, shown_samples
 from study.faults.imposed import impose
 from study.figures.sheet import in_style
 
@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture(scope="module")
 def clean(systems):
-    return measured(systems["duffing"], "displacement")
+    return measured_example(systems["duffing"], "displacement")
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def faulty(clean):
 @pytest.mark.parametrize("fault", NAMES)
 def test_every_fault_is_drawn_where_it_is_seen(fault, faulty):
     one = faulty(fault)
-    first, last = stretch(one)
+    first, last = shown_samples(one)
     with in_style():
         figure = picture(one)
     signal, difference = figure.axes
@@ -57,14 +57,14 @@ def test_every_fault_is_drawn_where_it_is_seen(fault, faulty):
 @pytest.mark.parametrize("fault", [SPIKES, DROP_OUTS, CLIPPING])
 def test_what_spoils_some_samples_is_shown_between_sound_ones(fault, faulty):
     one = faulty(fault)
-    first, last = stretch(one)
+    first, last = shown_samples(one)
     changed = one.clean[one.channel][first:last] != one.faulty[one.channel][first:last]
     assert 0 < np.count_nonzero(changed) < 0.3 * (last - first)
 
 
 @pytest.mark.parametrize("fault", [DRIFT, GAIN_CHANGE])
 def test_what_is_as_slow_as_the_record_is_shown_along_all_of_it(fault, faulty, clean):
-    assert stretch(faulty(fault)) == (0, len(clean))
+    assert shown_samples(faulty(fault)) == (0, len(clean))
 
 
 def test_an_example_is_what_the_search_finds(systems):

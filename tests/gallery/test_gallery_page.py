@@ -8,7 +8,7 @@ import pytest
 
 from study.commands import measurements
 from study.gallery import blocks, gallery_page, known
-from study.gallery.findings_of_record import beside, read
+from study.gallery.findings_of_record import found_beside, read_findings
 from study.gallery.known import Published
 from study.support import document
 from study.support.errors import StudyError
@@ -58,7 +58,7 @@ def published(key, step="reached", value=50.0):
 
 
 def said(folder):
-    return document.markdown(blocks.of_record(read(folder, "run"), named=True))
+    return document.markdown(blocks.of_record(read_findings(folder, "run"), named=True))
 
 
 def test_what_is_left_is_no_noise_where_the_last_verdict_says_so(folder):
@@ -87,7 +87,7 @@ def test_a_candidate_of_a_structure_has_a_place(folder):
     (folder / "climb/step_0/diagnosis.json").write_text(
         json.dumps(diagnosis("missing_effect", candidates=[placed | {"tied_with": tied}]))
     )
-    text = document.markdown([blocks.candidates(read(folder, "run"))])
+    text = document.markdown([blocks.candidates(read_findings(folder, "run"))])
     assert "stop between ground and pitch" in text
     assert "dead band at pitch" in text
 
@@ -98,7 +98,7 @@ def test_the_last_of_ten_diagnoses_counts(folder):
         target = folder / f"climb/step_{number}/diagnosis.json"
         target.parent.mkdir()
         target.write_text(json.dumps(diagnosis("nothing_missing" if number == 10 else "unknown_effect")))
-    assert read(folder, "run").last["verdict"] == "nothing_missing"
+    assert read_findings(folder, "run").last["verdict"] == "nothing_missing"
 
 
 @pytest.mark.parametrize(
@@ -110,13 +110,13 @@ def test_the_last_of_ten_diagnoses_counts(folder):
     ],
 )  # fmt: skip
 def test_values_beside_those_published(folder, key, at, found):
-    value = beside(published(key, at), read(folder, "run")).found
+    value = found_beside(published(key, at), read_findings(folder, "run")).found
     assert value == (None if found is None else pytest.approx(found))
 
 
 def test_a_row_says_by_how_much_a_value_differs(folder):
-    row = beside(published("kz", value=50.0), read(folder, "run"))
-    table = blocks.beside_each_other([row, beside(published("k"), read(folder, "run"))])
+    row = found_beside(published("kz", value=50.0), read_findings(folder, "run"))
+    table = blocks.beside_each_other([row, found_beside(published("k"), read_findings(folder, "run"))])
     text = document.markdown([table])
     assert "+20.0 %" in text
     assert "59 to 61" in text
@@ -125,8 +125,8 @@ def test_a_row_says_by_how_much_a_value_differs(folder):
 
 def test_the_page_holds_its_pictures_and_asks_for_nothing(folder):
     row = known.Literature(entry="damper", title="A <damper>", test="A test", source="Others", known="Much")
-    entry = gallery_page.Entry(row, (read(folder, "run"),), ())
-    page = gallery_page.page([entry]).decode()
+    entry = gallery_page.Entry(row, (read_findings(folder, "run"),), ())
+    page = gallery_page.gallery_page([entry]).decode()
     assert page.count("data:image/png;base64,") == 1
     assert "A &lt;damper&gt;" in page
     assert not re.search(r'(src|href)="(?!#|data:)', page)
@@ -136,10 +136,10 @@ def test_the_page_holds_its_pictures_and_asks_for_nothing(folder):
 def test_without_results_one_sentence(tmp_path):
     (tmp_path / "history.json").write_text('{"steps": []}')
     with pytest.raises(StudyError, match="holds no diagnosis; expected what 'snakemake run_climb' leaves there"):
-        read(tmp_path, "run")
+        read_findings(tmp_path, "run")
 
 
 def test_every_entry_has_its_literature_and_every_value_its_record():
-    rows = measurements.load(ROOT / "config")
+    rows = measurements.load_measurements(ROOT / "config")
     assert list(known.literature(ROOT / "config")) == list(dict.fromkeys(row.entry for row in rows.values()))
     assert {value.record for value in known.published(ROOT / "config")} <= set(rows)

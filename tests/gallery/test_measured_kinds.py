@@ -16,7 +16,7 @@ from study.diagnose.verdict import MISSING, diagnose
 from study.equations.model_file import read_model
 from study.equations.terms import LIBRARY, get
 from study.faults.kinds_of_tests import made_ready
-from study.gallery.findings_of_record import beside, read
+from study.gallery.findings_of_record import found_beside, read_findings
 from study.gallery.known import Published
 from study.identify.time_domain.fit_model import fit_model
 from study.records.readers import ReadOptions, read_record
@@ -107,7 +107,7 @@ def test_a_climb_of_a_structure_leaves_what_the_gallery_reads(tmp_path):
     """Each diagnosis is kept, and the structure reached."""
     options = ["--fit", "0:700", "--judge", "700:1200"]
     steps = climb([DATA / "wing" / "model_2.csv"], MODELS / "wing_2.yaml", options, 1, tmp_path)
-    found = read(tmp_path, "wing_2")
+    found = read_findings(tmp_path, "wing_2")
     assert [s["added"] for s in found.steps] == [s["added"] for s in steps]
     assert found.first["says"]
     assert len(list((tmp_path / "climb").glob("step_*"))) == len(steps)
@@ -116,4 +116,4 @@ def test_a_climb_of_a_structure_leaves_what_the_gallery_reads(tmp_path):
     key, value = "k[ground-heave]", 3318.0
     row = Published(record="wing_2", step="given", key=key, quantity="k", unit="", value=value, within="near")
     known = {c["key"]: c["value"] for c in steps[0]["coefficients"]}
-    assert beside(row, found).found == known[key] > 0.0
+    assert found_beside(row, found).found == known[key] > 0.0

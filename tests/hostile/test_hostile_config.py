@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from study.reproduction.config import load
+from study.reproduction.config import load_config
 from study.support.errors import StudyError
 
 ROOT = Path(__file__).parents[2]
@@ -36,7 +36,7 @@ def config(tmp_path: Path) -> Path:
 def refused(config: Path) -> str:
     started = time.monotonic()
     with pytest.raises(StudyError) as caught:
-        load(config)
+        load_config(config)
     assert time.monotonic() - started < SECONDS
     assert "\n" not in str(caught.value)
     assert str(config / "config.yaml") in str(caught.value)

@@ -16,7 +16,7 @@ from study import cli
 from study.compare import history
 from study.equations.model_file import read_model
 from study.support.errors import StudyError
-from study.support.transaction import journal_of, locked, recovered, replace_together
+from study.support.transaction import journal_of, locked, recover, replace_together
 
 OLD, NEW = b"terms: [inertia]\n", b"terms: [inertia, linear_damping]\n"
 STEPS, MORE = b'{"steps": []}\n', b'{"steps": [1]}\n'
@@ -73,7 +73,7 @@ def test_killed_between_any_two_writes(kept: bytes | None) -> None:
         if kept is not None:
             Path("rig.history.json").write_bytes(kept)
         assert subprocess.run([sys.executable, "-c", KILLED, str(last)], check=False).returncode == 9
-        recovered(Path("rig.yaml"))
+        recover(Path("rig.yaml"))
         assert state() in ((OLD, kept), (NEW, MORE)), last
         assert not journal_of(Path("rig.yaml")).exists()
         seen.add(state())
@@ -177,9 +177,9 @@ def test_an_add_that_fails_leaves_no_step_and_a_second_one_does_not_double_it(mo
     assert Path("rig.yaml").read_text() == MODEL
     assert not history.path_of(Path("rig.yaml")).exists()
     assert cli.main(add("cubic_stiffness")) == 0
-    assert [s["added"] for s in history.read(Path("rig.yaml"))] == [None, "cubic_stiffness"]
+    assert [s["added"] for s in history.read_history(Path("rig.yaml"))] == [None, "cubic_stiffness"]
     assert cli.main(add("cubic_stiffness")) == 2
-    assert len(history.read(Path("rig.yaml"))) == 2
+    assert len(history.read_history(Path("rig.yaml"))) == 2
 
 
 @pytest.mark.usefixtures("rig")
@@ -190,7 +190,7 @@ def test_two_adds_at_once_end_with_both_terms_and_both_steps() -> None:
         for term in ("cubic_stiffness", "quadratic_damping")
     ]
     assert [process.wait(60) for process in running] == [0, 0]
-    steps = history.read(Path("rig.yaml"))
+    steps = history.read_history(Path("rig.yaml"))
     assert {s["added"] for s in steps} == {None, "cubic_stiffness", "quadratic_damping"}
     assert len(steps) == 3
     model = read_model(Path("rig.yaml"))
@@ -212,7 +212,7 @@ def test_an_add_that_is_killed_at_any_moment_leaves_model_and_history_agreed() -
         time.sleep(delay)
         process.kill()
         process.wait()
-        steps, model = history.read(Path("rig.yaml")), read_model(Path("rig.yaml"))
+        steps, model = history.read_history(Path("rig.yaml")), read_model(Path("rig.yaml"))
         names = [t.name for t in model.terms]
         assert (steps[-1]["terms"] if steps else names[:3]) == names
         Path("rig.yaml").write_text(MODEL)

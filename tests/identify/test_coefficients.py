@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from study.equations.model import Model
-from study.identify.frequency_domain.coefficients import Estimate, fit
+from study.identify.frequency_domain.coefficients import Estimate, fit_coefficients
 from study.identify.frequency_domain.conditioned import MisoResult, analyse
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
 from study.records.record import Record
@@ -32,7 +32,7 @@ def test_exact_from_exact_responses(
     result = analysed(model, records[name])
     exact = np.array([i.response(result.frequency, model.numbers()) for i in inputs])
     weights = result.covariance if covariance == "estimated" else np.zeros_like(result.covariance)
-    estimate = fit(replace(result, response=exact, covariance=weights), inputs, BAND, 1.0)
+    estimate = fit_coefficients(replace(result, response=exact, covariance=weights), inputs, BAND, 1.0)
     for symbol in estimate.symbols:
         scale = 355.3 if symbol in ("c", "k", "km_cos", "km_sin") else 2e7 if symbol in ("k3", "c3") else 1.0
         assert estimate[symbol] == pytest.approx(model.numbers()[symbol], rel=1e-9, abs=1e-9 * scale)
@@ -42,7 +42,7 @@ def test_exact_from_exact_responses(
 def test_records_give_back_the_coefficients(name: str, systems: dict[str, Model], records: dict[str, Record]) -> None:
     """FINDINGS 3: what is left is leakage. One seed, hence three times the tolerances of the study's mean."""
     model, inputs, cut = systems[name], reverse_inputs(systems[name]), Segments()
-    estimate = fit(analysed(model, records[name]), inputs, BAND, cut.line_inflation())
+    estimate = fit_coefficients(analysed(model, records[name]), inputs, BAND, cut.line_inflation())
     truth = model.numbers()
     tolerances = {"k": 0.01, "m": 0.01, "c": 0.06, "k3": 0.01, "c3": 0.015, "km_cos": 0.01, "kg": 0.02}
     for symbol, tolerance in tolerances.items():
@@ -64,7 +64,7 @@ def repeats(systems: dict[str, Model], records: dict[str, Record]) -> list[Estim
     for seed in range(300):
         noise = 0.25 * np.std(record["force"]) * np.random.default_rng(seed).normal(size=len(record))
         result = analysed(model, record, record["force"] + noise, cut)
-        found.append(fit(result, inputs, BAND, cut.line_inflation()))
+        found.append(fit_coefficients(result, inputs, BAND, cut.line_inflation()))
     return found
 
 
@@ -102,7 +102,7 @@ def test_lines_outside_the_band_do_not_count(systems: dict[str, Model], records:
     result, inputs = analysed(model, records["duffing"]), reverse_inputs(model)
     spoilt = result.response.copy()
     spoilt[:, (result.frequency < BAND[0]) | (result.frequency > BAND[1])] = 1e30
-    before, after = (fit(r, inputs, BAND, 1.0).values for r in (result, replace(result, response=spoilt)))
+    before, after = (fit_coefficients(r, inputs, BAND, 1.0).values for r in (result, replace(result, response=spoilt)))
     np.testing.assert_array_equal(before, after)
 
 
@@ -114,7 +114,7 @@ def test_lines_where_an_input_is_silent_do_not_count(systems: dict[str, Model], 
     exact[1, 20:60] = 0.0
     covariance = result.covariance.copy()
     covariance[20:60, 1, :] = covariance[20:60, :, 1] = 0.0
-    estimate = fit(replace(result, response=exact, covariance=covariance), inputs, BAND, 1.0)
+    estimate = fit_coefficients(replace(result, response=exact, covariance=covariance), inputs, BAND, 1.0)
     assert estimate["k3"] == pytest.approx(2e7, rel=1e-9)
 
 
@@ -123,7 +123,7 @@ def test_units_do_not_matter(systems: dict[str, Model], records: dict[str, Recor
     model, record = systems["duffing"], records["duffing"]
     inputs = reverse_inputs(model)
     other = record.with_channels({"displacement": 1e6 * record["displacement"], "force": 1e-6 * record["force"]})
-    first, second = (fit(analysed(model, r), inputs, BAND, 1.0) for r in (record, other))
+    first, second = (fit_coefficients(analysed(model, r), inputs, BAND, 1.0) for r in (record, other))
     assert second["k3"] == pytest.approx(first["k3"] * 1e-24, rel=1e-8)
     assert second["k"] == pytest.approx(first["k"] * 1e-12, rel=1e-8)
     assert second.error("k3") == pytest.approx(first.error("k3") * 1e-24, rel=1e-6)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study.equations.free_run import predict
+from study.equations.free_run import predict_response
 from study.equations.simulate import simulate
 from study.identify.time_domain.continuation import fit_segments, lengthen
 from study.identify.time_domain.multiple_shooting import fit_in_segments
@@ -40,7 +40,9 @@ def test_a_motion_passes_the_ends_of_pieces_as_it_is(make_model, report_force):
     record = Record(0.02, {"force": report_force, "displacement": np.zeros(len(report_force))})
     pieces = replace(in_pieces(record, range(50, 1000, 50)), span=(0, 1000))
     states = pieces.passing(model, (), np.zeros(3))
-    motions = [predict(model, record, response=name, steps_per_sample=4) for name in ("displacement", "velocity")]
+    motions = [
+        predict_response(model, record, response=name, steps_per_sample=4) for name in ("displacement", "velocity")
+    ]
     np.testing.assert_allclose(states[:, :2], np.stack(motions, axis=1)[:1000:50], rtol=1e-12, atol=1e-15)
     assert np.all(states[1:, 2] != 0.0)
     again = pieces.passing(model, (500,), np.stack([np.zeros(3), states[10]]))
@@ -68,7 +70,7 @@ def test_what_is_no_one_motion_is_left_apart(chaotic):
     record, clean, model = chaotic
     struck = 2048
     later = clean.part(struck, 4096)
-    kicked = predict(
+    kicked = predict_response(
         model, Record(later.dt, {"force": later["force"], "displacement": later["displacement"]}),
         steps_per_sample=8, initial=(clean["displacement"][struck] + 0.01, clean["velocity"][struck]),
     )  # fmt: skip

@@ -30,7 +30,7 @@ def by_name(found):
 
 def test_an_unknown_estimator_is_refused():
     with pytest.raises(StudyError, match="there is no estimator 'mosi'; known are siso, miso, miso_hand_read"):
-        estimators.get("mosi")
+        estimators.get_estimator("mosi")
 
 
 @pytest.mark.parametrize("name", [name for name in estimators.ESTIMATORS if name != "miso_free_shape"])

@@ -5,18 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study.equations.model import free
+from study.equations.model import Model, ModelTerm, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
 from study.identify.time_domain import fit_model as fits
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.fit_model import fit_model, with_term
 from study.identify.time_domain.multiple_shooting import is_chaotic
+from study.identify.time_domain.no_response import LINEAR
 from study.identify.time_domain.part_fit import covariance_of, fit_part, linearise, with_states
 from study.identify.time_domain.settling import continued
 from study.identify.time_domain.stretch_states import is_poor
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.prepared import prepare_record, whole
+from study.records.record import Record
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 
@@ -151,3 +153,36 @@ def test_a_search_looks_at_everything_where_a_stretch_shows_nothing_of_the_struc
     fit = fit_model(opened(truth), prepared)
     assert fit.model.values["harmonic_force.f"] == pytest.approx(26.9567, rel=1e-4)
     assert fit.rms == pytest.approx(float(np.std(noise[: len(drive) // 2])), rel=0.02)
+
+
+def driven_by_a_sine(noise=0.0):
+    """A linear oscillator (m = 1 kg, c = 0.8 N s/m, k = 172.8 N/m) from rest, driven at 12 rad/s for 40 s."""
+    t = 0.01 * np.arange(4000)
+    terms = (ModelTerm(get(name), (value,), ()) for name, value in zip(LINEAR, (1.0, 0.8, 172.8), strict=True))
+    model = Model("linear", tuple(terms))
+    record = simulate(model, np.sin(12.0 * t), 0.01, Integrator("rk4", 4))
+    channels = {name: record[name] for name in ("force", "displacement")}
+    return opened(model), Record(0.01, channels | {"displacement": noisy(record, fraction=noise)["displacement"]})
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_a_transient_tells_the_mass_under_a_single_frequency(noise):
+    model, record = driven_by_a_sine(noise)
+    prepared = prepare_record(record)
+    fit = fit_model(model, prepared)
+    errors = np.sqrt(np.diag(covariance_of(fit, linearise(fit, prepared)))[: len(fit.keys)])
+    for key, truth, error in zip(fit.keys, (1.0, 0.8, 172.8), errors, strict=True):
+        assert fit.model.values[key] == pytest.approx(truth, rel=1e-6, abs=3.0 * error)
+        assert error < 0.01 * truth
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_a_steady_sine_does_not_tell_the_mass(noise):
+    """Without noise, what the record's rounding leaves chooses one mass, and its error is next to nothing."""
+    model, _ = driven_by_a_sine()
+    t = 0.01 * np.arange(4000)
+    motion = np.round(0.01 * np.sin(12.0 * t - 0.3), 9) + np.random.default_rng(4).normal(0.0, noise * 0.007, len(t))
+    prepared = prepare_record(Record(0.01, {"force": np.sin(12.0 * t), "displacement": motion}))
+    with pytest.raises(StudyError, match=r"drives one frequency, 1\.91 Hz, which cannot tell mass from stiffness"):
+        fit_model(model, prepared)
+    assert fit_model(model.with_values({"m": 1.0}), prepared).model.values["k"] == pytest.approx(239.6, rel=0.01)

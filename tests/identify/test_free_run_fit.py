@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from study.equations.free_run import FreeRun, predict, prepare
+from study.equations.free_run import FreeRun, predict_response, prepare
 from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import custom
@@ -67,7 +67,7 @@ def started(model: Model, record: Record) -> dict[str, float]:
     """What MI/SO makes of the record."""
     inputs, cut = reverse_inputs(model), Segments()
     responses = analyse(cross_spectra([*histories(inputs, record), record["force"]], record.dt, cut))
-    estimate = coefficients.fit(responses, inputs, (0.3, 10.0), cut.line_inflation())
+    estimate = coefficients.fit_coefficients(responses, inputs, (0.3, 10.0), cut.line_inflation())
     return dict(zip(estimate.symbols, (float(v) for v in estimate.values), strict=True))
 
 
@@ -109,7 +109,7 @@ def test_residual_and_covariance_are_those_of_the_estimates(
 ) -> None:
     model, record = systems["duffing"], noisy(records["duffing"], 0.05, 3)
     fit = fit_free_run(model, record, span=(100, 3000))
-    again = predict(fit.model, record, span=(100, 3000), initial=tuple(fit.initial))
+    again = predict_response(fit.model, record, span=(100, 3000), initial=tuple(fit.initial))
     np.testing.assert_allclose(record["displacement"][100:3000] - again, fit.residual, atol=1e-12)
     jacobian = prepare(model, record, fit.keys, span=(100, 3000)).respond(numbers(fit.model), fit.initial, 2)[1]
     scale = np.linalg.norm(jacobian, axis=0)
@@ -147,7 +147,7 @@ SHAPES = {
 @pytest.mark.parametrize("name", SHAPES)
 def test_shape_parameters_are_found(name: str, make_model: Make, report_force: Floats) -> None:
     model = with_effect(make_model, name)
-    clean = predict(model, Record(DT, {"force": report_force}), steps_per_sample=8)
+    clean = predict_response(model, Record(DT, {"force": report_force}), steps_per_sample=8)
     record = noisy(Record(DT, {"force": report_force, "displacement": clean}), 0.05, 5)
     values = numbers(model)
     start = {key: value * SHAPES[name].get(key, 0.9) for key, value in values.items()}
@@ -168,7 +168,7 @@ def test_acceleration_is_enough(systems: dict[str, Model], records: dict[str, Re
 
 def test_state_of_a_hysteresis_is_found_in_mid_record(make_model: Make, report_force: Floats) -> None:
     model = with_effect(make_model, "hysteresis")
-    clean = predict(model, Record(DT, {"force": report_force}), steps_per_sample=8)
+    clean = predict_response(model, Record(DT, {"force": report_force}), steps_per_sample=8)
     record = Record(DT, {"force": report_force, "displacement": clean})
     fit = fit_free_run(model, record, steps_per_sample=8, span=(3000, 6000))
     assert fit.rms < 1e-9 * np.std(clean)
@@ -252,10 +252,10 @@ def test_bad_arguments_are_named(systems: dict[str, Model], records: dict[str, R
         ("no 'k9'", lambda: fit_free_run(model, record, held=("k9",))),
         ("None for k3", lambda: fit_free_run(nothing, record)),
         ("no value for k3", lambda: fit_free_run(nothing, record, held=("k3",))),
-        ("no value for k3", lambda: predict(nothing, record)),
-        ("no response 'jerk'", lambda: predict(model, record, response="jerk")),
-        ("steps_per_sample is 0", lambda: predict(model, record, steps_per_sample=0)),
-        ("the span 9 to 9000", lambda: predict(model, record, span=(9, 9000))),
+        ("no value for k3", lambda: predict_response(nothing, record)),
+        ("no response 'jerk'", lambda: predict_response(model, record, response="jerk")),
+        ("steps_per_sample is 0", lambda: predict_response(model, record, steps_per_sample=0)),
+        ("the span 9 to 9000", lambda: predict_response(model, record, span=(9, 9000))),
         ("cannot be 'rest'", lambda: fit_free_run(model, record, initial="rest", restarts=(50,))),
         ("restarts \\(9, 5\\) must rise", lambda: predict_in_pieces(model, record, (9, 5))),
         ("has no k9", lambda: prepare(model, record, ("k9",))),

@@ -7,7 +7,7 @@ import pytest
 
 from study.equations.model import Model, free
 from study.equations.terms import custom, get
-from study.identify.frequency_domain.inputs import Part, histories, history, reverse_inputs
+from study.identify.frequency_domain.inputs import Part, histories, input_history, reverse_inputs
 from study.records.record import Record
 from study.support.errors import StudyError
 
@@ -124,7 +124,7 @@ def test_a_memory_that_is_short_beside_the_sampling_is_integrated_all_the_same()
     u, v = -10.0 * np.cos(5.0 * t), 50.0 * np.sin(5.0 * t)
     model = Model("dahl", (free(get("hysteresis")),)).with_values({"hysteresis.beta": beta, "hysteresis.gamma": 0.0})
     (item,) = reverse_inputs(model)
-    found = history(item, Record(dt, {"force": 0.0 * u, "displacement": u, "velocity": v}))
+    found = input_history(item, Record(dt, {"force": 0.0 * u, "displacement": u, "velocity": v}))
     exact = np.zeros_like(u)
     for i in range(1, len(u)):
         direction, way = np.sign(u[i] - u[i - 1]), abs(u[i] - u[i - 1])

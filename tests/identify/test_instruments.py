@@ -8,7 +8,7 @@ import pytest
 from study.identify import estimators
 from study.identify.estimators.base import Settings
 from study.identify.frequency_domain import instruments
-from study.identify.frequency_domain.inputs import Input, Part, history, reverse_inputs
+from study.identify.frequency_domain.inputs import Input, Part, input_history, reverse_inputs
 from study.records.excitation import displacement_noise
 from study.records.record import Record
 from study.records.spectra import Segments
@@ -54,7 +54,7 @@ def test_mean_of_any_shape_is_that_of_many_draws(shape):
     draws = np.random.default_rng(3).standard_normal((2, 400_000))
     noise = root @ draws
     moved = Record(0.02, {"force": noise[0], "displacement": 0.2 + noise[0], "velocity": 0.5 + noise[1]})
-    values = history(item, moved)
+    values = input_history(item, moved)
     found = instruments.expected(item, still(0.2, 0.5), spread)[0]
     assert abs(found - values.mean()) < 4.0 * values.std() / np.sqrt(values.size) + 1e-3 * abs(values.mean())
 
@@ -62,12 +62,12 @@ def test_mean_of_any_shape_is_that_of_many_draws(shape):
 def test_corrected_inputs_have_the_mean_of_the_true_ones(systems, records):
     clean = records["duffing_van_der_pol"]
     cube = reverse_inputs(systems["duffing_van_der_pol"])[1]
-    true = history(cube, clean)
+    true = input_history(cube, clean)
     raw, mended = [], []
     for seed in range(6):
         measured = noisy(clean, 0.2, seed)
-        mended.append(instruments.corrected([cube], measured, clean)[0])
-        raw.append(history(cube, measured))
+        mended.append(instruments.inputs_without_noise([cube], measured, clean)[0])
+        raw.append(input_history(cube, measured))
     slope = [float(np.mean([x @ true for x in found]) / (true @ true)) for found in (raw, mended)]
     u = clean["displacement"]
     drawn_to = 1.0 + 3.0 * 0.2 * np.mean(u**2) * np.mean(u**4) / np.mean(u**6)
@@ -119,7 +119,7 @@ def test_a_formula_of_a_missing_channel_is_refused(records):
     record = records["duffing"]
     lacking = replace(record, channels={name: record[name] for name in ("force", "displacement")})
     with pytest.raises(StudyError, match="velocity"):
-        instruments.corrected([one_input("v**3")], lacking, lacking)
+        instruments.inputs_without_noise([one_input("v**3")], lacking, lacking)
 
 
 def test_coherence_along_the_free_run_is_that_without_noise(systems, records):

@@ -35,7 +35,7 @@ def started(model: Model, record: Record) -> dict[str, float]:
     """What MI/SO makes of the record."""
     inputs, cut = reverse_inputs(model), Segments()
     responses = analyse(cross_spectra([*histories(inputs, record), record["force"]], record.dt, cut))
-    estimate = coefficients.fit(responses, inputs, (0.3, 10.0), cut.line_inflation())
+    estimate = coefficients.fit_coefficients(responses, inputs, (0.3, 10.0), cut.line_inflation())
     return dict(zip(estimate.symbols, (float(v) for v in estimate.values), strict=True))
 
 

@@ -11,11 +11,11 @@ from study.equations.simulate import Integrator, simulate
 from study.identify import estimators
 from study.identify.estimators.base import Settings
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
-from study.identify.frequency_domain.periodic import Periods, fit, steady
+from study.identify.frequency_domain.periodic import Periods, fit_periodic, steady
 from study.records.excitation import Excitation, force
 from study.records.record import Record
 from study.records.spectra import Segments
-from study.reproduction.config import load
+from study.reproduction.config import load_config
 from study.reproduction.identify_case import identify_case
 from study.support.errors import StudyError
 
@@ -113,7 +113,9 @@ def test_units_change_nothing(systems):
 
 def test_a_case_tells_the_period_that_its_table_has_lost(systems):
     record = replace(periodic(systems["linear"], 5), period=None)
-    known = load(Path(__file__).parents[2] / "config").identification_settings("linear", ("errors_in_variables",))
+    known = load_config(Path(__file__).parents[2] / "config").identification_settings(
+        "linear", ("errors_in_variables",)
+    )
     settings = known.model_copy(update={"also_assumed": "", "fit_band": BAND, "period": SAMPLES})
     found = identify_case(systems["linear"], record, settings)["errors_in_variables"]
     assert found.responses is None
@@ -134,7 +136,7 @@ def test_records_without_enough_periods(systems):
         with pytest.raises(StudyError, match=re.escape(says)):
             identified(systems["duffing"], spoilt)
     with pytest.raises(StudyError, match="a period of duffing has 12 lines from"):
-        fit(replace(record, period=64), reverse_inputs(systems["duffing"]), BAND)
+        fit_periodic(replace(record, period=64), reverse_inputs(systems["duffing"]), BAND)
 
 
 def test_shapes_that_differ_between_periods(systems):

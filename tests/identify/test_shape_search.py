@@ -34,14 +34,14 @@ POINTS = {
 
 @pytest.mark.parametrize("name", POINTS)
 def test_amplitudes_and_times_come_from_the_motion(name: str, base: SimpleNamespace) -> None:
-    found = shape_search.grid(get(name), base)
+    found = shape_search.points_to_try(get(name), base)
     np.testing.assert_allclose(found, POINTS[name], rtol=1e-12)
     keys = get(name).keys[1:]
     assert all(not get(name).physical(dict(zip(keys, point, strict=True))) for point in found)
 
 
 def test_frequencies_come_from_the_lines_of_the_residual(base: SimpleNamespace) -> None:
-    found = np.array(shape_search.grid(get("harmonic_force"), base))[:, 0] * N * DT
+    found = np.array(shape_search.points_to_try(get("harmonic_force"), base))[:, 0] * N * DT
     for line in LINES:
         for shift in (-0.35, 0.0, 0.35):
             assert np.min(np.abs(found - line - shift)) < 0.05
@@ -50,4 +50,4 @@ def test_frequencies_come_from_the_lines_of_the_residual(base: SimpleNamespace) 
 
 @pytest.mark.parametrize("name", [name for name, term in LIBRARY.items() if not term.parameters])
 def test_a_term_without_shape_parameters_is_tried_once(name: str, base: SimpleNamespace) -> None:
-    assert shape_search.grid(get(name), base) == [()]
+    assert shape_search.points_to_try(get(name), base) == [()]

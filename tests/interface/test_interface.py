@@ -287,15 +287,15 @@ def test_the_library_is_a_table_that_a_word_searches():
 
 
 def test_correlations_of_a_residual_are_those_of_their_definition():
-    from study.compare.residual_checks import correlation
+    from study.compare.residual_checks import cross_correlation
 
     random = np.random.default_rng(0)
     one, other = random.standard_normal(500), random.standard_normal(500)
     later = np.concatenate([np.zeros(7), one[:-7]])
-    by_lag = correlation(later, one, 20)
+    by_lag = cross_correlation(later, one, 20)
     assert int(np.argmax(by_lag)) - 19 == 7
     direct = np.sum(one[3:] * other[:-3]) / np.linalg.norm(one) / np.linalg.norm(other)
-    assert correlation(one, other, 20)[19 + 3] == pytest.approx(direct)
+    assert cross_correlation(one, other, 20)[19 + 3] == pytest.approx(direct)
 
 
 def test_the_checks_tell_a_right_model_in_noise_from_a_wrong_one():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from study.equations.free_run import predict
+from study.equations.free_run import predict_response
 from study.equations.model import Model, free
 from study.equations.terms import get
 from study.faults.accounting import accounted
@@ -22,7 +22,9 @@ def sampled(a_period, response="displacement", samples=1500):
     dt = 1.0 / (a_period * FINE)
     drive = force(Excitation("gaussian_lowpass", 60.0, "filtered", 4.0), samples * FINE, dt, 3)
     truth = LINEAR.with_values({"m": 1.0, "c": 0.377, "k": 39.5})
-    motion = predict(truth, Record(dt, {"force": drive}, dict(SI_UNITS)), response=response, steps_per_sample=2)
+    motion = predict_response(
+        truth, Record(dt, {"force": drive}, dict(SI_UNITS)), response=response, steps_per_sample=2
+    )
     seen = motion[::FINE] + displacement_noise(motion[::FINE], 1e-3, 2)
     return prepare_record(Record(dt * FINE, {"force": drive[::FINE], response: seen}, dict(SI_UNITS), "rig"))
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study.equations.free_run import predict
+from study.equations.free_run import predict_response
 from study.equations.model import Model, free
 from study.equations.terms import get
 from study.faults.accounting import accounted
@@ -27,7 +27,7 @@ def measured(model, response, noise, seed=1, samples=SAMPLES):
     """A record of a known system with so much noise (mean square over that of the response)."""
     drive = force(Excitation("gaussian_lowpass", 60.0, "filtered", 3.0), samples, DT, seed)
     record = Record(DT, {"force": drive}, dict(SI_UNITS), "rig")
-    clean = predict(model, record, response=response, steps_per_sample=4)
+    clean = predict_response(model, record, response=response, steps_per_sample=4)
     return record.with_channels({response: clean + displacement_noise(clean, noise, seed)})
 
 

@@ -40,12 +40,12 @@ MET, MISSED = Condition("c", "m", True), Condition("x above 2", "x 1", False)
 @pytest.fixture(scope="module")
 def settings() -> ClaimSettings:
     ensembles = Ensembles(seeds=SEEDS, first_seed=5001)
-    return config.load(ROOT / "config").settings.claims.model_copy(update={"ensembles": ensembles})
+    return config.load_config(ROOT / "config").settings.claims.model_copy(update={"ensembles": ensembles})
 
 
 @pytest.fixture(scope="module")
 def report() -> Reported:
-    return stated.load(ROOT / "config" / "reported.tsv")
+    return stated.load_reported(ROOT / "config" / "reported.tsv")
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def steps(settings: ClaimSettings) -> pd.DataFrame:
     record = evidence.record_settings(settings, evidence.Drive("linear", level=4.0))
     told = Settings(settings.segments.segments(), settings.fit_band)
     chosen = {name: models[name] for name in ("linear", "van_der_pol")}
-    return integrator_study.study(chosen, record, told, range(5001, 5004), ["raw", "filtered"])
+    return integrator_study.integrator_study(chosen, record, told, range(5001, 5004), ["raw", "filtered"])
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +109,7 @@ def test_together_is_met_only_as_a_whole() -> None:
 
 @pytest.mark.parametrize(("value", "met"), [(104.9, True), (105.1, False), (95.1, True), (94.9, False)])
 def test_close_stands_at_its_edge(value: float, met: bool) -> None:
-    assert judgement.close("x", Sample((value, value)), 100.0, 0.05).met is met
+    assert judgement.within_share("x", Sample((value, value)), 100.0, 0.05).met is met
 
 
 def test_a_sample_shows_mean_error_and_own_record() -> None:
@@ -179,7 +179,7 @@ def test_what_the_study_finds(judged: pd.DataFrame, name: str, said: str) -> Non
 
 
 def test_the_page_holds_every_row(judged: pd.DataFrame) -> None:
-    page = claims_table.page(judged)
+    page = claims_table.claims_page(judged)
     assert page.count("\n| [") == len(judged)
     assert page.count("<details>") == len(judged)
     beside = judged["where"].str.startswith(judgement.BESIDE)
@@ -216,19 +216,19 @@ def test_a_changed_coefficient_changes_the_verdicts(
 ) -> None:  # fmt: skip
     other = changed(tmp_path, settings, system, old, new)
     for claim in claims:
-        assert claims_table.judge(claim, found, report).verdict == "reproduced"
-        assert claims_table.judge(claim, other, report).verdict != "reproduced"
+        assert claims_table.judge_claim(claim, found, report).verdict == "reproduced"
+        assert claims_table.judge_claim(claim, other, report).verdict != "reproduced"
 
 
 def test_a_changed_statement_changes_the_verdict(found: evidence.Evidence, report: Reported) -> None:
     rows = dict(report.statements)
     rows["siso_stiffness"] = Statement(id="siso_stiffness", where="Section 5.2.2", what="k", value=400.0, unit="N/m")
-    assert claims_table.judge("siso_stiffness", found, Reported(rows)).verdict == "not reproduced"
+    assert claims_table.judge_claim("siso_stiffness", found, Reported(rows)).verdict == "not reproduced"
 
 
 def test_the_same_evidence_twice(settings: ClaimSettings, found: evidence.Evidence, report: Reported) -> None:
     again = evidence.Evidence(settings, evidence.models_of(ROOT / "models"), [])
-    first, second = (claims_table.judge("siso_frequency", whose, report) for whose in (found, again))
+    first, second = (claims_table.judge_claim("siso_frequency", whose, report) for whose in (found, again))
     assert first == second
 
 
@@ -261,14 +261,14 @@ def test_what_the_cubic_terms_add_at_the_lowest_level_is_what_siso_finds_too_muc
     assert single.siso("c").mean / 3.77 - 1.0 == pytest.approx(damper, rel=0.2)
     assert (
         f"adds {100 * spring:.0f} % to the force that follows u"
-        in claims_table.judge("levels_similar", found, report).why
+        in claims_table.judge_claim("levels_similar", found, report).why
     )
 
 
 def test_a_histogram_is_far_from_gaussian_by_its_shape_not_by_its_length(
     found: evidence.Evidence, report: Reported
 ) -> None:
-    claim = claims_table.judge("combined_histogram", found, report)
+    claim = claims_table.judge_claim("combined_histogram", found, report)
     assert "2.6 % lie beyond two standard deviations where a Gaussian has 4.6 %" in claim.why
     record = found.records(evidence.Drive("duffing_van_der_pol"))[0]["displacement"]
     short = np.split(record, 8)
@@ -291,7 +291,7 @@ def test_the_resonance_of_the_fast_mathieu_system_is_drawn_towards_half_its_stif
     turn = abs(np.angle(np.linalg.eigvals(np.array(ends).T)[0])) / (2.0 * math.pi)  # of a cycle in each period
     line = (1.0 - turn) / period
     assert 2.5 < line < 2.9
-    claim = claims_table.judge("mathieu_fast", found, report)
+    claim = claims_table.judge_claim("mathieu_fast", found, report)
     said = re.search(r"to ([0-9.]+) Hz, and its sum with f_m to ([0-9.]+) Hz", claim.why)
     assert said
     assert [float(x) for x in said.groups()] == pytest.approx([line, 5.0 + line], abs=0.11)
@@ -306,8 +306,8 @@ def test_instruments_are_judged_at_every_noise_by_their_own_bias(
         asked.append(noise)
         return {"m": Sample((-0.098, 0.0) if noise == 0.1 else (-0.01, 0.02)), "c": Sample((-0.2, 0.21))}
 
-    monkeypatch.setattr(noise_with_instruments, "biases", off)
-    claim = claims_table.judge("noise_instruments", found, report)
+    monkeypatch.setattr(noise_with_instruments, "relative_errors", off)
+    claim = claims_table.judge_claim("noise_instruments", found, report)
     assert asked == [0.05, 0.1, 0.2]
     assert claim.verdict == "reproduced", "a bias below the limit, and scatter that explains it"
     assert "10 % noise: m -4.9 +- 4.9 %, c +0.5 +- 20 %" in claim.measured
@@ -316,7 +316,7 @@ def test_instruments_are_judged_at_every_noise_by_their_own_bias(
 
 
 def test_raw_is_the_nearer_reading(found: evidence.Evidence, report: Reported) -> None:
-    rows = excitation_reading.study(found, report)
+    rows = excitation_reading.both_readings(found, report)
     raw, filtered = ((rows["nearer"] == reading).sum() for reading in ("raw", "filtered"))
     assert raw > filtered
     stiffness = rows.iloc[0]
@@ -356,7 +356,7 @@ def test_a_run_that_diverges_makes_error_free_worse_and_none_makes_it_better(
     settings: ClaimSettings, report: Reported, error: float, diverged: int, said: str
 ) -> None:
     some = evidence.Evidence(settings, evidence.models_of(ROOT / "models"), integrated(error, diverged))
-    claim = claims_table.judge("error_free", some, report)
+    claim = claims_table.judge_claim("error_free", some, report)
     assert claim.verdict == said
     assert ("2 of 4 runs of linear diverge (unit variance filtered)" in claim.measured) == (diverged == 2)
 
@@ -367,7 +367,7 @@ def test_diverged_runs_are_counted_by_name(steps: pd.DataFrame) -> None:
     named = rows["diverged_seeds"].iloc[0].split(", ")
     assert len(named) == rows["diverged"].iloc[0]
     assert all(" at " in n and n.endswith(" s") for n in named)
-    page = integrator_study.page(steps)
+    page = integrator_study.integrator_page(steps)
     assert f"{rows['diverged'].iloc[0]} of {rows['seeds'].iloc[0]} |" in page
 
 

@@ -15,7 +15,7 @@ from study.identify.estimators import ESTIMATORS, identify
 from study.identify.estimators.base import Settings
 from study.records.excitation import Excitation, force
 from study.records.spectra import Segments
-from study.reproduction.config import load
+from study.reproduction.config import load_config
 from study.reproduction.preconditions import CURVES
 from study.support.errors import StudyError
 
@@ -40,7 +40,7 @@ def spoil(path, old, new):
 def refused(folder):
     """The sentence."""
     with pytest.raises(StudyError) as caught:
-        load(folder)
+        load_config(folder)
     sentence = str(caught.value)
     assert "\n" not in sentence
     assert len(sentence) < 600
@@ -48,7 +48,7 @@ def refused(folder):
 
 
 def test_every_case_of_the_report_is_there():
-    study = load(ROOT / "config")
+    study = load_config(ROOT / "config")
     assert list(study.cases) == [
         "linear", "duffing", "van_der_pol", "duffing_van_der_pol", "mathieu", "dead_band", "extreme",
         "variance_0.2", "variance_0.5", "variance_2.0", "noise_5", "noise_10", "noise_20",
@@ -59,7 +59,7 @@ def test_every_case_of_the_report_is_there():
 
 
 def test_settings_of_a_case():
-    study = load(ROOT / "config")
+    study = load_config(ROOT / "config")
     record = study.record_settings("noise_10")
     assert record.noise == 0.1
     assert record.noise_seed == study.settings.noise_seed
@@ -78,7 +78,7 @@ def test_settings_of_a_case():
 def test_figures_without_a_number_are_named_after_the_case(folder):
     with (folder / "cases.tsv").open("a") as table:
         table.write("mine\tduffing\treport\t3\t0\t\t\t\t\t\t\t\t\t\tMy own system\n")
-    assert load(folder).cases["mine"].figures == {
+    assert load_config(folder).cases["mine"].figures == {
         kind: f"mine_{kind}" for kind in ("linear", "nonlinear", "coherence", "histogram")
     }
 
@@ -265,15 +265,15 @@ def test_an_estimator_that_needs_periods(folder):
         folder
     )
     spoil(folder / "config.yaml", "kind: gaussian_lowpass", "kind: gaussian_lowpass\n    periods: 8")
-    study = load(folder)
+    study = load_config(folder)
     assert study.identification_settings("linear").period == 1024
-    assert load(ROOT / "config").identification_settings("linear").period is None
+    assert load_config(ROOT / "config").identification_settings("linear").period is None
 
 
 @pytest.mark.parametrize("case", ["linear", "noise_10"])
 def test_what_a_job_is_told_survives_as_plain_data(case):
     """Snakemake keeps settings as text: a job reads the same values from it."""
-    study = load(ROOT / "config")
+    study = load_config(ROOT / "config")
     record, identification = study.record_settings(case), study.identification_settings(case)
     for settings in (record, record.without_seeds(), identification):
         told = json.loads(json.dumps(settings.plain()))

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from study.commands import measurements
-from study.reproduction.config import load
+from study.reproduction.config import load_config
 from study.reproduction.settings import StudySettings
-from study.support.config_files import Row, read_rows, read_yaml
+from study.support.config_files import TableRow, read_rows, read_yaml
 from study.support.errors import StudyError
 
 ROOT = Path(__file__).parents[2]
@@ -33,7 +33,7 @@ def spoil(path, old, new):
 def refused(folder):
     """The sentence."""
     with pytest.raises(StudyError) as caught:
-        load(folder)
+        load_config(folder)
     sentence = str(caught.value)
     assert "\n" not in sentence
     assert len(sentence) < 600
@@ -63,16 +63,16 @@ def test_names_that_no_file_or_rule_may_have(folder, name):
 def test_a_record_that_is_a_case(folder):
     for name in ("silverbox", "silverbox_climb"):
         with pytest.raises(StudyError, match=rf"row 2 \(record 'silverbox'\): '{name}' is a case of cases.tsv"):
-            measurements.load(folder, [name])
+            measurements.load_measurements(folder, [name])
     for name in ("silverbox_climb", "damper"):
         with pytest.raises(StudyError, match=f"'{name}' is another target of the workflow; give the record"):
-            measurements.load(folder, targets=[name])
+            measurements.load_measurements(folder, targets=[name])
 
 
 def test_a_byte_order_mark_is_none_of_the_table(folder):
     table = folder / "cases.tsv"
     table.write_bytes(b"\xef\xbb\xbf" + table.read_bytes())
-    assert load(folder).cases == load(ROOT / "config").cases
+    assert load_config(folder).cases == load_config(ROOT / "config").cases
 
 
 def test_rows_are_counted_as_an_editor_counts_lines(folder):
@@ -130,7 +130,7 @@ def test_more_inputs_than_a_band_tells_apart(folder):
     assert "half_width is 5; 2 inputs of degree 2 have 9 unknowns in a band, which needs 8 or more" in refused(folder)
 
 
-class Pair(Row):
+class Pair(TableRow):
     a: str
     b: float
 

@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 
 from study.reproduction import ensemble
-from study.reproduction.config import load
+from study.reproduction.config import load_config
 from study.reproduction.settings import IntegratorSettings
 
-CONFIG = load(Path(__file__).parents[2] / "config")
+CONFIG = load_config(Path(__file__).parents[2] / "config")
 
 
 def told(case, **record):
@@ -55,7 +55,7 @@ def test_standard_errors_do_not_promise_too_much(systems):
 
     standard errors come out up to three times the scatter, and must not come out below it.
     """
-    found = ensemble.rates(ensemble.estimates(systems["duffing"], *told("duffing"), range(100, 124)))
+    found = ensemble.tolerance_rates(ensemble.estimates(systems["duffing"], *told("duffing"), range(100, 124)))
     own = found[found["estimator"] == "miso"].set_index("parameter")
     assert (own["within_tolerance"] == 1.0).all()
     assert own["error_to_scatter"].between(0.9, 4.5).all()
@@ -63,7 +63,7 @@ def test_standard_errors_do_not_promise_too_much(systems):
 
 
 def test_rates():
-    found = ensemble.rates(rows(True, True, True, False, estimate=[355.0, 356.0, 355.0, 390.0])).iloc[0]
+    found = ensemble.tolerance_rates(rows(True, True, True, False, estimate=[355.0, 356.0, 355.0, 390.0])).iloc[0]
     assert found["within_tolerance"] == 0.75
     assert found["rate_error"] == pytest.approx(math.sqrt(0.75 * 0.25 / 4))
     assert found["mean"] == 364.0
@@ -73,7 +73,7 @@ def test_rates():
 
 def test_a_seed_without_an_estimate_does_not_meet_the_tolerance():
     table = pd.concat([rows(True, True, True, True), rows(True, True, parameter="f_n")])
-    found = ensemble.rates(table).set_index("parameter")
+    found = ensemble.tolerance_rates(table).set_index("parameter")
     assert found["within_tolerance"]["k"] == 1.0
     assert found["within_tolerance"]["f_n"] == 0.5
     assert found["found"]["f_n"] == 2
@@ -88,15 +88,20 @@ def test_a_run_that_diverges_counts_as_missed(systems):
     lost = table[table["parameter"] == "diverged"]
     assert 0 < len(lost) < 8, "some diverge, not all"
     assert (lost["estimate"] > 0.0).all(), "with the time at which they do"
-    found = ensemble.rates(table)
+    found = ensemble.tolerance_rates(table)
     assert (found["found"] == 8 - len(lost)).all()
     assert (found["within_tolerance"] <= (8 - len(lost)) / 8).all()
 
 
 def test_page_names_what_is_met_too_seldom():
-    table = pd.concat([ensemble.rates(rows(*[True] * 99, False)), ensemble.rates(rows(True, False, parameter="c"))])
-    page = ensemble.page(table, {"a": 0.0})
+    table = pd.concat(
+        [
+            ensemble.tolerance_rates(rows(*[True] * 99, False)),
+            ensemble.tolerance_rates(rows(True, False, parameter="c")),
+        ]
+    )
+    page = ensemble.ensemble_page(table, {"a": 0.0})
     assert "1 of 2 MI/SO estimates of noise-free cases meet" in page
     assert "- a: c in 50.0" in page
     assert ": k in" not in page
-    assert "0 of 0" in ensemble.page(table, {"a": 0.1}), "cases with noise are not judged"
+    assert "0 of 0" in ensemble.ensemble_page(table, {"a": 0.1}), "cases with noise are not judged"

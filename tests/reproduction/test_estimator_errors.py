@@ -12,13 +12,13 @@ from matplotlib import style
 from study.figures import page
 from study.identify.estimators import ESTIMATORS
 from study.reproduction import ensemble, error_pages, estimator_errors
-from study.reproduction.config import load
+from study.reproduction.config import load_config
 from study.reproduction.pictures import error_dots as drawn
 from study.support import document
 from study.support.errors import StudyError
 
 ROOT = Path(__file__).parents[2]
-CONFIG = load(ROOT / "config")
+CONFIG = load_config(ROOT / "config")
 NOISE = {"quiet": 0.0, "noisy": 0.1}
 
 
@@ -108,8 +108,8 @@ def test_largest_bias_is_named_by_its_parameter():
 
 def test_a_kept_table_over_more_seeds_is_of_the_same_study(table):
     kept = table.assign(seeds=200, median_error=0.5 * table["median_error"])
-    assert estimator_errors.differing(table, kept.sample(frac=1.0, random_state=1)) == []
-    assert estimator_errors.differing(table[table["estimator"] == "miso"], kept) == []
+    assert estimator_errors.differing_cases(table, kept.sample(frac=1.0, random_state=1)) == []
+    assert estimator_errors.differing_cases(table[table["estimator"] == "miso"], kept) == []
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def test_a_kept_table_over_more_seeds_is_of_the_same_study(table):
 def test_a_kept_table_of_another_study_shows(table, column, factor):
     kept, row = table.copy(), table.index[table["case"] == "noisy"][0]
     kept.loc[row, column] = "other" if factor is None else table.loc[row, column] * factor
-    assert estimator_errors.differing(table, kept) == ["noisy"]
+    assert estimator_errors.differing_cases(table, kept) == ["noisy"]
 
 
 def test_first_seeds_stand_apart():
@@ -130,7 +130,7 @@ def test_first_seeds_stand_apart():
 
 
 def test_words_say_who_is_nearer(table):
-    siso, output_error = error_pages.sentences(table, NOISE)
+    siso, output_error = error_pages.error_sentences(table, NOISE)
     assert "without noise nearer than MI/SO in 0 of 2 parameters" in siso
     assert "with noise on the displacement nearer than MI/SO in 2 of 2 parameters" in output_error
 
@@ -155,7 +155,7 @@ def test_factors_are_short():
 
 def test_the_picture_shows_each_estimator_at_its_error(table):
     with style.context(ROOT / "study" / "figures" / "study.mplstyle"):
-        figure = drawn.errors(table, list(NOISE))
+        figure = drawn.error_dots(table, list(NOISE))
     panel = next(axes for axes in figure.axes if axes.get_title(loc="left") == "stiffness k")
     (line,) = (line for line in panel.lines if line.get_label() == "output error")
     expected = table[(table["estimator"] == "output_error") & (table["parameter"] == "k")]["median_error"]
@@ -167,7 +167,7 @@ def test_the_picture_shows_each_estimator_at_its_error(table):
 def test_an_estimator_that_finds_nothing_stands_at_the_edge(table):
     lost = table.assign(median_error=math.inf, standard_error=math.inf)
     with style.context(ROOT / "study" / "figures" / "study.mplstyle"):
-        figure = drawn.errors(lost, list(NOISE))
+        figure = drawn.error_dots(lost, list(NOISE))
         assert page.rendered(figure, "png").startswith(b"\x89PNG")
     assert {
         float(x) for a in figure.axes for line in a.lines if line.get_label() == "MI/SO" for x in line.get_xdata()
@@ -184,7 +184,7 @@ def test_the_kept_table_is_what_this_code_gives(case, names, systems):
     model = systems[CONFIG.cases[case].model]
     own = estimator_errors.errors(ensemble.estimates(model, *settings, [7001, 7002], workers=1))
     kept = pd.read_csv(ROOT / "docs" / "estimators.csv")
-    assert estimator_errors.differing(own, kept) == [], "other settings, other code, or other rounding"
+    assert estimator_errors.differing_cases(own, kept) == [], "other settings, other code, or other rounding"
     assert list(kept.columns) == estimator_errors.COLUMNS
     assert set(kept["seeds"]) == {200}
     gains = kept[kept["case"] == case].set_index(["estimator", "parameter"])["gain"]

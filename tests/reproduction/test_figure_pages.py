@@ -62,7 +62,7 @@ def coherence_table(system):
 
 
 def one(system="duffing", number=1, **kwargs):
-    return curves.responses(response_table(system, **kwargs), 10.0)[number - 1]
+    return curves.input_responses(response_table(system, **kwargs), 10.0)[number - 1]
 
 
 def axes():
@@ -90,9 +90,9 @@ def products(tmp_path):
 
 def test_same_bytes_each_time_and_a_look_that_the_sheet_decides():
     def made():
-        figure, panels = page.page("Title", "what is shown")
-        frequency_response.magnitude(panels[0], one(), "N/m")
-        page.legend(figure, panels, bands=True)
+        figure, panels = page.empty_page("Title", "what is shown")
+        frequency_response.magnitude_panel(panels[0], one(), "N/m")
+        page.shared_legend(figure, panels, bands=True)
         return figure
 
     for kind in ("png", "svg"):
@@ -130,7 +130,7 @@ def test_nothing_overlaps_on_any_page(products, system, kind, monkeypatch, tmp_p
     seen = []
     monkeypatch.setattr(page, "rendered", lambda figure, _: seen.append(figure) or b"")
     title = "Extreme Duffing-Van der Pol system, input variance 0.2"
-    identified_figures.draw(*products(system), {kind: [tmp_path / "a.png"]}, title=title, style=SHEET)
+    identified_figures.draw_identified(*products(system), {kind: [tmp_path / "a.png"]}, title=title, style=SHEET)
     check_layout(seen[0])
 
 
@@ -139,7 +139,9 @@ def test_there_is_room_for_many_estimators(products, monkeypatch, tmp_path):
     monkeypatch.setattr(page, "rendered", lambda figure, _: seen.append(figure) or b"")
     names = (*styles.ESTIMATORS, "another_one")
     paths = products("duffing_van_der_pol", spread=0.5, estimators=names)
-    identified_figures.draw(*paths, {k: [tmp_path / k] for k in ("linear", "nonlinear")}, title="Noise", style=SHEET)
+    identified_figures.draw_identified(
+        *paths, {k: [tmp_path / k] for k in ("linear", "nonlinear")}, title="Noise", style=SHEET
+    )
     for figure in seen:
         check_layout(figure)
     assert {"local polynomial", "95 % band"} <= {t.get_text() for t in seen[0].legends[0].get_texts()}
@@ -147,7 +149,7 @@ def test_there_is_room_for_many_estimators(products, monkeypatch, tmp_path):
 
 def test_draw_writes_each_kind_twice(products, tmp_path):
     outputs = {kind: [tmp_path / f"{kind}.{ending}" for ending in ("png", "svg")] for kind in KINDS}
-    identified_figures.draw(*products("duffing"), outputs, title="Duffing system", style=SHEET)
+    identified_figures.draw_identified(*products("duffing"), outputs, title="Duffing system", style=SHEET)
     for png, svg in outputs.values():
         assert png.read_bytes().startswith(b"\x89PNG")
         assert b"</svg>" in svg.read_bytes()
@@ -155,7 +157,7 @@ def test_draw_writes_each_kind_twice(products, tmp_path):
 
 def test_draw_refuses_an_unknown_kind(products, tmp_path):
     with pytest.raises(StudyError, match="no kind of figure 'other'; known are linear"):
-        identified_figures.draw(*products("duffing"), {"other": [tmp_path / "a.png"]}, title="", style=SHEET)
+        identified_figures.draw_identified(*products("duffing"), {"other": [tmp_path / "a.png"]}, title="", style=SHEET)
 
 
 @pytest.mark.parametrize(
@@ -168,7 +170,7 @@ def test_preliminary_figures(products, tmp_path, system, kind, monkeypatch):
     seen, real = [], page.rendered
     monkeypatch.setattr(page, "rendered", lambda figure, ending: seen.append(figure) or real(figure, ending))
     output = tmp_path / "a.svg"
-    preliminary_figures.draw(source, {kind: [output]}, style=SHEET, segments=Segments(256))
+    preliminary_figures.draw_preliminary(source, {kind: [output]}, style=SHEET, segments=Segments(256))
     assert b"</svg>" in output.read_bytes()
     check_layout(seen[0])
 
@@ -183,4 +185,4 @@ def test_the_stretch_of_force_is_as_long_as_a_segment(products, length):
 def test_preliminary_refuses_an_unknown_kind(products, tmp_path):
     source = preliminary_figures.Source(products("plain")[0], ROOT / "models" / "linear.yaml", "")
     with pytest.raises(StudyError, match="no kind of figure 'other'; known are pattern"):
-        preliminary_figures.draw(source, {"other": [tmp_path / "a.png"]}, style=SHEET, segments={})
+        preliminary_figures.draw_preliminary(source, {"other": [tmp_path / "a.png"]}, style=SHEET, segments={})

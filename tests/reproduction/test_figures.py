@@ -62,7 +62,7 @@ def coherence_table(system):
 
 
 def one(system="duffing", number=1, **kwargs):
-    return curves.responses(response_table(system, **kwargs), 10.0)[number - 1]
+    return curves.input_responses(response_table(system, **kwargs), 10.0)[number - 1]
 
 
 def axes():
@@ -122,7 +122,7 @@ def test_no_two_estimators_look_alike_in_grey():
     looks = [*styles.ESTIMATORS.values(), styles.look("something_new")]
     assert len({str(look.dash) for look in looks}) == len(looks)
     assert styles.look("something_new").label == "something new"
-    assert styles.rank("miso") < styles.rank("siso") < styles.rank("something_new")
+    assert styles.legend_place("miso") < styles.legend_place("siso") < styles.legend_place("something_new")
 
 
 def test_figures_need_no_pyplot():
@@ -136,7 +136,7 @@ def test_figures_need_no_pyplot():
 
 
 def test_responses_are_sorted_by_input_and_estimator_and_leave_out_zero_frequency():
-    first, second = curves.responses(response_table("duffing"), 10.0)
+    first, second = curves.input_responses(response_table("duffing"), 10.0)
     assert [c.estimator for c in first.curves] == ["miso", "siso"]
     assert [c.estimator for c in second.curves] == ["miso"]
     assert (first.number, second.shape) == (1, "u**3")
@@ -144,14 +144,14 @@ def test_responses_are_sorted_by_input_and_estimator_and_leave_out_zero_frequenc
     assert first.frequency[-1] == pytest.approx(10.0)
     np.testing.assert_allclose(first.exact, LINEAR[1:101])
     assert one(exact=False).exact is None
-    chosen = curves.responses(response_table("duffing"), 10.0, ["siso"])
+    chosen = curves.input_responses(response_table("duffing"), 10.0, ["siso"])
     assert [[c.estimator for c in item.curves] for item in chosen] == [["siso"]]
 
 
 def test_the_band_holds_95_percent_of_real_parts_and_of_magnitudes():
     rng = np.random.default_rng(11)
     noise = (rng.standard_normal((2, 200_000)).T @ [1.0, 1j]) * 3.0 / np.sqrt(2.0)
-    curve = curves.Curve("miso", np.ones(len(noise)), 400.0 + noise, np.full(len(noise), 3.0))
+    curve = curves.ResponseCurve("miso", np.ones(len(noise)), 400.0 + noise, np.full(len(noise), 3.0))
     assert np.mean(np.abs(curve.values.real - 400.0) < curve.half_width) == pytest.approx(0.95, abs=0.003)
     assert np.mean(np.abs(np.abs(curve.values) - 400.0) < curve.half_width) == pytest.approx(0.95, abs=0.003)
 
@@ -170,7 +170,7 @@ def drawn(panel):
 
 def test_magnitude_draws_each_estimate_in_its_look():
     item = one()
-    lines = drawn(frequency_response.magnitude(axes(), item, "N/m"))
+    lines = drawn(frequency_response.magnitude_panel(axes(), item, "N/m"))
     assert list(lines) == ["MI/SO", "SI/SO", "exact"]
     np.testing.assert_allclose(lines["MI/SO"].get_ydata(), np.abs(item.curves[0].values))
     np.testing.assert_allclose(lines["exact"].get_ydata(), np.abs(LINEAR[1:101]))
@@ -180,12 +180,12 @@ def test_magnitude_draws_each_estimate_in_its_look():
 
 
 def test_magnitude_without_an_exact_function_is_that_of_a_measured_record():
-    assert list(drawn(frequency_response.magnitude(axes(), one(exact=False), "N/m"))) == ["MI/SO", "SI/SO"]
+    assert list(drawn(frequency_response.magnitude_panel(axes(), one(exact=False), "N/m"))) == ["MI/SO", "SI/SO"]
 
 
 def test_magnitude_band_is_about_the_curve():
     panel, item = axes(), one(spread=0.1)
-    frequency_response.magnitude(panel, item, "N/m")
+    frequency_response.magnitude_panel(panel, item, "N/m")
     edges = panel.collections[0].get_paths()[0].vertices
     at = np.isclose(edges[:, 0], item.frequency[50])
     size, half = abs(item.curves[0].values[50]), item.curves[0].half_width[50]
@@ -196,17 +196,17 @@ def test_magnitude_band_is_about_the_curve():
 @pytest.mark.parametrize(("angle", "shown"), [(179.0, 179.0), (-179.0, 181.0), (-10.0, -10.0), (0.0, 0.0)])
 def test_phase_does_not_wrap_at_180_degrees(angle, shown):
     frequency = np.array([1.0, 2.0])
-    curve = curves.Curve("miso", frequency, np.full(2, np.exp(1j * np.radians(angle))), np.zeros(2))
+    curve = curves.ResponseCurve("miso", frequency, np.full(2, np.exp(1j * np.radians(angle))), np.zeros(2))
     item = curves.InputResponse(1, "u", (curve,), frequency, None)
-    np.testing.assert_allclose(drawn(frequency_response.phase(axes(), item))["MI/SO"].get_ydata(), shown)
+    np.testing.assert_allclose(drawn(frequency_response.phase_panel(axes(), item))["MI/SO"].get_ydata(), shown)
 
 
 def test_phase_leaves_a_gap_where_it_wraps():
     frequency = np.arange(1.0, 4.0)
-    curve = curves.Curve("miso", frequency, np.exp(1j * np.radians([-80.0, -100.0, -100.0])), np.zeros(3))
+    curve = curves.ResponseCurve("miso", frequency, np.exp(1j * np.radians([-80.0, -100.0, -100.0])), np.zeros(3))
     item = curves.InputResponse(1, "u", (curve,), frequency, None)
     np.testing.assert_allclose(
-        drawn(frequency_response.phase(axes(), item))["MI/SO"].get_ydata(), [-80.0, np.nan, 260.0]
+        drawn(frequency_response.phase_panel(axes(), item))["MI/SO"].get_ydata(), [-80.0, np.nan, 260.0]
     )
 
 
@@ -224,7 +224,7 @@ def test_imaginary_part_of_a_damping_term_is_logarithmic_and_marks_wrong_signs()
     table = response_table("duffing_van_der_pol")
     line = (table["input"] == 2) & np.isclose(table["frequency"], 5.0)
     table.loc[line, "imag"] *= -1.0
-    item = curves.responses(table, 10.0)[1]
+    item = curves.input_responses(table, 10.0)[1]
     real, imaginary = axes(), axes()
     frequency_response.real_and_imaginary(real, imaginary, item, "N/m^3", frequency_response.common_span([item]))
     assert (real.get_yscale(), imaginary.get_yscale()) == ("linear", "log")
@@ -238,7 +238,7 @@ def test_imaginary_part_of_a_damping_term_is_logarithmic_and_marks_wrong_signs()
 def test_a_curve_has_a_gap_where_its_band_is_taller_than_the_panel():
     frequency, error = np.arange(1.0, 11.0), np.full(10, 0.1)
     error[6] = 100.0
-    curve = curves.Curve("miso", frequency, np.full(10, 2.0 + 1.0j), error)
+    curve = curves.ResponseCurve("miso", frequency, np.full(10, 2.0 + 1.0j), error)
     item = curves.InputResponse(2, "u**3", (curve,), frequency, np.full(10, 2.0 + 1.0j))
     real, imaginary = Figure().subplots(2)
     frequency_response.real_and_imaginary(real, imaginary, item, "N/m^3", frequency_response.common_span([item]))
@@ -250,18 +250,18 @@ def test_a_curve_has_a_gap_where_its_band_is_taller_than_the_panel():
 def test_real_part_that_is_zero_is_seen_to_be_small_beside_the_function():
     table = response_table("duffing_van_der_pol")
     table[["real", "exact_real"]] -= 2e7 * (table["input"] == 2).to_numpy()[:, None]
-    item = curves.responses(table, 10.0)[1]
+    item = curves.input_responses(table, 10.0)[1]
     assert frequency_response.common_span([item]) >= 1.5 * np.median(np.abs(item.exact))
 
 
 def test_one_scale_for_inputs_of_one_unit():
-    second, third = curves.responses(response_table("mathieu"), 10.0)[1:]
+    second, third = curves.input_responses(response_table("mathieu"), 10.0)[1:]
     assert frequency_response.common_span([second, third]) > 2.0 * frequency_response.common_span([third])
 
 
 def test_cumulative_coherence_names_what_each_curve_adds():
     shares = curves.coherences(coherence_table("mathieu"), 10.0)
-    lines = drawn(coherence.cumulative(axes(), shares))
+    lines = drawn(coherence.cumulative_panel(axes(), shares))
     first, second, _ = lines
     assert first.startswith("$u$: linear damping + Van der Pol")
     assert second.startswith(r"+ $u\,\mathrm{cos}")
@@ -273,7 +273,7 @@ def test_cumulative_coherence_names_what_each_curve_adds():
 
 def test_histogram_is_in_the_unit_of_its_axis():
     counts = histogram(0.002 * np.random.default_rng(1).standard_normal(4000))
-    panel = distribution.histogram(axes(), counts, "displacement", "m")
+    panel = distribution.histogram_panel(axes(), counts, "displacement", "m")
     assert panel.get_xlabel() == "displacement (mm)"
     bars = panel.patches[0].get_data()
     assert np.sum(bars.values * np.diff(bars.edges)) == pytest.approx(1.0)
@@ -286,7 +286,7 @@ def test_histogram_is_in_the_unit_of_its_axis():
 def test_patterns_share_their_scales():
     left, right = axes(), axes()
     grid = np.linspace(-1.0, 1.0, 9)
-    force_patterns.patterns(left, right, Pattern(0.01 * grid, grid), Pattern(0.02 * grid, 3.0 * grid), SI_UNITS)
+    force_patterns.pattern_panels(left, right, Pattern(0.01 * grid, grid), Pattern(0.02 * grid, 3.0 * grid), SI_UNITS)
     assert left.get_xlim() == right.get_xlim()
     assert left.get_ylim() == right.get_ylim()
     assert left.get_ylim()[1] > 3.0

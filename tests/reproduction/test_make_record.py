@@ -8,12 +8,12 @@ import pytest
 
 from study.identify.estimators import ESTIMATORS
 from study.reproduction import tables
-from study.reproduction.config import load
+from study.reproduction.config import load_config
 from study.reproduction.identify_case import assumed_model, estimator_settings, identify_case
 from study.reproduction.make_record import make_record
 from study.support.errors import DivergenceError, StudyError
 
-CONFIG = load(Path(__file__).parents[2] / "config")
+CONFIG = load_config(Path(__file__).parents[2] / "config")
 
 
 def settings(case, **changed):
@@ -81,7 +81,7 @@ def test_an_estimator_whose_model_diverges_leaves_the_others_alone(systems, reco
     assert found["output_error"].note.startswith("output_error finds nothing in linear: the free run diverges")
     assert found["output_error"].parameters == ()
     assert found["miso"].estimate is not None
-    assert set(tables.parameters("linear", systems["linear"], found, told)["estimator"]) == {"miso"}
+    assert set(tables.parameter_table("linear", systems["linear"], found, told)["estimator"]) == {"miso"}
 
 
 def test_every_estimator_but_miso_tells_a_relaxation_from_the_spring(make_model):

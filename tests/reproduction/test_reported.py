@@ -15,13 +15,13 @@ HEADING = "id\twhere\twhat\tvalue\tunit\n"
 
 @pytest.fixture(scope="module")
 def stated() -> reported.Reported:
-    return reported.load(ROOT / "config" / "reported.tsv")
+    return reported.load_reported(ROOT / "config" / "reported.tsv")
 
 
 def load(folder: Path, rows: str) -> reported.Reported:
     path = folder / "reported.tsv"
     path.write_text(HEADING + rows, encoding="utf-8")
-    return reported.load(path)
+    return reported.load_reported(path)
 
 
 @pytest.mark.parametrize("system", TABLE_1)

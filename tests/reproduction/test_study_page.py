@@ -35,7 +35,7 @@ def page():
         Picture("Another", "Figure 22", "its other path", PNG),
         Picture("A <system>", "Figure 23", "its coherence", PNG),
     ]
-    return study_page.page(tables, pictures).decode()
+    return study_page.study_page(tables, pictures).decode()
 
 
 class Outline(HTMLParser):
@@ -72,7 +72,7 @@ def test_the_page_asks_for_nothing_from_anywhere(page):
 
 
 def test_a_claim_has_one_line_and_its_conditions_are_folded():
-    text = claims_table.page(pd.concat([CLAIMS, LONG], ignore_index=True))
+    text = claims_table.claims_page(pd.concat([CLAIMS, LONG], ignore_index=True))
     lines = [line for line in text.splitlines() if line.startswith("| [")]
     assert len(lines) == 4
     assert all(len(cell) <= LONGEST + 10 for line in lines for cell in line.split("|") if cell.strip())

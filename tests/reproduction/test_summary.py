@@ -71,21 +71,21 @@ def flat(text):
 
 
 def test_the_verdict_opens_the_page_and_the_reasons_follow(tables):
-    page = document.markdown(summary.blocks(tables))
+    page = document.markdown(summary.summary_blocks(tables))
     assert "1 of 3 statements are reproduced" in "".join(page.splitlines()[:4])
     order = [page.index(words) for words in ("because of c", "500 N/m", "Parameters by case", "Run times")]
     assert order == sorted(order)
 
 
 def test_the_errors_of_the_estimators_have_a_page_of_their_own(tables):
-    page = flat(document.markdown(summary.estimators(tables)))
+    page = flat(document.markdown(summary.estimator_blocks(tables)))
     assert "| quiet | k | 2 % | 0.04 % (x 50) |" in page
     assert "![Errors of the estimators by parameter and case](../figures/estimators.png)" in page
-    assert "Errors of the estimators by parameter" not in document.markdown(summary.blocks(tables))
+    assert "Errors of the estimators by parameter" not in document.markdown(summary.summary_blocks(tables))
 
 
 def test_counts_are_counted(tables):
-    page = flat(document.markdown(summary.blocks(tables)))
+    page = flat(document.markdown(summary.summary_blocks(tables)))
     assert "**1 of 3 statements are reproduced**, 1 partly, 1 not." in page
     assert "Without noise, MI/SO recovers 2 of 2 parameters of 1 cases" in page
     assert "With noise on the displacement, 0 of 1 parameters of 1 cases" in page
@@ -97,14 +97,14 @@ def test_a_study_without_noise_does_not_speak_of_it():
 
 
 def test_parameters_stand_side_by_side(tables):
-    page = flat(document.markdown(summary.parameters(tables)))
+    page = flat(document.markdown(summary.parameter_blocks(tables)))
     assert "| case | parameter | true | tolerance | siso | miso |" in page
     assert "| quiet | k | 355.3 | 0.5 % | **500 ± 4 (+41 %)** | 355 ± 0.3 (-0.08 %) |" in page
     assert "| quiet | k3 | 0 | 100000 | | 10 ± 20 |" in page
 
 
 def test_failing_claims_come_with_their_reasons_the_worst_first(tables):
-    page = document.markdown(summary.failing(tables))
+    page = document.markdown(summary.failing_claims(tables))
     assert page.index("because of c") < page.index("because of b")
     assert "flat" not in page
 
@@ -156,7 +156,7 @@ class Tags(HTMLParser):
 
 def test_html_is_whole_and_escapes_what_it_shows(tables):
     tags = Tags()
-    tags.feed(document.page("A <title>", summary.blocks(tables)))
+    tags.feed(document.document_page("A <title>", summary.summary_blocks(tables)))
     assert tags.open == []
     assert "|A_1| <is> flat" in tags.words
     assert "claims.md" in " ".join(tags.words), "links become words"
@@ -171,7 +171,7 @@ def test_an_empty_table_says_so():
 
 
 def test_structures_stand_in_the_verdict_and_have_a_section(tables):
-    page = flat(document.markdown(summary.blocks(tables)))
+    page = flat(document.markdown(summary.summary_blocks(tables)))
     verdict = page[: page.index("What is not reproduced")]
     assert "1 of 2 claims hold; MI/SO recovers 1 of 2 coefficients of 1 cases" in verdict
     section = page[page.index("Structures of several coordinates", page.index("Parameters by case")) :]

@@ -10,11 +10,11 @@ import pytest
 from study.identify.estimators.base import Identified, Parameter
 from study.identify.frequency_domain.responses import Responses
 from study.reproduction import tables
-from study.reproduction.config import load
+from study.reproduction.config import load_config
 from study.reproduction.identify_case import identify_case
 from study.support.errors import StudyError
 
-CONFIG = load(Path(__file__).parents[2] / "config")
+CONFIG = load_config(Path(__file__).parents[2] / "config")
 JUDGED = CONFIG.identification_settings("duffing").model_copy(update={"relative": {"k": 0.01}, "absolute": {"k": 2.0}})
 
 
@@ -40,18 +40,18 @@ def settings():
     ],
 )
 def test_verdict(true, value, error, within):
-    judged = tables.judge("k", true, value, JUDGED)
+    judged = tables.judge_estimate("k", true, value, JUDGED)
     assert judged["relative_error"] == pytest.approx(error, nan_ok=True)
     assert judged["tolerance"] == (0.01 if true else 2.0)
     assert judged["within_tolerance"] is within
 
 
 def test_what_has_no_tolerance_is_not_met():
-    assert tables.judge("own", 1.0, 1.0, JUDGED)["within_tolerance"] is False
+    assert tables.judge_estimate("own", 1.0, 1.0, JUDGED)["within_tolerance"] is False
 
 
 def test_parameters_in_long_form(systems, found):
-    table = tables.parameters("x", systems["duffing_van_der_pol"], found, settings())
+    table = tables.parameter_table("x", systems["duffing_van_der_pol"], found, settings())
     assert list(table.columns) == [
         "case", "estimator", "parameter", "true", "estimate", "standard_error",
         "relative_error", "tolerance", "within_tolerance", "note",
@@ -67,12 +67,12 @@ def test_parameters_in_long_form(systems, found):
 
 def test_a_system_without_stiffness_has_no_row_for_its_frequency(systems):
     found = {"siso": Identified((), None, (Parameter("k", 1.0, 0.1), Parameter("f_n", 2.0, 0.1)))}
-    table = tables.parameters("extreme", systems["extreme"], found, settings())
+    table = tables.parameter_table("extreme", systems["extreme"], found, settings())
     assert list(table["parameter"]) == ["k"]
 
 
 def test_frequency_responses_stand_beside_the_exact_function(systems, found):
-    table = tables.frequency_responses(systems["duffing_van_der_pol"], found)
+    table = tables.response_table(systems["duffing_van_der_pol"], found)
     assert {"siso", "miso"} <= set(table["estimator"]) <= set(settings().estimators) - {"miso_hand_read"}
     second = table[(table["estimator"] == "miso") & (table["input"] == 2)]
     exact = 2e7 + 2e6 / 3.0 * 2j * np.pi * second["frequency"].to_numpy()
@@ -83,7 +83,7 @@ def test_frequency_responses_stand_beside_the_exact_function(systems, found):
 
 
 def test_coherences_name_their_terms(found):
-    table = tables.coherences(found)
+    table = tables.coherence_table(found)
     own = table[table["estimator"] == "miso"]
     assert set(own["terms"]) == {
         "inertia + linear damping + linear stiffness", "cubic stiffness + van der pol damping"
@@ -104,29 +104,29 @@ def test_noise_spectra_are_what_the_inputs_leave_of_the_force(found):
 def test_an_estimator_has_what_it_has(systems, found):
     """Parameters alone, responses without coherences, or both."""
     bare = {"a": Identified(found["miso"].inputs, None, found["miso"].parameters)}
-    assert len(tables.parameters("x", systems["duffing_van_der_pol"], bare, settings())) == 7
-    whole = tables.frequency_responses(systems["duffing_van_der_pol"], found)
-    assert list(tables.frequency_responses(systems["duffing_van_der_pol"], bare)) == list(whole)
-    assert list(tables.coherences(bare)) == list(tables.coherences(found))
+    assert len(tables.parameter_table("x", systems["duffing_van_der_pol"], bare, settings())) == 7
+    whole = tables.response_table(systems["duffing_van_der_pol"], found)
+    assert list(tables.response_table(systems["duffing_van_der_pol"], bare)) == list(whole)
+    assert list(tables.coherence_table(bare)) == list(tables.coherence_table(found))
     assert list(tables.noise_spectra(bare)) == tables.NOISE_COLUMNS
     own = found["miso"].responses
     plain = Responses(own.frequency, own.response, own.covariance, own.noise)
     curves = {"a": Identified(found["miso"].inputs, plain, ())}
-    assert len(tables.frequency_responses(systems["duffing_van_der_pol"], curves)) == 2 * len(own.frequency)
-    assert tables.coherences(curves).empty
+    assert len(tables.response_table(systems["duffing_van_der_pol"], curves)) == 2 * len(own.frequency)
+    assert tables.coherence_table(curves).empty
 
 
 def test_csv_has_twelve_digits_and_the_same_bytes_each_time(tmp_path):
     table = pd.DataFrame({"a": [1.0 / 3.0, 2e7, math.nan], "b": [True, False, True]})
     for name in ("one.csv", "two.csv"):
-        tables.write_csv(table, tmp_path / "new" / name)
+        tables.write_table(table, tmp_path / "new" / name)
     assert (tmp_path / "new" / "one.csv").read_bytes() == b"a,b\n0.333333333333,True\n20000000,False\n,True\n"
     assert (tmp_path / "new" / "one.csv").read_bytes() == (tmp_path / "new" / "two.csv").read_bytes()
 
 
 def test_a_table_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch):
     path = tmp_path / "a.csv"
-    tables.write_csv(pd.DataFrame({"a": [1]}), path)
+    tables.write_table(pd.DataFrame({"a": [1]}), path)
 
     def full(_, target, **__):
         target.write_text("a\n")
@@ -134,6 +134,6 @@ def test_a_table_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch
 
     monkeypatch.setattr(pd.DataFrame, "to_csv", full)
     with pytest.raises(StudyError, match="No space left"):
-        tables.write_csv(pd.DataFrame({"a": [2]}), path)
+        tables.write_table(pd.DataFrame({"a": [2]}), path)
     assert path.read_text() == "a\n1\n"
     assert [p.name for p in tmp_path.iterdir()] == ["a.csv"]

@@ -13,7 +13,7 @@ from study.structure.placed_candidates import candidate_entries, external, one_s
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure
 from study.structure.structure_record import write_structure_csv
-from study.structure.structure_verdict import search_base
+from study.structure.structure_verdict import placed_search_base
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def test_effect_and_place_come_first(diagnosed):
 
 def test_the_reverse_system_puts_the_effect_where_it_is(believed, record_of):
     comparison = compare_structure(believed, prepare_structure(record_of(), believed))
-    ordered = screened(candidate_entries(believed), search_base(comparison))
+    ordered = screened(candidate_entries(believed), placed_search_base(comparison))
     entry, points = ordered[0]
     assert entry.place is not None
     assert entry.place.path == {"floor2", "floor3"}

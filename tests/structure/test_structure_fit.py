@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from study.equations.model import Model
-from study.structure.linear_start import linear_start
+from study.structure.linear_start import structure_linear_start
 from study.structure.prepared_structure import prepare_structure
-from study.structure.structure_comparison import compare_structure, document
+from study.structure.structure_comparison import compare_structure, structure_document
 from study.support.errors import StudyError
 
 
@@ -46,15 +46,15 @@ def test_held_values_are_held(frame, record_of):
 
 def test_the_residual_force_acts_between_the_two_floors(believed, record_of):
     quiet = compare_structure(believed, prepare_structure(record_of(noise=0.0), believed))
-    rows = document(quiet)["where"]
+    rows = structure_document(quiet)["where"]
     assert rows["places"][0]["between"] == ["floor2", "floor3"]
     shared = np.array(rows["shared_force"])
     assert np.argmax(shared) in (5, 7)  # row floor2, column floor3, or the other way round
     assert shared[1, 2] > 0.5
     noisy = compare_structure(believed, prepare_structure(record_of(), believed))
-    assert document(noisy)["where"]["places"][0]["between"] == ["floor2", "floor3"]
-    errors = list(document(noisy)["error"]["sensors"].values())
-    floors = list(document(noisy)["noise_floor"]["sensors"].values())
+    assert structure_document(noisy)["where"]["places"][0]["between"] == ["floor2", "floor3"]
+    errors = list(structure_document(noisy)["error"]["sensors"].values())
+    floors = list(structure_document(noisy)["noise_floor"]["sensors"].values())
     assert all(e > 1.1 * f for e, f in zip(errors, floors, strict=True))
 
 
@@ -62,7 +62,7 @@ def test_linear_terms_come_from_frequency_responses(frame, record_of):
     linear = frame.without_term("cubic_stiffness[floor2-floor3]")
     free = linear.with_values(dict.fromkeys(linear.values, None))
     for without in ((), ("floor2",)):
-        start = linear_start(free, prepare_structure(record_of(without=without), free), {})
+        start = structure_linear_start(free, prepare_structure(record_of(without=without), free), {})
         masses = [start[f"m[floor{i}]"] / frame.values[f"m[floor{i}]"] for i in (1, 2, 3)]
         assert np.max(np.abs(np.array(masses) - 1.0)) < 0.1
 

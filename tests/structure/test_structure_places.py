@@ -19,7 +19,7 @@ from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure
 from study.structure.structure_reader import read_structure
 from study.structure.structure_record import Sensor, write_structure_csv
-from study.structure.structure_report import in_words
+from study.structure.structure_report import structure_diagnosis_in_words
 from study.structure.structure_simulation import simulate_structure
 from study.structure.structure_verdict import diagnose_structure
 from study.support.errors import StudyError
@@ -59,7 +59,7 @@ def test_places_that_the_sensors_cannot_tell_apart_are_a_tie(sensors, tied):
     comparison = compare_structure(model, prepare_structure(twin_record(sensors), model))
     others = [n for n in LIBRARY if n not in ("cubic_stiffness", "quadratic_damping", "constant_force")]
     diagnosis = diagnose_structure(comparison, without=others)
-    first, said = diagnosis.candidates[0], in_words(diagnosis)
+    first, said = diagnosis.candidates[0], structure_diagnosis_in_words(diagnosis)
     assert diagnosis.verdict == "missing_effect"
     assert first.term.name == "cubic_stiffness"
     places = {"cubic_stiffness[trunk-left]", "cubic_stiffness[trunk-right]"}

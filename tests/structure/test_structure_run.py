@@ -131,10 +131,10 @@ def test_one_coordinate_moves_as_a_model_without_coordinates():
     structure = Model("one", tuple(terms), ("mass",), (("shaker", "mass"),))
     plain = Model("one", tuple(replace(t, place=None) for t in terms))
     force = slow_force(N, DT, 3.0)
-    from study.equations.free_run import predict
+    from study.equations.free_run import predict_response
 
     record = simulate(plain, force, DT, Integrator("rk4", 8))
-    wanted = predict(plain, record, steps_per_sample=8)
+    wanted = predict_response(plain, record, steps_per_sample=8)
     found = simulate_structure(structure, {"shaker": force}, DT).motions[Sensor("mass", "displacement")]
     assert np.max(np.abs(found - wanted)) < 1e-7 * np.std(wanted)
 

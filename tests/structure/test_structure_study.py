@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from study.equations.model_file import read_model
-from study.reproduction.tables import judge
+from study.reproduction.tables import judge_estimate
 from study.structure.measured_comparison import compare_measured
 from study.structure.measured_tables import measured_figure, measured_parameters, measured_responses
 from study.structure.prepared_structure import prepare_structure
@@ -18,7 +18,7 @@ from study.structure.structure_claims import measured_claims, structure_claims
 from study.structure.structure_study import (
     assumed_structure,
     identify_structure,
-    load,
+    load_structures,
     make_structure_record,
     measured_model,
 )
@@ -30,7 +30,7 @@ ROOT = Path(__file__).parents[2]
 @pytest.fixture(scope="module")
 def two_masses():
     """The first case with a quarter of its samples."""
-    study = load(ROOT / "config")
+    study = load_structures(ROOT / "config")
     case = study.cases["two_masses"]
     sampling = study.settings.sampling.model_copy(update={"samples": 4096})
     segments = study.settings.segments.model_copy(update={"length": 1024})
@@ -57,7 +57,7 @@ def test_tables_hold_every_estimator_and_the_truth(two_masses):
     assert true == {**result.model.values}
     exact = table[(table["estimator"] == "local_polynomial") & (table["true"] != 0.0)]
     assert (exact["relative_error"].abs() < 1e-4).all()
-    assert judge("k3", 0.0, 2e5, settings.tolerances)["within_tolerance"] is False
+    assert judge_estimate("k3", 0.0, 2e5, settings.tolerances)["within_tolerance"] is False
 
 
 def test_siso_changes_and_miso_places(two_masses):
@@ -101,11 +101,11 @@ def test_a_bad_row_is_named(tmp_path, old, new, said):
     assert old in text
     table.write_text(text.replace(old, new, 1))
     with pytest.raises(StudyError, match=said):
-        load(tmp_path / "config")
+        load_structures(tmp_path / "config")
 
 
 def test_the_beam_is_found_by_its_own_modes():
-    study = load(ROOT / "config")
+    study = load_structures(ROOT / "config")
     case = study.cases["beam"]
     sampling = study.settings.sampling.model_copy(update={"samples": 8192})
     settings = study.settings.model_copy(update={"sampling": sampling})

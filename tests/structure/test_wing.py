@@ -14,7 +14,7 @@ from study.structure.placed_candidates import candidate_entries, screened
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure
 from study.structure.structure_reader import read_structure
-from study.structure.structure_verdict import UNKNOWN, diagnose_structure, search_base
+from study.structure.structure_verdict import UNKNOWN, diagnose_structure, placed_search_base
 from study.support.errors import StudyError
 
 DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parents[3] / "shared" / "data"))
@@ -54,7 +54,7 @@ def test_stiffness_is_found_and_what_is_missing_is_in_pitch(name):
     values = comparison.fit.model.values
     assert values["k[ground-heave]"] == pytest.approx(heave, rel=0.15)
     assert values["k[ground-pitch]"] == pytest.approx(pitch, rel=0.15)
-    ordered = screened(candidate_entries(model), search_base(comparison))
+    ordered = screened(candidate_entries(model), placed_search_base(comparison))
     best = {c: max(p[0].share for e, p in ordered if e.place and e.place.moving == (c,)) for c in model.coordinates}
     assert best["pitch"] > 0.5
     assert best["heave"] < 0.5 * best["pitch"]

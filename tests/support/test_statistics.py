@@ -45,7 +45,7 @@ def test_errors_of_a_models_own_coefficients_are_no_evidence_for_a_change_that_r
         change = alone[n:] * (alone[:n] @ left[:n]) / (alone[:n] @ alone[:n])
         freed = noise - own * (own @ noise) / (own @ own)
         alarms["gain"] += statistics.gain(left[n:], left[n:] - change).p_value < 0.02
-        alarms["beside"] += statistics.beside(left[n:], change, freed[n:]).p_value < 0.02
+        alarms["beside"] += statistics.gain_beside(left[n:], change, freed[n:]).p_value < 0.02
     assert alarms["beside"] <= 14  # six are meant: more have a chance of 2 in a thousand
     assert alarms["gain"] > 30  # what is held against the residual as it stands
 

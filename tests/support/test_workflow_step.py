@@ -10,7 +10,7 @@ import pytest
 from study.support.code_dependencies import rests_on
 from study.support.errors import StudyError
 from study.support.files import replacing
-from study.support.workflow_step import alone, one_sentence, sweep
+from study.support.workflow_step import alone, one_sentence, remove_half_written
 
 ROOT = Path(__file__).parents[2]
 
@@ -55,7 +55,7 @@ def test_what_killed_runs_left_half_written_is_swept(tmp_path):
         beside.write_text("half")
         left = beside.with_name(beside.name + ".csv")
         left.write_text("as a killed run leaves it")
-    sweep(tmp_path / "results", tmp_path / "missing")
+    remove_half_written(tmp_path / "results", tmp_path / "missing")
     assert [p.name for p in path.parent.iterdir()] == ["b.csv"]
 
 
@@ -111,7 +111,7 @@ def test_simulation_does_not_rest_on_identification():
 
 
 def test_steps_write_files_that_are_never_half_there():
-    """By ``study.support.files`` or ``tables.write_csv``: what ``write_text`` began stays as a killed run leaves it."""
+    """By ``study.support.files`` or ``tables.write_table``: what ``write_text`` began a killed run leaves as it is."""
     for path in sorted((ROOT / "scripts").glob("*.py")):
         assert not re.search(r"[.](write_text|write_bytes|to_csv[(](Path|output|page|csv)\b)", path.read_text()), (
             path.name

@@ -29,13 +29,13 @@ def test_the_first_row_of_each_kind_is_what_this_code_gives(test: str):
 
 def test_the_rates_of_the_page_are_those_of_the_table():
     assert tuple(kept().columns) == COLUMNS
-    assert markdown(kind_rates.blocks(kept())).strip() in (DOCS / "kinds_of_tests.md").read_text()
+    assert markdown(kind_rates.rate_blocks(kept())).strip() in (DOCS / "kinds_of_tests.md").read_text()
 
 
 def test_a_row_that_could_not_be_diagnosed_counts_as_failed():
     table = kept()
     worse = pd.concat([table, table[table["hidden"] != "none"].head(1).assign(right=None, trouble="it diverged")])
-    before, after = (markdown(kind_rates.blocks(t)) for t in (table, worse))
+    before, after = (markdown(kind_rates.rate_blocks(t)) for t in (table, worse))
     failed = int(table["trouble"].notna().sum())
     assert f"; {failed} could not be diagnosed" in before
     assert f"; {failed + 1} could not be diagnosed" in after

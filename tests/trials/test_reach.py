@@ -12,17 +12,17 @@ from scipy.stats import binomtest
 from study.diagnose.verdict import diagnose
 from study.faults.imposed import FAULTS
 from study.records.prepared import prepare_record
-from study.reproduction.config import load
+from study.reproduction.config import load_config
 from study.reproduction.settings import TrialSettings
 from study.support.errors import StudyError
 from study.trials import constants_table, findings, kept, make_trial, reach, runs
 from study.trials.draw import HIDDEN
-from study.trials.findings import accounted
+from study.trials.findings import accounted_comparison
 from study.trials.rates import mean, proportion
 from study.trials.runs import COLUMNS, Order
 
 ROOT = Path(__file__).parents[2]
-CONFIG = load(ROOT / "config").settings.trials
+CONFIG = load_config(ROOT / "config").settings.trials
 KEPT = ROOT / "docs" / "trials.csv"
 AGAIN, QUICK = 12, 3000  # trials that are run again: the first, those of records with fewer samples among them
 SETTINGS = TrialSettings(
@@ -141,7 +141,7 @@ def test_summary_confusion_and_ladder_of_a_table(tmp_path: Path) -> None:
         ],
         tmp_path,
     )
-    found = reach.summary(read, WANTED).set_index(["reach", "faults"])
+    found = reach.target_summary(read, WANTED).set_index(["reach", "faults"])
     first = found.loc[("true effect first, noise to 5 %", "without")]
     assert (first["trials"], first["value"], first["least"]) == (3, pytest.approx(1 / 3), 0.97)
     assert first["reached"] == "no", "one of three, at most 79 %"
@@ -158,7 +158,7 @@ def test_summary_confusion_and_ladder_of_a_table(tmp_path: Path) -> None:
     assert counts.loc["relaxation", "unknown_effect"] == 1
     assert counts.loc["none", "nothing_missing"] == 1
     assert counts.to_numpy().sum() == 4
-    rungs = reach.ladder(read).set_index(["kind", "noise", "step"])
+    rungs = reach.error_by_noise(read).set_index(["kind", "noise", "step"])
     assert rungs.loc[("single", 0.0, "after"), "mean_error"] == pytest.approx(0.25)
 
 
@@ -183,16 +183,16 @@ def test_any_alpha_and_any_k_after_the_fact(tmp_path: Path) -> None:
 
 def test_evidence_and_intervals_are_those_of_the_diagnosis() -> None:
     trial = make_trial(901, ("quadratic_damping",), 0.01, "displacement")
-    comparison, faults = accounted(trial.completed, prepare_record(trial.record))
+    comparison, faults = accounted_comparison(trial.completed, prepare_record(trial.record))
     assert faults == ()
     inside = findings.intervals(comparison, trial.truth)
     true = trial.truth.numbers()
     assert inside["asked"] == len(comparison.coefficients) == len(true)
     assert inside["held"] == sum(c.interval[0] <= true[c.key] <= c.interval[1] for c in comparison.coefficients)
-    lacking, _ = accounted(trial.believed, prepare_record(trial.record))
+    lacking, _ = accounted_comparison(trial.believed, prepare_record(trial.record))
     assert findings.intervals(lacking, trial.truth) == {"held": 0, "asked": 0}
     diagnosis = diagnose(lacking)
-    said = findings.evidence(diagnosis, trial.hidden)
+    said = findings.evidence_row(diagnosis, trial.hidden)
     assert findings.tie_set(diagnosis)[0] == diagnosis.candidates[0].name == "quadratic_damping"
     assert said["distance"] == 0.0
     assert said["true_p"] == said["smallest_p"] == diagnosis.candidates[0].p_value
@@ -213,16 +213,16 @@ def test_what_was_found_of_the_measurement_stands_beside_what_was_imposed() -> N
 
 def test_a_trial_that_cannot_be_made_is_a_row_with_its_trouble(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("study.trials.draw.ATTEMPTS", 0)
-    made = runs.run(Order("single", 1, ("relaxation",), 0.0, "displacement"))
+    made = runs.run_trial(Order("single", 1, ("relaxation",), 0.0, "displacement"))
     assert "no system" in made["trouble"]
 
 
 def test_every_trial_with_a_fault_has_one_and_all_have_their_turn(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runs, "_judged", lambda *_: {})
-    made = [runs.run(Order("none", 5000 + i, (), 0.01, "velocity", "with")) for i in range(len(FAULTS))]
+    made = [runs.run_trial(Order("none", 5000 + i, (), 0.01, "velocity", "with")) for i in range(len(FAULTS))]
     assert {m["fault"] for m in made} == set(FAULTS)
     assert all(m["trouble"] == "" for m in made)
-    assert runs.run(Order("none", 5000, (), 0.01, "velocity"))["fault"] == ""
+    assert runs.run_trial(Order("none", 5000, (), 0.01, "velocity"))["fault"] == ""
 
 
 def test_the_kept_table_is_what_this_code_gives(tmp_path: Path) -> None:
@@ -234,8 +234,8 @@ def test_the_kept_table_is_what_this_code_gives(tmp_path: Path) -> None:
     assert set(table["seed"]) <= set(orders)
     quick = [orders[int(seed)] for seed in first.loc[first["samples"] < QUICK, "seed"]]
     assert len(quick) >= 3
-    own = written([runs.run(order) for order in quick], tmp_path)
-    assert kept.differing(own, table) == [], "other settings, other code, or other rounding"
+    own = written([runs.run_trial(order) for order in quick], tmp_path)
+    assert kept.differing_trials(own, table) == [], "other settings, other code, or other rounding"
 
 
 @pytest.mark.parametrize(
@@ -245,10 +245,10 @@ def test_a_kept_table_of_another_run_shows(column: str, value: object) -> None:
     table = pd.read_csv(KEPT)
     seed, other = int(table["seed"].iloc[1]), table.copy()
     other.loc[other["seed"] == seed, column] = value
-    assert kept.differing(table, other) == [f"seed {seed}: {column}"]
+    assert kept.differing_trials(table, other) == [f"seed {seed}: {column}"]
     slower = table.assign(seconds=99.0).sample(frac=1.0, random_state=1)
-    assert kept.differing(table, slower) == []
-    assert kept.differing(table, table[table["seed"] != seed])
+    assert kept.differing_trials(table, slower) == []
+    assert kept.differing_trials(table, table[table["seed"] != seed])
 
 
 def test_the_page_for_users_holds_the_numbers_of_its_table(tmp_path: Path) -> None:

@@ -14,8 +14,8 @@ from study.equations.model_file import read_model
 from study.structure.modes import modes_of
 from study.support.errors import StudyError
 from study.trials import kept
-from study.trials.structure_draw import HIDDEN, SHARE, make_structure_trial, structure
-from study.trials.structure_rates import confusion_of_effects, confusion_of_places, rates
+from study.trials.structure_draw import HIDDEN, SHARE, make_structure_trial, random_structure
+from study.trials.structure_rates import confusion_of_effects, confusion_of_places, structure_rates
 from study.trials.structure_runs import COLUMNS, LOOSE, WORDS, run_structure, structure_orders
 
 ROOT = Path(__file__).parents[2]
@@ -37,7 +37,7 @@ def test_a_trial_is_the_same_for_the_same_seed():
 
 def test_every_mass_of_a_drawn_structure_is_tied_to_the_shaker():
     for seed in range(20):
-        model = structure(np.random.default_rng(seed), 5)
+        model = random_structure(np.random.default_rng(seed), 5)
         reached = {where for _, where in model.forces}
         for _ in range(5):
             reached |= {e for t in model.terms if t.place and reached & set(t.place.moving) for e in t.place.moving}
@@ -76,7 +76,7 @@ def test_rates_count_what_holds():
         **GOOD, "effect_first": "False", "error_after": "", "noise": "0.05", "true_inside": "6", "true_keys": "8",
     }  # fmt: skip
     none = {**GOOD, "hidden": "none", "verdict": "unknown_effect"}
-    found = {str(r["what"]): r for r in rates([GOOD, bad, none])}
+    found = {str(r["what"]): r for r in structure_rates([GOOD, bad, none])}
     shares = {what: (row["share"], row["trials"]) for what, row in found.items()}
     assert shares["effect and place first, noise to 1 %"] == (1.0, 1)
     assert shares["effect and place first, noise of 5 %"] == (0.0, 1)
@@ -122,9 +122,9 @@ def test_the_kept_table_is_what_this_code_gives():
     pd.DataFrame([run_structure(order) for order in quick], columns=list(COLUMNS)).to_csv(buffer, index=False)
     buffer.seek(0)
     own = pd.read_csv(buffer, keep_default_na=False, na_values=["nan", ""])
-    assert kept.differing(own, table, COLUMNS, WORDS, LOOSE) == []
+    assert kept.differing_trials(own, table, COLUMNS, WORDS, LOOSE) == []
     other = own.assign(first_place="ground-mass9")
-    assert len(kept.differing(other, table, COLUMNS, WORDS, LOOSE)) == 2
+    assert len(kept.differing_trials(other, table, COLUMNS, WORDS, LOOSE)) == 2
 
 
 def test_the_page_holds_the_numbers_of_the_kept_table(tmp_path):

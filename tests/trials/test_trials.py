@@ -222,7 +222,7 @@ def test_what_is_no_answer_is_refused_in_a_sentence(
 
 
 def test_answer_file_is_plain_json_with_how_to_open_it(tmp_path: Path) -> None:
-    _, _, answer = sealed.write(make_trial(2, ()), tmp_path)
+    _, _, answer = sealed.write_trial(make_trial(2, ()), tmp_path)
     assert json.loads(answer.read_text())["open_with"] == "study trial --open trial_2.answer.json"
 
 

@@ -22,7 +22,7 @@ ESTIMATORS = {
 }
 
 
-def get(name: str) -> "Estimator":
+def get_estimator(name: str) -> "Estimator":
     """The estimator of this name, its module imported only now."""
     if name not in ESTIMATORS:
         raise StudyError(f"there is no estimator {name!r}; known are {', '.join(ESTIMATORS)}")
@@ -31,4 +31,4 @@ def get(name: str) -> "Estimator":
 
 def identify(name: str, model: "Model", record: "Record", settings: "Settings") -> "Identified":
     """Identify a record with the estimator of this name."""
-    return get(name)(model, record, settings)
+    return get_estimator(name)(model, record, settings)

@@ -14,7 +14,7 @@ def identify(model: Model, record: Record, settings: Settings) -> Identified:
     shapes = tuple(key for key in model.values if "." in key)
     if not shapes:
         return Identified((), None, ())
-    fit = output_error.fit(model.with_values(dict.fromkeys(shapes)), record)
+    fit = output_error.free_run_fit(model.with_values(dict.fromkeys(shapes)), record)
     known = model.with_values({key: fit.estimate[key] for key in shapes})
     result = miso.identify(known, record, settings)
     own = output_error.shapes_of(fit, shapes)

@@ -16,20 +16,22 @@ def identify(model: Model, record: Record, settings: Settings) -> Identified:
 
     Coherences are those of the force with the inputs along that motion, which has no noise.
     """
-    fit = output_error.fit(model, record)
+    fit = output_error.free_run_fit(model, record)
     inputs = reverse_inputs(fit.model)
     clean = clean_motion(fit, record)
     values = instruments.channels(inputs, record, clean)
     matrix = spectra.cross_spectra(values, record.dt, settings.segments)
-    estimate = instruments.fit(
-        matrix, inputs, settings.band, from_coefficients.response(inputs, fit.estimate, matrix.frequency),
+    estimate = instruments.fit_with_instruments(
+        matrix, inputs, settings.band, from_coefficients.fitted_functions(inputs, fit.estimate, matrix.frequency),
         instruments.stretches(values, record.dt, settings.segments),
     )  # fmt: skip
     note = "" if fit.converged else fit.message
     own = spectra.cross_spectra([*histories(inputs, clean), record["force"]], record.dt, settings.segments)
     shapes = output_error.shapes_of(fit, [key for key in model.values if "." in key])
     named = (*named_parameters(estimate), *named_parameters(shapes))
-    return Identified(inputs, instruments.responses(matrix), named, estimate, note, shapes, conditioned.analyse(own))
+    return Identified(
+        inputs, instruments.instrumental_responses(matrix), named, estimate, note, shapes, conditioned.analyse(own)
+    )
 
 
 def clean_motion(fit: FreeRunFit, record: Record) -> Record:

@@ -3,8 +3,8 @@
 from study.equations.model import Model
 from study.identify.estimators.base import Identified, Settings, named_parameters
 from study.identify.frequency_domain.inputs import Input, histories, reverse_inputs
-from study.identify.frequency_domain.local_polynomial_fit import fit
-from study.identify.frequency_domain.local_polynomial_method import Lines, responses, transform
+from study.identify.frequency_domain.local_polynomial_fit import fit_local_polynomial
+from study.identify.frequency_domain.local_polynomial_method import Lines, local_polynomial_responses, transform
 from study.records.record import Record
 
 
@@ -16,5 +16,7 @@ def identify(model: Model, record: Record, settings: Settings) -> Identified:
 
 def identify_lines(inputs: tuple[Input, ...], lines: Lines, settings: Settings) -> Identified:
     """The same for the transforms of any inputs and, last, of what they make up."""
-    estimate = fit(lines, inputs, settings.band, settings.local_polynomial)
-    return Identified(inputs, responses(lines, settings.local_polynomial), named_parameters(estimate), estimate)
+    estimate = fit_local_polynomial(lines, inputs, settings.band, settings.local_polynomial)
+    return Identified(
+        inputs, local_polynomial_responses(lines, settings.local_polynomial), named_parameters(estimate), estimate
+    )

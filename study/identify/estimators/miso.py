@@ -17,5 +17,5 @@ def identify_inputs(inputs: tuple[Input, ...], record: Record, settings: Setting
     """The same for any inputs."""
     matrix = spectra.cross_spectra([*histories(inputs, record), record["force"]], record.dt, settings.segments)
     result = conditioned.analyse(matrix)
-    estimate = coefficients.fit(result, inputs, settings.band, settings.segments.line_inflation())
+    estimate = coefficients.fit_coefficients(result, inputs, settings.band, settings.segments.line_inflation())
     return Identified(inputs, result, named_parameters(estimate), estimate)

@@ -25,10 +25,10 @@ REFINED = 12  # free runs in which a fit follows a change of steps
 
 def identify(model: Model, record: Record, settings: Settings) -> Identified:
     """Coefficients, and shape parameters that the model leaves open; A_j(f) of the form that they give it."""
-    free_run = fit(model, record)
+    free_run = free_run_fit(model, record)
     inputs, estimate = reverse_inputs(free_run.model), free_run.estimate
     matrix = spectra.cross_spectra([*histories(inputs, record), record["force"]], record.dt, settings.segments)
-    result = from_coefficients.responses(inputs, estimate, matrix)
+    result = from_coefficients.responses_with_errors(inputs, estimate, matrix)
     note = "" if free_run.converged else free_run.message
     return Identified(inputs, result, named_parameters(estimate), estimate, note)
 
@@ -41,7 +41,7 @@ def shapes_of(fit: FreeRunFit, keys: Collection[str]) -> Estimate:
 
 
 @lru_cache(maxsize=KEPT)
-def fit(model: Model, record: Record) -> FreeRunFit:
+def free_run_fit(model: Model, record: Record) -> FreeRunFit:
     """The fit in free run behind the estimate; cached, as the instruments use the same one.
 
     Coefficients of the model are left open, shape parameters that it gives are held.

@@ -53,7 +53,9 @@ class Estimate:
         return float(np.sqrt(max(g @ self.covariance @ g, 0.0)))
 
 
-def fit(result: Responses, inputs: Sequence[Input], band: tuple[float, float], line_inflation: float) -> Estimate:
+def fit_coefficients(
+    result: Responses, inputs: Sequence[Input], band: tuple[float, float], line_inflation: float
+) -> Estimate:
     """Weighted least squares of A_j(f) on powers of j 2 pi f, over the lines of a band (Hz).
 
     Each input is fitted by itself, every line weighted by the inverse of its random-error variance

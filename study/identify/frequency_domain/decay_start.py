@@ -24,10 +24,12 @@ def decay_start(model: Model, prepared: Prepared) -> dict[str, float]:
     part = prepared.record.part(*prepared.plan.fit)
     omega, rate = frequency_and_rate(part, prepared.response)
     unit = {"m": 1.0, "c": 2.0 * rate, "k": omega**2 + rate**2}
-    return dict.fromkeys(model.values, 0.0) | scaled({k: v for k, v in unit.items() if k in model.values}, model)
+    return dict.fromkeys(model.values, 0.0) | with_given_value(
+        {k: v for k, v in unit.items() if k in model.values}, model
+    )
 
 
-def scaled(unit: dict[str, float], model: Model) -> dict[str, float]:
+def with_given_value(unit: dict[str, float], model: Model) -> dict[str, float]:
     """Values per unit mass, times the common factor that a value given by the model fixes; the mass first."""
     for key in sorted(unit, key=lambda k: k != "m"):
         given = model.values.get(key)

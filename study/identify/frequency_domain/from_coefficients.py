@@ -11,7 +11,7 @@ from study.records.spectra import SpectralMatrix
 from study.support.arrays import Complexes, Floats
 
 
-def responses(inputs: Sequence[Input], estimate: Estimate, matrix: SpectralMatrix) -> Responses:
+def responses_with_errors(inputs: Sequence[Input], estimate: Estimate, matrix: SpectralMatrix) -> Responses:
     """``A_j(f) = sum of coefficient * factor * (j 2 pi f)^order`` with the covariance of the coefficients.
 
     The matrix, that of the inputs and the force, gives the lines and what the functions leave of the force. The
@@ -19,11 +19,11 @@ def responses(inputs: Sequence[Input], estimate: Estimate, matrix: SpectralMatri
     """
     form = _form(inputs, estimate, matrix.frequency)
     covariance = form @ estimate.covariance @ form.conj().transpose(0, 2, 1)
-    known = response(inputs, estimate, matrix.frequency)
-    return Responses(matrix.frequency, known, covariance, left_over(matrix, known))
+    known = fitted_functions(inputs, estimate, matrix.frequency)
+    return Responses(matrix.frequency, known, covariance, residual_density(matrix, known))
 
 
-def response(inputs: Sequence[Input], estimate: Estimate, frequency: Floats) -> Complexes:
+def fitted_functions(inputs: Sequence[Input], estimate: Estimate, frequency: Floats) -> Complexes:
     """The functions alone, shape (inputs, lines)."""
     return (_form(inputs, estimate, frequency) @ estimate.values).T
 
@@ -36,7 +36,7 @@ def _form(inputs: Sequence[Input], estimate: Estimate, frequency: Floats) -> Com
     return form
 
 
-def left_over(matrix: SpectralMatrix, response: Complexes) -> Floats:
+def residual_density(matrix: SpectralMatrix, response: Complexes) -> Floats:
     """Autospectral density of the output less what comes through the inputs by these A_j(f), shape (lines,)."""
     through = np.concatenate([-response, np.ones((1, response.shape[1]))]).T
     return np.clip(np.einsum("fi,fij,fj->f", through.conj(), matrix.density, through).real, 0.0, None)

@@ -132,11 +132,11 @@ def _known_parameters(entry: ModelTerm) -> tuple[tuple[str, float], ...]:
 
 
 def histories(inputs: Sequence[Input], record: Record) -> list[Floats]:
-    """Time history of each input, each of shape (n,); raises as :func:`history`."""
-    return [record["displacement"] if i.shape == "u" else history(i, record) for i in inputs]
+    """Time history of each input, each of shape (n,); raises as :func:`input_history`."""
+    return [record["displacement"] if i.shape == "u" else input_history(i, record) for i in inputs]
 
 
-def history(item: Input, record: Record) -> Floats:
+def input_history(item: Input, record: Record) -> Floats:
     """g(u, v, t) of one input along a record, shape (n,); a state begins at zero.
 
     Raises
@@ -152,12 +152,12 @@ def history(item: Input, record: Record) -> Floats:
     data = _columns(wanted, formula, record)
     graph = Graph()
     known = {name: graph.input(name) for name in (*wanted, *own)}
-    program = with_registers(graph.program([formulas.build(graph, formula, known)]), dict(item.parameters))
+    program = with_registers(graph.program([formulas.add_formula(graph, formula, known)]), dict(item.parameters))
     positions = np.array([program.inputs[n] for n in wanted], dtype=np.int64)
     registers, output = program.registers.copy(), program.outputs
     if item.state is not None and record.joints:  # each stretch begins at zero, as a record does
         bounds = pairwise((0, *record.joints, len(record)))
-        return np.concatenate([history(item, _alone(record.part(a, b))) for a, b in bounds])
+        return np.concatenate([input_history(item, _alone(record.part(a, b))) for a, b in bounds])
     if item.state is not None:
 
         def integrated(steps: int) -> Floats:

@@ -19,8 +19,8 @@ import numpy as np
 from study.equations import formulas
 from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.frequency_domain.conditioned import COLLINEAR
-from study.identify.frequency_domain.from_coefficients import left_over
-from study.identify.frequency_domain.inputs import Input, history
+from study.identify.frequency_domain.from_coefficients import residual_density
+from study.identify.frequency_domain.inputs import Input, input_history
 from study.identify.frequency_domain.responses import Responses
 from study.records import spectra
 from study.records.record import Record
@@ -37,7 +37,11 @@ FAINT = 1e-8  # noise below this share of a channel's mean square is the roundin
 
 def channels(inputs: Sequence[Input], record: Record, clean: Record) -> list[Floats]:
     """q instruments, then q corrected inputs, then the force; ``clean`` has the motion of the fitted model."""
-    return [*(history(item, clean) for item in inputs), *corrected(inputs, record, clean), record["force"]]
+    return [
+        *(input_history(item, clean) for item in inputs),
+        *inputs_without_noise(inputs, record, clean),
+        record["force"],
+    ]
 
 
 def stretches(values: Sequence[Floats], dt: float, segments: Segments) -> list[SpectralMatrix]:
@@ -49,7 +53,7 @@ def stretches(values: Sequence[Floats], dt: float, segments: Segments) -> list[S
     return [spectra.cross_spectra([v[i * length :][:length] for v in values], dt, segments) for i in range(count)]
 
 
-def responses(matrix: SpectralMatrix) -> Responses:
+def instrumental_responses(matrix: SpectralMatrix) -> Responses:
     """``A = G_ZX^-1 G_ZF`` from the matrix of :func:`channels`; e is what is left of the force.
 
     The covariance is ``G_ZX^-1 G_ZZ G_ZX^-H G_ee / (n_d - q)``.
@@ -60,14 +64,14 @@ def responses(matrix: SpectralMatrix) -> Responses:
     inverse: Complexes = np.asarray(_pinv(scaled[:, :count, count:-1], rcond=COLLINEAR), dtype=np.complex128)
     gain = scale[:, -1:] / scale[:, count:-1]
     response = (np.einsum("fij,fj->fi", inverse, scaled[:, :count, -1]) * gain).T
-    noise = left_over(_without_instruments(matrix), response)
+    noise = residual_density(_without_instruments(matrix), response)
     share = noise / (np.maximum(density[:, -1, -1].real, TINY) * (matrix.averages - count))
     spread = inverse @ scaled[:, :count, :count] @ inverse.conj().transpose(0, 2, 1)
     covariance = spread * share[:, None, None] * (gain[:, :, None] * gain[:, None, :])
     return Responses(matrix.frequency, response, covariance, noise)
 
 
-def fit(
+def fit_with_instruments(
     matrix: SpectralMatrix,
     inputs: Sequence[Input],
     band: tuple[float, float],
@@ -99,7 +103,7 @@ def fit(
     """
     keep = (matrix.frequency >= band[0]) & (matrix.frequency <= band[1])
     density, count = matrix.density[keep], len(inputs)
-    noise = left_over(_without_instruments(matrix), known)[keep]
+    noise = residual_density(_without_instruments(matrix), known)[keep]
     noise = np.maximum(noise, FAINT * np.max(noise))
     powers = np.concatenate([item.powers(matrix.frequency[keep]) for item in inputs], axis=1)
     owner = np.repeat(np.arange(count), [len(item.parts) for item in inputs])
@@ -141,7 +145,7 @@ def _without_instruments(matrix: SpectralMatrix) -> SpectralMatrix:
     return replace(matrix, density=matrix.density[:, count:, count:])
 
 
-def corrected(inputs: Sequence[Input], record: Record, clean: Record) -> list[Floats]:
+def inputs_without_noise(inputs: Sequence[Input], record: Record, clean: Record) -> list[Floats]:
     """Inputs from the measured motion whose mean is that of the true ones, each of shape (n,).
 
     A term with a memory has no such mean at a point of time; its history along the clean motion takes its place.
@@ -150,11 +154,11 @@ def corrected(inputs: Sequence[Input], record: Record, clean: Record) -> list[Fl
     histories: list[Floats] = []
     for item in inputs:
         if item.state is not None:
-            histories.append(history(item, clean))
+            histories.append(input_history(item, clean))
         elif item.shape == "u":
-            histories.append(history(item, record))
+            histories.append(input_history(item, record))
         else:
-            histories.append(history(item, record) - (expected(item, clean, spread) - history(item, clean)))
+            histories.append(input_history(item, record) - (expected(item, clean, spread) - input_history(item, clean)))
     return histories
 
 
@@ -181,5 +185,5 @@ def expected(item: Input, clean: Record, spread: dict[str, Floats]) -> Floats:
             for name in used
         }
         weight = float(np.prod(weights[list(places)]))
-        total += weight * history(item, clean.with_channels(moved))
+        total += weight * input_history(item, clean.with_channels(moved))
     return total

@@ -32,7 +32,9 @@ from study.support.errors import StudyError
 STRETCHES = 32  # parts of the record whose scatter gives the errors
 
 
-def fit(lines: Lines, inputs: Sequence[Input], band: tuple[float, float], settings: LocalPolynomial) -> Estimate:
+def fit_local_polynomial(
+    lines: Lines, inputs: Sequence[Input], band: tuple[float, float], settings: LocalPolynomial
+) -> Estimate:
     """Coefficients of all inputs that have power from the first to the second frequency of ``band`` (Hz).
 
     Local bands are widened until few lines are left over.
@@ -43,7 +45,7 @@ def fit(lines: Lines, inputs: Sequence[Input], band: tuple[float, float], settin
 def fit_with_shifts(
     lines: Lines, inputs: Sequence[Input], band: tuple[float, float], settings: LocalPolynomial
 ) -> tuple[Estimate, Floats]:
-    """:func:`fit`, and how far the coefficients move when one stretch of time after the other is left out.
+    """The same, and how far the coefficients move when one stretch of time after the other is left out.
 
     The shifts, shape (STRETCHES, coefficients), of two equations of one record give the covariance between them.
     """

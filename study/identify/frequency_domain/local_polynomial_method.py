@@ -98,7 +98,7 @@ def transform(channels: Sequence[Floats], dt: float) -> Lines:
     return Lines(frequency, inputs, spectra[-1, 1 : lines + 1], 2.0 * dt / samples, samples)
 
 
-def responses(lines: Lines, settings: LocalPolynomial) -> Responses:
+def local_polynomial_responses(lines: Lines, settings: LocalPolynomial) -> Responses:
     """A_j(f) with their covariance and the noise, in the middle of bands that overlap.
 
     Bands stand half of their half width apart. Estimates of neighbouring ones share lines and so are

@@ -62,7 +62,7 @@ def steady(record: Record, settle: int) -> Record:
     return kept
 
 
-def fit(record: Record, inputs: Sequence[Input], band: tuple[float, float]) -> Estimate:
+def fit_periodic(record: Record, inputs: Sequence[Input], band: tuple[float, float]) -> Estimate:
     """Coefficients of all inputs that have power in the band (Hz), from the periods that :func:`steady` gives.
 
     The covariance has as many degrees of freedom as there are periods, less one.

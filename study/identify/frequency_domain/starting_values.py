@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from study.equations.model import Model, free
 from study.equations.terms import get
 from study.identify.frequency_domain import coefficients, conditioned
-from study.identify.frequency_domain.decay_start import along_the_motion, decay_start, drift_start, scaled
+from study.identify.frequency_domain.decay_start import along_the_motion, decay_start, drift_start, with_given_value
 from study.identify.frequency_domain.inputs import histories, reverse_inputs, without_inertia
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record
@@ -34,7 +34,7 @@ LONGEST, SHORTEST, PARTS = 1024, 64, 12  # samples in a segment, at most and at 
 
 
 @dataclass(frozen=True)
-class Lines:
+class LinearApproximation:
     """Best linear approximation on the lines of the fitting part where force and response have something in common."""
 
     omega: Complexes  # 2 pi j f, shape (lines,)
@@ -48,7 +48,7 @@ class Lines:
         return self.neighbours <= MAIN_LOBE
 
 
-def coherent_lines(prepared: Prepared) -> Lines:
+def coherent_lines(prepared: Prepared) -> LinearApproximation:
     """The lines by the usual segments; by longer ones where too few lines of those are driven, as in slow records.
 
     Raises
@@ -78,7 +78,7 @@ def coherent_lines(prepared: Prepared) -> Lines:
     )
 
 
-def _lines(part: Record, response: str, length: int) -> tuple[Lines, float]:
+def _lines(part: Record, response: str, length: int) -> tuple[LinearApproximation, float]:
     """The lines by segments of a length, and how many of those driven may be coherent by chance."""
     force, motion = (part[name] - np.mean(part[name]) for name in ("force", response))
     if part.joints:
@@ -98,10 +98,10 @@ def _lines(part: Record, response: str, length: int) -> tuple[Lines, float]:
     places = np.flatnonzero(keep)
     neighbours = int(places[-1] - places[0]) + 1 if len(places) else 0
     expected = CHANCE * float(np.count_nonzero(driven))
-    return Lines(omega, receptance, weight, neighbours), expected + 3.0 * float(np.sqrt(expected))
+    return LinearApproximation(omega, receptance, weight, neighbours), expected + 3.0 * float(np.sqrt(expected))
 
 
-def solved(lines: Lines, wanted: Sequence[str]) -> tuple[Floats, Floats]:
+def solved(lines: LinearApproximation, wanted: Sequence[str]) -> tuple[Floats, Floats]:
     """Those of k, c and m that are wanted, and their standard errors from what the lines leave; shapes (wanted,)."""
     design = np.stack([lines.omega ** LINEAR_ORDERS[key] for key in wanted], axis=1) * lines.weight[:, None]
     target = lines.weight / lines.receptance
@@ -178,11 +178,11 @@ def reverse_start(model: Model, prepared: Prepared) -> dict[str, float]:
     band = (max(float(driven[0]), prepared.band[0]), min(float(driven[-1]), prepared.band[1]))
     if not np.any((matrix.frequency >= band[0]) & (matrix.frequency <= band[1])):
         raise StudyError(f"no frequency that the force of {part.name!r} drives is one at which all motions are valid")
-    estimate = coefficients.fit(conditioned.analyse(matrix), inputs, band, cut.line_inflation())
+    estimate = coefficients.fit_coefficients(conditioned.analyse(matrix), inputs, band, cut.line_inflation())
     if not np.all(np.isfinite(estimate.values)) or not (prepared.free or estimate["m"] > 0.0):
         raise StudyError(f"the reverse system of {model.name!r} and {part.name!r} has no solution")
     found = dict(zip(estimate.symbols, estimate.values.tolist(), strict=True))
-    return scaled({"m": 1.0} | found, model) if prepared.free else found
+    return with_given_value({"m": 1.0} | found, model) if prepared.free else found
 
 
 def _with_shapes(model: Model) -> Model:

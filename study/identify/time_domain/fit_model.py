@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from study.equations.model import Model, ModelTerm
 from study.equations.substeps import needed_steps
 from study.equations.terms import LIBRARY
-from study.identify.frequency_domain.inputs import history, reverse_inputs
+from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.no_response import LINEAR, unfit, why_no_response
-from study.identify.time_domain.part_fit import STEPS, fit_part
-from study.identify.time_domain.settling import KEPT, better, continued, from_segments, settled
+from study.identify.time_domain.no_response import LINEAR, SURE, driven_at, one_frequency, unfit, why_no_response
+from study.identify.time_domain.part_fit import STEPS, covariance_of, fit_part, linearise
+from study.identify.time_domain.settling import KEPT, better_fit, continued, from_segments, settled
 from study.identify.time_domain.shape_search import Baseline
 from study.records.prepared import FORCE, Prepared
 from study.support.errors import StudyError
@@ -29,6 +29,9 @@ from study.support.errors import StudyError
 Floats = NDArray[np.float64]
 Values = Mapping[str, float]
 TRIED = 15  # free runs of a fit that tries a start
+BELOW, ABOVE = (4.0, 2.0, 1.4, 1.2, 1.1), (0.9, 0.8, 0.7, 0.5, 0.25)  # of one frequency: resonances to begin at
+ASIDE = 1.2  # times the mass of a fit, where another begins that is to come back
+SAME = 1e-6  # of a mass: two searches for the same minimum end as near without noise
 NEAR = 0.01  # standard errors: as near a minimum as the fit of a search has to come
 
 
@@ -64,7 +67,7 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
         )
     unknown = tuple(t for t in model.terms if None in t.parameters)
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
-    look = shape_search.stretch(known, prepared) if unknown else prepared
+    look = shape_search.searched_stretch(known, prepared) if unknown else prepared
     fit = _from_nothing(known, look)
     for entry in unknown:
         fit = with_term(fit, entry, shape_search.baseline(fit, look), look)
@@ -74,11 +77,36 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
 
 def _followed(fit: FreeRunFit, model: Model, prepared: Prepared) -> FreeRunFit:
     """The fit; a linear system is never chaotic: one that needs segments is refused where there is a plain reason."""
-    if fit.restarts and all(term.name in LINEAR for term in model.terms):
-        sentence = unfit(model, prepared)
-        if sentence:
-            raise StudyError(sentence)
+    if not all(term.name in LINEAR for term in model.terms):
+        return fit
+    omega = driven_at(model, prepared)
+    if omega and not _tells_mass(fit, omega, prepared):
+        raise StudyError(one_frequency(omega, prepared))
+    sentence = unfit(model, prepared) if fit.restarts else ""
+    if sentence:
+        raise StudyError(sentence)
     return fit
+
+
+def _tells_mass(fit: FreeRunFit, omega: float, prepared: Prepared) -> bool:
+    """Whether a transient tells the mass where one frequency drives: from zero, and a fit from beside it comes back.
+
+    The steady motion has the same error for any mass and the stiffness to it; what little is left (rounding, a force
+    between its samples) chooses one of them, with a standard error that means nothing.
+    """
+    heavier = _along_steady(fit.model.numbers(), omega, ASIDE)
+    again = _tried(fit.model.with_values(heavier), prepared, fit.held, heavier, KEPT)
+    if fit.restarts or again is None or not (fit.converged and again.converged):
+        return False
+    place = fit.keys.index("m")
+    own, other = (f.model.numbers()["m"] for f in (fit, again))
+    known = np.sqrt([covariance_of(f, linearise(f, prepared))[place, place] for f in (fit, again)])
+    return own > SURE * known[0] and abs(own - other) < SURE * float(np.hypot(*known)) + SAME * own
+
+
+def _along_steady(values: Values, omega: float, times: float) -> dict[str, float]:
+    """Another mass, with the stiffness that gives the same steady motion at one frequency."""
+    return dict(values) | {"m": times * values["m"], "k": values["k"] + (times - 1.0) * values["m"] * omega**2}
 
 
 def _from_nothing(model: Model, prepared: Prepared) -> FreeRunFit:
@@ -89,7 +117,7 @@ def _from_nothing(model: Model, prepared: Prepared) -> FreeRunFit:
     except StudyError as error:
         reason = error
     if (fit is None or not fit.converged) and any(term.name not in LINEAR for term in model.terms):
-        fit = better(fit, _built_up(model, prepared))
+        fit = better_fit(fit, _built_up(model, prepared))
     if fit is None:
         raise reason or StudyError(why_no_response(model, prepared))
     return fit
@@ -99,6 +127,12 @@ def first_starts(model: Model, prepared: Prepared) -> list[dict[str, float]]:
     """Where a fit from nothing begins: the best linear approximation, and the reverse system's solution if any."""
     linear = linear_start(model, prepared)
     starts = [linear, linear | _reversed(model, prepared)]
+    omega = driven_at(model, prepared)
+    if omega:  # only the transient tells the mass, and a fit begun at another resonance loses step with it
+        steady = linear["k"] - linear["m"] * omega**2
+        ratios = BELOW if steady > 0.0 else ABOVE
+        masses = [steady / ((ratio * omega) ** 2 - omega**2) for ratio in ratios]
+        starts += [linear | {"m": m, "k": steady + m * omega**2} for m in masses]
     return [{key: value for key, value in start.items() if key not in model.held_keys} for start in starts]
 
 
@@ -131,7 +165,7 @@ def with_term(fit: FreeRunFit, entry: ModelTerm, base: Baseline, prepared: Prepa
     given = {key: value for key, value in entry.values.items() if value is not None}
     known = fit.model.numbers()
     grown = fit.model.with_term(entry)
-    points = shape_search.starts(entry.term, base, prepared)
+    points = shape_search.shape_starts(entry.term, base, prepared)
     starts = [known | dict.fromkeys(entry.term.symbols, 0.0) | _shapes(entry, p.parameters) | given for p in points]
     if points:
         anew = _reversed(grown.with_values(starts[0]), prepared) or base.linear
@@ -189,7 +223,7 @@ def _at_minimum(
         apart = from_segments(best.model if best else model, prepared, (*held, *shapes))
         if apart is not None and shapes:
             apart = _freed(apart, prepared, held)
-        best = better(best, apart)
+        best = better_fit(best, apart)
     return best
 
 
@@ -247,4 +281,4 @@ def _check_own_formulas(model: Model, prepared: Prepared) -> None:
     known = replace(model, terms=tuple(t for t in model.terms if None not in t.parameters))
     for item in reverse_inputs(known):
         if any(name not in LIBRARY for name in item.terms):
-            history(item, motion)
+            input_history(item, motion)

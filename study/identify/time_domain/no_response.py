@@ -1,6 +1,7 @@
 """Why no values of a model let it follow a record, as far as the record or the model says."""
 
 import numpy as np
+from scipy.fft import rfft, rfftfreq
 
 from study.equations.model import Model
 from study.identify.frequency_domain.starting_values import coherent_lines, solved
@@ -45,11 +46,7 @@ def unfit(model: Model, prepared: Prepared) -> str:
     except StudyError as error:
         return str(error)
     if lines.single:
-        frequency = float(np.mean(np.abs(lines.omega))) / (2.0 * np.pi)
-        return (
-            f"the force of {name!r} drives one frequency, {frequency:.3g} Hz, which cannot tell mass from stiffness; "
-            "expected a force of several frequencies, or a model that gives the value of one of them"
-        )
+        return one_frequency(_strongest(prepared), prepared)
     values, errors = solved(lines, ORDER)
     mass, error = float(values[0]), float(errors[0])
     if mass < -SURE * error and float(values[1]) < SURE * float(errors[1]):
@@ -63,3 +60,33 @@ def unfit(model: Model, prepared: Prepared) -> str:
             "reaches the resonance, or a model that gives the mass"
         )
     return ""
+
+
+def driven_at(model: Model, prepared: Prepared) -> float:
+    """The one frequency, in rad/s, at which a model is driven whose mass and stiffness are open; 0 if more do."""
+    of_force = not (prepared.free or prepared.response == FORCE or prepared.record.stretches)
+    if not of_force or not {"m", "k"} <= {key for key, value in model.values.items() if value is None}:
+        return 0.0
+    try:
+        lines = coherent_lines(prepared)
+    except StudyError:
+        return 0.0
+    return _strongest(prepared) if lines.single else 0.0
+
+
+def one_frequency(omega: float, prepared: Prepared) -> str:
+    """The sentence for a force that drives one frequency, in rad/s."""
+    return (
+        f"the force of {prepared.record.name!r} drives one frequency, {omega / (2.0 * np.pi):.3g} Hz, which cannot "
+        "tell mass from stiffness; expected a force of several frequencies, or a model that gives the value of one of "
+        "them"
+    )
+
+
+def _strongest(prepared: Prepared) -> float:
+    """The angular frequency at which the force has its highest peak, between the lines of its spectrum, in rad/s."""
+    force = prepared.record["force"]
+    power = np.abs(rfft(np.hanning(len(force)) * (force - np.mean(force)))) ** 2
+    f = rfftfreq(len(force), prepared.dt)
+    peak = slice(max(int(np.argmax(power)) - 1, 0), int(np.argmax(power)) + 2)
+    return float(2.0 * np.pi * np.average(f[peak], weights=power[peak]))

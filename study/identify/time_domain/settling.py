@@ -46,13 +46,23 @@ def _settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
         return fit
     if is_chaotic(fit, prepared):
         apart = _in_segments(fit, prepared)
-        return apart if apart is not None and (apart.converged or apart.rms < LOST * fit.rms) else fit
+        if apart is None or (fit.converged and not _more_than_states(apart, fit)):
+            return fit
+        return apart if apart.converged or apart.rms < LOST * fit.rms else fit
     near = from_segments(fit.model, prepared, fit.held, fit.steps_per_sample)
-    best = better(fit, near) or fit
+    best = better_fit(fit, near) or fit
     if near is None or _stands(best, prepared) or not is_chaotic(near, prepared):
         return best
     apart = _in_segments(near, prepared)  # a fit at wrong values may be regular where the true system is chaotic
-    return apart if apart is not None and apart.converged else best
+    if apart is None or (best.converged and not _more_than_states(apart, best)):
+        return best
+    return apart if apart.converged else best
+
+
+def _more_than_states(apart: FreeRunFit, fit: FreeRunFit) -> bool:
+    """Whether segments leave less than one free run by more than the noise that their own states follow by chance."""
+    freedom = 1.0 - len(apart.restarts) * np.size(fit.initial) / len(fit.residual)
+    return apart.rms**2 < freedom * fit.rms**2
 
 
 def _in_segments(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit | None:
@@ -67,7 +77,7 @@ def _in_segments(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit | None:
         )
     except DivergenceError:
         return None
-    if _stands(together, prepared):
+    if _stands(together, prepared) or (together.converged and not _more_than_states(apart, together)):
         return together
     return apart if apart.rms <= fit.rms else None  # with a state for each segment, what ends worse is lost
 
@@ -103,7 +113,7 @@ def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     return fit
 
 
-def better(one: FreeRunFit | None, other: FreeRunFit | None) -> FreeRunFit | None:
+def better_fit(one: FreeRunFit | None, other: FreeRunFit | None) -> FreeRunFit | None:
     """The fit with the smaller residual; of two alike the later one, which knows more errors."""
     if one is None or other is None:
         return one or other

@@ -13,7 +13,7 @@ from scipy.fft import irfft, rfft, rfftfreq
 
 from study.equations.model import Model, ModelTerm
 from study.equations.substeps import needed_steps
-from study.equations.term import Parameter, Term
+from study.equations.term import ShapeParameter, Term
 from study.identify.frequency_domain.starting_values import linear_start, oscillator
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import run_of, with_states
@@ -31,7 +31,7 @@ STARTS = 4  # points of the search that start a fit
 SPREAD = 5  # points that start a fit where the search is blunt, from one end of the range to the other
 
 
-def stretch(model: Model, prepared: Prepared) -> Prepared:
+def searched_stretch(model: Model, prepared: Prepared) -> Prepared:
     """What a search for open shape parameters looks at: everything, where a short stretch shows no linear start.
 
     A slow sweep that is sampled often may pass none of the structure's own frequencies in it.
@@ -115,9 +115,9 @@ def _linear(fit: FreeRunFit, prepared: Prepared) -> tuple[dict[str, float], dict
         return {key: own[key] if key in approximation else 0.0 for key in own}, approximation
 
 
-def starts(term: Term, base: Baseline, prepared: Prepared) -> list[Start]:
+def shape_starts(term: Term, base: Baseline, prepared: Prepared) -> list[Start]:
     """The best points of the search over a candidate's shape parameters, best first."""
-    points = (_try(term, parameters, base, prepared) for parameters in grid(term, base))
+    points = (_try(term, parameters, base, prepared) for parameters in points_to_try(term, base))
     tried = [point for point in points if point is not None]
     best = sorted(tried, key=lambda s: -s.share)
     if not any(p.search.blunt for p in term.parameters):
@@ -162,7 +162,7 @@ def _try(
     return Start(parameters, tuple(float(a) for a in amounts), share)
 
 
-def grid(term: Term, base: Baseline) -> list[tuple[float, ...]]:
+def points_to_try(term: Term, base: Baseline) -> list[tuple[float, ...]]:
     """Points to try: amplitudes from the motion, times from the resonance, frequencies from spectra."""
     points: list[tuple[float, ...]] = [()]
     for parameter in term.parameters:
@@ -170,7 +170,7 @@ def grid(term: Term, base: Baseline) -> list[tuple[float, ...]]:
     return points
 
 
-def _places(parameter: Parameter, point: tuple[float, ...], base: Baseline) -> list[float]:
+def _places(parameter: ShapeParameter, point: tuple[float, ...], base: Baseline) -> list[float]:
     """Values of one shape parameter to try beside those of the parameters before it."""
 
     def lines(kind: str, shifts: Floats) -> Floats:
@@ -182,7 +182,7 @@ def _places(parameter: Parameter, point: tuple[float, ...], base: Baseline) -> l
 
 
 def values_to_try(
-    parameter: Parameter, point: tuple[float, ...], u: Floats, dt: float, lines: Callable[[str, Floats], Floats],
+    parameter: ShapeParameter, point: tuple[float, ...], u: Floats, dt: float, lines: Callable[[str, Floats], Floats],
     sharp: Sequence[float] = (),
 ) -> list[float]:  # fmt: skip
     """Values of one shape parameter for a motion u beside those of the parameters before it, ``point``.

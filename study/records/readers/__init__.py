@@ -10,7 +10,7 @@ import numpy as np
 
 from study.records.readers import hdf5, matlab, parquet, uff
 from study.records.readers.assemble import record_from
-from study.records.readers.options import ReadOptions, assignments, beside, read_options
+from study.records.readers.options import ReadOptions, assignments, options_beside, read_options
 from study.records.readers.source import EXPECTED, readable
 from study.records.readers.swapped import suspect_swapped
 from study.records.readers.table import Table
@@ -70,8 +70,8 @@ def read_table(path: Path, mapping: ReadOptions | None = None) -> tuple[Table, R
     options = mapping or ReadOptions()
     with readable(path) as source:
         head = _head(path, source)
-        if beside(path).is_file():
-            options = options.over(read_options(beside(path)))
+        if options_beside(path).is_file():
+            options = options.over(read_options(options_beside(path)))
         return _table(path, source, head, options), options
 
 

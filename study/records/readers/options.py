@@ -81,7 +81,7 @@ def assignments(texts: Sequence[str], option: str) -> dict[str, str]:
     return given
 
 
-def beside(path: Path) -> Path:
+def options_beside(path: Path) -> Path:
     """Where the options of a file may stand: ``rig.record.yaml`` for ``rig.csv``."""
     return path.with_suffix(BESIDE) if path.name else path
 

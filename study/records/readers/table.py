@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from study.support.errors import StudyError, expect
 from study.support.units import is_unit
-from study.support.yaml_text import short
+from study.support.yaml_text import excerpt
 
 Floats = NDArray[np.float64]
 Array = NDArray[Any]  # as a file holds it: of any kind of number, or of none
@@ -51,7 +51,7 @@ class Table:
 
     def listing(self) -> str:
         """The columns as a message lists them."""
-        shown = [f"{k} {short(c.name, 30)!r}" for k, c in enumerate(self.columns[:12], start=1)]
+        shown = [f"{k} {excerpt(c.name, 30)!r}" for k, c in enumerate(self.columns[:12], start=1)]
         return ", ".join(shown) + (f" and {len(self.columns) - 12} more" if len(self.columns) > 12 else "")
 
 

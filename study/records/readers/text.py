@@ -22,7 +22,7 @@ import pandas as pd
 from study.records.readers.table import NONE, Column, Table, split_unit
 from study.support.errors import StudyError, expect
 from study.support.units import is_unit
-from study.support.yaml_text import short
+from study.support.yaml_text import excerpt
 
 HEAD_BYTES = 200_000
 HEAD_LINES = 200
@@ -40,7 +40,7 @@ Place = Callable[[int], str]
 
 
 @dataclass(frozen=True)
-class Layout:
+class TextLayout:
     """How a text file is laid out."""
 
     delimiter: str  # between cells
@@ -140,7 +140,7 @@ def _reading(lines: Sequence[str], delimiter: str, decimal: str) -> _Reading:
     return _Reading(delimiter, decimal, same, others, width, numeric, score * (1 + (len(numeric) > 1)))
 
 
-def _layout(path: Path, lines: Sequence[str]) -> Layout:
+def _layout(path: Path, lines: Sequence[str]) -> TextLayout:
     best = max((_reading(lines, *dialect) for dialect in DIALECTS), key=lambda r: r.score)
     samples = [k for k in best.cells if best.is_sample(k)]
     expect(best.score and samples, f"{path}: no line with numbers is found among the first {len(lines)}; {EXPECTED}")
@@ -153,7 +153,7 @@ def _layout(path: Path, lines: Sequence[str]) -> Layout:
     odd = next((k for k in best.others if heading < k < first and (words or best.is_numbers(k))), None)
     if odd is not None:  # a sample with a cell too many or too few must not be taken for a heading
         raise StudyError(f"{path}: line {odd + 1} has {len(best.others[odd])} cells; expected {best.width}")
-    return Layout(best.delimiter, best.decimal, first, *_headings(header, units, best.width))
+    return TextLayout(best.delimiter, best.decimal, first, *_headings(header, units, best.width))
 
 
 def _headings(header: Sequence[str], units: Sequence[str], width: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -181,7 +181,7 @@ def _commented(lines: Sequence[str], best: _Reading) -> list[str]:
     return []
 
 
-def _table(path: Path, body: bytes, layout: Layout) -> Table:
+def _table(path: Path, body: bytes, layout: TextLayout) -> Table:
     place, width = partial(_line, body, layout.first), len(layout.names)
     try:
         frame, read = _frame(body, layout)
@@ -196,7 +196,7 @@ def _table(path: Path, body: bytes, layout: Layout) -> Table:
     return Table(tuple(columns), place=place)
 
 
-def _frame(body: bytes, layout: Layout) -> tuple[pd.DataFrame, Callable[..., Column]]:
+def _frame(body: bytes, layout: TextLayout) -> tuple[pd.DataFrame, Callable[..., Column]]:
     """The cells, and how to make a column of them: as numbers at once, or where a cell holds text, cell by cell."""
     try:
         if not WORDS.search(body):
@@ -208,7 +208,7 @@ def _frame(body: bytes, layout: Layout) -> tuple[pd.DataFrame, Callable[..., Col
     return _parse(body, layout, "str"), _checked
 
 
-def _parse(body: bytes, layout: Layout, dtype: str) -> pd.DataFrame:
+def _parse(body: bytes, layout: TextLayout, dtype: str) -> pd.DataFrame:
     return pd.read_csv(
         BytesIO(body), sep=layout.delimiter, decimal=layout.decimal, header=None, index_col=False, dtype=dtype,
         comment="%" if b"\n%" in body else "#", skipinitialspace=True, engine="c",
@@ -225,13 +225,13 @@ def _checked(name: str, unit: str, cells: "pd.Series[Any]", decimal: str, place:
     texts = [cell.strip(SPACE) if isinstance(cell, str) else "" for cell in cells.tolist()]
     wrong = next((i for i, cell in enumerate(texts) if cell and not _is_number(cell, decimal)), None)
     if wrong is not None:
-        fault = f"column {name!r} holds {short(texts[wrong], 30)!r} in {place(wrong)}; expected a number"
+        fault = f"column {name!r} holds {excerpt(texts[wrong], 30)!r} in {place(wrong)}; expected a number"
         return Column(name, NONE, unit, fault=fault)
     numbers = (cell.replace(",", ".") if decimal == "," else cell for cell in texts)
     return Column(name, np.array([float(cell) if cell else np.nan for cell in numbers]), unit)
 
 
-def _ragged(error: str, layout: Layout, top: str) -> str:
+def _ragged(error: str, layout: TextLayout, top: str) -> str:
     width = len(layout.names)
     numbers = re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", error)
     if numbers is None:

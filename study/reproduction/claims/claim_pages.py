@@ -12,7 +12,7 @@ LONGEST = 110  # characters of a measured number in a table
 MARKS = {REPRODUCED: "yes", PARTLY: "partly", NOT_REPRODUCED: "no"}
 
 
-def verdict(claims: pd.DataFrame) -> str:
+def verdict_sentence(claims: pd.DataFrame) -> str:
     """How many statements were reproduced, in one sentence; places beside the report are not counted."""
     verdicts = claims.loc[~claims["where"].str.startswith(BESIDE), "verdict"]
     whole, part, none = (int((verdicts == name).sum()) for name in (REPRODUCED, PARTLY, NOT_REPRODUCED))
@@ -27,7 +27,7 @@ def by_claim(claims: pd.DataFrame) -> list[Block]:
     ]
     said = "Each line leads to its conditions: what must hold, what was measured and, where it does not hold, why."
     return [
-        Text(verdict(claims)), Text(said), table(["where", "claim", "report", "ours", "verdict"], rows),
+        Text(verdict_sentence(claims)), Text(said), table(["where", "claim", "report", "ours", "verdict"], rows),
         Heading("What each verdict rests on"), *(conditions(row) for row in _rows(claims)),
     ]  # fmt: skip
 

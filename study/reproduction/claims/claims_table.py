@@ -31,7 +31,7 @@ SECTIONS = (
 CLAIMS = {name: conditions for section in SECTIONS for name, conditions in section.CLAIMS.items()}
 
 
-def judge(name: str, evidence: Evidence, reported: Reported) -> Claim:
+def judge_claim(name: str, evidence: Evidence, reported: Reported) -> Claim:
     """One claim, by its id."""
     return conclude(reported, name, *CLAIMS[name](evidence, reported))
 
@@ -42,13 +42,13 @@ def judge_all(
     """Every claim, one row each, in the order of the report."""
     claims: list[Claim] = []
     for name in CLAIMS:
-        claims.append(judge(name, evidence, reported))
+        claims.append(judge_claim(name, evidence, reported))
         if progress is not None:
             progress(len(claims), claims[-1])
     order = list(reported.statements)
     return pd.DataFrame([asdict(claim) for claim in sorted(claims, key=lambda c: order.index(c.id))])
 
 
-def page(table: pd.DataFrame) -> str:
+def claims_page(table: pd.DataFrame) -> str:
     """The table as a page: counts, one line a claim, and below it the conditions of each, folded."""
     return document.markdown([document.Heading("Claims of the report", 1), *by_claim(table)])

@@ -23,7 +23,7 @@ NEAR_UNITY_MEAN, NEAR_UNITY_LOWEST = 0.99, 0.95
 TESTS_WRONG = 0.10  # a 5 % test may refuse up to twice as many Gaussian records
 
 
-def levels(reported: Reported) -> list[float]:
+def input_variances(reported: Reported) -> list[float]:
     """The input variances of Section 5.3."""
     return [reported.value(f"levels_invariant.{name}") for name in ("lowest", "second", "third", "highest")]
 

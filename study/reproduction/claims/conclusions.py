@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from study.equations.simulate import Integrator, simulate
 from study.records.excitation import Excitation, force, theoretical_autospectrum
-from study.reproduction.claims.common import COMBINED, LINEAR_PARTS, levels, noises, recovered
+from study.reproduction.claims.common import COMBINED, LINEAR_PARTS, input_variances, noises, recovered
 from study.reproduction.claims.evidence import Assumed, Drive, Ensemble, Evidence, Outcome
 from study.reproduction.claims.judgement import Condition, at_least, claims, explained, together
 from study.reproduction.claims.levels import PARTS
@@ -84,7 +84,7 @@ def _parts(system: str) -> tuple[str, ...]:
 
 def conclusion_5_level(evidence: Evidence, reported: Reported) -> list[Condition]:
     """Nonlinear systems at the lowest and the highest level of Section 5.3."""
-    lowest, *_, highest = levels(reported)
+    lowest, *_, highest = input_variances(reported)
     return [
         together(
             f"{system} at {level:g}", recovered(evidence, reported, evidence.at(system, level), _parts(system))
@@ -107,7 +107,7 @@ def conclusion_5_noise(evidence: Evidence, reported: Reported) -> list[Condition
 
 def conclusion_6(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """The lowest level of Section 5.3."""
-    ensemble = evidence.at(COMBINED, levels(reported)[0])
+    ensemble = evidence.at(COMBINED, input_variances(reported)[0])
     yield at_least("linear coherence at the lowest level", ensemble.linear_coherence(), 0.95)
     yield from recovered(evidence, reported, ensemble, ("k3", "c3"))
 

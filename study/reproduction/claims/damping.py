@@ -6,7 +6,7 @@ import numpy as np
 
 from study.reproduction.claims import common
 from study.reproduction.claims.evidence import Assumed, Drive, Evidence
-from study.reproduction.claims.judgement import Condition, at_least, claims, close, far, near, significant
+from study.reproduction.claims.judgement import Condition, at_least, claims, far, near, surely_above_zero, within_share
 from study.reproduction.claims.reported import Reported
 from study.reproduction.claims.sample import GAUSSIAN_OUTER_SHARE, outer_share
 from study.support.numbers import percent
@@ -15,7 +15,7 @@ from study.support.numbers import percent
 def van_der_pol_linear(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """A_1 by MI/SO; c by SI/SO at every level."""
     ensemble = evidence.at("van_der_pol")
-    by_level = {level: evidence.at("van_der_pol", level).siso("c") for level in common.levels(reported)}
+    by_level = {level: evidence.at("van_der_pol", level).siso("c") for level in common.input_variances(reported)}
     yield from common.recovered(evidence, reported, ensemble, common.LINEAR_PARTS)
     yield far("SI/SO c", ensemble.siso("c"), reported.table_1("van_der_pol", "c"), 0.1)
     yield from common.rising("SI/SO c", by_level)
@@ -27,7 +27,7 @@ def van_der_pol_damping(evidence: Evidence, reported: Reported) -> Iterator[Cond
     ensemble = evidence.ensemble(Drive("van_der_pol"), Assumed(plus=("cubic_stiffness",)))
     at_resonance = 2.0 * np.pi * reported.table_1("van_der_pol", "f_n") * c3 / 3.0
     real = ensemble.sample(lambda o: o.miso.values["k3"] / at_resonance)
-    yield close("c3", ensemble.miso("c3"), c3, evidence.tolerance("van_der_pol", "c3"))
+    yield within_share("c3", ensemble.miso("c3"), c3, evidence.tolerance("van_der_pol", "c3"))
     yield near("real part of A_2 over its imaginary part at f_n", real, 0.0, 0.05)
 
 
@@ -41,7 +41,7 @@ def van_der_pol_share(evidence: Evidence, reported: Reported) -> Iterator[Condit
         f"below {edge:g} Hz {below.mean:.3f} of the force passes through L_1; the lowest line, {lowest:.2f}, "
         f"stands at {where:.2f} Hz",
     )  # fmt: skip
-    yield significant(
+    yield surely_above_zero(
         f"nonlinear share above less that below {edge:g} Hz", below.minus(above),
         f"linear coherence is {below.mean:.3f} below and {above.mean:.3f} above {edge:g} Hz: the mass takes most "
         "of the force at high frequency",
@@ -62,7 +62,7 @@ def combined_cubic(evidence: Evidence, reported: Reported) -> Iterator[Condition
     yield from common.recovered(evidence, reported, ensemble, alone)
     for name, sample in alone.items():
         allowed = 2.0 * evidence.tolerance(common.COMBINED, name)
-        yield close(f"{name} of the combined system", ensemble.miso(name), sample.mean, allowed)
+        yield within_share(f"{name} of the combined system", ensemble.miso(name), sample.mean, allowed)
     yield from common.near_unity(ensemble)
 
 

@@ -14,11 +14,11 @@ from study.reproduction.claims.judgement import (
     at_least,
     at_most,
     claims,
-    close,
     far,
     near,
     one_record,
-    significant,
+    surely_above_zero,
+    within_share,
 )
 from study.reproduction.claims.linear_system import longer_segments_help
 from study.reproduction.claims.reported import Reported
@@ -42,7 +42,7 @@ def dead_band_as_duffing(evidence: Evidence, reported: Reported) -> Iterator[Con
         f"dead band and response of the same order (within a factor of {SAME_ORDER:g})",
         f"root mean square response {size} of u_g", 1.0 / SAME_ORDER <= size.mean <= SAME_ORDER,
     )  # fmt: skip
-    yield significant("k3", ensemble.miso("k3"))
+    yield surely_above_zero("k3", ensemble.miso("k3"))
     why = f"the cubic term takes the coherence from {linear.mean:.3f} to {whole.mean:.3f} only"
     yield at_least("share of the linear fit's failure that the cubic term removes", gain, 0.5, why)
     why = f"it reaches {whole.mean:.3f} on average: a cubic imitates the gap well"
@@ -56,7 +56,7 @@ def dead_band_as_duffing(evidence: Evidence, reported: Reported) -> Iterator[Con
 
 def dead_band_not_invariant(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """k and k3 of the Duffing system put in its place, at the lowest and the highest level of Section 5.3."""
-    lowest, *_, highest = common.levels(reported)
+    lowest, *_, highest = common.input_variances(reported)
     low, high = (evidence.ensemble(Drive(SYSTEM, level), AS_DUFFING) for level in (lowest, highest))
     for name in ("k", "k3"):
         before, after = low.miso(name), high.miso(name)
@@ -83,7 +83,7 @@ def dead_band_stiffness(evidence: Evidence, reported: Reported) -> Iterator[Cond
     worst = ensemble.sample(lambda o: float(np.max(line_errors(o, stated)[outside])))
     limit, allowed = reported.value("dead_band_error"), evidence.tolerance(SYSTEM, "k_dead_band")
     why = f"outside the band the worst line of a record errs by {percent(worst.mean, '.0f')}"
-    yield close("fitted A_2", ensemble.miso("k_dead_band").scaled(-1.0), stated, allowed)
+    yield within_share("fitted A_2", ensemble.miso("k_dead_band").scaled(-1.0), stated, allowed)
     yield at_most(f"largest error of a line outside {low:g} to {high:g} Hz", worst, limit, why)
 
 
@@ -100,7 +100,7 @@ def dead_band_error(evidence: Evidence, reported: Reported) -> Iterator[Conditio
         f"the worst line of a record errs by {percent(error.mean, '.0f')} (scatter {percent(error.scatter, '.0f')}), "
         f"which is leakage: segments twice as long leave {percent(finer.mean, '.0f')}"
     )
-    yield close(f"largest error from {low:g} to {high:g} Hz", error, stated, 0.5, why)
+    yield within_share(f"largest error from {low:g} to {high:g} Hz", error, stated, 0.5, why)
     yield one_record(f"largest error from {low:g} to {high:g} Hz", error, stated, why)
     why = f"the largest error lies in that band in {percent(there.mean, '.0f')} of the records only"
     yield at_least("share of records whose largest error lies in that band", there, 0.5, why)
@@ -109,7 +109,9 @@ def dead_band_error(evidence: Evidence, reported: Reported) -> Iterator[Conditio
 def dead_band_share(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """About 65 percent, under both readings of unit variance."""
     stated, chosen = reported.value("dead_band_share"), evidence.settings.excitation.reading
-    by_level = {level: evidence.at(SYSTEM, level).linear_coherence() for level in (0.05, 0.1, *common.levels(reported))}
+    by_level = {
+        level: evidence.at(SYSTEM, level).linear_coherence() for level in (0.05, 0.1, *common.input_variances(reported))
+    }
     lowest = min(by_level, key=lambda level: by_level[level].mean)
     where, bottom = evidence.at(SYSTEM, lowest).lowest(lambda o: o.miso.cumulative[0])
     text = ", ".join(f"{level:g}: {sample.mean:.3f}" for level, sample in by_level.items())
@@ -150,7 +152,7 @@ def extreme_siso(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
         "the averaged SI/SO |A_1| has its minimum inside the band", f"minimum at {lowest:.2f} Hz",
         ensemble.frequency[0] < lowest < ensemble.frequency[-1],
     )  # fmt: skip
-    yield significant("SI/SO k (exact 0)", ensemble.siso("k"))
+    yield surely_above_zero("SI/SO k (exact 0)", ensemble.siso("k"))
     why = f"SI/SO's m is {percent(mass.mean / m - 1.0, '+.1f')} off, hardly a serious error"
     yield far("SI/SO m", mass, m, 0.05, why)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from study.reproduction.claims import common
 from study.reproduction.claims.evidence import Assumed, Drive, Evidence
-from study.reproduction.claims.judgement import Condition, at_most, claims, close, explained, near, one_record
+from study.reproduction.claims.judgement import Condition, at_most, claims, explained, near, one_record, within_share
 from study.reproduction.claims.reported import Reported
 from study.reproduction.claims.sample import average
 from study.support.numbers import percent
@@ -50,16 +50,16 @@ def _siso_curve(evidence: Evidence, name: str, stated: float, why: str = "") -> 
     """The SI/SO curve gives a parameter that the report states, read by hand and fitted."""
     read, fitted = evidence.at("duffing").hand_read(name), evidence.at("duffing").siso(name)
     return [
-        close(f"hand-read {name}", read, stated, common.READ_OFF, why),
+        within_share(f"hand-read {name}", read, stated, common.READ_OFF, why),
         one_record(f"hand-read {name}", read, stated, why),
-        close(f"fitted {name}", fitted, stated, common.READ_OFF, why),
+        within_share(f"fitted {name}", fitted, stated, common.READ_OFF, why),
     ]
 
 
 def siso_frequency(evidence: Evidence, reported: Reported) -> list[Condition]:
     """f_n = 3.6 Hz."""
     fitted = evidence.at("duffing").siso("f_n")
-    lower = evidence.at("duffing", common.levels(reported)[1]).hand_read("f_n")
+    lower = evidence.at("duffing", common.input_variances(reported)[1]).hand_read("f_n")
     why = (
         f"the best linear fit lies at {fitted.mean:.2f} Hz; at half the variance it is read at {lower.mean:.2f} Hz, so "
         "that the report's force seems to have been weaker"
@@ -69,7 +69,7 @@ def siso_frequency(evidence: Evidence, reported: Reported) -> list[Condition]:
 
 def siso_wrong(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """SI/SO k and m at every level, against the study's tolerances."""
-    for level in common.levels(reported):
+    for level in common.input_variances(reported):
         for name in ("k", "m"):
             true, sample = reported.table_1("duffing", name), evidence.at("duffing", level).siso(name)
             allowed = evidence.tolerance("duffing", name)
@@ -84,7 +84,7 @@ def duffing_cubic(evidence: Evidence, reported: Reported) -> Iterator[Condition]
     ensemble, k3 = evidence.at("duffing"), reported.value("duffing_cubic")
     imaginary = ensemble.sample(lambda o: average(o.miso.response[1].imag) / k3)
     lines = ensemble.sample(lambda o: float(np.median(np.abs(o.miso.response[1].imag))) / k3)
-    yield close("k3", ensemble.miso("k3"), k3, evidence.tolerance("duffing", "k3"))
+    yield within_share("k3", ensemble.miso("k3"), k3, evidence.tolerance("duffing", "k3"))
     yield near("Im A_2 / k3 averaged over the band", imaginary, 0.0, 0.01)
     yield at_most("median |Im A_2| / k3 of a line", lines, common.READ_OFF)
 
@@ -92,7 +92,7 @@ def duffing_cubic(evidence: Evidence, reported: Reported) -> Iterator[Condition]
 def duffing_share(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Figure 23, lower curve: approximately 90 percent."""
     stated, share = reported.value("duffing_share"), evidence.at("duffing").linear_coherence()
-    lower = evidence.at("duffing", common.levels(reported)[1]).linear_coherence()
+    lower = evidence.at("duffing", common.input_variances(reported)[1]).linear_coherence()
     why = (
         f"on average {share.mean:.3f} passes through L_1; {stated:g} would be met by a weaker force ({lower.mean:.3f} "
         "at half the variance)"
@@ -111,6 +111,8 @@ CLAIMS = claims(
     added_terms, siso_frequency, siso_wrong, duffing_cubic, duffing_share, duffing_histogram,
     siso_stiffness=lambda e, r: _siso_curve(e, "k", r.value("siso_stiffness")),
     duffing_linear=lambda e, r: common.recovered(e, r, e.at("duffing"), common.LINEAR_PARTS),
-    siso_varies=lambda e, r: common.rising("SI/SO k", {v: e.at("duffing", v).siso("k") for v in common.levels(r)}),
+    siso_varies=lambda e, r: common.rising(
+        "SI/SO k", {v: e.at("duffing", v).siso("k") for v in common.input_variances(r)}
+    ),
     duffing_coherence=lambda e, _: common.near_unity(e.at("duffing")),
 )  # fmt: skip

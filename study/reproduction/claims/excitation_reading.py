@@ -57,7 +57,7 @@ def quantities(reported: Reported) -> tuple[Quantity, ...]:
     )  # fmt: skip
 
 
-def study(evidence: Evidence, reported: Reported) -> pd.DataFrame:
+def both_readings(evidence: Evidence, reported: Reported) -> pd.DataFrame:
     """Each quantity under both readings, one row each; ``results/excitation_reading.csv``.
 
     ``distance`` is the mean less the reported number; ``in_scatter`` is the distance over the standard

@@ -100,7 +100,7 @@ def together(label: str, conditions: Sequence[Condition]) -> Condition:
     )
 
 
-def close(label: str, sample: Sample, target: float, relative: float, why: str = "") -> Condition:
+def within_share(label: str, sample: Sample, target: float, relative: float, why: str = "") -> Condition:
     """The mean over the seeds lies within a share of a number."""
     met = abs(sample.mean - target) <= relative * abs(target)
     return Condition(f"mean {label} within {percent(relative)} of {target:.6g}", f"{label} {sample}", met, why)
@@ -138,7 +138,7 @@ def at_most(label: str, sample: Sample, bound: float, why: str = "") -> Conditio
     return Condition(f"mean {label} at most {bound:g}", f"{label} {sample}", sample.mean <= bound, why)
 
 
-def significant(label: str, sample: Sample, why: str = "") -> Condition:
+def surely_above_zero(label: str, sample: Sample, why: str = "") -> Condition:
     """The mean over the seeds is above zero by three of its standard errors."""
     met = sample.mean > 3.0 * sample.error
     return Condition(f"mean {label} above zero by 3 standard errors", f"{label} {sample}", met, why)

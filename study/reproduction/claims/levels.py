@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.records.excitation import displacement_noise
-from study.reproduction.claims.common import COMBINED, levels, near_unity, noises, recovered, rising
+from study.reproduction.claims.common import COMBINED, input_variances, near_unity, noises, recovered, rising
 from study.reproduction.claims.evidence import Analysis, Assumed, Drive, Ensemble, Evidence
-from study.reproduction.claims.judgement import Condition, at_least, claims, close, explained, together
+from study.reproduction.claims.judgement import Condition, at_least, claims, explained, together, within_share
 from study.reproduction.claims.reported import Reported
 from study.reproduction.claims.sample import Sample, average
 from study.reproduction.ensemble import NOISE_OFFSET, threaded
@@ -27,20 +27,20 @@ def levels_invariant(evidence: Evidence, reported: Reported) -> list[Condition]:
     """Every parameter at every level within its tolerance."""
     return [
         together(f"variance {level:g}", recovered(evidence, reported, evidence.at(COMBINED, level), PARTS))
-        for level in levels(reported)
+        for level in input_variances(reported)
     ]
 
 
 def levels_similar(evidence: Evidence, reported: Reported) -> list[Condition]:
     """SI/SO and MI/SO at the lowest level."""
-    level = levels(reported)[0]
+    level = input_variances(reported)[0]
     ensemble = evidence.at(COMBINED, level)
     spring, damper = cubic_shares(evidence, reported, level)
     conditions: list[Condition] = []
     for name in ("f_n", "k", "m", "c"):
         single, multiple = ensemble.siso(name), ensemble.miso(name).mean
         why = f"SI/SO's {name} is {single.mean:.4g} where MI/SO's is {multiple:.4g}"
-        conditions.append(close(f"SI/SO {name}", single, multiple, 0.10, why))
+        conditions.append(within_share(f"SI/SO {name}", single, multiple, 0.10, why))
     return explained(
         f"even at {level:g} N^2 the cubic spring adds {percent(spring, '.0f')} to the force that follows u and the "
         f"cubic damper {percent(damper, '.0f')} to that which follows the velocity: SI/SO takes them for k and c",
@@ -217,8 +217,8 @@ def noise_coherence(evidence: Evidence, reported: Reported) -> Iterator[Conditio
 CLAIMS = claims(
     levels_invariant, levels_similar, noise_random_only, noise_output, noise_random, noise_linear, noise_cubic,
     noise_coherence,
-    levels_siso=lambda e, r: rising("SI/SO f_n", {v: e.at(COMBINED, v).siso("f_n") for v in levels(r)}),
+    levels_siso=lambda e, r: rising("SI/SO f_n", {v: e.at(COMBINED, v).siso("f_n") for v in input_variances(r)}),
     levels_coherence=lambda e, r: [
-        together(f"variance {v:g}", near_unity(e.at(COMBINED, v))) for v in levels(r)
+        together(f"variance {v:g}", near_unity(e.at(COMBINED, v))) for v in input_variances(r)
     ],
 )  # fmt: skip

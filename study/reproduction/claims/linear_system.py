@@ -10,7 +10,7 @@ from study.identify.estimators import miso
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.reproduction.claims.common import READ_OFF, TESTS_WRONG, looks_gaussian, near_unity
 from study.reproduction.claims.evidence import Assumed, Drive, Evidence
-from study.reproduction.claims.judgement import Condition, at_most, claims, close, significant
+from study.reproduction.claims.judgement import Condition, at_most, claims, surely_above_zero, within_share
 from study.reproduction.claims.reported import Reported
 from study.reproduction.claims.sample import Sample, average, relative_distance
 from study.support.numbers import percent
@@ -85,7 +85,7 @@ def hanning(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Leakage at the linear system's resonance with and without the window."""
     f_n = reported.table_1("linear", "f_n")
     more = deficit(evidence, "linear", f_n, window="boxcar").minus(deficit(evidence, "linear", f_n))
-    yield significant("1 - coherence near resonance without window less that with it", more)
+    yield surely_above_zero("1 - coherence near resonance without window less that with it", more)
 
 
 def overlap(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
@@ -109,7 +109,7 @@ def linear_same(evidence: Evidence, _: Reported) -> Iterator[Condition]:
     ensemble = evidence.ensemble(Drive("linear"), Assumed(plus=("cubic_stiffness",)))
     apart = ensemble.sample(lambda o: relative_distance(o.miso.response[0], o.siso.response[0]))
     yield at_most("difference of the curves (root mean square over the band, relative)", apart, 0.02)
-    yield from (close(f"MI/SO {n}", ensemble.miso(n), ensemble.siso(n).mean, 0.01) for n in ("m", "c", "k"))
+    yield from (within_share(f"MI/SO {n}", ensemble.miso(n), ensemble.siso(n).mean, 0.01) for n in ("m", "c", "k"))
 
 
 def linear_leakage(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
@@ -125,7 +125,7 @@ def hand_read(evidence: Evidence, reported: Reported) -> list[Condition]:
     """The recipes of Section 5.2.1 on the linear system."""
     why = "the recipe reads single lines of a curve whose minimum the window fills up with leakage"
     read = {name: evidence.at("linear").hand_read(name) for name in ("k", "f_n", "m", "c")}
-    return [close(f"hand-read {n}", s, reported.table_1("linear", n), READ_OFF, why) for n, s in read.items()]
+    return [within_share(f"hand-read {n}", s, reported.table_1("linear", n), READ_OFF, why) for n, s in read.items()]
 
 
 CLAIMS = claims(

@@ -6,7 +6,7 @@ import numpy as np
 
 from study.reproduction.claims import common
 from study.reproduction.claims.evidence import Evidence
-from study.reproduction.claims.judgement import Condition, at_most, claims, close, near
+from study.reproduction.claims.judgement import Condition, at_most, claims, near, within_share
 from study.reproduction.claims.reported import Reported
 from study.reproduction.claims.sample import GAUSSIAN_CENTRAL_SHARE, average, central_share, kurtosis
 from study.support.numbers import percent
@@ -55,7 +55,7 @@ def mathieu_stiffness(evidence: Evidence, reported: Reported) -> Iterator[Condit
     keep = ensemble.between(low, high)
     error = ensemble.sample(lambda o: average(np.abs(o.miso.response[1][keep] / stated - 1.0)))
     imaginary = ensemble.sample(lambda o: average(o.miso.response[1][keep].imag) / stated)
-    yield close("k_m", ensemble.miso("k_m"), stated, evidence.tolerance("mathieu", "k_m"))
+    yield within_share("k_m", ensemble.miso("k_m"), stated, evidence.tolerance("mathieu", "k_m"))
     yield at_most(f"error of a line of A_2 from {low:g} to {high:g} Hz", error, EXCELLENT)
     yield near(f"Im A_2 / k_m from {low:g} to {high:g} Hz", imaginary, 0.0, NEGLIGIBLE)
 

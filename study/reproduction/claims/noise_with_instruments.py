@@ -17,7 +17,10 @@ def noise_instruments(evidence: Evidence, reported: Reported) -> list[Condition]
     That errors are random only is not claimed: over 200 seeds (docs/estimators.md) a few tenths of a per cent are left.
     """
     return [
-        together(f"{percent(noise)} noise", [small(n, bias) for n, bias in biases(evidence, reported, noise).items()])
+        together(
+            f"{percent(noise)} noise",
+            [small(n, bias) for n, bias in relative_errors(evidence, reported, noise).items()],
+        )
         for noise in noises(reported)
     ]
 
@@ -28,7 +31,7 @@ def small(name: str, bias: Sample) -> Condition:
     return Condition(f"mean bias of {name} within {percent(SIGNIFICANT_BIAS)}", measured, met, measured)
 
 
-def biases(evidence: Evidence, reported: Reported, noise: float) -> dict[str, Sample]:
+def relative_errors(evidence: Evidence, reported: Reported, noise: float) -> dict[str, Sample]:
     """Relative error of each parameter against its exact value."""
     drive, settings = Drive(COMBINED, noise=noise), evidence.estimator_settings()
     model, truth = evidence.model(drive), {n: reported.table_1(COMBINED, n) for n in (*PARTS, "f_n")}

@@ -10,7 +10,7 @@ from study.equations.model import Model
 from study.records.record import Record
 from study.reproduction.claims.common import COMBINED, READ_OFF, SYSTEMS
 from study.reproduction.claims.evidence import Drive, Evidence
-from study.reproduction.claims.judgement import Condition, at_least, claims, close, near
+from study.reproduction.claims.judgement import Condition, at_least, claims, near, within_share
 from study.reproduction.claims.reported import Reported
 from study.reproduction.claims.sample import Sample, average
 from study.reproduction.ensemble import threaded
@@ -120,14 +120,14 @@ def envelope(model: Model, record: Record, mass: float) -> tuple[float, float]:
 def _slope(evidence: Evidence, reported: Reported, system: str, within: float, label: str) -> Condition:
     """The slope of the mean of F_r at given u is the linear stiffness."""
     m, k = reported.table_1(system, "m"), reported.table_1(system, "k")
-    return close(label, evidence.each(Drive(system), lambda r: mean_curve(r, m, 1)[0]), k, within)
+    return within_share(label, evidence.each(Drive(system), lambda r: mean_curve(r, m, 1)[0]), k, within)
 
 
 def _hardening(evidence: Evidence, reported: Reported, system: str) -> Condition:
     """The mean of F_r at given u is k u + k3 u^3."""
     m, k3 = reported.table_1(system, "m"), reported.table_1(system, "k3")
     cubic = evidence.each(Drive(system), lambda r: mean_curve(r, m, 1, 3)[1])
-    return close("cubic part of the mean", cubic, k3, READ_OFF)
+    return within_share("cubic part of the mean", cubic, k3, READ_OFF)
 
 
 def _damping_ratio(evidence: Evidence, reported: Reported, system: str) -> Sample:
@@ -168,7 +168,7 @@ def mathieu_pattern(evidence: Evidence, reported: Reported) -> list[Condition]:
     halves = (("stiff", 1.0), ("soft", -1.0))
     slopes = {half: evidence.each(Drive("mathieu"), lambda r, s=sign: slope(r, s)) for half, sign in halves}
     return [
-        close(f"slope in the {half} half period", slopes[half], k + sign * 2.0 / math.pi * k_m, BY_EYE)
+        within_share(f"slope in the {half} half period", slopes[half], k + sign * 2.0 / math.pi * k_m, BY_EYE)
         for half, sign in halves
     ]
 
@@ -177,7 +177,7 @@ def dead_band_pattern(evidence: Evidence, reported: Reported) -> Iterator[Condit
     """The gap read off the pattern."""
     m, gap = reported.table_1("dead_band", "m"), reported.value("dead_band_pattern")
     read = evidence.each(Drive("dead_band"), lambda r: read_dead_band(r, m))
-    yield close("gap read off the pattern", read, gap, BY_EYE)
+    yield within_share("gap read off the pattern", read, gap, BY_EYE)
 
 
 CLAIMS = claims(

@@ -9,7 +9,7 @@ from typing import Annotated, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from study.support.config_files import Row, Text, read_rows
+from study.support.config_files import TableRow, Text, read_rows
 from study.support.errors import StudyError
 
 MANY = 8  # numbers that still read well in one cell
@@ -54,7 +54,7 @@ IN_WORDS = _names("""
 """)
 
 
-class Statement(Row):
+class Statement(TableRow):
     """One row: a statement, with its number where it has one."""
 
     id: Annotated[
@@ -145,7 +145,7 @@ def check_systems(reported: Reported, models: Path) -> None:
             raise StudyError(f"config/reported.tsv: {name!r} names a system that is not in {models.name}/")
 
 
-def load(path: Path) -> Reported:
+def load_reported(path: Path) -> Reported:
     """Read and check the table."""
     statements: dict[str, Statement] = {}
     for _, statement in read_rows(path, Statement):

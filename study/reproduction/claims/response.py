@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from study.reproduction.claims import common
 from study.reproduction.claims.evidence import Drive, Evidence
-from study.reproduction.claims.judgement import Condition, at_least, claims, explained, significant
+from study.reproduction.claims.judgement import Condition, at_least, claims, explained, surely_above_zero
 from study.reproduction.claims.reported import Reported
 from study.reproduction.claims.sample import Sample, kurtosis
 from study.reproduction.preliminary import mathieu_lines
@@ -45,7 +45,7 @@ def harmonics(evidence: Evidence, _: Reported) -> Iterator[Condition]:
     duffing = evidence.spectra(Drive("duffing"))[1]
     peak = float(frequency[np.argmax(np.mean(duffing[1:], axis=0))])
     excess = _excess(duffing, linear, np.abs(frequency - 3.0 * peak) <= 0.2 * 3.0 * peak)
-    yield significant(f"excess over the linear response about three times the peak at {peak:.2f} Hz", excess)
+    yield surely_above_zero(f"excess over the linear response about three times the peak at {peak:.2f} Hz", excess)
 
 
 def _excess(density: Floats, linear: Floats, keep: NDArray[np.bool_]) -> Sample:
@@ -86,7 +86,7 @@ def mathieu_fast(evidence: Evidence, reported: Reported) -> list[Condition]:
         [
             *(common.has_line(MAXIMUM, maxima, line) for line in (low, middle, high)),
             *(
-                significant(f"excess over the response with constant stiffness about {line:g} Hz", sample)
+                surely_above_zero(f"excess over the response with constant stiffness about {line:g} Hz", sample)
                 for line, sample in excess.items()
             ),
         ],

@@ -10,7 +10,7 @@ from study.figures import labels
 from study.reproduction.preliminary import Histogram
 
 
-def histogram(axes: Axes, counts: Histogram, quantity: str, unit: str) -> Axes:
+def histogram_panel(axes: Axes, counts: Histogram, quantity: str, unit: str) -> Axes:
     """Probability density of a quantity; skewness and kurtosis stand above the panel.
 
     ``unit`` is that of ``counts``; metres are shown as mm or µm where that reads better.

@@ -28,7 +28,7 @@ WIDEST = 20.0  # a stretch of exp(20) is wider than the picture
 LEFT, TOP, ROW = 1.5, 1.15, 0.19  # inches
 
 
-def errors(table: pd.DataFrame, cases: Sequence[str]) -> Figure:
+def error_dots(table: pd.DataFrame, cases: Sequence[str]) -> Figure:
     """The picture of a table of :func:`study.reproduction.estimator_errors.errors`.
 
     Parameters that are zero have no relative error and are not drawn. ``cases`` are the rows, from above.
@@ -53,7 +53,7 @@ def _panel(panel: Axes, table: pd.DataFrame, cases: Sequence[str]) -> None:
     place = {case: index for index, case in enumerate(cases)}
     for case in dict.fromkeys(table["case"]):
         panel.axhline(place[case], color="0.85", linewidth=0.7, zorder=1.0)
-    for name in estimator_errors.estimators(table):
+    for name in estimator_errors.estimator_names(table):
         own = table[table["estimator"] == name]
         error = np.clip(100.0 * own["median_error"].to_numpy(dtype=np.float64), LOWEST, HIGHEST)
         spread = 100.0 * own["standard_error"].to_numpy(dtype=np.float64)

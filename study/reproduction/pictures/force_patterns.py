@@ -21,7 +21,7 @@ RANDOM: dict[str, Any] = {"color": "0.45", "linewidth": 0.4}
 DECADES = 1e-5  # an autospectrum is shown down to this share of its largest line
 
 
-def patterns(
+def pattern_panels(
     harmonic_axes: Axes, random_axes: Axes, harmonic: Pattern, random: Pattern, unit: Mapping[str, str]
 ) -> None:
     """Restoring force against displacement under harmonic motion and under random excitation.
@@ -41,7 +41,7 @@ def patterns(
     harmonic_axes.set_ylabel(f"restoring force $F_r$ ({dimensions.pretty(unit['force'])})")
 
 
-def autospectrum(axes: Axes, frequency: Floats, density: Floats, unit: str, highest: float) -> Axes:
+def autospectrum_panel(axes: Axes, frequency: Floats, density: Floats, unit: str, highest: float) -> Axes:
     """A one-sided autospectrum on a logarithmic scale, from the first line above zero."""
     keep = (frequency > 0.0) & (frequency <= highest)
     axes.semilogy(frequency[keep], density[keep], color="C0", linewidth=1.6)
@@ -52,7 +52,7 @@ def autospectrum(axes: Axes, frequency: Floats, density: Floats, unit: str, high
     return axes
 
 
-def marked(axes: Axes, lines: Mapping[str, float]) -> Axes:
+def frequency_marks(axes: Axes, lines: Mapping[str, float]) -> Axes:
     """Vertical lines at named frequencies (mathtext without its dollars), the names above the panel."""
     for name, frequency in lines.items():
         axes.axvline(frequency, color="C1", linestyle=(0, (5.0, 2.0)), linewidth=1.2, zorder=1.5)
@@ -63,7 +63,7 @@ def marked(axes: Axes, lines: Mapping[str, float]) -> Axes:
     return axes
 
 
-def history(axes: Axes, time: Floats, values: Floats, quantity: str, unit: str) -> Axes:
+def history_panel(axes: Axes, time: Floats, values: Floats, quantity: str, unit: str) -> Axes:
     """A stretch of a time history."""
     axes.plot(time, values, color="C0", linewidth=0.9)
     axes.set_xlim(float(time[0]), float(time[-1]))

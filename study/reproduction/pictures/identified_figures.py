@@ -18,28 +18,28 @@ PARTS = ("real part", "imaginary part")
 
 def linear(response_csv: Path, title: str, highest: float = HIGHEST, drawn: Sequence[str] | None = None) -> Figure:
     """Magnitude and phase of A_1."""
-    first = curves.responses(pd.read_csv(response_csv), highest, drawn)[0]
-    figure, axes = page.page(
+    first = curves.input_responses(pd.read_csv(response_csv), highest, drawn)[0]
+    figure, axes = page.empty_page(
         title, "Linear frequency response function $A_1(f)$", rows=2,
         legend_rows=page.rows_for(len(first.curves) + 2),
     )  # fmt: skip
-    frequency_response.magnitude(axes[0], first, labels.response_unit(first.shape))
-    frequency_response.phase(axes[1], first)
+    frequency_response.magnitude_panel(axes[0], first, labels.response_unit(first.shape))
+    frequency_response.phase_panel(axes[1], first)
     page.letter(axes, ("magnitude", "phase"))
-    page.legend(figure, axes, bands=True)
+    page.shared_legend(figure, axes, bands=True)
     return figure
 
 
 def nonlinear(response_csv: Path, title: str, highest: float = HIGHEST, drawn: Sequence[str] | None = None) -> Figure:
     """Real and imaginary part of A_2 and every further one, side by side."""
-    shown = curves.responses(pd.read_csv(response_csv), highest, drawn)[1:]
+    shown = curves.input_responses(pd.read_csv(response_csv), highest, drawn)[1:]
     if not shown:
-        figure, axes = page.page(title, "No nonlinear input is assumed")
+        figure, axes = page.empty_page(title, "No nonlinear input is assumed")
         axes[0].set_axis_off()
         return figure
     count = len(shown)
     names, s = ", ".join(f"$A_{r.number}(f)$" for r in shown), "s" if count > 1 else ""
-    figure, axes = page.page(
+    figure, axes = page.empty_page(
         title, f"Nonlinear frequency response function{s} {names}", rows=2, columns=count,
         width=page.width(count), legend_rows=page.rows_for(len(shown[0].curves) + 3),
     )  # fmt: skip
@@ -49,36 +49,38 @@ def nonlinear(response_csv: Path, title: str, highest: float = HIGHEST, drawn: S
         frequency_response.real_and_imaginary(real, imaginary, item, unit, frequency_response.common_span(alike))
     by_input = [panel for pair in zip(axes[:count], axes[count:], strict=True) for panel in pair]
     page.letter(by_input, [f"{p} of $A_{r.number}$, input {labels.formula(r.shape)}" for r in shown for p in PARTS])
-    page.legend(figure, axes, bands=True)
+    page.shared_legend(figure, axes, bands=True)
     return figure
 
 
-def cumulative(coherence_csv: Path, title: str, highest: float = HIGHEST, drawn: Sequence[str] | None = None) -> Figure:
+def cumulative_figure(
+    coherence_csv: Path, title: str, highest: float = HIGHEST, drawn: Sequence[str] | None = None
+) -> Figure:
     """Cumulative coherences of MI/SO; over them those with estimated shape parameters, and of motion free of noise."""
     table = pd.read_csv(coherence_csv)
     shares = curves.coherences(table, highest)
     known = set(table["estimator"])
     others = [e for e in BESIDE if e in known and (drawn is None or e in drawn)]
-    figure, axes = page.page(
+    figure, axes = page.empty_page(
         title, "Cumulative coherence", panel=2.7, legend_rows=len(shares) * (1 + len(others)), headed=False
     )  # fmt: skip
-    coherence.cumulative(axes[0], shares)
+    coherence.cumulative_panel(axes[0], shares)
     for estimator in others:
-        coherence.beside(axes[0], curves.coherences(table, highest, estimator), estimator)
-    page.legend(figure, axes, columns=1)
+        coherence.marks_of_another(axes[0], curves.coherences(table, highest, estimator), estimator)
+    page.shared_legend(figure, axes, columns=1)
     return figure
 
 
-def histogram(record_csv: Path, title: str, channel: str = "displacement") -> Figure:
+def histogram_figure(record_csv: Path, title: str, channel: str = "displacement") -> Figure:
     """Histogram of a channel of a record."""
     record = read_csv(record_csv)
-    figure, axes = page.page(title, f"Histogram of the {channel}", panel=2.7)
-    distribution.histogram(axes[0], preliminary.histogram(record[channel]), channel, record.units[channel])
-    page.legend(figure, axes)
+    figure, axes = page.empty_page(title, f"Histogram of the {channel}", panel=2.7)
+    distribution.histogram_panel(axes[0], preliminary.histogram(record[channel]), channel, record.units[channel])
+    page.shared_legend(figure, axes)
     return figure
 
 
-def draw(
+def draw_identified(
     record_csv: Path, response_csv: Path, coherence_csv: Path, outputs: Mapping[str, Sequence[Path]],
     *, title: str, style: Path, highest: float = HIGHEST, drawn: Sequence[str] | None = None,
     parameters_csv: Path | None = None,
@@ -112,7 +114,7 @@ def draw(
     kinds = {
         "linear": lambda: linear(response_csv, system, highest, drawn),
         "nonlinear": lambda: nonlinear(response_csv, system, highest, drawn),
-        "coherence": lambda: cumulative(coherence_csv, system, highest, drawn),
-        "histogram": lambda: histogram(record_csv, title),
+        "coherence": lambda: cumulative_figure(coherence_csv, system, highest, drawn),
+        "histogram": lambda: histogram_figure(record_csv, title),
     }
     page.write_each(kinds, outputs, style)

@@ -26,18 +26,20 @@ class Source:
 
 
 def pattern(source: Source) -> Figure:
-    """MissingForce force against displacement (Figures 2 to 7): as large a harmonic motion as the random one."""
+    """Restoring force against displacement (Figures 2 to 7): as large a harmonic motion as the random one."""
     record, model = read_csv(source.record), read_model(source.model)
     random = preliminary.random_pattern(record, model.numbers()["m"])
     amplitude, frequency = preliminary.harmonic_beside(model, record)
     cycles = preliminary.closing_cycles(model, frequency)
     harmonic = preliminary.harmonic_pattern(model, amplitude, frequency, cycles)
-    figure, axes = page.page(source.title, "MissingForce force against displacement", columns=2, width=7.6, panel=3.1)
+    figure, axes = page.empty_page(
+        source.title, "Restoring force against displacement", columns=2, width=7.6, panel=3.1
+    )
     left, right = axes
-    force_patterns.patterns(left, right, harmonic, random, record.units)
+    force_patterns.pattern_panels(left, right, harmonic, random, record.units)
     size = labels.quantity(amplitude, record.units["displacement"])
     page.letter(axes, (f"harmonic motion, {size} at {frequency:.3g} Hz", "random excitation"))
-    page.legend(figure, axes)
+    page.shared_legend(figure, axes)
     return figure
 
 
@@ -46,23 +48,23 @@ def periodic_lines(source: Source, segments: spectra.Segments) -> Figure:
     record, values = read_csv(source.record), read_model(source.model).numbers()
     natural = preliminary.natural_frequency(values)
     lines = preliminary.mathieu_lines(natural, values["periodic_stiffness.f_m"])
-    figure, axes = page.page(source.title, "Autospectrum of the displacement", panel=2.9, legend_rows=1)
+    figure, axes = page.empty_page(source.title, "Autospectrum of the displacement", panel=2.9, legend_rows=1)
     frequency, density = spectra.autospectrum(record["displacement"], record.dt, segments)
-    force_patterns.autospectrum(axes[0], frequency, density, record.units["displacement"], HIGHEST)
-    force_patterns.marked(axes[0], lines)
+    force_patterns.autospectrum_panel(axes[0], frequency, density, record.units["displacement"], HIGHEST)
+    force_patterns.frequency_marks(axes[0], lines)
     return figure
 
 
 def force_history(source: Source, segments: spectra.Segments) -> Figure:
     """A stretch of the force as long as a segment, the report's subrecord, and its autospectrum (Figure 16)."""
     record = read_csv(source.record)
-    figure, axes = page.page(
+    figure, axes = page.empty_page(
         "Excitation", "Force history (segment) and autospectrum", rows=2, legend_rows=0, share=False
     )
     shown = record.part(0, segments.length)
-    force_patterns.history(axes[0], shown.time, shown["force"], "force", record.units["force"])
+    force_patterns.history_panel(axes[0], shown.time, shown["force"], "force", record.units["force"])
     frequency, density = spectra.autospectrum(record["force"], record.dt, segments)
-    force_patterns.autospectrum(axes[1], frequency, density, record.units["force"], float(frequency[-1]))
+    force_patterns.autospectrum_panel(axes[1], frequency, density, record.units["force"], float(frequency[-1]))
     page.letter(axes, ("history", "autospectrum"))
     return figure
 
@@ -70,13 +72,15 @@ def force_history(source: Source, segments: spectra.Segments) -> Figure:
 def force_histogram(source: Source) -> Figure:
     """Histogram of the force (Figure 17)."""
     record = read_csv(source.record)
-    figure, axes = page.page("Excitation", "Histogram of the force", panel=2.7)
-    distribution.histogram(axes[0], preliminary.histogram(record["force"]), "force", record.units["force"])
-    page.legend(figure, axes)
+    figure, axes = page.empty_page("Excitation", "Histogram of the force", panel=2.7)
+    distribution.histogram_panel(axes[0], preliminary.histogram(record["force"]), "force", record.units["force"])
+    page.shared_legend(figure, axes)
     return figure
 
 
-def draw(source: Source, outputs: Mapping[str, Sequence[Path]], *, style: Path, segments: spectra.Segments) -> None:
+def draw_preliminary(
+    source: Source, outputs: Mapping[str, Sequence[Path]], *, style: Path, segments: spectra.Segments
+) -> None:
     """Draw figures of the preliminary analysis of a case.
 
     Parameters
