@@ -228,7 +228,8 @@ def _curves(comparison: Comparison) -> pd.DataFrame:
 
 def _map(comparison: Comparison) -> pd.DataFrame:
     lacking = comparison.missing_force
-    plane = surface(*(x[lacking.inner] for x in (lacking.displacement, lacking.velocity, lacking.force)))
+    inner = lacking.inner
+    plane = surface(lacking.displacement[inner], lacking.velocity[inner], lacking.force[inner])
     i, j = np.nonzero(np.isfinite(plane.mean))
     u, v = (0.5 * (x[1:] + x[:-1]) for x in (plane.displacement, plane.velocity))
     return pd.DataFrame({"displacement": u[i], "velocity": v[j], "mean": plane.mean[i, j], "error": plane.error[i, j]})

@@ -186,3 +186,13 @@ def test_a_steady_sine_does_not_tell_the_mass(noise):
     with pytest.raises(StudyError, match=r"drives one frequency, 1\.91 Hz, which cannot tell mass from stiffness"):
         fit_model(model, prepared)
     assert fit_model(model.with_values({"m": 1.0}), prepared).model.values["k"] == pytest.approx(239.6, rel=0.01)
+
+
+def test_noise_is_no_decay():
+    """It was called complete: what is left of it depends on nothing."""
+    noise = Record(0.01, {"force": np.zeros(4000), "displacement": np.random.default_rng(1).standard_normal(4000)})
+    model, _ = driven_by_a_sine()
+    with pytest.raises(
+        StudyError, match="no free motion of 'linear' explains any of .*; expected the record of a decay"
+    ):
+        fit_model(model.with_values({"m": 1.0}), prepare_record(noise))

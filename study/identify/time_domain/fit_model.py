@@ -20,7 +20,15 @@ from study.identify.frequency_domain.starting_values import linear_start, revers
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.motion_start import from_the_motion, has_lost_the_motion
-from study.identify.time_domain.no_response import LINEAR, SURE, driven_at, one_frequency, unfit, why_no_response
+from study.identify.time_domain.no_response import (
+    LINEAR,
+    SURE,
+    driven_at,
+    explains_nothing,
+    one_frequency,
+    unfit,
+    why_no_response,
+)
 from study.identify.time_domain.part_fit import STEPS, covariance_of, fit_part, linearise
 from study.identify.time_domain.settling import KEPT, better_fit, continued, from_segments, settled
 from study.identify.time_domain.shape_search import Baseline
@@ -78,6 +86,11 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
 
 def _followed(fit: FreeRunFit, model: Model, prepared: Prepared) -> FreeRunFit:
     """The fit; a linear system is never chaotic: one that needs segments is refused where there is a plain reason."""
+    if prepared.free and explains_nothing(fit, prepared):
+        raise StudyError(
+            f"no free motion of {model.name!r} explains any of {prepared.record.name!r}: as much is left as without "
+            "any; expected the record of a decay"
+        )
     if not all(term.name in LINEAR for term in model.terms):
         return fit
     omega = driven_at(model, prepared)

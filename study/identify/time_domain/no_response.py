@@ -2,12 +2,15 @@
 
 import numpy as np
 from scipy.fft import rfft, rfftfreq
+from scipy.special import fdtrc
 
 from study.equations.model import Model
 from study.identify.frequency_domain.starting_values import coherent_lines, solved
+from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.coarse_sampling import too_coarse
 from study.records.prepared import FORCE, Prepared
 from study.support.errors import StudyError
+from study.support.thresholds import ALPHA
 
 SURE = 3.0  # standard errors by which a coefficient must differ from zero to have a sign
 ORDER = ("m", "c", "k")
@@ -60,6 +63,14 @@ def unfit(model: Model, prepared: Prepared) -> str:
             "reaches the resonance, or a model that gives the mass"
         )
     return ""
+
+
+def explains_nothing(fit: FreeRunFit, prepared: Prepared) -> bool:
+    """Whether a fit leaves no less of the response than chance lets its own values and states take, by the F test."""
+    taken = len(fit.keys) + np.size(fit.initial)
+    rest = len(fit.residual) - taken
+    ratio = (prepared.spread**2 / fit.rms**2 - 1.0) * rest / taken if fit.rms > 0.0 else np.inf
+    return float(fdtrc(taken, rest, max(ratio, 0.0))) > ALPHA
 
 
 def driven_at(model: Model, prepared: Prepared) -> float:
