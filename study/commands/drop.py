@@ -44,7 +44,6 @@ def _run(arguments: argparse.Namespace) -> None:
     with locked(arguments.model):  # another run may have changed it meanwhile
         model, name = read_model(arguments.model), arguments.term
         if model.coordinates:
-            structures.refuse_measured(model, "drop")
             with at(arguments.model):
                 name = _placed(arguments, model)
             structures.drop(arguments, model, name, text_without(arguments.model, name))

@@ -4,7 +4,14 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from study.commands.command import progress
-from study.commands.record_arguments import given_options, inputs_of, out_folder, refuse_groups, written_together
+from study.commands.record_arguments import (
+    ALTERNATE,
+    given_options,
+    inputs_of,
+    out_folder,
+    refuse_groups,
+    written_together,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -18,7 +25,7 @@ if TYPE_CHECKING:
 
 def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[PreparedStructure]":
     """The records that were named, made ready."""
-    from study.structure.prepared_structure import prepare_structure
+    from study.structure.structure_layout import Parts, lay_out
     from study.structure.structure_reader import read_structure
     from study.support.errors import at
 
@@ -26,9 +33,11 @@ def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[
     made: list[PreparedStructure] = []
     for path in arguments.records:
         record = read_structure(path, model, given_options(arguments))
-        parts = [_within(span, len(record)) for span in (arguments.fit, arguments.judge)]
+        turns = arguments.judge == ALTERNATE
+        fit, judge = (_within(span, len(record)) for span in (arguments.fit, None if turns else arguments.judge))
         with at(path):
-            made.append(prepare_structure(record, model, parts[0], parts[1], arguments.cutoff))
+            parts = Parts(fit, judge, tuple(arguments.use), turns, arguments.cutoff)
+            made.append(lay_out(record, model, parts))
     return made
 
 
@@ -82,7 +91,7 @@ def refuse_measured(model: "Model", command: str) -> None:
     """Say so where a command needs masses, stiffnesses and dampings."""
     from study.support.errors import expect
 
-    like = "expected inertia at every coordinate; 'compare', 'diagnose' and 'add' take it"
+    like = "expected inertia at every coordinate; 'compare', 'diagnose', 'add' and 'drop' take it"
     expect(not model.measured, f"{command} knows no {model.name!r} with 'linear: measured' yet; {like}")
 
 
@@ -246,6 +255,9 @@ def drop(arguments: argparse.Namespace, model: "Model", name: str, text: str) ->
     )
 
     folder, steps = out_folder(arguments), history.read_history(arguments.model)
+    if model.measured:
+        _drop_measured(arguments, model, name, text, steps)
+        return
     comparisons: list[StructureComparison] = []
     for prepared in prepared_structures(arguments, model):
         before = compare_structure(model, prepared)
@@ -255,6 +267,30 @@ def drop(arguments: argparse.Namespace, model: "Model", name: str, text: str) ->
         )
     written_together(arguments, text, steps, as_json(structure_document(comparisons[-1])), folder)
     print("\n\n".join(structure_summary(c) for c in comparisons))
+    print("\n" + history.history_table(steps))
+
+
+def _drop_measured(
+    arguments: argparse.Namespace, model: "Model", name: str, text: str, steps: "list[dict[str, Any]]"
+) -> None:
+    """The same where the linear part is as measured; its modes are fitted anew."""
+    from study.compare import history
+    from study.compare.comparison_report import as_json
+    from study.structure.measured_comparison import (
+        MeasuredComparison,
+        compare_measured,
+        measured_document,
+        measured_step,
+        measured_summary,
+    )
+
+    comparisons: list[MeasuredComparison] = []
+    for prepared in prepared_structures(arguments, model):
+        before = compare_measured(model, prepared)
+        comparisons.append(compare_measured(model.without_term(name), prepared))
+        steps = history.with_step(steps, measured_step(before), measured_step(comparisons[-1], dropped=name))
+    written_together(arguments, text, steps, as_json(measured_document(comparisons[-1])), out_folder(arguments))
+    print("\n\n".join(measured_summary(c) for c in comparisons))
     print("\n" + history.history_table(steps))
 
 

@@ -18,6 +18,7 @@ tags are refused, and formulas are parsed, never evaluated.
 
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -37,6 +38,7 @@ from study.support.yaml_text import as_list, as_mapping, scalar, shown
 MOST_TERMS = 200
 LONGEST_NAME = 100
 SMALLEST, LARGEST = 1e-50, 1e50  # of a value: no unit makes one beyond, and the square of one beyond may be no number
+NO_TERMS = re.compile(r"^terms:[ \t]*(#.*)?$", re.MULTILINE)  # of an entry that was taken out with its list
 WANTED = "a YAML file with 'name' and 'terms', such as models/duffing.yaml"
 
 
@@ -137,7 +139,7 @@ def text_without(path: Path, name: str) -> str:
     """The text of a model file without a term, which stays in the file; raises as :func:`drop_term`."""
     text = read_text(path, WANTED)
     before = parse_model(text, path)
-    if name not in before or len(before.terms) == 1:
+    if name not in before or (len(before.terms) == 1 and not before.measured):
         raise StudyError(f"{path}: {shown(name)} cannot be taken out of {', '.join(t.name for t in before.terms)}")
     return revised(text, str(path), before.without_term(name))
 
@@ -164,6 +166,10 @@ def _shortened(text: str, source: str, model: Model) -> str:
     """The text with those entries alone that the model begins with, in their order."""
     wanted, gone = [t.name for t in model.terms], list[int]()
     entries = parse_model(text, Path(source)).terms
+    if model.measured and entries and not wanted:  # its linear part is a model of its own
+        for number in reversed(range(len(entries))):
+            text = yaml_text.without_entry(text, "terms", number)
+        return NO_TERMS.sub(lambda found: f"terms: []{'  ' + found[1] if found[1] else ''}", text)
     for number, entry in enumerate(entries):
         if wanted[number - len(gone) :][:1] != [entry.name]:
             gone.append(number)

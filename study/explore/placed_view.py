@@ -22,7 +22,7 @@ from study.records.spectra import autospectrum
 from study.structure.connection_spectra import dynamic_stiffnesses, highest_frequency, missing_force_spectra
 from study.structure.sketch import Sketch
 from study.structure.structure_comparison import StructureComparison
-from study.structure.structure_pictures import closeup, sketch_of, sketch_of_diagnosis
+from study.structure.structure_pictures import close_by, sketch_of, sketch_of_diagnosis
 
 NINETY_FIVE = 1.96  # standard errors to each side
 
@@ -129,7 +129,7 @@ def _motions(comparison: StructureComparison, close: bool = False) -> Columns:
 
     def parts() -> Iterator[tuple[str, Mapping[str, Floats]]]:
         for i, sensor in enumerate(prediction.prepared.sensors):
-            near = closeup(prediction.residual[:, i]) if close else slice(None)
+            near = close_by(prediction, i) if close else slice(None)
             motions = {
                 "measured": prediction.measured[near, i], "predicted": prediction.predicted[near, i],
                 "difference": prediction.residual[near, i],

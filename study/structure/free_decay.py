@@ -1,15 +1,21 @@
 """Where the fit of a structure begins that nothing drives: its linear terms from the motion itself.
 
 ``M a + C v + K u = 0`` along the measured motions, with the masses held: without a force nothing else tells their size.
+The equation stands for motions that all have passed one filter: those frequencies are left out where the motions do not
+stand above their noise, which two derivatives would make larger than any force.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from study.equations.model import Model
+from study.records.plan import FEWEST
 from study.structure.mass_matrix import linear_keys, patterns
+from study.structure.missing_forces import band_above_noise, in_band
 from study.structure.prepared_structure import PreparedStructure
+from study.support.arrays import Floats, Ints
 from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares
 
@@ -32,10 +38,35 @@ def free_decay_start(model: Model, prepared: PreparedStructure, held: Mapping[st
         raise StudyError(
             f"nothing drives {model.name!r} and no sensor is at {lacking}; expected one at each coordinate"
         )
-    first, last = max(prepared.fit[0], prepared.edge), min(prepared.fit[1], len(prepared.record) - prepared.edge)
-    motion = np.stack([prepared.complete[c][:, first:last] for c in model.coordinates], axis=1)  # (3, n, samples)
+    motion = _free_of_noise(prepared, model)
     weight = 1.0 / np.std(motion[2], axis=1)
     columns = {key: ((own[key] @ motion[orders[key]]) * weight[:, None]).ravel() for key in orders}
     target = -np.sum([held[key] * columns[key] for key in orders if key in held], axis=0)
     amounts = least_squares(np.column_stack([columns[key] for key in free]), target)
     return dict(zip(free, amounts.tolist(), strict=True))
+
+
+def _free_of_noise(prepared: PreparedStructure, model: Model) -> Floats:
+    """Motions along the fitting part in the band where any of them stands above noise, shape (3, n, samples)."""
+    record = prepared.record.whole or prepared.record
+    whole = replace(prepared, record=record)
+    bands = [band_above_noise(record.motions[s], prepared.dt, prepared.low) for s in prepared.sensors]
+    known = [band for band in bands if band is not None]
+    edge, motion = whole.edge, np.stack([whole.complete[c] for c in model.coordinates], axis=1)
+    if known:
+        frequency, gate = known[0][0], np.max([band[1] for band in known], axis=0)
+        motion = np.apply_along_axis(in_band, 2, motion, prepared.dt, frequency, gate)
+        width = float(np.sum(gate)) * float(frequency[1] - frequency[0])
+        edge += round(1.0 / (width * prepared.dt)) if width > 0.0 else 0
+    return motion[:, :, _fitted_samples(prepared, edge)]
+
+
+def _fitted_samples(prepared: PreparedStructure, edge: int) -> Ints:
+    """Samples of the whole record that are fitted, without those at its ends."""
+    samples = np.arange(len(prepared.record))
+    if prepared.record.stretches:
+        samples = np.concatenate([np.arange(s.first, s.last) for s in prepared.record.stretches])
+    last = len(prepared.record.whole or prepared.record) - edge
+    fitted = samples[slice(*prepared.fit)]
+    kept = fitted[(fitted >= edge) & (fitted < last)]
+    return kept if len(kept) > FEWEST else fitted

@@ -225,11 +225,13 @@ def measured_summary(comparison: MeasuredComparison) -> str:
     return "\n\n".join(parts) + (f"\n({'; '.join(comparison.notes)})" if comparison.notes else "")
 
 
-def measured_step(comparison: MeasuredComparison, added: str | None = None) -> dict[str, Any]:
+def measured_step(
+    comparison: MeasuredComparison, added: str | None = None, dropped: str | None = None
+) -> dict[str, Any]:
     """A comparison as a step of the history (``study.compare.history``); there is no error of the force."""
     prediction, document = comparison.prediction, measured_document(comparison)
     return {
-        "terms": [t.name for t in comparison.model.terms], "added": added, "dropped": None,
+        "terms": [t.name for t in comparison.model.terms], "added": added, "dropped": dropped,
         "record": comparison.prepared.record.name, "error": {"force": None, "response": prediction.error},
         "rms": float(np.sqrt(np.mean(prediction.residual**2))), "unit": "",
         "noise_floor": {"response": prediction.floor}, "converged": comparison.fit.converged,

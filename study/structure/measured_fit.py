@@ -18,7 +18,7 @@ from study.structure.modal_program import ModalKeys, modal_program
 from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_fit import MOST_STEPS, ROUGH, SHIFT
 from study.structure.structure_record import Sensor
-from study.structure.structure_run import StructureRun
+from study.structure.structure_run import StretchDrive, StructureRun
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError, StudyError
 from study.support.levenberg_marquardt import Point, minimise, point_at
@@ -62,8 +62,8 @@ class ModalRun:
         keys, n = self.run.keys, self.modal.modes
         own, slopes = self.run.respond(values, initial, range(len(initial)) if keys else ())
         kinds = list(dict.fromkeys(s.motion for s in self.sensors))
-        motion = np.empty((self.run.samples, len(self.sensors)))
-        change = np.empty((self.run.samples, len(self.sensors), slopes.shape[2]))
+        motion = np.empty((own.shape[1], len(self.sensors)))
+        change = np.empty((own.shape[1], len(self.sensors), slopes.shape[2]))
         for i, sensor in enumerate(self.sensors):
             rows = slice(kinds.index(sensor.motion) * n, (kinds.index(sensor.motion) + 1) * n)
             names = self.modal.shape(sensor.coordinate)
@@ -93,8 +93,8 @@ def modal_run(
     program = replace(made, program=with_registers(made.program, named))
     kinds = list(dict.fromkeys(s.motion for s in sensors))
     rows = [MOTIONS.index(kind) * modal.modes + r for kind in kinds for r in range(modal.modes)]
-    start = record.start + first * record.dt
-    run = StructureRun(program, keys, drive, record.dt, steps, start, last - first, np.array(rows, np.int64))
+    drives = (StretchDrive(drive, record.start + first * record.dt, last - first),)
+    run = StructureRun(program, keys, drives, record.dt, steps, np.array(rows, np.int64))
     return ModalRun(model, modal, run, sensors)
 
 

@@ -109,40 +109,60 @@ def gated_motion(prediction: StructurePrediction) -> Floats:
     wanted = tuple(Sensor(c, m) for m in MOTIONS for c in coordinates)
     samples = len(prediction.measured)
     free = np.zeros((samples, len(wanted))) if prediction.diverged else prediction.motion(wanted)
-    return corrected_motion(free, prediction.residual, prediction.prepared, coordinates)
+    return corrected_motion(free, prediction.residual, prediction.prepared, coordinates, prediction.prepared.judge)
 
 
 def corrected_motion(
-    free: Floats, difference: Floats, prepared: PreparedStructure, coordinates: Sequence[str]
+    free: Floats, difference: Floats, prepared: PreparedStructure, coordinates: Sequence[str], span: tuple[int, int]
 ) -> Floats:
-    """A free run's motions, shape (samples, 3 coordinates), with what of the difference stands above the noise.
+    """A free run's motions along a span, shape (samples, 3 coordinates), with what of the difference is no noise.
 
-    Shape (3, samples, coordinates).
+    Shape (3, samples, coordinates). Each stretch is differentiated by itself: at its end the difference jumps.
     """
+    runs = [slice(begin - span[0], end - span[0]) for begin, end in prepared.record.runs(span)]
     motion = free.reshape(len(free), len(MOTIONS), -1).transpose(1, 0, 2).copy()
     for sensor, values in zip(prepared.sensors, difference.T, strict=True):
-        seen, level = _above_noise(values, prepared.dt, prepared.low), MOTIONS.index(sensor.motion)
-        for order in range(len(MOTIONS)):
-            steps = order - level
-            low = prepared.low if steps < 0 else 0.0
-            motion[order, :, coordinates.index(sensor.coordinate)] += derivative(seen, prepared.dt, steps, low)
+        band, level = band_above_noise(values, prepared.dt, prepared.low), MOTIONS.index(sensor.motion)
+        if band is None:
+            continue
+        for part in runs:
+            seen = values[part] if prepared.anew else in_band(values[part], prepared.dt, *band)
+            for order in range(len(MOTIONS)):
+                steps = order - level
+                change = derivative(seen, prepared.dt, steps, prepared.low if steps < 0 else 0.0)
+                if prepared.anew:  # a short stretch begins and ends with a step, which no filter may meet before
+                    change = in_band(change, prepared.dt, *band)
+                motion[order, part, coordinates.index(sensor.coordinate)] += change
     return motion
 
 
 def _above_noise(values: Floats, dt: float, low: float) -> Floats:
     """Values in those bands where their density stands above that of white noise; none if noise alone would do."""
+    found = band_above_noise(values, dt, low)
+    return np.zeros_like(values) if found is None else in_band(values, dt, *found)
+
+
+def band_above_noise(values: Floats, dt: float, low: float) -> tuple[Floats, Floats] | None:
+    """Frequencies in hertz, and 1 at those where a density stands above that of white noise, 0 at others.
+
+    None if noise alone would do.
+    """
     floor = noise_floor.floor(values, dt, low)
     if floor.significance <= SIGNIFICANT:
-        return np.zeros_like(values)
+        return None
     cut = Segments(length=max(32, min(1024, 2 ** int(np.log2(len(values) / 8)))))
     frequency, density = autospectrum(values, dt, cut)
     white = floor.noise**2 / (0.5 / dt - low)
     smooth = np.convolve(np.pad(density, SMOOTH // 2, mode="edge"), np.ones(SMOOTH) / SMOOTH, "valid")
     limit = white * (1.0 + CLEAR / np.sqrt(cut.effective_averages(len(values)) * SMOOTH / cut.line_inflation()))
-    gate = (smooth > limit) & (frequency >= low)
+    return frequency, ((smooth > limit) & (frequency >= low)).astype(np.float64)
+
+
+def in_band(values: Floats, dt: float, frequency: Floats, gate: Floats) -> Floats:
+    """Values, shape (n,), of which each frequency is kept to its share."""
     size = next_fast_len(2 * len(values), real=True)
     at = np.asarray(rfftfreq(size, dt), dtype=np.float64)
-    weight = np.asarray(np.interp(at, frequency, gate.astype(np.float64)), dtype=np.float64)
+    weight = np.asarray(np.interp(at, frequency, gate), dtype=np.float64)
     lines = np.asarray(rfft(values, size), dtype=np.complex128)
     return np.asarray(irfft(lines * weight, size), dtype=np.float64)[: len(values)]
 

@@ -148,8 +148,7 @@ def _without(
 
 
 def _states(fit: StructureFit, model: Model) -> Floats:
-    """The initial states of a fit without those of the terms that ``model`` does not have."""
-    own = [t.name for t in fit.model.states]
-    names = [*[""] * (len(fit.initial) - len(own)), *own]
-    kept = {"", *(t.name for t in model.states)}
-    return fit.initial[[i for i, name in enumerate(names) if name in kept]]
+    """The states with which the stretches of a fit begin, without those of the terms that ``model`` does not have."""
+    own, motions = [t.name for t in fit.model.states], 2 * len(fit.model.coordinates)
+    kept = [*range(motions), *(motions + i for i, t in enumerate(own) if t in {t.name for t in model.states})]
+    return fit.initial.reshape(-1, motions + len(own))[:, kept].ravel()

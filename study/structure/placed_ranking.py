@@ -135,6 +135,7 @@ class HeldOutTest:
     noise: SensorNoise
     own: tuple[Floats, Floats]  # what the model leaves of judging and fitting part, white
     bases: tuple[Floats, Floats]  # orthonormal bases of what its own coefficients and initial state could change there
+    anew: bool = False  # stretches of a decay: what a change explains lies in the loud ones
 
     def p_value(self, parts: tuple[Floats, Floats], searched: bool) -> float:
         """Of one candidate alone, by what it leaves of both parts (:func:`held_out_parts`).
@@ -149,7 +150,7 @@ class HeldOutTest:
                 left, moved = (x - basis @ (basis.T @ x) for x in (own, change))
                 before.append(left)
                 after.append(left - moved)
-        return statistics.gain(np.concatenate(before), np.concatenate(after)).p_value
+        return statistics.gain(np.concatenate(before), np.concatenate(after), evenly=self.anew).p_value
 
 
 def held_out_test(fit: StructureFit, before: StructurePrediction, noise: SensorNoise) -> HeldOutTest:
@@ -162,7 +163,7 @@ def held_out_test(fit: StructureFit, before: StructurePrediction, noise: SensorN
         columns = []
     bases = [orthonormal(noise.weighted(x)) for x in columns] or [np.zeros((part.size, 0)) for part in parts]
     white = [noise.weighted(part).ravel() if len(part) else np.zeros(0) for part in parts]
-    return HeldOutTest(noise, (white[0], white[1]), (bases[0], bases[1]))
+    return HeldOutTest(noise, (white[0], white[1]), (bases[0], bases[1]), before.prepared.anew)
 
 
 def orthonormal(columns: Floats) -> Floats:

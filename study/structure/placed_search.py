@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.fft import irfft, rfft, rfftfreq
+from scipy.fft import rfftfreq
 
 from study.equations.model import Model, ModelTerm
 from study.equations.place import Place
@@ -25,6 +25,7 @@ from study.structure.missing_forces import corrected_motion, placed_inputs, rela
 from study.structure.placed_lines import placed_modulation_lines, placed_residual_lines
 from study.structure.places import transfer
 from study.structure.prepared_structure import PreparedStructure
+from study.structure.stretch_transforms import StretchTransforms, stretch_transforms
 from study.structure.structure_fit import StructureFit, fit_structure, flat, linearise_structure
 from study.structure.structure_record import Sensor
 from study.structure.structure_run import prepare_run
@@ -51,9 +52,9 @@ class PlacedBaseline:
     motion : array, shape (3, n, c)
         Displacement, velocity and acceleration of all coordinates.
     paths : complex array, shape (lines, s, c)
-        From a force on each coordinate to each sensor, on the lines of a transform of ``size`` samples.
-    size : int
-        With room for the response to die away.
+        From a force on each coordinate to each sensor, on the lines of ``transforms``.
+    transforms : StretchTransforms
+        Of the stretches of the fitting part.
     columns : array, shape (n s, keys + states)
         What a unit of each key, and of the initial state, adds to the sensors, weighted as the residual, sensors of one
         time side by side.
@@ -69,7 +70,7 @@ class PlacedBaseline:
     prepared: PreparedStructure
     motion: Floats
     paths: Complexes
-    size: int
+    transforms: StretchTransforms
     columns: Floats
     basis: Floats
     violated: Floats
@@ -77,7 +78,8 @@ class PlacedBaseline:
 
     def passed(self, place: Place, forces: Sequence[Complexes]) -> Floats:
         """What forces at a place, given by their lines, add to the sensors, shape (n s, forces)."""
-        return _passed(self.fit, self.paths, self.size, place, forces)
+        e = np.array(place.direction(self.fit.model.coordinates))
+        return flat(self.fit, self.transforms.passed(-(self.paths @ e), forces))
 
     def added(self, place: Place, forces: Sequence[Complexes]) -> Floats:
         """The same less what the model's own coefficients could do."""
@@ -85,8 +87,8 @@ class PlacedBaseline:
         return columns - self.basis @ (self.basis.T @ columns)
 
     def lines(self, values: Floats) -> Complexes:
-        """Transform of forces along the fitting part, samples along the first axis."""
-        return np.asarray(rfft(values, self.size, axis=0), dtype=np.complex128)
+        """Transform of forces along the fitting part, samples along the first axis, shape (stretches, lines, ...)."""
+        return self.transforms.lines(values)
 
     @property
     def by_sensor(self) -> Floats:
@@ -95,8 +97,11 @@ class PlacedBaseline:
 
     def modulation(self, u: Floats, place: Place) -> Floats:
         """:func:`placed_modulation_lines` of a place with the relative displacement u."""
-        e = np.array(place.direction(self.fit.model.coordinates))
-        return placed_modulation_lines(u, (self.paths @ e)[::2] / self.fit.noise.deviation, self.by_sensor)
+        e, fit, paths = np.array(place.direction(self.fit.model.coordinates)), self.fit, self.paths[::2]
+        if len(self.transforms.runs) > 1:
+            linear = matrices(fit.model, fit.model.numbers())
+            paths = transfer(linear, self.prepared.sensors, fit.model.coordinates, self.prepared.dt, len(u))
+        return placed_modulation_lines(u, (paths @ e) / fit.noise.deviation, self.by_sensor)
 
     def dated(self, record: Record) -> Record:
         """A relative motion with the time at which it was."""
@@ -105,13 +110,7 @@ class PlacedBaseline:
     @property
     def omega(self) -> Complexes:
         """``j 2 pi f`` of the lines."""
-        return np.asarray(2j * np.pi * rfftfreq(self.size, self.prepared.dt), dtype=np.complex128)
-
-
-def _passed(fit: StructureFit, paths: Complexes, size: int, place: Place, forces: Sequence[Complexes]) -> Floats:
-    e = np.array(place.direction(fit.model.coordinates))
-    path, n = -(paths @ e), len(fit.residual)
-    return flat(fit, np.stack([irfft(path * f[:, None], size, axis=0)[:n] for f in forces], axis=2))
+        return np.asarray(2j * np.pi * rfftfreq(self.transforms.size, self.prepared.dt), dtype=np.complex128)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,11 +130,11 @@ def placed_baseline(fit: StructureFit, prepared: PreparedStructure) -> PlacedBas
     wanted = tuple(Sensor(c, m) for m in MOTIONS for c in model.coordinates)
     run = prepare_run(model, prepared.record, sensors=wanted, steps_per_sample=fit.steps, span=fit.span)
     free = run.respond({}, fit.initial)[0].T
-    motion = corrected_motion(free, fit.residual, prepared, model.coordinates)
-    size = 2 * len(fit.residual)  # every other line is one of the record
-    paths = transfer(matrices(model, model.numbers()), prepared.sensors, model.coordinates, prepared.dt, size)
+    motion = corrected_motion(free, fit.residual, prepared, model.coordinates, fit.span)
+    own = stretch_transforms(prepared.record.runs(fit.span))  # of one stretch every other line is one of the record
+    paths = transfer(matrices(model, model.numbers()), prepared.sensors, model.coordinates, prepared.dt, own.size)
     left = flat(fit, fit.residual)
-    bare = PlacedBaseline(fit, prepared, motion, paths, size, free, free, left, left)
+    bare = PlacedBaseline(fit, prepared, motion, paths, own, free, free, left, left)
     columns = flat(fit, linearise_structure(fit, prepared))  # right for the initial state and for shape parameters
     for i, column in _own_columns(bare).items():
         columns[:, i] = column
@@ -150,12 +149,11 @@ def _own_columns(base: PlacedBaseline) -> dict[int, Floats]:
     """What a unit of each estimated coefficient of the model adds along the motion, by the number of its key."""
     fit, model = base.fit, base.fit.model
     found: dict[int, Floats] = {}
-    own, orders, n = patterns(model), linear_keys(model), len(fit.residual)
+    own, orders = patterns(model), linear_keys(model)
     for key in orders:
         if key in fit.keys:
             force = base.lines(base.motion[orders[key]] @ own[key])
-            column = np.asarray(irfft(-np.einsum("fsc,fc->fs", base.paths, force), base.size, axis=0), dtype=np.float64)
-            found[fit.keys.index(key)] = flat(fit, column[:n])
+            found[fit.keys.index(key)] = flat(fit, base.transforms.back(-np.einsum("fsc,kfc->kfs", base.paths, force)))
     for entry in model.terms:
         if entry.place is None or not set(entry.symbols) & set(fit.keys) or entry.symbols[0] in orders:
             continue

@@ -54,6 +54,11 @@ class PreparedStructure:
         """Size of each sensor: the standard deviation of its motion in the fitting part, shape (sensors,)."""
         return np.std(self.measured[slice(*self.fit)], axis=0)
 
+    @property
+    def anew(self) -> bool:
+        """Whether the judged motion has states of its own: of a free decay these are all that is known of it."""
+        return bool(self.record.stretches)
+
     @cached_property
     def complete(self) -> dict[str, Floats]:
         """Displacement, velocity and acceleration of each measured coordinate, shape (3, samples)."""
@@ -66,24 +71,36 @@ class PreparedStructure:
 
     @cached_property
     def edge(self) -> int:
-        """Samples at each end that derivatives and integrals leave uncertain."""
+        """Samples at each end that derivatives and integrals leave uncertain; stretches leave these out."""
+        if self.record.stretches:
+            return 0
         return max(self._completed(s.coordinate).edge for s in self.sensors)
 
     def _completed(self, coordinate: str) -> CompletedRecord:
-        channels = {s.motion: x for s, x in self.record.motions.items() if s.coordinate == coordinate}
-        still = np.zeros(len(self.record))
-        return complete(Record(self.dt, {"force": still, **channels}, name=self.record.name), self.cutoff)
+        return completed_coordinate(self.record.whole or self.record, coordinate, self.cutoff)
 
     def _motion(self, coordinate: str) -> Floats:
         record = self._completed(coordinate).record
-        return np.stack([record[motion] for motion in MOTIONS])
+        motion = np.stack([record[motion] for motion in MOTIONS])
+        cuts = [motion[:, s.first : s.last] for s in self.record.stretches]
+        return np.concatenate(cuts, axis=1) if cuts else motion
 
     def shortened(self, samples: int) -> "PreparedStructure":
         """The same with no more than so many samples to fit: those that the judging part follows, if it does."""
         first, last = self.fit
         if last - first <= samples:
             return self
+        if self.record.stretches:
+            return replace(self, fit=(first, max(end for begin, end in self.record.runs(self.fit)
+                                                 if begin == first or end - first <= samples)))  # fmt: skip
         return replace(self, fit=(last - samples, last) if self.judge[0] == last else (first, first + samples))
+
+
+def completed_coordinate(record: StructureRecord, coordinate: str, cutoff: float | None = None) -> CompletedRecord:
+    """The motion of one coordinate, completed."""
+    channels = {s.motion: x for s, x in record.motions.items() if s.coordinate == coordinate}
+    still = np.zeros(len(record))
+    return complete(Record(record.dt, {"force": still, **channels}, name=record.name), cutoff)
 
 
 def prepare_structure(

@@ -77,7 +77,7 @@ def compare_structure(
     """
     report: Callable[[str], None] = progress or (lambda _: None)
     sentence = f"{model.name!r} has 'linear: measured'; expected a model with inertia at every coordinate here"
-    expect(not model.measured, f"{sentence}; 'study compare', 'diagnose' and 'add' take this one")
+    expect(not model.measured, f"{sentence}; 'study compare', 'diagnose', 'add' and 'drop' take this one")
     report("fit")
     if fit is None:
         fit = settled_structure(first_fit(model, prepared), prepared)

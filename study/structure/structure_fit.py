@@ -13,6 +13,7 @@ import numpy as np
 from study.equations.model import Model, ModelTerm
 from study.structure.mass_matrix import matrices
 from study.structure.prepared_structure import PreparedStructure
+from study.structure.stretch_beginnings import beginnings
 from study.structure.structure_run import StructureRun, prepare_run
 from study.support.arrays import Floats
 from study.support.autoregression import autoregression, whitened
@@ -199,10 +200,8 @@ def fit_structure(
     positive = tuple(key for entry in model.terms for key in positive_keys(entry) if key in keys)
     measured = prepared.measured[slice(*prepared.fit)]
     problem = _Problem(begun, run, measured, noise or sized(prepared.scale), positive)
-    state = np.zeros(run.program.states)
-    if initial is not None:
-        state[: len(initial)] = initial
-    point = problem.linearise(np.array([*(values[key] for key in keys), *state]))
+    own, begins = [values[key] for key in keys], beginnings(initial, run, prepared, model)
+    point = next((p for s in begins if (p := problem.linearise(np.array([*own, *s]))) is not None), None)
     if point is None:
         raise DivergenceError(f"the free run of {model.name!r} diverges with the starting values", run.start)
     size = float(np.linalg.norm(problem.noise.weighted(measured)))
@@ -215,6 +214,11 @@ def fit_structure(
         begun.with_values(found), keys, x[len(keys) :], measured - response.T, end.converged, end.message,
         prepared.fit[0], steps, problem.noise, undecided,
     )  # fmt: skip
+
+
+def same_states(fit: StructureFit, prepared: PreparedStructure) -> Floats | None:
+    """The states of a fit, where the fitting part begins as it did; with stretches, where it is the same."""
+    return fit.initial if (fit.span == prepared.fit if prepared.anew else fit.first == prepared.fit[0]) else None
 
 
 def fitted_run(fit: StructureFit, prepared: PreparedStructure, keys: tuple[str, ...], finer: int = 1) -> StructureRun:
@@ -266,8 +270,7 @@ def settled_structure(fit: StructureFit, prepared: PreparedStructure) -> Structu
     for a single coordinate (``weighted_fit``).
     """
     if fit.span != prepared.fit or not fit.converged:
-        begin = fit.initial if fit.first == prepared.fit[0] else None
-        fit = fit_structure(fit.model, prepared, fit.held, steps=fit.steps, initial=begin)
+        fit = fit_structure(fit.model, prepared, fit.held, steps=fit.steps, initial=same_states(fit, prepared))
     while fit.keys and fit.steps < MOST_STEPS:
         jacobian = linearise_structure(fit, prepared)
         moved = np.abs(structure_shift(fit, prepared, jacobian))

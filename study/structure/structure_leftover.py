@@ -5,10 +5,10 @@ the second. A force of each shape at each place passes through the linear approx
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
+from scipy.fft import next_fast_len
 
 from study.diagnose.dependence import DEGREE, TAUS, hysteretic, relaxed
 from study.equations.place import Place
@@ -16,6 +16,7 @@ from study.records.record import MOTIONS
 from study.structure.mass_matrix import matrices
 from study.structure.placed_lines import placed_modulation_lines, placed_residual_lines
 from study.structure.places import connections, transfer
+from study.structure.stretch_transforms import stretch_transforms
 from study.structure.structure_prediction import StructurePrediction
 from study.structure.structure_record import Sensor
 from study.structure.structure_run import prepare_run
@@ -51,6 +52,7 @@ def family_gains(prediction: StructurePrediction) -> list[FamilyGain]:
     """What each family of shapes at each place explains of what a fitted structure leaves; none if it diverges."""
     fit, prepared = prediction.fit, prediction.prepared
     model = fit.model
+    prediction = _from_the_fit(prediction)
     begin = max(prediction.first, prepared.judge[0] - LONGEST)
     end = min(prepared.judge[1], prepared.judge[0] + LONGEST)
     split = prepared.judge[0] - begin if begin < prepared.judge[0] else (end - begin) // 2
@@ -63,9 +65,11 @@ def family_gains(prediction: StructurePrediction) -> list[FamilyGain]:
         return []
     residual = ((prepared.measured[begin:end] - predicted) / prepared.scale).ravel()
     own = own.reshape(len(residual), -1)
-    size = next_fast_len(2 * len(free), real=True)
+    own_runs = stretch_transforms(prepared.record.runs((begin, end)))
+    transforms = replace(own_runs, size=next_fast_len(own_runs.size, real=True))
     linear = matrices(model, model.numbers())
-    paths = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, size) / prepared.scale[:, None]
+    paths = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, transforms.size)
+    paths = paths / prepared.scale[:, None]
     cut, n = split * len(prepared.sensors), len(model.coordinates)
     early = residual[:cut].reshape(split, -1)
     short = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, split) / prepared.scale[:, None]
@@ -76,11 +80,19 @@ def family_gains(prediction: StructurePrediction) -> list[FamilyGain]:
         u = free[:, :n] @ e
         families = [*_families(u, free[:, n:] @ e), ("time", _times(u, short @ e, early, steady))]
         for family, shapes in families:
-            lines = np.stack([rfft(x, size) for x in shapes], axis=1)
-            columns = irfft((paths @ e)[:, :, None] * lines[:, None, :], size, axis=0)[: len(free)]
-            gain = statistics.gain(*_held_out(own, columns.reshape(len(residual), -1), residual, cut))
+            columns = transforms.passed(paths @ e, [transforms.lines(x) for x in shapes])
+            before, after = _held_out(own, columns.reshape(len(residual), -1), residual, cut)
+            gain = statistics.gain(before, after, evenly=prepared.anew)
             found.append(FamilyGain(place, family, gain))
     return found
+
+
+def _from_the_fit(prediction: StructurePrediction) -> StructurePrediction:
+    """The same with the fitted stretches before the judged ones, which are as loud; of a decay, halves are not."""
+    fit, prepared = prediction.fit, prediction.prepared
+    if not prepared.anew or prediction.diverged or fit.span != (prepared.fit[0], prepared.judge[0]):
+        return prediction
+    return replace(prediction, first=fit.first, initial=np.concatenate([fit.initial, prediction.initial]))
 
 
 def _derivatives(prediction: StructurePrediction, begin: int, end: int) -> Floats:

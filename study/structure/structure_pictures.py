@@ -21,6 +21,7 @@ from study.structure.sketch import Sketch, sketch
 from study.structure.sketch_drawing import structure_sketch
 from study.structure.structure_comparison import StructureComparison
 from study.structure.structure_leftover import explained_by_place
+from study.structure.structure_prediction import StructurePrediction
 from study.structure.structure_verdict import StructureDiagnosis
 from study.support.arrays import Floats
 from study.support.numbers import percent
@@ -123,7 +124,7 @@ def responses_figure(comparison: StructureComparison) -> Figure:
     time = prediction.prepared.record.time[slice(*prediction.prepared.judge)]
     names: list[str] = []
     for panel, i in zip(axes, order, strict=True):
-        sensor, near = prediction.prepared.sensors[int(i)], closeup(prediction.residual[:, int(i)])
+        sensor, near = prediction.prepared.sensors[int(i)], close_by(prediction, int(i))
         panels.response_panel(
             panel, time[near], prediction.measured[near, int(i)], prediction.predicted[near, int(i)],
             SI_UNITS[sensor.motion],
@@ -133,6 +134,16 @@ def responses_figure(comparison: StructureComparison) -> Figure:
     page.letter(axes, names)
     page.shared_legend(figure, axes, columns=2)
     return figure
+
+
+def close_by(prediction: StructurePrediction, sensor: int) -> slice:
+    """The samples of a close-up, all of one stretch: that of the largest mean square."""
+    judged = prediction.prepared.judge
+    runs = [(begin - judged[0], end - judged[0]) for begin, end in prediction.prepared.record.runs(judged)]
+    left = prediction.residual[:, sensor]
+    begin, end = max(runs, key=lambda run: float(np.mean(left[slice(*run)] ** 2)))
+    near = closeup(left[begin:end])
+    return slice(begin + near.start, begin + near.stop)
 
 
 def closeup(residual: Floats, samples: int = 300) -> slice:

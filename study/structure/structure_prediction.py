@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from study.compare.noise import SIGNIFICANT
 from study.records import noise_floor
 from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_fit import StructureFit, fit_structure
@@ -58,6 +59,17 @@ class StructurePrediction:
         rms = np.sqrt(np.mean(self.residual**2, axis=0))
         return np.minimum(np.maximum(noise, self.numerical), rms) / self.size
 
+    @cached_property
+    def above_noise(self) -> float:
+        """Rms of what stands above white noise in the residual, over that of the motions; 0 where chance does as much.
+
+        Of a free decay it is structure: no force is there whose noise the motion could have turned into one of its own
+        colour. It asks for no derivative, and so sees what is left where the free run has lost the motion.
+        """
+        found = [noise_floor.floor(x, self.prepared.dt) for x in self.residual.T]
+        power = [f.excess if f.significance > SIGNIFICANT else 0.0 for f in found]
+        return float(np.sqrt(np.mean(np.array(power) / self.size**2)))
+
     @property
     def floor(self) -> float:
         """Root mean square of the sensors' floors."""
@@ -92,7 +104,7 @@ def predict_structure(fit: StructureFit, prepared: PreparedStructure) -> Structu
     judged = prepared.measured[slice(*prepared.judge)]
     try:
         first, initial = fit.first, fit.initial
-        if prepared.judge[0] != fit.span[1]:
+        if prepared.anew or prepared.judge[0] != fit.span[1]:
             swapped = replace(prepared, fit=prepared.judge, judge=prepared.fit)
             first = prepared.judge[0]
             initial = fit_structure(fit.model, swapped, tuple(fit.model.values), steps=fit.steps).initial

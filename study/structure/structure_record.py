@@ -1,12 +1,13 @@
 """What was measured on a structure: forces, and motions at some of its coordinates."""
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from study.records.record import SI_UNITS
+from study.records.record import SI_UNITS, Stretch
 from study.support.arrays import Floats
 
 
@@ -50,6 +51,10 @@ class StructureRecord:
         What it is called in tables and file names.
     start : float
         Time of the first sample in seconds.
+    stretches : tuple of Stretch
+        What it is strung together of, each a motion from a state of its own; empty for a record of its own.
+    whole : StructureRecord, optional
+        The record that the stretches are of.
     """
 
     dt: float
@@ -59,6 +64,8 @@ class StructureRecord:
     units: Mapping[str, str] = field(default_factory=lambda: dict(SI_UNITS))
     name: str = "record"
     start: float = 0.0
+    stretches: tuple[Stretch, ...] = ()
+    whole: "StructureRecord | None" = None
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -72,7 +79,23 @@ class StructureRecord:
     @property
     def time(self) -> Floats:
         """Time of each sample in seconds, shape (n,)."""
+        if self.stretches:
+            return np.concatenate([stretch.time for stretch in self.stretches])
         return self.start + self.dt * np.arange(len(self), dtype=np.float64)
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """Samples at which its stretches begin, the first aside."""
+        return tuple(itertools.accumulate(len(stretch) for stretch in self.stretches[:-1]))
+
+    def runs(self, span: tuple[int, int]) -> tuple[tuple[int, int], ...]:
+        """The parts of a span along each of which the motion goes on without a break: first sample, and last + 1."""
+        bounds = (span[0], *(joint for joint in self.joints if span[0] < joint < span[1]), span[1])
+        return tuple(itertools.pairwise(bounds))
+
+    def run_of(self, sample: int) -> tuple[int, int]:
+        """First sample of the stretch that holds this one, and the one after its last."""
+        return next(run for run in self.runs((0, len(self))) if run[0] <= sample < run[1])
 
     @property
     def measured(self) -> Floats:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from study.equations.graph import Program
 from study.equations.model import Model, with_registers
 from study.records.interpolation import between_samples
 from study.records.record import MOTIONS
@@ -20,8 +21,27 @@ from study.support.errors import DivergenceError, expect
 
 
 @dataclass(frozen=True)
+class StretchDrive:
+    """What acts along a stretch of a record in which the motion goes on without a break.
+
+    Attributes
+    ----------
+    values : array, shape (2 steps (samples - 1) + 1, forces + channels)
+        Forces and channels at every half step.
+    start : float
+        Time of the first sample in seconds.
+    samples : int
+        Samples in the stretch.
+    """
+
+    values: Floats
+    start: float
+    samples: int
+
+
+@dataclass(frozen=True)
 class StructureRun:
-    """A structure and a stretch of a record, made ready to run as often as a fit needs.
+    """A structure and a part of a record, made ready to run as often as a fit needs.
 
     Attributes
     ----------
@@ -29,28 +49,32 @@ class StructureRun:
         Its equations of motion.
     keys : tuple of str
         The coefficients and shape parameters to differentiate by.
-    drive : array, shape (2 steps (samples - 1) + 1, forces + channels)
-        Forces and channels at every half step.
+    drives : tuple of StretchDrive
+        One for each stretch: the motion begins anew at each.
     dt : float
         Sampling interval in seconds.
     steps : int
         Steps in each sampling interval.
-    start : float
-        Time of the first sample in seconds.
-    samples : int
-        Samples in the stretch.
     rows : int array, shape (sensors,)
         The motions that are wanted: displacements, velocities and accelerations counted through.
     """
 
     program: MotionProgram
     keys: tuple[str, ...]
-    drive: Floats
+    drives: tuple[StretchDrive, ...]
     dt: float
     steps: int
-    start: float
-    samples: int
     rows: Ints
+
+    @property
+    def states(self) -> int:
+        """Number of states at the beginnings of all stretches together."""
+        return self.program.states * len(self.drives)
+
+    @property
+    def start(self) -> float:
+        """Time of the first sample in seconds."""
+        return self.drives[0].start
 
     def respond(self, values: Mapping[str, float], initial: Floats, free: Sequence[int] = ()) -> tuple[Floats, Floats]:
         """Motions at the sensors and their derivatives.
@@ -60,7 +84,8 @@ class StructureRun:
         values : mapping of float
             Value of each key.
         initial : array, shape (states,)
-            Displacements, velocities and the terms' own states at the first sample; what is left out is zero.
+            Displacements, velocities and the terms' own states at the first sample of each stretch, one stretch after
+            the other; what is left out is zero.
         free : sequence of int
             States to differentiate by, after the keys.
 
@@ -74,22 +99,38 @@ class StructureRun:
         DivergenceError
             If a motion leaves the range of finite numbers.
         """
-        own = self.program
-        program = with_registers(own.program, {key: values[key] for key in self.keys})
-        first = 1 + len(self.keys)
-        out = np.empty((len(self.rows), self.samples, first + len(free)))
+        program = with_registers(self.program.program, {key: values[key] for key in self.keys})
+        first, n = 1 + len(self.keys), self.program.states
+        if len(self.drives) == 1 and len(free) <= n:
+            out = self._along(self.drives[0], program, initial, free)
+            return out[:, :, 0], out[:, :, 1:]
+        out = np.zeros((len(self.rows), sum(drive.samples for drive in self.drives), first + len(free)))
+        begin = 0
+        for k, drive in enumerate(self.drives):
+            columns = [first + i for i, state in enumerate(free) if k * n <= state < (k + 1) * n]
+            own = [state - k * n for state in free if k * n <= state < (k + 1) * n]
+            part = self._along(drive, program, initial[k * n : (k + 1) * n], own)
+            out[:, begin : begin + drive.samples, [*range(first), *columns]] = part
+            begin += drive.samples
+        return out[:, :, 0], out[:, :, 1:]
+
+    def _along(self, drive: StretchDrive, program: Program, initial: Floats, free: Sequence[int]) -> Floats:
+        """Motions and derivatives along one stretch side by side, shape (sensors, samples, 1 + keys + free states)."""
+        own, first = self.program, 1 + len(self.keys)
+        out = np.empty((len(self.rows), drive.samples, first + len(free)))
         state = np.zeros((own.states, out.shape[2]))
-        state[: len(initial), 0] = initial
+        begun = initial[: own.states]
+        state[: len(begun), 0] = begun
         state[list(free), range(first, out.shape[2])] = 1.0
         sides = own.sides if len(own.sides) else None
         failed = kernels.integrate_structure(
             program.code, program.first, program.registers.copy(), own.slopes, own.by_state, own.by_key, sides,
-            own.by_side, own.directions, self.start, self.dt, self.steps, self.drive, state, self.rows, out,
+            own.by_side, own.directions, drive.start, self.dt, self.steps, drive.values, state, self.rows, out,
         )  # fmt: skip
         if failed >= 0:
-            time = self.start + failed * self.dt
+            time = drive.start + failed * self.dt
             raise DivergenceError(f"the free run diverged at t = {time:.4g} s", time)
-        return out[:, :, 0], out[:, :, 1:]
+        return out
 
 
 def prepare_run(
@@ -130,16 +171,28 @@ def prepare_run(
     lacking = ", ".join(name for name in names if name not in record.forces)
     expect(not lacking, f"record {record.name!r} has no force {lacking}; expected {', '.join(names)}")
     program = motion_program(model, tuple(record.extra), keys)
-    factor = 2 * steps_per_sample
     columns = [record.forces[name] for name in names] + [record.extra[name] for name in model.channels]
-    part = slice(factor * first, factor * (last - 1) + 1)
-    drive = np.zeros((factor * (last - first - 1) + 1, len(columns)))
-    for i, values in enumerate(columns):
-        drive[:, i] = between_samples(values, factor)[part]
     return StructureRun(
-        program, tuple(keys), drive, record.dt, steps_per_sample, record.start + first * record.dt, last - first,
+        program, tuple(keys), _drives(record, (first, last), columns, 2 * steps_per_sample), record.dt,
+        steps_per_sample,
         np.array([_row(model, s) for s in (record.sensors if sensors is None else sensors)], dtype=np.int64),
     )  # fmt: skip
+
+
+def _drives(
+    record: StructureRecord, span: tuple[int, int], columns: Sequence[Floats], factor: int
+) -> tuple[StretchDrive, ...]:
+    """What acts along each stretch of a span, ``factor`` half steps in a sampling interval."""
+    found: list[StretchDrive] = []
+    time = record.time
+    for begin, end in record.runs(span):
+        first, last = record.run_of(begin)
+        values = np.zeros((factor * (end - begin - 1) + 1, len(columns)))
+        part = slice(factor * (begin - first), factor * (end - 1 - first) + 1)
+        for i, channel in enumerate(columns):
+            values[:, i] = between_samples(channel[first:last], factor)[part]
+        found.append(StretchDrive(values, float(time[begin]), end - begin))
+    return tuple(found)
 
 
 def _row(model: Model, sensor: Sensor) -> int:

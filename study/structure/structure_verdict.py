@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from study.diagnose.credibility import credible
-from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
+from study.diagnose.verdict import MISSING, MOST, NOTHING, UNKNOWN
 from study.equations.model import ModelTerm
 from study.equations.term import Term
 from study.structure.modes import Modes, modes_of
@@ -26,6 +26,7 @@ from study.structure.structure_comparison import StructureComparison, compare_st
 from study.structure.structure_fit import (
     fit_structure,
     linearise_structure,
+    same_states,
     settled_structure,
     sized,
     structure_covariance,
@@ -85,9 +86,9 @@ def placed_search_base(comparison: StructureComparison) -> PlacedBaseline:
     """The fitted structure as candidates are tried beside it, on no more samples than a search takes."""
     prepared, fit = comparison.prepared, comparison.fit
     first, last = prepared.fit
-    look = prepared.shortened(int(np.clip((last - first) // 2, SHORT, LONG)))
-    begin = fit.initial if look.fit[0] == fit.first else None
-    again = fit_structure(fit.model, look, fit.held, initial=begin, noise=sized(prepared.scale))
+    wanted = LONG if prepared.anew else int(np.clip((last - first) // 2, SHORT, LONG))  # loud and quiet stretches
+    look = prepared.shortened(wanted)
+    again = fit_structure(fit.model, look, fit.held, initial=same_states(fit, look), noise=sized(prepared.scale))
     return placed_baseline(again, look)
 
 
@@ -118,17 +119,29 @@ def _decide(rows: list[PlacedRanked], comparison: StructureComparison, asked: in
     families = tuple(family_gains(first.prediction))
     left = _left(first.prediction, families)
     rows = [first] + [r for r in rows if r is not first]
-    enough = first.gain.explained >= ENOUGH or left <= GOOD
-    verdict = MISSING if enough and not first.wanders(asked) else UNKNOWN
+    enough = (first.gain.explained >= ENOUGH or left <= GOOD) and not first.wanders(asked)
+    verdict = MISSING if enough or _stands_out(first) else UNKNOWN
     if verdict == UNKNOWN:
         families = comparison.leftovers
     return StructureDiagnosis(verdict, comparison, tuple(rows), asked, left, _ordered(families))
 
 
+def _stands_out(first: PlacedRanked) -> bool:
+    """Whether an effect explains most of what a decay's motion lacks, as for a single mass.
+
+    Measured ones seldom lack one effect alone: what is left beside the first is asked for when it is added.
+    """
+    return first.prediction.prepared.anew and first.gain.explained > MOST and not first.unphysical
+
+
 def _left(prediction: StructurePrediction, families: Sequence[FamilyGain]) -> float:
-    """Rms over that of the response which general shapes explain of a residual, and not by chance."""
+    """Rms over that of the response which general shapes explain of a residual, and not by chance.
+
+    Of a free decay all that stands above the noise: where its run has lost the motion, shapes along it explain nothing.
+    """
     found = [f.gain.explained for f in families if f.gain.p_value * len(families) < NAMELESS]
-    return prediction.error * float(np.sqrt(max((0.0, *found))))
+    left = prediction.error * float(np.sqrt(max((0.0, *found))))
+    return left if prediction.fit.model.forces else max(left, prediction.above_noise)
 
 
 def _ordered(families: Sequence[FamilyGain]) -> tuple[FamilyGain, ...]:

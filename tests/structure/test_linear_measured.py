@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from study.cli import main
+from study.compare import history
 from study.equations.model_file import format_model, parse_model, read_model
 from study.identify.frequency_domain.subspace import observability
 from study.records.excitation import Excitation, force
@@ -182,5 +183,17 @@ def test_compare_on_the_command_line(tmp_path, beam, comparison, capsys):
     assert (tmp_path / "out" / "comparison.json").stat().st_size > 1000
     assert measured_document(comparison)["model"]["linear"] == "measured"
     assert "Line by line" in measured_says(comparison)
-    assert main(["drop", str(tmp_path / "beam.yaml"), "cubic_stiffness", "--data", str(tmp_path / "beam.csv")]) == 2
-    assert "linear: measured" in capsys.readouterr().err
+
+
+def test_a_term_is_dropped_beside_a_measured_linear_part(tmp_path, beam, capsys):
+    write_structure_csv(at_sensors(beam, samples=4000), tmp_path / "beam.csv")
+    model = tmp_path / "beam.yaml"
+    model.write_text(MEASURED)
+    words = ["--data", str(tmp_path / "beam.csv"), "--out", str(tmp_path / "out")]
+    assert main(["drop", str(model), "quintic_stiffness", *words]) == 2
+    assert "expected one of cubic_stiffness[ground-p10]" in capsys.readouterr().err
+    assert main(["drop", str(model), "cubic_stiffness", "--between", "ground", "p10", *words]) == 0
+    assert read_model(model).terms == ()
+    before, after = history.read_history(model)
+    assert after["dropped"] == "cubic_stiffness[ground-p10]"
+    assert after["error"]["response"] > 2.0 * before["error"]["response"]

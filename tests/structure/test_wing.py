@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from study.diagnose.verdict import MISSING, UNKNOWN
 from study.equations.model import free
 from study.equations.model_file import parse_model
 from study.equations.place import Place
@@ -13,8 +14,9 @@ from study.equations.terms import LIBRARY, get
 from study.structure.placed_candidates import candidate_entries, screened
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure
+from study.structure.structure_layout import Parts, lay_out
 from study.structure.structure_reader import read_structure
-from study.structure.structure_verdict import UNKNOWN, diagnose_structure, placed_search_base
+from study.structure.structure_verdict import diagnose_structure, placed_search_base
 from study.support.errors import StudyError
 
 DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parents[3] / "shared" / "data"))
@@ -110,3 +112,36 @@ def test_without_a_force_masses_must_be_given():
     record = read_structure(DATA / "wing" / "model_1.csv", free)
     with pytest.raises(StudyError, match=r"says nothing of m\[heave\]; expected a value"):
         compare_structure(free, prepare_structure(record, free, (0, 2500), (2500, 4000)))
+
+
+SEARCHED = ("quadratic_stiffness", "cubic_stiffness", "bilinear_stiffness", "coulomb_friction")
+
+
+@pytest.mark.parametrize("name", list(AUTHORS))
+def test_as_a_user_runs_it_the_missing_stiffness_is_in_pitch(name):
+    """Without parts named: every other stretch of one and a half periods is judged, from a state of its own."""
+    model = wing(name)
+    record = read_structure(DATA / "wing" / f"{name}.csv", model)
+    comparison = compare_structure(model, lay_out(record, model, Parts()))
+    _, _, heave, pitch = AUTHORS[name]
+    values = comparison.fit.model.values
+    assert values["k[ground-heave]"] == pytest.approx(heave, rel=0.15)
+    assert values["k[ground-pitch]"] == pytest.approx(pitch, rel=0.15)
+    diagnosis = diagnose_structure(comparison, without=[effect for effect in LIBRARY if effect not in SEARCHED])
+    assert diagnosis.verdict == MISSING
+    first = diagnosis.candidates[0]
+    assert first.name in ("bilinear_stiffness[ground-pitch]", "bilinear_stiffness[pitch-ground]")
+    assert first.gain.explained > 0.5
+    assert "quadratic_stiffness[ground-pitch]" in first.tied_with
+
+
+@pytest.mark.parametrize(("fit", "judge"), [((0, 2500), (2500, 4000)), ((1250, 2500), (2500, 3750))])
+def test_no_division_of_a_decay_lacks_nothing(fit, judge):
+    """As long as its free run leaves a hundred times the noise; a free run of seconds has lost the motion there."""
+    model = wing("model_1")
+    record = read_structure(DATA / "wing" / "model_1.csv", model)
+    others = [effect for effect in LIBRARY if effect != "constant_force"]
+    for prepared in (lay_out(record, model, Parts(fit, judge)), prepare_structure(record, model, fit, judge)):
+        comparison = compare_structure(model, prepared)
+        assert comparison.prediction.error > 30.0 * comparison.prediction.floor
+        assert diagnose_structure(comparison, without=others).verdict == UNKNOWN

@@ -1,0 +1,149 @@
+"""Free decays of a structure: stretches that begin anew, what is missing in them, and what is never said of them."""
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from study.diagnose.verdict import MISSING, NOTHING
+from study.equations.model_file import parse_model
+from study.structure.prepared_structure import prepare_structure
+from study.structure.structure_comparison import compare_structure
+from study.structure.structure_fit import linearise_structure
+from study.structure.structure_layout import Parts, lay_out
+from study.structure.structure_record import Sensor, StructureRecord
+from study.structure.structure_run import prepare_run
+from study.structure.structure_verdict import diagnose_structure
+from study.support.errors import StudyError
+
+DT, SAMPLES = 0.01, 2000
+SENSORS = (Sensor("a", "displacement"), Sensor("b", "displacement"))
+BEGIN = np.array([0.01, 0.02, 0.0, 0.0])
+FEW = ("quintic_stiffness", "periodic_stiffness", "harmonic_force", "hysteresis", "relaxation", "dead_band",
+       "cubic_damping", "displacement_damping", "van_der_pol_damping", "two_sided_contact")  # fmt: skip
+TERMS = """
+name: pair
+coordinates: [a, b]
+terms:
+  - {{term: inertia, at: a, value: 1.0}}
+  - {{term: inertia, at: b, value: 0.5}}
+  - {{term: linear_stiffness, between: [ground, a]{}}}
+  - {{term: linear_stiffness, between: [a, b]{}}}
+  - {{term: linear_damping, between: [ground, a]{}}}
+  - {{term: linear_damping, between: [a, b]{}}}
+"""
+HARD = "  - {term: cubic_stiffness, between: [ground, a], value: 60000.0}\n"
+
+
+def model(*, known=False, more=""):
+    values = (40.0, 25.0, 0.1, 0.06)
+    texts = [f", value: {value}" if known else "" for value in values]
+    return parse_model(TERMS.format(*texts) + more, Path("pair.yaml"))
+
+
+def decay(more="", noise=0.003, seed=1, begin=BEGIN, samples=SAMPLES):
+    """The pair let go; noise as a share of each motion's size."""
+    still = StructureRecord(DT, {}, {s: np.zeros(samples) for s in SENSORS})
+    run = prepare_run(model(known=True, more=more), still, sensors=SENSORS, steps_per_sample=4)
+    motion, rng = run.respond({}, begin)[0], np.random.default_rng(seed)
+    noisy = motion + noise * np.std(motion, axis=1, keepdims=True) * rng.standard_normal(motion.shape)
+    return StructureRecord(DT, {}, dict(zip(SENSORS, noisy, strict=True)), name="decay", start=3.0)
+
+
+def test_a_decay_is_fitted_and_judged_in_turn_and_its_motion_begins_anew():
+    prepared = lay_out(decay(), model(), Parts())
+    record = prepared.record
+    runs = record.runs((0, len(record)))
+    assert len(record.stretches) == len(runs) >= 6
+    assert prepared.fit == (0, prepared.judge[0])
+    firsts = sorted((s.first, s.last) for s in record.stretches)
+    assert all(end == begin for (_, end), (begin, _) in itertools.pairwise(firsts)), "each sample once"
+    fitted = [s.first for s, (_, end) in zip(record.stretches, runs, strict=True) if end <= prepared.fit[1]]
+    assert fitted == [first for first, _ in firsts[::2]], "every other block is judged"
+    begin = record.joints[0]
+    assert record.time[begin] == pytest.approx(3.0 + DT * record.stretches[1].first)
+    assert record.time[begin] - record.time[begin - 1] > 10 * DT
+    whole = prepare_structure(decay(), model())
+    a = record.stretches[1]
+    assert np.allclose(prepared.complete["a"][:, begin : begin + len(a)], whole.complete["a"][:, a.first : a.last])
+
+
+def test_derivatives_by_the_states_of_each_stretch_are_those_of_the_motion():
+    prepared = lay_out(decay(HARD), model(more=HARD), Parts())
+    fit = compare_structure(model(more=HARD), prepared).fit
+    jacobian = linearise_structure(fit, prepared)
+    states = len(fit.initial) // 4
+    assert states == len(prepared.record.runs(prepared.fit))
+    run = prepare_run(fit.model, prepared.record, sensors=prepared.sensors, steps_per_sample=fit.steps, span=fit.span)
+    for state in (0, 5, len(fit.initial) - 1):
+        moved = np.zeros(len(fit.initial))
+        moved[state] = 1e-6
+        change = (run.respond({}, fit.initial + moved)[0] - run.respond({}, fit.initial - moved)[0]).T / 2e-6
+        column = jacobian[:, :, len(fit.keys) + state]
+        assert np.allclose(change, column, atol=1e-5 * np.max(np.abs(column)))
+        begin, end = prepared.record.runs(prepared.fit)[state // 4]
+        assert not np.any(column[:begin])
+        assert not np.any(column[end:])
+
+
+@pytest.mark.parametrize("seed", [2, 7, 9])
+@pytest.mark.parametrize("noise", [0.05, 0.1])
+def test_a_fit_begins_where_noise_does_not_lead_it_astray(noise, seed):
+    """Of displacements every 0.01 s: two derivatives of their noise are larger than the acceleration itself."""
+    record = decay(noise=noise, seed=seed)
+    comparison = compare_structure(model(), lay_out(record, model(), Parts((0, 1000), (1000, 1600))))
+    found = comparison.fit.model.values
+    assert found["k[ground-a]"] == pytest.approx(40.0, rel=0.02)
+    assert found["k[a-b]"] == pytest.approx(25.0, rel=0.02)
+
+
+def test_a_hardening_spring_is_found_where_it_is():
+    comparison = compare_structure(model(), lay_out(decay(HARD), model(), Parts()))
+    diagnosis = diagnose_structure(comparison, without=FEW)
+    assert diagnosis.verdict == MISSING
+    first = diagnosis.candidates[0]
+    assert first.name == "cubic_stiffness[ground-a]"
+    assert first.coefficient == pytest.approx(60000.0, abs=4.0 * first.error)
+    assert first.error < 0.05 * 60000.0
+    assert first.response_error < 1.2 * first.prediction.floor
+
+
+@pytest.mark.parametrize("noise", [0.003, 0.05])
+def test_where_nothing_is_missing_nothing_is_said_to_be(noise):
+    comparison = compare_structure(model(), lay_out(decay(noise=noise), model(), Parts()))
+    assert diagnose_structure(comparison, without=FEW).verdict == NOTHING
+
+
+def test_a_free_run_that_lost_the_motion_is_no_noise():
+    """One run of a linear model along the decay of a hard spring: whatever explains nothing there, something lacks."""
+    prepared = prepare_structure(decay(HARD), model(), (0, 1000), (1000, 1600))
+    prediction = compare_structure(model(), prepared).prediction
+    assert prediction.error > 20.0 * prediction.floor
+    assert prediction.above_noise > 0.5 * prediction.error
+    right = model(more=HARD)
+    again = compare_structure(right, prepare_structure(decay(HARD), right, (0, 1000), (1000, 1600))).prediction
+    assert again.above_noise < 2e-3
+
+
+def test_stretches_that_are_named_are_used_alone():
+    prepared = lay_out(decay(), model(), Parts(use=((3.5, 9.0), (12.0, None))))
+    times = prepared.record.time
+    assert np.all((times >= 3.5) & (times < 9.0) | (times >= 12.0))
+    assert min(times) == pytest.approx(3.5)
+    explicit = lay_out(decay(), model(), Parts((0, 900), (900, 1800)))
+    assert len(explicit.record.stretches) == 2
+
+
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        (Parts(use=((0.0, 5.0),)), "0:5 s does not lie in it; expected times from 3 s to 23 s"),
+        (Parts(use=((4.0, 9.0), (8.0, 12.0))), "overlap at 8 s"),
+        (Parts(fit=(0, 500), alternate=True), "exclude each other; expected '--judge every-other-block'"),
+        (Parts(use=((4.0, 4.3),)), "leave 30 that are sure; expected 64"),
+    ],
+)
+def test_parts_that_cannot_be_are_refused(parts, said):
+    with pytest.raises(StudyError, match=said):
+        lay_out(decay(), model(), parts)
