@@ -20,7 +20,7 @@ from playwright.sync_api import Page, sync_playwright
 from scripts.page_picture import QUIET, browser
 from study import trials
 from study.equations import model_file
-from study.explore import html_page, session
+from study.explore import any_page, html_page, session
 from study.explore.saved_files import files, of_stage
 from study.explore.view import view
 from study.records.prepared import prepare_record
@@ -86,7 +86,7 @@ def alone(trial: Any) -> dict[str, float]:
     stage, _ = session.examined(now)
     now = session.with_stage(now, stage)
     after = session.with_added(now, stage.shown[0].name)
-    history = html_page.history_columns(after)
+    history = any_page.history_columns(after)
     text = model_file.format_model(trial.believed)
     drawn = of_stage(now.now)
     work: dict[str, Callable[[], object]] = {

@@ -24,7 +24,10 @@ class Command:
 
 @contextmanager
 def progress(unit: str, total: int | None = None, name: str = "") -> Generator[Callable[[str], None], None, None]:
-    """A line of progress; what is given back counts a step, and says what is done in it unless that is empty."""
+    """A line of progress; what is given back counts a step, and says what is done in it unless that is empty.
+
+    ``total`` is a least: a record with a fault of the measurement is compared more than once.
+    """
     from tqdm import tqdm
 
     with tqdm(total=total, delay=QUIET, leave=False, unit=unit, desc=harmless(name) or None) as bar:
@@ -32,6 +35,8 @@ def progress(unit: str, total: int | None = None, name: str = "") -> Generator[C
         def step(doing: str) -> None:
             if doing:
                 bar.set_description(harmless(doing), refresh=False)
+            if bar.total is not None:
+                bar.total = max(bar.total, bar.n + 2)  # this step and one that is still to come
             bar.update()
 
         yield step

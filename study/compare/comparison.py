@@ -32,9 +32,8 @@ from study.support.errors import StudyError
 STEPS = 5  # reports of progress a record
 Progress = Callable[[str], None]
 CHAOTIC = (
-    "the fitted system magnifies disturbances, as a chaotic one does: its free run loses the measured motion however "
-    "true the model, so that the coefficients come from segments of the record, the response error says little, and "
-    "the error of the force says how good the model is"
+    "the fitted system magnifies disturbances, as a chaotic one does: one free run would lose the measured motion "
+    "however true the model, so it is fitted and judged in segments, each from a state of its own"
 )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-CELLS = 21  # along each axis of the map
+CELLS = (21, 15, 11, 7)  # along each axis of the map, from the finest
 CLASSES = 24  # of a curve
 FEWEST = 8  # visits, for a mean with an error
 REACH = 0.001  # quantile at each end where map and curves end
@@ -42,15 +42,37 @@ def curve(at: Floats, force: Floats) -> ForceCurve:
     return ForceCurve(centre[keep], mean[keep], error[keep])
 
 
-def surface(u: Floats, v: Floats, force: Floats) -> Surface:
-    """Mean force over the (u, v) plane in cells of equal size."""
-    bounds = [edges(x, CELLS) for x in (u, v)]
-    i, j = (np.searchsorted(e, x) - 1 for e, x in zip(bounds, (u, v), strict=True))
-    inside = (i >= 0) & (i < CELLS) & (j >= 0) & (j < CELLS)
-    mean, error, visits = _means(i * CELLS + j, force, inside, CELLS * CELLS)
+def surface(u: Floats, v: Floats, force: Floats, cells: int | None = None) -> Surface:
+    """Mean force over the (u, v) plane in cells of equal size, as many along an axis as :func:`cells_of` says."""
+    cells = cells or cells_of(u, v)
+    bounds = [edges(x, cells) for x in (u, v)]
+    place, inside = _cell(u, v, bounds)
+    mean, error, visits = _means(place, force, inside, cells * cells)
     seen = visits >= FEWEST
-    grids = [np.where(seen, x, np.nan).reshape(CELLS, CELLS) for x in (mean, error)]
+    grids = [np.where(seen, x, np.nan).reshape(cells, cells) for x in (mean, error)]
     return Surface(bounds[0], bounds[1], grids[0], grids[1])
+
+
+def cells_of(u: Floats, v: Floats) -> int:
+    """Cells along each axis: the most of which those that have a mean hold the greater part of the motion."""
+    for cells in CELLS:
+        place, inside = _cell(u, v, [edges(x, cells) for x in (u, v)])
+        visits = np.bincount(place[_entered(place, inside)], minlength=cells * cells)
+        if np.count_nonzero(visits[place[inside]] >= FEWEST) > 0.5 * len(u):
+            return cells
+    return CELLS[-1]
+
+
+def _cell(u: Floats, v: Floats, bounds: list[Floats]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Number of each sample's cell, and whether it lies in one."""
+    i, j = (np.searchsorted(e, x) - 1 for e, x in zip(bounds, (u, v), strict=True))
+    cells = len(bounds[0]) - 1
+    return i * cells + j, (i >= 0) & (i < cells) & (j >= 0) & (j < cells)
+
+
+def _entered(place: NDArray[np.int64], inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Where a visit begins. Neighbouring samples are no independent evidence: a run in one class is one visit."""
+    return inside & np.concatenate([[True], place[1:] != place[:-1]])
 
 
 def edges(values: Floats, classes: int) -> Floats:
@@ -62,12 +84,8 @@ def edges(values: Floats, classes: int) -> Floats:
 def _means(
     place: NDArray[np.int64], values: Floats, inside: NDArray[np.bool_], classes: int
 ) -> tuple[Floats, Floats, Floats]:
-    """Mean, standard error and number of visits of each class, shape (classes,).
-
-    Neighbouring samples are no independent evidence: a run of samples in one class is one visit.
-    """
-    entered = inside & np.concatenate([[True], place[1:] != place[:-1]])
-    visits = np.bincount(place[entered], minlength=classes).astype(np.float64)
+    """Mean, standard error and number of visits of each class, shape (classes,)."""
+    visits = np.bincount(place[_entered(place, inside)], minlength=classes).astype(np.float64)
     counts = np.maximum(np.bincount(place[inside], minlength=classes), 1.0)
     mean = np.bincount(place[inside], values[inside], minlength=classes) / counts
     spread = np.bincount(place[inside], (values[inside] - mean[place[inside]]) ** 2, minlength=classes) / counts

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.fft import rfft, rfftfreq
 
 from study.compare.comparison import Comparison
-from study.compare.force_map import CELLS, CLASSES, edges
+from study.compare.force_map import CLASSES, cells_of, edges
 from study.records.spectra import Segments
 
 Floats = NDArray[np.float64]
@@ -39,7 +39,7 @@ class Links:
     power: Floats  # autospectral density of the difference around the middle of each block; shape (blocks, lines)
     displacement: Classes  # what each block holds of the curves
     velocity: Classes
-    cells: Floats  # samples in the cells of the map, by displacement, then velocity; shape (blocks, CELLS * CELLS)
+    cells: Floats  # samples in the cells of the map, by displacement, then velocity; shape (blocks, cells^2)
 
 
 def links(comparison: Comparison) -> Links:
@@ -85,7 +85,8 @@ def _classes(values: Floats, force: Floats, block: NDArray[np.int64], count: int
 
 
 def _cells(u: Floats, v: Floats, block: NDArray[np.int64], count: int) -> Floats:
-    (i, in_u), (j, in_v) = (_place(x, edges(x, CELLS)) for x in (u, v))
+    cells = cells_of(u, v)
+    (i, in_u), (j, in_v) = (_place(x, edges(x, cells)) for x in (u, v))
     inside = in_u & in_v
-    where = (block * CELLS * CELLS + i * CELLS + j)[inside]
-    return np.bincount(where, minlength=count * CELLS * CELLS).astype(np.float64).reshape(count, CELLS * CELLS)
+    where = (block * cells**2 + i * cells + j)[inside]
+    return np.bincount(where, minlength=count * cells**2).astype(np.float64).reshape(count, cells**2)

@@ -1,7 +1,8 @@
 """Is what a model leaves noise, and nothing of the force? Autocorrelation, correlation with the force, histogram.
 
 The checks of system identification (Ljung, System Identification, 1999, Section 16.6): a right model in white noise
-leaves a residual without correlation to itself; a right model in any noise leaves one without correlation to the force.
+leaves a residual without correlation to itself; a right model in any noise leaves one without correlation to the force,
+or where motion is prescribed to the displacement.
 """
 
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.special import ndtri
 
 from study.compare.prediction import Prediction
+from study.compare.response_functions import drive_of
 from study.support.arrays import Floats
 
 LAGS = 100  # to each side, at most
@@ -27,7 +29,7 @@ class ResidualChecks:
     autocorrelation: Floats  # of the residual over its mean square, shape (lags,)
     band: float  # 99 % of the autocorrelations of white noise lie within it
     lag_force: Floats  # in seconds, negative before the force, shape (2 lags - 1,)
-    with_force: Floats  # correlation of residual and force, shape (2 lags - 1,)
+    with_force: Floats  # correlation of residual and force, or prescribed displacement, shape (2 lags - 1,)
     band_force: float  # 99 % lie within it where they are independent, whatever their colours
     edges: Floats  # of the histogram, in standard deviations, shape (bins + 1,)
     counts: Floats  # share of the samples over the width of a bin: a normal density if it is one; shape (bins,)
@@ -37,7 +39,7 @@ def residual_checks(prediction: Prediction) -> ResidualChecks:
     """The checks of the residual on the judging part."""
     prepared, residual = prediction.prepared, prediction.residual
     residual = residual - np.mean(residual)
-    force = prepared.record["force"][slice(*prepared.plan.judge)]
+    force = prepared.record[drive_of(prepared)][slice(*prepared.plan.judge)]
     force = force - np.mean(force)
     n, lags = len(residual), min(LAGS, len(residual) // 4)
     own, drive = cross_correlation(residual, residual, lags), cross_correlation(force, force, lags)

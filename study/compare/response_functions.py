@@ -1,7 +1,8 @@
-"""The frequency response function of force and response, measured and as the fitted model predicts it.
+"""The frequency response function of drive and response, measured and as the fitted model predicts it.
 
 Both by H1 = G_fx / G_ff from the same force on the same samples, so that what a nonlinear system does to H1 shows in
-both alike (Bendat and Piersol, Random Data, 2010, Section 9.1).
+both alike (Bendat and Piersol, Random Data, 2010, Section 9.1). Where the motion is prescribed, displacement drives and
+the force responds: H1 is then the dynamic stiffness, whose phase is the loss angle.
 """
 
 from dataclasses import dataclass
@@ -10,21 +11,23 @@ import numpy as np
 
 from study.compare.noise import segments_of
 from study.compare.prediction import Prediction
+from study.records.prepared import FORCE, Prepared
 from study.records.spectra import SpectralMatrix, cross_spectra
 from study.support.arrays import Complexes, Floats
+from study.support.errors import expect
 
-LOUD = 1e-3  # of the force's largest density: what is divided by less is no response
+LOUD = 1e-3  # of the drive's largest density: what is divided by less is no response
 
 
 @dataclass(frozen=True)
 class ResponseFunctions:
-    """Response over force at each line; arrays of shape (lines,)."""
+    """Response over drive at each line; arrays of shape (lines,)."""
 
     frequency: Floats  # in hertz
-    measured: Complexes  # unit of the response over that of the force
+    measured: Complexes  # unit of the response over that of the drive
     predicted: Complexes  # the same of the model's free run
     error: Floats  # standard error of the measured magnitude: |H| sqrt((1 - g) / (2 n g)), with g the coherence
-    coherence: Floats  # ordinary coherence of force and measured response
+    coherence: Floats  # ordinary coherence of drive and measured response
     coherence_predicted: Floats  # the same of the model's: below one where it is nonlinear
 
     @property
@@ -39,12 +42,20 @@ class ResponseFunctions:
 
 
 def response_functions(prediction: Prediction) -> ResponseFunctions:
-    """H1 of the judging part, where the force has power, up to the record's highest frequency that is judged."""
+    """H1 of the judging part, where the drive has power, up to the record's highest frequency that is judged.
+
+    Raises
+    ------
+    StudyError
+        If the record is of free decays, which nothing drives.
+    """
     prepared = prediction.prepared
-    force = prepared.record["force"][slice(*prepared.plan.judge)]
-    cut = segments_of(len(force))
-    measured = cross_spectra([force, prediction.measured], prediction.dt, cut)
-    predicted = cross_spectra([force, prediction.predicted], prediction.dt, cut)
+    name = prepared.record.name
+    expect(not prepared.free, f"{name}: no force acts; expected a driven record for a frequency response function")
+    drive = prepared.record[drive_of(prepared)][slice(*prepared.plan.judge)]
+    cut = segments_of(len(drive))
+    measured = cross_spectra([drive, prediction.measured], prediction.dt, cut)
+    predicted = cross_spectra([drive, prediction.predicted], prediction.dt, cut)
     power = measured.density[:, 0, 0].real
     kept = (measured.frequency > 0.0) & (power > LOUD * np.max(power))
     (h, coherence), (model, of_model) = _h1(measured), _h1(predicted)
@@ -52,6 +63,11 @@ def response_functions(prediction: Prediction) -> ResponseFunctions:
     return ResponseFunctions(
         measured.frequency[kept], h[kept], model[kept], (np.abs(h) * spread)[kept], coherence[kept], of_model[kept]
     )
+
+
+def drive_of(prepared: Prepared) -> str:
+    """The channel that a response answers to: the force, or where motion is prescribed the displacement."""
+    return "displacement" if prepared.response == FORCE else FORCE
 
 
 def _h1(matrix: SpectralMatrix) -> tuple[Complexes, Floats]:

@@ -17,6 +17,7 @@ from study.diagnose.held_out import HeldOutResidual, alike, evidence_of
 from study.equations.model import ModelTerm
 from study.figures.labels import term_names
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.motion_start import has_lost_the_motion
 from study.identify.time_domain.part_fit import covariance_of, linearise
 from study.support.arrays import Floats
 from study.support.cores import cores
@@ -96,12 +97,15 @@ def needless(comparison: Comparison, besides: Collection[str] = ()) -> tuple[Nee
     Returns
     -------
     tuple of Needless
-        Empty where the response error judges nothing: the free run does not stay finite, or the system is chaotic.
+        Empty where the response error judges nothing: the free run does not stay finite or has lost the motion, or the
+        system is chaotic.
     """
     keys = comparison.fit.keys  # a term that another estimator than the fit in free run found has none there
     terms: list[ModelTerm] = [
         t for t in comparison.model.terms if is_open(t) and t.name not in besides and set(t.keys) <= set(keys)
     ]
+    if has_lost_the_motion(comparison.fit, comparison.prepared):
+        return ()
     stage, asked = _Stage(comparison.fit, comparison.prediction, comparison), len(terms)
     found: list[Needless] = []
     while terms and len(stage.fit.model.terms) > 2 and not (stage.prediction.diverged or stage.fit.restarts):

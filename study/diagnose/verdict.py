@@ -19,6 +19,7 @@ from study.diagnose.ranking import rank
 from study.equations.terms import Term
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.motion_start import has_lost_the_motion
 from study.identify.time_domain.part_fit import fit_part, linearise
 from study.identify.time_domain.settling import continued
 from study.identify.time_domain.shape_search import Baseline
@@ -112,7 +113,10 @@ def _decide(
     trusted = [r for r in rows if believed(r, prediction, own)]
     if not trusted:
         left = _left(comparison.fit, prediction)
-        return (UNKNOWN if left > TOLERANCE else NOTHING), rows, left, ()
+        lost = has_lost_the_motion(
+            comparison.fit, comparison.prepared
+        )  # what is left along another motion tells nothing
+        return (UNKNOWN if left > TOLERANCE or lost else NOTHING), rows, left, ()
     first = trusted[0]
     left = _left(first.fit, first.prediction)
     rows = [first] + [r for r in rows if r is not first]

@@ -1,25 +1,78 @@
-"""Columns of the response functions and of the checks of the residual, for the panels of ``check_plots``."""
+"""Columns of what shows a test of its kind and of the checks of the residual, for the panels of ``check_plots``."""
 
 import math
 
 import numpy as np
 
 from study.compare.comparison import Comparison
+from study.compare.decay import decays_of
+from study.compare.loops import loops
 from study.compare.residual_checks import residual_checks
 from study.compare.response_functions import response_functions
 from study.explore.axis_scales import Columns, Floats, Scales, heard
+from study.explore.decimate import BUCKETS
+from study.records.prepared import FORCE, Prepared
 
 NINETY_FIVE = 1.96  # standard errors to each side
+DRIVEN, PRESCRIBED, FREE = "driven", "prescribed", "free"
+
+
+def kind_of(prepared: Prepared) -> str:
+    """What those who run such a test look at: response functions, loops too, or frequency and damping by amplitude."""
+    return PRESCRIBED if prepared.response == FORCE else FREE if prepared.free else DRIVEN
 
 
 def columns(comparison: Comparison, scales: Scales) -> dict[str, Columns]:
-    """By the name of their source; magnitudes in the unit of the response's axis over that of the force."""
-    return {"frf": _functions(comparison, scales), **_checks(comparison)}
+    """By the name of their source, in the units of the axes."""
+    kind = kind_of(comparison.prepared)
+    shown = _decay(comparison, scales) if kind == FREE else {"frf": _functions(comparison, scales)}
+    return shown | (_loops(comparison, scales) if kind == PRESCRIBED else {}) | _checks(comparison)
+
+
+def _decay(comparison: Comparison, scales: Scales) -> dict[str, Columns]:
+    """Frequency and damping ratio in per cent against amplitude; nothing where the decay is too short for them."""
+    found = decays_of(comparison)
+    shown: dict[str, Columns] = {}
+    for name, one in (("decay", found and found.measured), ("decay_model", found and found.predicted)):
+        rows = np.zeros((5, 0)) if not one else np.array(
+            [one.amplitude, one.frequency, one.damping, one.frequency_error, one.damping_error]
+        )  # fmt: skip
+        at, frequency, damping, *errors = rows[:, np.argsort(rows[0])]
+        half = [NINETY_FIVE * e for e in errors]
+        shown[name] = {
+            "at": at / scales.response.factor, "frequency": frequency, "frequency_low": frequency - half[0],
+            "frequency_high": frequency + half[0], "damping": 100.0 * damping,
+            "damping_low": 100.0 * (damping - half[1]), "damping_high": 100.0 * (damping + half[1]),
+        }  # fmt: skip
+    return shown
+
+
+def _loops(comparison: Comparison, scales: Scales) -> dict[str, Columns]:
+    """Force, measured and predicted, beside the motion that was prescribed; and what each cycle takes of energy."""
+    prediction, prepared = comparison.prediction, comparison.prepared
+    part = prepared.record.part(*prepared.plan.judge)
+    some = slice(None, None, -(-len(part) // (2 * BUCKETS)))  # dots: a loop is as well seen in every second of them
+    found = loops(prediction)
+    energy = scales.response.factor * scales.displacement.factor
+    return {
+        "loops": {
+            "u": part["displacement"][some] / scales.displacement.factor,
+            "v": part["velocity"][some] / scales.velocity.factor,
+            "measured": prediction.measured[some] / scales.response.factor,
+            "predicted": prediction.predicted[some] / scales.response.factor,
+        },
+        "cycles": {
+            "stroke": found.stroke / scales.displacement.factor, "measured": found.measured / energy,
+            "predicted": found.predicted / energy,
+        },
+    }  # fmt: skip
 
 
 def _functions(comparison: Comparison, scales: Scales) -> Columns:
     found = response_functions(comparison.prediction)
     keep, size = heard(comparison, found.frequency), scales.response.factor
+    if kind_of(comparison.prepared) == PRESCRIBED:
+        size /= scales.displacement.factor
     measured, predicted = (values[keep] / size for values in found.magnitude)
     half = NINETY_FIVE * found.error[keep] / size
     angles = [_gapped(values[keep]) for values in found.phase]

@@ -1,23 +1,101 @@
-"""Panels of the response functions and of the checks of the residual."""
+"""Panels of what shows a test of its kind and of the checks of the residual."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 from bokeh.models import ColumnDataSource, Span
 
 from study.explore import theme
+from study.explore.check_columns import DRIVEN, FREE, PRESCRIBED
 
 Sources = Mapping[str, ColumnDataSource]
 HEIGHT = 228  # pixels
 
 
-def panels(s: Sources, frequency: Any) -> dict[str, Any]:
-    """All of them, by the name of their place."""
-    return {
-        "frf": magnitude(s, frequency), "phase": phase(s, frequency), "linearity": coherence(s, frequency),
-        "autocorrelation": correlation(s, "autocorrelation", "autocorrelation / 1"),
-        "with_force": correlation(s, "with_force", "correlation / 1"), "histogram": histogram(s),
+@dataclass(frozen=True)
+class Check:
+    """A panel: its place, the words above it, and what they say to a mouse."""
+
+    name: str
+    heading: str
+    about: str = ""
+
+
+Card = tuple[Check, ...]
+PHASE = Check("phase", "… its phase")
+FUNCTIONS: Card = (
+    Check("frf", "Frequency response", "H1 of the judged part, of the record and of the model's free run under the "
+          "same force"), PHASE,
+    Check("linearity", "… coherence with the force", "below one in both: nonlinear; in the measured alone: noise, or "
+          "something missing"),
+)  # fmt: skip
+STIFFNESS: Card = (
+    Check("frf", "Dynamic stiffness", "force over displacement, of the record and of the model under the same motion"),
+    replace(PHASE, about="the loss angle"), replace(FUNCTIONS[2], heading="… its coherence"),
+)  # fmt: skip
+LOOPS: Card = (
+    Check("loop_u", "Force over displacement", "the loops of the judged part"), Check("loop_v", "… over velocity"),
+    Check("cycles", "… energy of a cycle", "the area of each loop, over its stroke"),
+)  # fmt: skip
+DECAY: Card = (
+    Check("decay_frequency", "Frequency over amplitude", "windows of the analytic signal, with 95 % intervals"),
+    Check("decay_damping", "… damping ratio"),
+)  # fmt: skip
+ITSELF = Check("autocorrelation", "Difference with itself", "a right model in white noise leaves nothing outside of "
+               "the band")  # fmt: skip
+DRIVE = Check("with_force", "… with the force", "a right model leaves nothing outside of the band, whatever the colour "
+              "of the noise")  # fmt: skip
+SPREAD = Check("histogram", "… its distribution", "σ: the standard deviation of the difference")
+CARDS: dict[str, tuple[Card, ...]] = {
+    DRIVEN: (FUNCTIONS, (ITSELF, DRIVE, SPREAD)),
+    PRESCRIBED: (LOOPS, STIFFNESS, (ITSELF, replace(DRIVE, heading="… with the displacement"), SPREAD)),
+    FREE: (DECAY, (ITSELF, SPREAD)),
+}  # of each kind of test
+
+
+def panels(s: Sources, frequency: Any, kind: str) -> dict[str, Any]:
+    """Those of a kind of test, by the name of their place."""
+    drawn: dict[str, Callable[[], Any]] = {
+        "frf": lambda: magnitude(s, frequency), "phase": lambda: phase(s, frequency),
+        "linearity": lambda: coherence(s, frequency), "loop_u": lambda: loop(s, "u"), "loop_v": lambda: loop(s, "v"),
+        "cycles": lambda: cycles(s), "decay_frequency": lambda: decay(s, "frequency", "frequency / Hz"),
+        "decay_damping": lambda: decay(s, "damping", "damping ratio / %"),
+        "autocorrelation": lambda: correlation(s, "autocorrelation", "autocorrelation / 1"),
+        "with_force": lambda: correlation(s, "with_force", "correlation / 1"), "histogram": lambda: histogram(s),
     }  # fmt: skip
+    return {check.name: drawn[check.name]() for card in CARDS[kind] for check in card}
+
+
+def loop(s: Sources, of: str) -> Any:
+    """Force over the motion that was prescribed, measured and by the model."""
+    drawn = theme.panel(f"loop_{of}", HEIGHT, of, "force", narrow=True)
+    measured = drawn.scatter(of, "measured", source=s["loops"], size=3.2, fill_color="#a3adb7", line_color=None)
+    predicted = drawn.scatter(of, "predicted", source=s["loops"], size=1.8, fill_color=theme.BLUE, line_color=None)
+    theme.legend(drawn, [("measured", [measured]), ("model", [predicted])])
+    return drawn
+
+
+def cycles(s: Sources) -> Any:
+    """Energy that each cycle takes, over its stroke."""
+    drawn = theme.panel("cycles", HEIGHT, "stroke", "energy", narrow=True)
+    look: dict[str, Any] = {"source": s["cycles"], "line_width": 1.3}
+    measured = drawn.scatter("stroke", "measured", size=6, fill_color="#a3adb7", line_color="#5c6873", **look)
+    predicted = drawn.scatter("stroke", "predicted", marker="x", size=7, line_color=theme.BLUE, **look)
+    drawn.x_range.range_padding = 0.08
+    theme.legend(drawn, [("measured", [measured]), ("model", [predicted])])
+    return drawn
+
+
+def decay(s: Sources, of: str, label: str) -> Any:
+    """Frequency or damping ratio of a decay against its amplitude."""
+    drawn = theme.panel(f"decay_{of}", HEIGHT, "amplitude", label, x_axis_type="log")
+    bars = drawn.segment("at", f"{of}_low", "at", f"{of}_high", source=s["decay"], line_color="#5c6873", line_width=1.0)
+    dots = drawn.scatter("at", of, source=s["decay"], size=5.5, fill_color="#a3adb7", line_color="#5c6873")
+    model = drawn.line("at", of, source=s["decay_model"], **theme.PREDICTED)
+    drawn.x_range.range_padding = 0.06
+    theme.legend(drawn, [("measured, 95 %", [dots, bars]), ("model", [model])])
+    return drawn
 
 
 def magnitude(s: Sources, frequency: Any) -> Any:
@@ -67,7 +145,7 @@ def correlation(s: Sources, name: str, label: str) -> Any:
 
 def histogram(s: Sources) -> Any:
     """Distribution of the residual beside a normal one."""
-    drawn = theme.panel("histogram", HEIGHT, "difference / standard deviations", "density / 1", narrow=True)
+    drawn = theme.panel("histogram", HEIGHT, "difference / σ", "density / 1", narrow=True)
     bars = drawn.quad(
         left="left", right="right", top="top", bottom=0.0, source=s["histogram"], fill_color="#a3adb7",
         fill_alpha=0.6, line_color=None,

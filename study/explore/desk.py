@@ -14,7 +14,7 @@ from typing import Any, Generic, TypeVar
 
 from study.equations.model import Model
 from study.explore import session as sessions
-from study.explore.any_session import AnySession
+from study.explore.any_session import AnySession, undone
 from study.explore.saved_files import PAGE, files, of_stage
 from study.explore.session import Session
 from study.support.errors import StudyError
@@ -73,7 +73,7 @@ def _examined(session: Session, progress: Callable[[int], None]) -> sessions.Sta
 
 
 ALONE = Deeds(
-    sessions.with_added, sessions.dropped, sessions.undone, sessions.with_held, sessions.tried, _examined,
+    sessions.with_added, sessions.dropped, undone, sessions.with_held, sessions.tried, _examined,
     sessions.with_stage, _by_itself, _drawn, files,
 )  # fmt: skip
 

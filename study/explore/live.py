@@ -9,6 +9,7 @@ from bokeh.events import RangesUpdate
 from bokeh.models import ColumnDataSource, CustomJS
 
 from study.explore import decimate, html_page, preview
+from study.explore.any_page import history_columns
 from study.explore.axis_scales import scales_of
 from study.explore.by_record import worst
 from study.explore.desk import Desk
@@ -41,23 +42,19 @@ class AloneScene:
     def __init__(self, session: Session, stores: Sequence[ColumnDataSource]) -> None:
         self.shown = session
         self.record = worst(session.now.on_each)
-        self.page = html_page.build(self._view(), html_page.history_columns(session), stores)
+        self.page = html_page.build(self._view(), history_columns(session), stores)
         self.span: tuple[float, float] | None = None
 
     def lay(self, document: Document) -> None:
         """Put panels, template and words into an empty document."""
-        for panel in html_page.placed(self.page, diagnosed=True):
-            document.add_root(panel)
-        document.title = html_page.title(self.shown)
-        document.template = html_page.template()
-        document.template_variables.update(html_page.variables(self.shown, live=True))
-        self.page.sources["words"].js_on_change("data", CustomJS(code="window.study.words()"))
+        self.page.lay(document, html_page.TEMPLATE, html_page.variables(self.shown, live=True))
         self.page.panels["response"].on_event(RangesUpdate, self._zoomed)
 
     def show(self, session: Session) -> None:
         """Draw another session."""
         self.shown = session
-        self.page.show(self._view(), html_page.history_columns(session))
+        history = history_columns(session)
+        self.page.show(html_page.columns(self._view(), history), history)
         if self.span is not None:
             self._refine(self.span)
 

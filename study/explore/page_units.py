@@ -1,14 +1,20 @@
 """Units on the axes of a page: scaled so that numbers are easy to read, powers raised without mathtext."""
 
+import math
 import re
 from dataclasses import dataclass
 
 from study.figures import labels
 from study.support.errors import StudyError
+from study.support.numbers import percent
 from study.support.units import FORCE, LENGTH, role_unit
 
 EASY = (0.1, 1e4)  # largest numbers of an axis that are read without a power of ten
 EXPONENT = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e([+-]?\d+)")
+LONG = re.compile(r"(?<![\w.])(\d{6,})(\.\d+)?(?![\w]|\.\d| samples)")
+KNOWN = 1e4  # times its error: a value that is larger
+PLAIN = (-3, 5)  # powers of ten from which on, and up to which, no power is written
+NO_BREAK = "\u00a0"
 RAISED = str.maketrans("0123456789-/.", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻ᐟ·")
 
 
@@ -49,10 +55,45 @@ def number(value: float, digits: int = 4) -> str:
     return f"{mantissa}·10{str(int(exponent)).translate(RAISED)}" if sign else text
 
 
+def in_percent(part: float) -> str:
+    """A share in per cent, which no line breaks before its sign: ``3.68·10⁻⁵ %``."""
+    return in_sentence(percent(part)).replace(" ", NO_BREAK)
+
+
+def with_error(value: float, half: float) -> tuple[str, str]:
+    """A value to the second digit of half its interval, and that: ``("5.74·10⁶", "0.16·10⁶")``.
+
+    A value that is known to more digits than a reader compares is shown to six.
+    """
+    if not (math.isfinite(value) and math.isfinite(half) and half > 0.0):
+        return number(value, 5), number(half, 2)
+    largest = max(abs(value), half)
+    if largest > KNOWN * half:
+        return number(value, 6), number(half, 2)
+    power = math.floor(math.log10(largest))
+    power = power if power >= PLAIN[1] or power < PLAIN[0] else 0
+    last = math.floor(math.log10(half)) - 1 - power  # the decimal of the error's second digit
+    shown = (f"{round(x / 10.0**power, -last) + 0.0:.{max(0, -last)}f}" for x in (value, half))
+    behind = f"·10{str(power).translate(RAISED)}" if power else ""
+    first, second = (text + behind for text in shown)
+    return first, second
+
+
 def in_sentence(text: str) -> str:
-    """A sentence of the command line in the page's format: powers raised, ``±`` for ``+-``, no exponents."""
+    """A sentence of the command line in the page's format: powers raised, ``±`` for ``+-``, no exponents.
+
+    Nor more than five digits before the point, but for what is counted.
+    """
     plain = re.sub(EXPONENT, lambda m: f"{m[1]}·10{str(int(m[2])).translate(RAISED)}", text)
+    plain = re.sub(LONG, _in_powers, plain)
     return re.sub(r"\^(-?[0-9]+)", lambda m: m[1].translate(RAISED), plain.replace("+-", "±"))
+
+
+def _in_powers(found: re.Match[str]) -> str:
+    """A long number with its digits behind the point: ``2.000013·10⁷`` for 20000130."""
+    whole, fraction = found[1], found[2] or ""
+    digits = (whole[1:] + fraction[1:]).rstrip("0")
+    return f"{whole[0]}{'.' if digits else ''}{digits}·10{str(len(whole) - 1).translate(RAISED)}"
 
 
 def mass(unit: str) -> Scale:

@@ -1,7 +1,7 @@
 // The page of a structure: the sketch selects a place, and what is known of it is drawn from tables that Python has
 // filled for all places. What is clicked goes to Python as on the page of one coordinate, whose script runs before.
 ;(() => {
-  const {model, column, put, place, DRAWN} = window.study
+  const {stage, follow, under, model, column, put, place, DRAWN} = window.study
   const all = (selector) => document.querySelectorAll(selector)
   let where = null, sensor = null, moved = false, row = null
 
@@ -47,51 +47,38 @@
     }))
   }
 
-  function follow(name) {
+  function candidate(name) {
     row = name
-    const element = [...all("[data-row]")].find((item) => item.dataset.row === name)
-    const keep = []
+    const element = [...all("[data-row]")].find((item) => item.dataset.row === name), keep = []
     column("all_constancy", "of").forEach((value, i) => { if (value === name) keep.push(i) })
-    const of = (key) => keep.map((i) => column("all_constancy", key)[i]), none = [NaN, NaN]
-    put("shown", keep.length ? {f: of("f"), value: of("value"), low: of("low"), high: of("high"), zero: keep.map(() => 0)}
-      : {f: [0, 1], value: none, low: none, high: none, zero: [0, 0]})
-    if (element) model("constancy_y").axis_label = element.dataset.label
-    place("constancy-of").textContent = element ? element.querySelector(".name").textContent : "no candidate"
-    place("constancy-card").classList.toggle("none", !keep.length)
-    place("constancy-none").hidden = !element || keep.length > 0
-    place("detail").innerHTML = element?.querySelector("small").innerHTML ?? ""
-    for (const item of all("[data-row]")) item.classList.toggle("shown", item === element)
+    follow(element, "all_constancy", keep, element?.querySelector(".name").textContent)
   }
 
   // ---- the words of the present model; a place that was clicked stays selected
   function words() {
-    const places = column("words", "place"), html = column("words", "html")
-    places.forEach((id, i) => { const element = place(id); if (element) element.innerHTML = html[i] })
-    const panels = column("units", "panel"), labels = column("units", "label")
-    panels.forEach((name, i) => { model(name).axis_label = labels[i] })
+    stage()
     const known = [...all("#sketch [data-place]")], first = document.querySelector("[data-row]")
     const glowing = known.find((item) => item.classList.contains("selected"))
     if (!moved || !known.some((item) => item.dataset.place === where)) where = glowing?.dataset.place ?? known[0].dataset.place
     select(where)
-    follow(first ? first.dataset.row : null)
+    candidate(first ? first.dataset.row : null)
   }
 
-  const under = (event, key) => event.composedPath().find((e) => e.dataset && e.dataset[key] !== undefined)
-  function chosen(event) {
+  function clicked(event) {
     if (under(event, "act")) return
-    const link = event.target.closest?.("#sketch [data-place]"), candidate = under(event, "row")
+    const link = event.target.closest?.("#sketch [data-place]"), chosen = under(event, "row")
     if (link) { moved = true; select(link.dataset.place) }
-    if (candidate) { moved = true; follow(candidate.dataset.row); select(candidate.dataset.at) }
+    if (chosen) { moved = true; candidate(chosen.dataset.row); select(chosen.dataset.at) }
   }
-  document.addEventListener("click", chosen)
+  document.addEventListener("click", clicked)
   document.addEventListener("keydown", (event) => {
     const meant = event.target.closest?.("#sketch [data-place], [data-row]")
-    if ((event.key === "Enter" || event.key === " ") && meant === event.target) { event.preventDefault(); chosen(event) }
+    if ((event.key === "Enter" || event.key === " ") && meant === event.target) { event.preventDefault(); clicked(event) }
   })
   for (const kind of ["mouseover", "focusin"])
     document.addEventListener(kind, (event) => {
-      const candidate = under(event, "row")
-      if (candidate && candidate.dataset.row !== row && window.study.ready) follow(candidate.dataset.row)
+      const pointed = under(event, "row")
+      if (pointed && pointed.dataset.row !== row && window.study.ready) candidate(pointed.dataset.row)
     })
 
   Object.assign(window.study, {words, select, look})

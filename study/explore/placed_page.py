@@ -1,31 +1,27 @@
-"""The page of a structure: sources, panels and template put together, for a live document and a saved one alike."""
+"""The page of a structure: sources and panels put together, for a live document and a saved one alike."""
 
 from collections.abc import Sequence
-from functools import cache
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 from bokeh.document import Document
-from bokeh.models import ColumnDataSource, CustomJS
-from jinja2 import Environment, Template
+from bokeh.models import ColumnDataSource
 
-from study.compare import history
 from study.compare.comparison_report import as_json
-from study.compare.history_picture import history_files as history_pictures
-from study.equations import model_file
-from study.explore import placed_panels, placed_session, plots, theme, words
+from study.explore import any_session, placed_panels, placed_session, plots, theme
+from study.explore.any_page import EMPTY, Page, frame, history_columns, history_ends, history_height, page_of
+from study.explore.any_page import variables as any_variables
 from study.explore.axis_scales import Columns
 from study.explore.desk import Deeds, Drawn
-from study.explore.html_page import history_columns, history_height
 from study.explore.placed_session import PlacedSession
 from study.explore.placed_view import PlacedView, placed_view
-from study.explore.saved import as_file, marked
-from study.explore.saved_files import PAGE
+from study.explore.saved import as_file, stored
+from study.explore.saved_files import PAGE, beside
 from study.structure import structure_report
 from study.structure.structure_comparison import structure_document
 from study.structure.structure_pictures import diagnosis_pictures, structure_pictures
 
+TEMPLATE = "placed.html"
 SHOWN = {  # of all places, sensors and candidates, by the source that the script fills with the selected one's
     "all_map": "map", "all_force": "force", "all_stiffness": "stiffness", "all_motion": "motion", "all_close": "close",
     "all_spectrum": "spectrum",
@@ -35,53 +31,52 @@ SHOWN = {  # of all places, sensors and candidates, by the source that the scrip
 class PlacedScene:
     """A session with a structure in a document."""
 
-    def __init__(
-        self, session: PlacedSession, stores: Sequence[ColumnDataSource], seen: PlacedView | None = None
-    ) -> None:
+    def __init__(self, session: PlacedSession, stores: Sequence[ColumnDataSource]) -> None:
+        self.page = build(_last_view(session), history_columns(session), stores)
         self.session = session
-        seen = seen or _last_view(session)
-        lasting = history_columns(session)
-        given = {**seen.columns, **_selected(seen.columns), "history": lasting}
-        given["shown"] = {"f": [0.0, 1.0], "zero": [0.0, 0.0]} | {n: [np.nan, np.nan] for n in ("value", "low", "high")}
-        self.sources = {name: ColumnDataSource(columns, name=name) for name, columns in given.items()}
-        times = seen.columns["all_motion"]["t"]
-        time = theme.fixed("range_time", float(times[0]), float(np.max(times)))
-        frequency = theme.fixed("range_frequency", 0.0, seen.highest)
-        s = self.sources
-        self.panels: dict[str, Any] = {
-            "history": plots.history(s, lasting["name"], history_height(len(lasting["name"]))),
+
+    def lay(self, document: Document) -> None:
+        """Put panels, template and words into an empty document."""
+        self.page.lay(document, TEMPLATE, variables(self.session, live=True))
+
+    def turn_to(self, record: str) -> None:
+        """A structure has one record."""
+
+    def show(self, session: PlacedSession) -> None:
+        """Draw another model."""
+        self.session, lasting = session, history_columns(session)
+        self.page.show(columns(_last_view(session), lasting), lasting)
+
+
+def build(seen: PlacedView, lasting: Columns, stores: Sequence[ColumnDataSource] = ()) -> Page:
+    """A page that shows one structure, with the columns of its history; ``stores`` are further sources."""
+    times, count = seen.columns["all_motion"]["t"], len(lasting["name"])
+    time = theme.fixed("range_time", float(times[0]), float(np.max(times)))
+
+    def draw(s: placed_panels.Sources, frequency: Any) -> dict[str, Any]:
+        return {
+            "history": plots.history(s, lasting["name"], history_height(count)),
             "sensors": placed_panels.sensors(s, list(seen.columns["sensors"]["name"])),
             "map": placed_panels.restoring(s), "force": placed_panels.force(s, frequency),
             "stiffness": placed_panels.stiffness(s, frequency), "spectrum": placed_panels.spectrum(s, frequency),
             "motion": placed_panels.motion(s, time), "difference": placed_panels.difference(s, time),
             "close": placed_panels.close(s), "constancy": plots.constancy(s),
         }  # fmt: skip
-        # What no panel draws has to hang on one all the same, to be part of the document.
-        self.panels["motion"].tags = [*s.values(), *stores]
 
-    def lay(self, document: Document) -> None:
-        """Put panels, template and words into an empty document."""
-        for panel in self.panels.values():
-            document.add_root(panel)
-        values = variables(self.session, live=True)
-        document.title, document.template = values["title"], template()
-        document.template_variables.update(values)
-        self.sources["words"].js_on_change("data", CustomJS(code="window.study.words()"))
+    given = {**columns(seen, lasting), **_selected(seen.columns), "history": lasting, "shown": EMPTY}
+    return page_of(given, _frequencies(seen), draw, stores)
 
-    def turn_to(self, record: str) -> None:
-        """A structure has one record."""
 
-    def show(self, session: PlacedSession) -> None:
-        """Draw another model; the words come last, since the page begins anew when they change."""
-        self.session, lasting = session, history_columns(session)
-        columns = _last_view(session).columns
-        for name in columns:
-            if name != "words":
-                self.sources[name].data = columns[name]
-        self.sources["history"].data = lasting
-        self.panels["history"].y_range.factors = lasting["name"][::-1]
-        self.panels["history"].height = history_height(len(lasting["name"]))
-        self.sources["words"].data = columns["words"]
+def columns(seen: PlacedView, lasting: Columns) -> dict[str, Columns]:
+    """What a structure gives the sources of a page."""
+    rows = [(axis, "axis_label", label) for axis, label in seen.labels.items()]
+    return {**seen.columns, "frame": frame(rows, _frequencies(seen), {"history": history_ends(lasting)})}
+
+
+def _frequencies(seen: PlacedView) -> tuple[float, float]:
+    """The lowest frequency in hertz that the panels draw, and the highest."""
+    lines = seen.columns["all_spectrum"]["f"]
+    return float(np.min(lines, initial=seen.highest)), seen.highest
 
 
 def _last_view(session: PlacedSession) -> PlacedView:
@@ -99,50 +94,27 @@ def _selected(columns: dict[str, Columns]) -> dict[str, Columns]:
     return found
 
 
-@cache
-def template() -> Template:
-    """The page's template."""
-    return Environment(autoescape=False).from_string(_text("placed.html"))
-
-
 def variables(session: PlacedSession, live: bool) -> dict[str, Any]:
     """What the template needs beside the panels."""
-    record, model = session.prepared.record.name, session.now.model.name
-    return {
-        "record": record, "model": model, "live": live, "title": f"{record}: {model}",
-        "style": _text("page.css") + _text("placed.css"), "script": _text("page.js") + _text("placed.js"),
-        "steps": [f"{i} {words.in_words(s.label)}" for i, s in enumerate(session.stages)],
-    }  # fmt: skip
-
-
-def _text(name: str) -> str:
-    return files("study.explore").joinpath(name).read_text(encoding="utf-8")
+    return any_variables(session, live, "placed")
 
 
 def saved_structure(session: PlacedSession) -> bytes:
     """The whole session as a file that a browser opens without a server; it shows the last model first."""
-    views = [placed_view(stage, number, live=False) for number, stage in enumerate(session.stages)]
-    lasting, stores = history_columns(session), list[ColumnDataSource]()
-    for number, seen in enumerate(views if len(views) > 1 else []):
-        columns = {**seen.columns, "history": marked(lasting, number - len(views))}
-        stores += [ColumnDataSource(c, name=f"{name}@{number}.0") for name, c in columns.items()]
-    scene = PlacedScene(session, stores, views[-1])
-    return as_file(list(scene.panels.values()), template(), variables(session, live=False))
+    lasting = history_columns(session)
+    views = [placed_view(stage, n, live=False) for n, stage in enumerate(session.stages)]
+    stores = stored({(n, 0): columns(seen, lasting) for n, seen in enumerate(views)}, lasting)
+    return as_file(build(views[-1], lasting, stores), TEMPLATE, variables(session, live=False))
 
 
 def structure_files(
     session: PlacedSession, name: str, text: str, values: bool = False, drawn: Drawn | None = None
 ) -> dict[str, bytes]:
     """What Save writes, by file name: as ``saved_files`` has it for one coordinate."""
-    now, steps = session.now, session.steps
+    now = session.now
     model = now.model.with_values(now.values) if values else now.model
-    contents = {
-        name: model_file.revised(text, name, model).encode(),
-        history.name_for(name): history.as_bytes(steps),
-        PAGE: saved_structure(session),
-    }
     shown = _drawn(session) if drawn is None else drawn
-    return contents | dict(shown) | history_pictures(steps, name.rpartition(".")[0] or name)
+    return {**beside(session, name, text, model), PAGE: saved_structure(session), **shown}
 
 
 def _drawn(session: PlacedSession) -> dict[str, bytes]:
@@ -159,7 +131,7 @@ def _by_itself(session: PlacedSession) -> PlacedSession:
 
 
 PLACED = Deeds(
-    placed_session.with_placed, placed_session.without_placed, placed_session.undone, placed_session.with_held,
+    placed_session.with_placed, placed_session.without_placed, any_session.undone, placed_session.with_held,
     placed_session.tried, placed_session.examined, placed_session.with_stage, _by_itself, _drawn,
     structure_files,
 )  # fmt: skip

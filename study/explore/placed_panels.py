@@ -53,7 +53,7 @@ def force(s: Sources, frequency: Any) -> Any:
 
 def stiffness(s: Sources, frequency: Any) -> Any:
     """Real part of the dynamic stiffness of the selected connection, as measured and as the model has it."""
-    drawn = theme.panel("stiffness", 250, "frequency / Hz", "force over displacement", narrow=True,
+    drawn = theme.panel("stiffness", 250, "frequency / Hz", "stiffness", narrow=True,
                         ranges=(frequency, None))  # fmt: skip
     measured = drawn.line("f", "measured", source=s["stiffness"], line_color=theme.BLUE, line_width=1.2)
     band = drawn.segment("f", "low", "f", "high", source=s["stiffness"], line_color=theme.BLUE, line_alpha=0.35)
@@ -76,6 +76,7 @@ def motion(s: Sources, time: Any) -> Any:
 def difference(s: Sources, time: Any) -> Any:
     """What the free run misses of it."""
     drawn = theme.panel("difference", 150, "time / s", "difference", ranges=(time, None))
+    drawn.yaxis[0].ticker.desired_num_ticks = 3  # it is low
     line = drawn.line("t", "difference", source=s["motion"], **theme.DIFFERENCE)
     theme.legend(drawn, [("measured less predicted", [line])])
     return drawn

@@ -6,15 +6,14 @@ from dataclasses import dataclass, replace
 from study.diagnose.diagnosis_files import unneeded_in_words
 from study.equations.model import Model, free
 from study.equations.terms import Term
+from study.explore.any_session import chosen, held, holding
 from study.explore.session import Step, joined, own_term
 from study.structure.placed_dropping import dropped_term, term_at
 from study.structure.placed_needless import PlacedNeedless, placed_needless
-from study.structure.placed_ranking import PlacedRanked
 from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_comparison import StructureComparison, compare_structure, structure_history_step
 from study.structure.structure_report import structure_diagnosis_in_words
 from study.structure.structure_verdict import StructureDiagnosis, added_term, diagnose_structure
-from study.support.errors import StudyError, expect
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,22 +61,9 @@ def begin_placed(comparison: StructureComparison, earlier: Sequence[Step] = ()) 
     return PlacedSession(comparison.prepared, (first,), earlier=tuple(earlier))
 
 
-def _climbed(session: PlacedSession, comparison: StructureComparison, label: str) -> PlacedSession:
-    return replace(session, stages=(*session.stages, PlacedStage(comparison.model, label, None, comparison)))
-
-
-def placed_candidate(session: PlacedSession, name: str) -> PlacedRanked:
-    """The candidate with this effect and place in the present diagnosis, which must have one."""
-    diagnosis = session.now.diagnosis
-    for row in diagnosis.candidates if diagnosis is not None else ():
-        if row.name == name:
-            return row
-    raise StudyError(f"{name!r} is no candidate of the present model; expected one of the list")
-
-
 def with_placed(session: PlacedSession, name: str) -> PlacedSession:
     """The session with a candidate added where its diagnosis found it."""
-    row = placed_candidate(session, name)
+    row = chosen(session.now.diagnosis.candidates if session.now.diagnosis is not None else (), name)
     comparison = added_term(session.now.comparison, free(row.term, row.entry.place))
     stage = PlacedStage(comparison.model, f"+ {name}", name, comparison)
     return replace(session, stages=(*session.stages, stage))
@@ -96,19 +82,11 @@ def without_placed(session: PlacedSession, name: str) -> PlacedSession:
     return replace(session, stages=(*session.stages, stage))
 
 
-def undone(session: PlacedSession) -> PlacedSession:
-    """The session before its last change; the model as given stays."""
-    return replace(session, stages=session.stages[:-1]) if len(session.stages) > 1 else session
-
-
 def with_held(session: PlacedSession, key: str, hold: bool) -> PlacedSession:
     """The session with a value held where it stands, or freed; it must not be so already."""
-    values = session.now.model.values
-    expect(key in values, f"{key!r} is no value of this model; it has {', '.join(values)}")
-    expect((values[key] is None) == hold, f"{key} is {'held' if hold else 'free'} already")
-    model = session.now.model.with_values({**values, key: session.now.values[key] if hold else None})
-    comparison = compare_structure(model, session.prepared)
-    return _climbed(session, comparison, f"{key} {'held' if hold else 'free'}")
+    comparison = compare_structure(holding(session, key, hold), session.prepared)
+    stage = PlacedStage(comparison.model, held(key, hold), None, comparison)
+    return replace(session, stages=(*session.stages, stage))
 
 
 def tried(session: PlacedSession, text: str) -> PlacedSession:

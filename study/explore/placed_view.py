@@ -34,6 +34,7 @@ class PlacedView:
     columns: dict[str, Columns]  # of each source; all of one have the same length
     drawn: Sketch
     highest: float  # frequency in hertz at which the axes of frequency end
+    labels: dict[str, str]  # of axes, by the axis
 
 
 def placed_view(stage: PlacedStage, step: int, live: bool = True) -> PlacedView:
@@ -52,13 +53,14 @@ def placed_view(stage: PlacedStage, step: int, live: bool = True) -> PlacedView:
         "all_stiffness": stiffness,
         "all_spectrum": _spectra(comparison),
         "all_constancy": _constancy(stage),
-        "units": {"panel": ["map_x", "map_y", "force_y", "stiffness_y"], "label": [
-            f"relative displacement / {in_text(lengths.unit)}", f"missing force / {in_text(forces.unit)}",
-            f"missing force / ({in_text(forces.unit)}/√Hz)", f"force over displacement / ({unit})",
-        ]},
         "words": placed_words(stage, drawn, step, live),
     }  # fmt: skip
-    return PlacedView({name: _small(c) for name, c in columns.items()}, drawn, highest_frequency(comparison))
+    force = in_text(forces.unit)
+    axes = {
+        "map_x": f"relative displacement / {in_text(lengths.unit)}", "map_y": f"missing force / {force}",
+        "force_y": f"missing force / ({force}/√Hz)", "stiffness_y": f"stiffness / ({unit})",
+    }  # fmt: skip
+    return PlacedView({name: _small(c) for name, c in columns.items()}, drawn, highest_frequency(comparison), axes)
 
 
 def _small(columns: Columns) -> Columns:

@@ -7,9 +7,9 @@ from typing import Any
 
 from study.equations.place import Place
 from study.equations.place import place_in_words as placed
-from study.explore.page_units import in_sentence, in_text, number
+from study.explore.page_units import in_percent, in_sentence, in_text, with_error
 from study.explore.placed_session import PlacedStage
-from study.explore.words import NOT_ASKED, UNKNOWN, VERDICTS, WAITING, bar, gives, in_words
+from study.explore.words import HEAD, NOT_ASKED, UNKNOWN, VERDICTS, WAITING, bar, figure, gives, in_table, in_words
 from study.figures.labels import power_of_ten
 from study.structure.modes import Modes
 from study.structure.placed_ranking import PlacedRanked
@@ -46,16 +46,13 @@ def placed_words(stage: PlacedStage, drawn: Sketch, step: int, live: bool) -> di
 def _figures(comparison: StructureComparison) -> str:
     prediction = comparison.prediction
     worst = max(zip(prediction.errors, prediction.prepared.sensors, strict=True), key=lambda pair: pair[0])
-    about = f"worst {percent(worst[0])} at {worst[1].coordinate}"
+    about = f"worst {in_percent(worst[0])} at {worst[1].coordinate}"
     cells = (
-        ("error", "Error of the motions", percent(prediction.error), about),
-        ("floor", "Noise floor", percent(prediction.floor), "what no model could explain"),
-        ("force", "Error of the forces", percent(comparison.forces.share), "of the power of those of inertia"),
+        ("error", "Error of the motions", in_percent(prediction.error), about),
+        ("floor", "Noise floor", in_percent(prediction.floor), "what no model could explain"),
+        ("force", "Error of the forces", in_percent(comparison.forces.share), "of the power of those of inertia"),
     )  # fmt: skip
-    return "".join(
-        f'<div class="figure" id="figure-{key}"><span>{title}</span><b>{value}</b><small>{escape(about)}</small></div>'
-        for key, title, value, about in cells
-    )
+    return "".join(figure(*cell) for cell in cells)
 
 
 def _hint(stage: PlacedStage) -> str:
@@ -85,8 +82,9 @@ def _places(stage: PlacedStage, drawn: Sketch) -> str:
         known = [f"<h3>{escape(_capital(placed(link.place)))}</h3><p>{escape(terms_there(comparison, path))}</p>"]
         if path in shares:
             known.append(
-                f"<p>Any force there could make {percent(shares[path])} of what stands above the noise; general "
-                f"functions of its own motion explain {percent(general.get(path, 0.0))} of what is left, held out.</p>"
+                f"<p>Any force there could make {in_percent(shares[path])} of what stands above the noise; general "
+                f"functions of its own motion explain {in_percent(general.get(path, 0.0))} of what is left, held "
+                "out.</p>"
             )
         own = [r for r in rows if r.entry.place is not None and r.entry.place.path == path]
         if own:
@@ -112,13 +110,10 @@ def _capital(text: str) -> str:
 def _candidates(stage: PlacedStage, live: bool) -> str:
     if stage.diagnosis is None:
         return ""
-    scale = "".join(f"<span style='left:{x}%'>{x}</span>" for x in (0, 50, 100))
-    heading = "effect and place, and the share of the difference that it explains / %"
-    head = f"<li class='scale'><span class='head'>{heading}</span><i class='axis'>{scale}</i></li>"
     offered = [r for r in stage.diagnosis.candidates if gives(r)][:SHOWN]
     left = stage.diagnosis.asked - len(offered)
     rest = f"<li class='more'>{left} more effects and places explain less, or no more than chance would</li>"
-    return f"<ol>{head}{''.join(_row(i, r, stage, live) for i, r in enumerate(offered))}{rest}</ol>"
+    return f"<ol>{HEAD}{''.join(_row(i, r, stage, live) for i, r in enumerate(offered))}{rest}</ol>"
 
 
 def _row(number_: int, row: PlacedRanked, stage: PlacedStage, live: bool) -> str:
@@ -156,11 +151,12 @@ def _axis(row: PlacedRanked) -> str:
 
 def _detail(row: PlacedRanked) -> str:
     unit = in_text(row.term.unit(row.term.symbols[0], "N", "m"))
-    size = f"{number(row.coefficient)} ± {number(1.96 * row.error, 2)} {unit}"
+    size = f"{' ± '.join(with_error(row.coefficient, 1.96 * row.error))} {unit}"
     where = f" {escape(placed(row.entry.place))}" if row.entry.place else ""
     return (
         f"<b>{escape(in_words(row.term.name))}</b>{where} <i>{escape(in_text(row.term.formula))}</i>, coefficient "
-        f"<em>{escape(size)}</em>; error with it {percent(row.response_error)}. {escape(_capital(row.term.meaning))}."
+        f"<em>{escape(size)}</em>; error with it {in_percent(row.response_error)}. "
+        f"{escape(_capital(row.term.meaning))}."
         + (f" As fitted it is no physical effect: {escape(row.unphysical)}." if row.unphysical else "")
     )
 
@@ -181,13 +177,13 @@ def _coefficients(stage: PlacedStage, live: bool) -> str:
 
 
 def _coefficient(c: PlacedCoefficient, drop: str, live: bool) -> str:
-    half = "held" if c.error is None else f"± {number(1.96 * c.error, 2)}"
+    size, half = in_table(c.value, c.error)
     act, label = ("free", "Free") if c.error is None else ("hold", "Hold")
     button = f"<button data-act='{act}' data-name='{escape(c.key)}'>{label}</button>" if live else ""
     symbol, where = c.key.partition("[")[0].rpartition(".")[2], c.place.label if c.place else ""
     return (
         f"<tr data-key='{escape(c.key)}'><td><i>{escape(symbol)}</i></td><td>{escape(in_words(c.term))} "
-        f"<i>{escape(where)}</i>{drop}</td><td class='number'>{number(c.value, 5)}</td><td>{half}</td>"
+        f"<i>{escape(where)}</i>{drop}</td><td class='number'>{size}</td><td>{half}</td>"
         f"<td>{escape(in_text(c.unit))}</td><td>{button}</td></tr>"
     )
 
@@ -209,8 +205,8 @@ def _modes(stage: PlacedStage) -> str:
 
 def _mode(m: Modes, i: int) -> str:
     return (
-        f"<td class='number'>{number(m.frequency[i], 5)} ± {number(1.96 * m.frequency_error[i], 2)}</td>"
-        f"<td>{number(100.0 * m.damping[i], 4)} ± {number(196.0 * m.damping_error[i], 2)}</td>"
+        f"<td class='number'>{' ± '.join(with_error(m.frequency[i], 1.96 * m.frequency_error[i]))}</td>"
+        f"<td>{' ± '.join(with_error(100.0 * m.damping[i], 196.0 * m.damping_error[i]))}</td>"
     )
 
 

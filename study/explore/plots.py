@@ -3,7 +3,17 @@
 from collections.abc import Mapping
 from typing import Any
 
-from bokeh.models import ColorBar, ColumnDataSource, FactorRange, HoverTool, LinearColorMapper, Quad, Span, VStrip
+from bokeh.models import (
+    ColorBar,
+    ColumnDataSource,
+    CustomJSTickFormatter,
+    FactorRange,
+    HoverTool,
+    LinearColorMapper,
+    Quad,
+    Span,
+    VStrip,
+)
 from bokeh.palettes import RdBu11
 
 from study.explore import theme
@@ -27,6 +37,7 @@ def response(s: Sources, time: Any) -> Any:
 def difference(s: Sources, time: Any) -> Any:
     """What the model misses, the noise, and what a candidate would leave."""
     drawn = theme.panel("difference", 178, "time / s", "difference", select=True, ranges=(time, None))
+    drawn.yaxis[0].ticker.desired_num_ticks = 4  # it is low
     _blocks(drawn, s)
     line = drawn.line("t", "difference", source=s["time"], **theme.DIFFERENCE)
     would = drawn.line("t", "y", source=s["ghost_time"], **theme.WOULD)
@@ -117,7 +128,7 @@ def plane(s: Sources) -> Any:
     bar = ColorBar(
         color_mapper=mapper, name="plane_bar", width=9, padding=4, background_fill_color=None,
         major_label_text_font=theme.FONT, major_label_text_font_size="11px", major_label_text_color=theme.QUIET,
-        label_standoff=4, bar_line_color=None,
+        label_standoff=4, bar_line_color=None, formatter=CustomJSTickFormatter(code=theme.EVEN),
     )  # fmt: skip
     drawn.add_layout(bar, "right")
     drawn.min_border_right = 60  # its numbers grow when its scale changes, the room for them does not

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from study.compare.comparison import Comparison
-from study.compare.force_map import CLASSES, curve, surface
+from study.compare.force_map import CLASSES, cells_of, curve, surface
 from study.compare.noise import segments_of
 from study.diagnose.ranked import Ranked
 from study.explore import decimate
@@ -18,12 +18,13 @@ def columns(stage: Stage, scales: Scales) -> dict[str, Columns]:
     """For each candidate what it would leave, under its place: difference, its spectrum, and the missing force."""
     rows, force = stage.shown, scales.force.factor
     lacking = [within(stage.would[row.name][0]) for row in rows]
+    cells = cells_of(*within(stage.comparison.missing_force)[:2])  # those of the map that is shown
     return {
         "would_time": difference(stage, scales),
         "would_spectrum": {str(i): _spectrum(stage.comparison, row, scales) for i, row in enumerate(rows)},
         "would_u": _curves([(u, f) for u, _, f in lacking], scales.displacement.factor, force),
         "would_v": _curves([(v, f) for _, v, f in lacking], scales.velocity.factor, force),
-        "would_plane": {str(i): surface(u, v, f).mean.ravel() / force for i, (u, v, f) in enumerate(lacking)},
+        "would_plane": {str(i): surface(u, v, f, cells).mean.ravel() / force for i, (u, v, f) in enumerate(lacking)},
     }
 
 

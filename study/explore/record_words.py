@@ -5,9 +5,8 @@ from html import escape
 
 from study.compare.across_levels import Level
 from study.compare.comparison import Comparison
-from study.explore.page_units import in_text, number
+from study.explore.page_units import in_percent, in_text, number, with_error
 from study.explore.session import Stage
-from study.support.numbers import percent
 
 WAITING = "each record is being fitted by itself …"
 NOT_ASKED = "Not asked for here: <code>study compare</code> fits each record by itself."
@@ -29,7 +28,7 @@ def _records(stage: Stage, shown: str) -> str:
     own = stage.by_record.errors if stage.by_record is not None else ()
     names = [c.record.name for c in stage.on_each]
     rows = [
-        _row(_button(i, c.record.name, c.record.name == shown), c, percent(own[i]) if own else "–")
+        _row(_button(i, c.record.name, c.record.name == shown), c, in_percent(own[i]) if own else "–")
         for i, c in enumerate(stage.on_each)
     ]
     everything = _row(f"all {len(names)}", stage.comparison, "")
@@ -45,8 +44,14 @@ def _button(place: int, name: str, pressed: bool) -> str:
 
 def _row(name: str, comparison: Comparison, own: str) -> str:
     judged = comparison.prediction
-    level = f"{judged_level(comparison):.3g}"
-    cells = (level, percent(judged.error), percent(judged.floor), percent(comparison.force.total), own)
+    level = number(judged_level(comparison), 3)
+    cells = (
+        level,
+        in_percent(judged.error),
+        in_percent(judged.floor),
+        in_percent(comparison.force.total),
+        own,
+    )
     return f"<tr><th>{name}</th>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
 
 
@@ -72,7 +77,7 @@ def _levels(stage: Stage, live: bool) -> str:
         return f"<table><tr><th></th><th>{WAITING}<small>&nbsp;</small></th></tr>{rows}</table>"
     if not found.levels:
         return "<p>every coefficient is held</p>"
-    forces = [f"{force:.3g}" for force in found.levels[0].force]
+    forces = [number(force, 3) for force in found.levels[0].force]
     columns = zip(found.names, forces, strict=True)
     unit = in_text(stage.comparison.record.units.get("force", ""))
     head = "".join(f"<th>{escape(name)}<small>{force} {escape(unit)}</small></th>" for name, force in columns)
@@ -94,4 +99,5 @@ def _symbol(key: str) -> str:
 
 def _cells(values: Sequence[float], errors: Sequence[float]) -> str:
     pairs = zip(values, errors, strict=True)
-    return "".join(f"<td>{number(v)}<small>± {number(1.96 * e, 2)}</small></td>" for v, e in pairs)
+    shown = (with_error(v, 1.96 * e) for v, e in pairs)
+    return "".join(f"<td>{value}<small>± {half}</small></td>" for value, half in shown)

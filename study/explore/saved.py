@@ -8,10 +8,10 @@ from typing import Any, cast
 from bokeh.document import Document
 from bokeh.models import ColumnDataSource, CustomJS
 from bokeh.resources import Resources
-from jinja2 import Template
 
 from study.compare.comparison import Comparison
 from study.explore import html_page
+from study.explore.any_page import Page, history_columns, template
 from study.explore.axis_scales import Columns
 from study.explore.by_record import worst
 from study.explore.session import Session, begin_with
@@ -22,28 +22,30 @@ EMBED = "Bokeh.safely(() => Bokeh.embed.embed_items({docs}, {items}))"
 
 def saved(session: Session) -> bytes:
     """The whole session as a file that a browser opens; it shows the last model first, where that misses most."""
-    many, first = len(session.stages), (len(session.stages) - 1, worst(session.now.on_each))
+    history, first = history_columns(session), (len(session.stages) - 1, worst(session.now.on_each))
     views = {
         (number, record): view(stage, number, live=False, record=record)
         for number, stage in enumerate(session.stages)
         for record in range(max(len(stage.on_each), 1))
     }
-    history = html_page.history_columns(session)
-    stores: list[ColumnDataSource] = []
-    for (number, record), seen in views.items() if len(views) > 1 else ():
-        columns: dict[str, Columns] = {
-            **seen.columns, "frame": html_page.frame(seen, history), "history": marked(history, number - many)
-        }  # fmt: skip
-        stores += [ColumnDataSource(c, name=f"{name}@{number}.{record}") for name, c in columns.items()]
+    stores = stored({place: html_page.columns(seen, history) for place, seen in views.items()}, history)
     made = html_page.build(views[first], history, stores)
-    values = html_page.variables(session, live=False)
-    shown = html_page.placed(made, values["diagnosed"])
-    return as_file(shown, html_page.template(), {**values, "title": html_page.title(session)})
+    return as_file(made, html_page.TEMPLATE, html_page.variables(session, live=False))
 
 
-def as_file(panels: Sequence[Any], template: Template, values: Mapping[str, Any]) -> bytes:
-    """Panels in a template as a file that needs no server; each has its place in the template by its name."""
-    document = Document()
+def stored(columns: Mapping[tuple[int, int], Mapping[str, Columns]], history: Columns) -> list[ColumnDataSource]:
+    """What a saved page turns to: the columns of each stage, counted from 0, and record; nothing of a single one."""
+    many = 1 + max(stage for stage, _ in columns)
+    stores: list[ColumnDataSource] = []
+    for (stage, record), shown in columns.items() if len(columns) > 1 else ():
+        given = {**shown, "history": _marked(history, stage - many)}
+        stores += [ColumnDataSource(c, name=f"{name}@{stage}.{record}") for name, c in given.items()]
+    return stores
+
+
+def as_file(made: Page, name: str, values: Mapping[str, Any]) -> bytes:
+    """A page as a file that needs no server; each panel has its place in the template of this name by its own."""
+    document, panels = Document(), made.placed(values["diagnosed"])
     with document.models.freeze():  # what belongs to the document is gathered once, not anew for each panel
         for panel in panels:
             document.add_root(panel)
@@ -53,7 +55,7 @@ def as_file(panels: Sequence[Any], template: Template, values: Mapping[str, Any]
     items = [{"docid": "study", "roots": {r.id: r.elementid for r in roots.values()},
               "root_ids": [r.id for r in roots.values()]}]  # fmt: skip
     script = EMBED.format(docs=_in_script({"study": content}), items=_in_script(items))
-    text = template.render(
+    text = template(name).render(
         **values, roots=roots, plot_script=f"<script>{script}</script>",
         bokeh_js=Resources(mode="inline", components=["bokeh"], minified=True, log_level="error").render_js(),
     )  # fmt: skip
@@ -65,7 +67,7 @@ def of_comparison(comparison: Comparison) -> bytes:
     return saved(begin_with(comparison))
 
 
-def marked(history: Columns, place: int) -> Columns:
+def _marked(history: Columns, place: int) -> Columns:
     """The history with a larger dot where the page stands."""
     size = [6.0] * len(history["size"])
     size[place] = 10.0

@@ -8,6 +8,8 @@ from study.compare.comparison_report import as_json, comparison_document, tables
 from study.compare.history_picture import history_files as history_pictures
 from study.diagnose.diagnosis_files import diagnosis_files
 from study.equations import model_file
+from study.equations.model import Model
+from study.explore.any_session import AnySession
 from study.explore.saved import saved
 from study.explore.session import Session, Stage
 
@@ -22,18 +24,23 @@ def files(
     With ``values`` the model file gives what was fitted, and a fit of it holds that; otherwise what the session holds.
     ``drawn`` is what :func:`of_stage` gives of the present model, where that is known.
     """
-    now, steps = session.now, session.steps
+    now = session.now
     model = now.model.with_values(now.values) if values else now.model
     for one in session.several.separate:  # terms that tell the records of this session apart belong to it alone
         for term in [t.name for t in model.terms if set(t.term.symbols) & set(one.differences)]:
             model = model.without_term(term)
-    contents = {
+    shown = of_stage(now, by_level=not session.several.separate) if drawn is None else drawn
+    return {**beside(session, name, text, model), PAGE: saved(session), **shown}
+
+
+def beside(session: AnySession, name: str, text: str, model: Model) -> dict[str, bytes]:
+    """The model file, with the comments of its text, and the history with its picture."""
+    steps = session.steps
+    return {
         name: model_file.revised(text, name, model).encode(),
         history.name_for(name): history.as_bytes(steps),
-        PAGE: saved(session),
+        **history_pictures(steps, name.rpartition(".")[0] or name),
     }
-    shown = of_stage(now, by_level=not session.several.separate) if drawn is None else drawn
-    return contents | dict(shown) | history_pictures(steps, name.rpartition(".")[0] or name)
 
 
 def of_stage(now: Stage, by_level: bool = True) -> dict[str, bytes]:

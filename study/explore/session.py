@@ -25,6 +25,7 @@ from study.diagnose.verdict import Diagnosis, search_base, search_part
 from study.equations import formulas
 from study.equations.model import Model
 from study.equations.terms import LIBRARY, Term, custom
+from study.explore.any_session import chosen, held, holding
 from study.explore.by_record import ByRecord, Several, by_record
 from study.records.oversampling import without_spare_samples
 from study.records.prepared import Prepared
@@ -138,11 +139,7 @@ def climbed(session: Session, comparison: Comparison, label: str, added: str | N
 
 def candidate(session: Session, name: str) -> Ranked:
     """The candidate of this name in the present diagnosis, which must have one."""
-    diagnosis = session.now.diagnosis
-    for row in diagnosis.candidates if diagnosis is not None else ():
-        if row.name == name:
-            return row
-    raise StudyError(f"{name!r} is no candidate of the present model; expected one of the list")
+    return chosen(session.now.diagnosis.candidates if session.now.diagnosis is not None else (), name)
 
 
 def with_added(session: Session, name: str) -> Session:
@@ -192,22 +189,12 @@ def weighed(session: Session) -> Session:
     return replace(session, stages=(*session.stages[:-1], now))
 
 
-def undone(session: Session) -> Session:
-    """The session before its last change; the model as given stays."""
-    return replace(session, stages=session.stages[:-1]) if len(session.stages) > 1 else session
-
-
 def with_held(session: Session, key: str, hold: bool) -> Session:
     """The session with a value held where it stands, or freed; it must not be so already."""
-    values = session.now.model.values
-    expect(key in values, f"{key!r} is no value of this model; it has {', '.join(values)}")
-    expect((values[key] is None) == hold, f"{key} is {'held' if hold else 'free'} already")
-    alone = key == "m" and len(session.now.model.terms) == 1
+    model, now = holding(session, key, hold), session.now.values
+    alone = key == "m" and len(model.terms) == 1
     expect(hold or not alone, "m alone cannot be freed; a model of inertia alone has nothing to be fitted to")
-    now = session.now.values
-    model = session.now.model.with_values({**values, key: now[key] if hold else None})
-    comparison = compare(model, session.prepared, start=now)
-    return climbed(session, comparison, f"{key} {'held' if hold else 'free'}", None)
+    return climbed(session, compare(model, session.prepared, start=now), held(key, hold), None)
 
 
 def examined(session: Session, progress: Callable[[int], None] | None = None) -> tuple[Stage, Diagnosis]:

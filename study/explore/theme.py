@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from bokeh.models import (
+    BasicTickFormatter,
     BoxAnnotation,
     CustomJSTickFormatter,
     DataRange1d,
@@ -32,6 +33,15 @@ const power = Math.floor(Math.log10(tick) + 1e-9), mantissa = Number((tick / 10 
 if (power >= -2 && power <= 3) return String(Number(tick.toPrecision(3)))
 const raised = String(power).replace(/./g, (c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻")
 return (mantissa === 1 ? "10" : mantissa + "·10") + raised
+"""
+# Even ticks as the words of the page have their numbers; the digits are those that tell two ticks apart.
+EVEN = """
+const most = Math.max(...ticks.map(Math.abs)), step = ticks.length > 1 ? Math.abs(ticks[1] - ticks[0]) : most
+if (tick === 0 || !(step > 0)) return String(tick)
+const plain = most < 1e5 && most >= 1e-3, power = plain ? 0 : Math.floor(Math.log10(most) + 1e-9)
+const places = Math.min(12, Math.max(0, power + 1 - Math.floor(Math.log10(step) + 1e-9)))
+const text = String(Number((tick / 10 ** power).toFixed(places))).replace("-", "−")
+return plain ? text : text + "·10" + String(power).replace(/./g, (c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻")
 """
 PASSING = ("candidate", "pinned", "selected")  # entries of legends
 
@@ -67,6 +77,8 @@ def panel(
         if more.get(f"{side}_axis_type") == "log":
             axis.ticker = FixedTicker(name=f"{name}_ticks", ticks=[], minor_ticks=[])
             axis.formatter = CustomJSTickFormatter(code=POWERS)
+        elif isinstance(axis.formatter, BasicTickFormatter):
+            axis.formatter = CustomJSTickFormatter(code=EVEN)
     for grid in drawn.grid:
         grid.grid_line_color = RULE
     return drawn
@@ -95,7 +107,7 @@ def legend(drawn: Any, items: Sequence[tuple[Any, list[Any]]], place: Any = "abo
     )  # fmt: skip
     words.padding = 0
     if place == "above":
-        words.location = (-34, 0)
+        words.location = (-34, 0) if drawn.name != "panel_history" else "right"  # long names leave little room
         drawn.add_layout(Title(text=" ", text_font_size="6px", standoff=0), "above")  # the row of the tools
         drawn.add_layout(words, "above")
     else:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.compare.comparison import Comparison
-from study.compare.force_map import CELLS, curve, surface
+from study.compare.force_map import curve, surface
 from study.compare.links import links
 from study.diagnose.ranked import Ranked
 from study.explore import check_columns, decimate, preview, record_words, words
@@ -35,6 +35,7 @@ class View:
     limits: tuple[float, float]  # of the axis of the force
     least: float  # missing force, in the unit of its axis, below which nothing is to be seen
     force_unit: str  # of the record, as text
+    kind: str  # of test, as ``check_columns`` tells them apart
 
 
 def view(found: Stage, step: int, live: bool = True, record: int = 0) -> View:
@@ -62,7 +63,8 @@ def view(found: Stage, step: int, live: bool = True, record: int = 0) -> View:
     small = {name: _small(c) for name, c in columns.items()}
     limits, highest = force_limits(comparison), comparison.force.highest
     unit = in_text(comparison.record.units.get("force", ""))
-    return View(small, scales, highest, comparison.plan.response, limits, least / force.factor, unit)
+    kind = check_columns.kind_of(comparison.prepared)
+    return View(small, scales, highest, comparison.plan.response, limits, least / force.factor, unit, kind)
 
 
 def _words(found: Stage, stage: Stage, step: int, live: bool, force_unit: str) -> Columns:
@@ -159,8 +161,9 @@ def _spectrum(comparison: Comparison, scales: Scales) -> Columns:
 def _plane(comparison: Comparison, scales: Scales) -> Columns:
     """Every cell of the map; those where the motion hardly came have no mean."""
     plane = surface(*within(comparison.missing_force))
-    left, right = (np.repeat(e, CELLS) for e in (plane.displacement[:-1], plane.displacement[1:]))
-    low, high = (np.tile(e, CELLS) for e in (plane.velocity[:-1], plane.velocity[1:]))
+    cells = len(plane.mean)
+    left, right = (np.repeat(e, cells) for e in (plane.displacement[:-1], plane.displacement[1:]))
+    low, high = (np.tile(e, cells) for e in (plane.velocity[:-1], plane.velocity[1:]))
     tiny = 1e-9 * float(np.std(comparison.record["force"]))  # rounding
     missing = plane.mean.ravel()
     mean, size, speed = missing / scales.force.factor, scales.displacement.factor, scales.velocity.factor

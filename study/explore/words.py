@@ -5,18 +5,21 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any, Protocol
 
+import numpy as np
+
 from study.compare.comparison import Comparison
 from study.compare.comparison_sentences import comparison_in_words
 from study.compare.fitted_coefficients import Coefficient
+from study.compare.force_map import FEWEST, surface
 from study.compare.modal import modal
 from study.diagnose.needless import Needless
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
 from study.equations.terms import LIBRARY
-from study.explore.page_units import Scale, in_sentence, in_text, length, mass, number, rate
+from study.explore.axis_scales import within
+from study.explore.page_units import Scale, in_percent, in_sentence, in_text, length, mass, number, rate, with_error
 from study.explore.session import Stage
 from study.figures.labels import power_of_ten, term_names
-from study.support.numbers import percent
 from study.support.statistics import Gain
 from study.support.thresholds import ALPHA
 
@@ -27,12 +30,14 @@ NOT_ASKED = (
     "Not asked for here: <code>study diagnose</code> or <code>study explore</code> tells which effect is missing."
 )
 PREDICTED = "The model runs free under the measured force, on the part of the record that it was not fitted to."
+LONG = 8  # characters of a large number
 FLOOR = "From the quietest bands of what is left, or from what differs between periods."
 FORCE = "The model in reverse: what its terms, computed from the measured motion, leave of the measured force."
 SCALE = "".join(f"<span style='left:{x}%'>{x}</span>" for x in (0, 50, 100))
 HEAD = (
     f"<li class='scale'><span class='head'>share of the difference explained / %</span><i class='axis'>{SCALE}</i></li>"
 )
+READ = "a dash: below zero; a dot: may be noise"
 ONLY_NOISE = "What is left is noise: there is no missing force to show over displacement and velocity."
 
 
@@ -49,10 +54,17 @@ def words(stage: Stage, rows: Sequence[Ranked], step: int, live: bool, force_uni
         "equation-values": equation(stage, values=True),
         "notes": escape(in_sentence("; ".join(comparison.notes))),
         "only-noise": ONLY_NOISE if comparison.prediction.noise.alone else "",
+        "plane-hint": hint(comparison),
         "step": escape(name(stage, step)),
         "force-unit": escape(in_text(force_unit)),
     }
     return {"place": list(fragments), "html": list(fragments.values())}
+
+
+def hint(comparison: Comparison) -> str:
+    """How to read the map of the missing force; or why there is none."""
+    plane = surface(*within(comparison.missing_force)).mean
+    return READ if np.any(np.isfinite(plane)) else f"no cell is visited {FEWEST} times: too short a record for a map"
 
 
 def name(stage: Stage, step: int) -> str:
@@ -82,16 +94,24 @@ def _figures(comparison: Comparison) -> str:
     size = comparison.prediction.error * comparison.prediction.size
     scaled = length if comparison.plan.response == "displacement" else rate
     shown = scaled(comparison.record.units.get(comparison.plan.response, ""), size)
-    rms = f"rms {size / shown.factor:.3g} {in_text(shown.unit)}; fit {percent(1.0 - comparison.prediction.error)}"
+    fit = in_percent(1.0 - comparison.prediction.error)
+    rms = f"rms {number(size / shown.factor, 3)} {in_text(shown.unit)}; fit {fit}"
     cells = (
-        ("error", "Error of the response", percent(comparison.prediction.error), rms, PREDICTED),
-        ("floor", "Noise floor", percent(comparison.prediction.floor), "what no model could explain", FLOOR),
-        ("force", "Error of the force", percent(comparison.force.total), "of its power unexplained", FORCE),
+        ("error", "Error of the response", in_percent(comparison.prediction.error), rms, PREDICTED),
+        ("floor", "Noise floor", in_percent(comparison.prediction.floor), "what no model could explain", FLOOR),
+        ("force", "Error of the force", in_percent(comparison.force.total), "of its power unexplained", FORCE),
     )
     return "".join(
-        f'<div class="figure" id="figure-{key}" title="{escape(meaning)}"><span>{title}</span><b>{value}</b>'
+        figure(key, title, value, about, f' title="{escape(meaning)}"') for key, title, value, about, meaning in cells
+    )
+
+
+def figure(key: str, title: str, value: str, about: str, more: str = "") -> str:
+    """One of the large numbers, small enough for its place where it has many digits."""
+    size = " class='long'" if len(value) > LONG else ""
+    return (
+        f'<div class="figure" id="figure-{key}"{more}><span>{title}</span><b{size}>{value}</b>'
         f"<small>{escape(about)}</small></div>"
-        for key, title, value, about, meaning in cells
     )
 
 
@@ -106,9 +126,11 @@ def _candidates(stage: Stage, rows: Sequence[Ranked], live: bool) -> str:
     if stage.diagnosis is None:
         return ""
     offered = [(i, row) for i, row in enumerate(rows) if offers(stage.diagnosis, row)]
-    more = len(stage.diagnosis.candidates) - len(offered)
+    shown = {row.name for _, row in offered}
+    left = [in_words(row.name) for row in stage.diagnosis.candidates if row.name not in shown]
+    more = len(left)
     others = f"{more} more explain no more than chance would" if offered else f"none of {more} explains any of it"
-    rest = f"<li class='more'>{others}</li>" if more > 0 else ""
+    rest = f"<li class='more'>{others}: {escape(', '.join(left))}</li>" if more > 0 else ""
     return f"<ol>{HEAD if offered else ''}{''.join(_row(i, row, stage, live) for i, row in offered)}{rest}</ol>"
 
 
@@ -144,11 +166,11 @@ def _row(place: int, row: Ranked, stage: Stage, live: bool) -> str:
     formula = escape(in_text(row.term.formula))
     words = escape(in_words(row.name))
     meaning = row.term.meaning[0].upper() + row.term.meaning[1:]
-    size = f"{number(row.coefficient)} ± {number(1.96 * row.error, 2)} {in_text(unit)}"
+    size = f"{' ± '.join(with_error(row.coefficient, 1.96 * row.error))} {in_text(unit)}"
     found = f" Found in {escape(row.term.cause)}." if row.name in LIBRARY else ""
     detail = (
         f"<b>{words}</b> <i>{formula}</i>, coefficient <em>{escape(size)}</em>; explains {explained[:-2]} ± "
-        f"{number(100.0 * row.gain.error, 1)} %, error with it {percent(row.response_error)}. {escape(meaning)}.{found}"
+        f"{100.0 * row.gain.error:.1f} %, error with it {in_percent(row.response_error)}. {escape(meaning)}.{found}"
     )
     return (
         f"<li class='candidate' data-candidate='{place}' data-label='{escape(_label(row, unit))}' tabindex='0' "
@@ -206,9 +228,10 @@ def _modal(comparison: Comparison) -> str:
     for (symbol, what), found in zip(named, modal(comparison.fit, comparison.prepared), strict=True):
         if found is not None:
             value, error, unit = found
-            half = "held" if math.isnan(error) else f"± {number(1.96 * error, 2)}"
+            size, half = with_error(value, 1.96 * error)
+            half = "held" if math.isnan(error) else f"± {half}"
             rows += (
-                f"<tr class='derived'><td><i>{symbol}</i></td><td>{what}</td><td class='number'>{number(value, 5)}</td>"
+                f"<tr class='derived'><td><i>{symbol}</i></td><td>{what}</td><td class='number'>{size}</td>"
                 f"<td>{half}</td><td>{unit or '1'}</td><td></td></tr>"
             )
     return rows
@@ -222,14 +245,22 @@ def _unneeded(term: Needless | None, live: bool) -> str:
     return f"<span class='unneeded' title='{escape(term.sentence())}'>not needed{drop}</span>"
 
 
+def in_table(value: float, error: float | None, factor: float = 1.0) -> tuple[str, str]:
+    """A value and half its interval as a table has them; of a value that is held, that."""
+    if error is None:
+        return number(value, 5), "held"
+    size, half = with_error(value, 1.96 * error / factor)
+    return size, f"± {half}"
+
+
 def _coefficient(coefficient: Coefficient, live: bool, unneeded: Needless | None) -> str:
     shown = mass(coefficient.unit) if coefficient.term == "inertia" else Scale(1.0, coefficient.unit)
-    half = "held" if coefficient.error is None else f"± {number(1.96 * coefficient.error / shown.factor, 2)}"
+    size, half = in_table(coefficient.value / shown.factor, coefficient.error, shown.factor)
     act, label = ("free", "Free") if coefficient.held else ("hold", "Hold")
     button = f"<button data-act='{act}' data-name='{escape(coefficient.key)}'>{label}</button>" if live else ""
     return (
         f"<tr data-key='{escape(coefficient.key)}'><td><i>{escape(coefficient.key.rpartition('.')[2])}</i></td>"
         f"<td>{escape(in_words(coefficient.term))}{_unneeded(unneeded, live)}</td>"
-        f"<td class='number'>{number(coefficient.value / shown.factor, 5)}</td><td>{half}</td>"
+        f"<td class='number'>{size}</td><td>{half}</td>"
         f"<td>{escape(in_text(shown.unit))}</td><td>{button}</td></tr>"
     )

@@ -15,6 +15,7 @@ from study.faults.leftover import leaves_less, leftover
 from study.faults.search import first_faults, search_faults
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.motion_start import has_lost_the_motion
 from study.identify.time_domain.settling import settled
 from study.records.coarse_sampling import too_coarse
 from study.records.oversampling import without_spare_samples
@@ -22,6 +23,7 @@ from study.records.prepared import FORCE, Prepared
 from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE
 
+OF_THE_MOTION = (DRIFT, OFFSET, FORCE_NOISE)  # of which a model that has lost the motion tells nothing
 NOT_ASKED = "faults of the measurement are looked for in a single stretch of a driven response alone"
 
 
@@ -82,7 +84,9 @@ def accounted(
     if not asked:
         return _compared(model, fewer, faults, None, estimator, progress)
     fit = fit_model(model, fewer)
-    found, near = search_faults(prepared, fit if fewer is first else _on_all(fit, first), faults, asked)
+    lost = has_lost_the_motion(fit, fewer)
+    told = tuple(name for name in asked if not (lost and name in OF_THE_MOTION))
+    found, near = search_faults(prepared, fit if fewer is first else _on_all(fit, first), faults, told)
     for begin in _begins(first, fit, asked):
         found, near = _beneath(begin, model, prepared, faults, asked, (found, near))
     if found == faults:
@@ -96,7 +100,8 @@ def accounted(
 def _begins(prepared: Prepared, fit: FreeRunFit, asked: Sequence[str]) -> list[Fault]:
     """What may lie beneath the motion and lead its fit astray: the slowest lines, and its mean where a fit is lost."""
     slow = slow_response(prepared, len(asked)) if DRIFT in asked else None
-    mean = [] if fit.converged or OFFSET not in asked else [mean_response(prepared)]
+    astray = not fit.converged or has_lost_the_motion(fit, prepared)
+    mean = [mean_response(prepared)] if astray and OFFSET in asked else []
     return mean if slow is None else [slow]
 
 
@@ -110,9 +115,12 @@ def _beneath(
     """
     if begin.waveform is None:
         return plain
+    beneath = corrected(prepared, (*faults, begin))
     try:
-        begun = fit_model(model, corrected(prepared, (*faults, begin)))
+        begun = fit_model(model, beneath)
     except StudyError:
+        return plain
+    if has_lost_the_motion(begun, beneath):
         return plain
     whole = replace(begun, residual=begun.residual + begin.waveform[slice(*begun.span)])  # of the record as it is
     other = search_faults(prepared, whole, faults, asked)

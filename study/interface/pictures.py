@@ -46,17 +46,19 @@ class FitPictures:
     def plot_frf(self, ax: "Axes | None" = None, *, part: str = "magnitude") -> "Axes":
         """Response over force by frequency, of the record and of the model's free run under the same force.
 
+        Where the motion is prescribed, force over displacement: the dynamic stiffness.
         ``part`` is ``magnitude``, ``phase`` or ``coherence``.
         """
         from study.compare import fit_panels
-        from study.compare.response_functions import response_functions
+        from study.compare.response_functions import drive_of, response_functions
         from study.support.errors import expect
 
         expect(part in ("magnitude", "phase", "coherence"), f"part is {part!r}; expected magnitude, phase or coherence")
         functions, highest = response_functions(self.comparison.prediction), self.comparison.force.highest
         with drawing_axes(ax) as (axes,):
             if part == "magnitude":
-                unit = f"{self._unit()}/{self.comparison.record.units.get('force', '')}"
+                drive = drive_of(self.comparison.prepared)
+                unit = f"{self._unit()}/{self.comparison.record.units.get(drive, '')}"
                 return fit_panels.response_magnitude(axes, functions, unit, highest)
             return (fit_panels.response_phase if part == "phase" else fit_panels.coherence_panel)(
                 axes, functions, highest

@@ -1,8 +1,12 @@
 """A browser; and a short record of a frame with a hardening joint, of which its owner's model knows nothing."""
 
 import os
-from collections.abc import Iterator
-from dataclasses import replace
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +35,44 @@ def hall(tmp_path_factory):
     model = replace(believed, name="frame").with_values(dict.fromkeys(believed.values, None))
     (folder / "frame.yaml").write_text(f"# hall 3\n{format_model(model)}")
     return folder
+
+
+@dataclass(frozen=True)
+class Explored:
+    """A ``study explore`` that runs."""
+
+    process: int
+    port: int
+    errors: Path  # what it has said of faults
+
+    @property
+    def address(self) -> str:
+        return f"http://127.0.0.1:{self.port}/"
+
+
+@contextmanager
+def _exploring(folder: Path, record: str, model: str, *options: str) -> Iterator[Explored]:
+    words = ["explore", record, "--model", model, "--port", "0", "--no-browser", *options]
+    errors = folder / "errors.txt"
+    with errors.open("w") as stream:
+        server = subprocess.Popen(
+            [sys.executable, "-m", "study", *words], cwd=folder, stdout=subprocess.PIPE, stderr=stream, text=True
+        )
+        assert server.stdout is not None
+        line = server.stdout.readline()
+        found = re.match(r"http://127\.0\.0\.1:(\d+)/ shows", line)
+        assert found, line + errors.read_text()
+        yield Explored(server.pid, int(found[1]), errors)
+        server.terminate()
+        server.wait(10)
+        server.stdout.close()
+    assert "Traceback" not in errors.read_text()
+
+
+@pytest.fixture(scope="session")
+def exploring() -> Callable[..., AbstractContextManager[Explored]]:
+    """What starts ``study explore`` in a folder, and ends it: of a record, a model file and further options."""
+    return _exploring
 
 
 @pytest.fixture(scope="module")

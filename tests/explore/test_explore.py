@@ -17,7 +17,7 @@ from study.diagnose.adding import added
 from study.equations import model_file
 from study.equations.model import Model, free
 from study.equations.terms import get
-from study.explore import decimate, html_page, page_units, saved_files, view, words
+from study.explore import any_page, any_session, decimate, page_units, saved_files, view, words
 from study.explore import session as sessions
 from study.explore.desk import Desk
 from study.explore.saved import saved
@@ -80,8 +80,8 @@ def test_adding_what_is_missing_lets_the_error_fall_and_undoing_brings_it_back(a
     assert before.prediction.error > 1.4 * before.prediction.floor
     assert after.prediction.error == pytest.approx(after.prediction.floor, rel=0.1)
     assert [s["added"] for s in grown.steps] == [None, "quadratic_damping"]
-    assert sessions.undone(grown) == asked
-    assert sessions.undone(asked) is asked
+    assert any_session.undone(grown) == asked
+    assert any_session.undone(asked) is asked
     with pytest.raises(StudyError, match="no candidate of the present model"):
         sessions.with_added(grown, "quadratic_damping")
 
@@ -138,8 +138,8 @@ def test_a_dropped_term_is_gone_and_undoing_brings_it_back(grown, superfluous):
     assert [history.label(s) for s in after.steps] == [
         "as given", "+ quadratic_damping", "+ quadratic_stiffness", "- quadratic_stiffness"
     ]  # fmt: skip
-    assert html_page.history_columns(after)["name"][-1] == "3 - quadratic stiffness"
-    assert sessions.undone(after) == superfluous
+    assert any_page.history_columns(after)["name"][-1] == "3 - quadratic stiffness"
+    assert any_session.undone(after) == superfluous
     model = model_file.format_model(grown.stages[0].model.with_term(get("quadratic_stiffness")))
     contents = files(after, "rig.yaml", f"# hall 3\n{model}")
     assert "quadratic_stiffness" not in contents["rig.yaml"].decode()
@@ -209,7 +209,7 @@ def test_the_history_goes_on_where_the_file_left_it(begun):
     step = begun.steps[0]
     earlier = ({**step, "terms": ["inertia"]}, {**step, "added": "linear_damping"})
     assert len(replace(begun, earlier=earlier).steps) == 2
-    names = html_page.history_columns(replace(begun, earlier=earlier[:1]))["name"]
+    names = any_page.history_columns(replace(begun, earlier=earlier[:1]))["name"]
     assert names == ["0 as given", "1 as given"]
 
 
@@ -381,7 +381,7 @@ def test_bad_input_is_one_sentence_and_serves_nothing(words_, said, tmp_path, mo
     ("low", "high"), [(0.03, 0.8), (4.2, 7.9), (1e-5, 1e3), (0.9, 1.1e4), (1e-12, 1e-11), (2.0, 2.0)]
 )
 def test_ticks_of_a_logarithmic_axis_do_not_collide(low, high):
-    inside = [tick for tick in html_page.log_ticks(low, high) if low <= tick <= high]
+    inside = [tick for tick in any_page.log_ticks(low, high) if low <= tick <= high]
     apart = np.diff(np.log10(inside)) / max(np.log10(high / low), 1e-9)
     assert len(inside) <= 8
     assert len(inside) >= (2 if high > 1.5 * low else 0)

@@ -3,8 +3,6 @@
 import contextlib
 import re
 import socket
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -34,21 +32,9 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def address(rig: Path) -> Iterator[str]:
-    words = ["explore", "rig.csv", "--model", "rig.yaml", "--port", "0", "--no-browser", "--out", "saved"]
-    with (rig / "errors.txt").open("w") as errors:
-        server = subprocess.Popen(
-            [sys.executable, "-m", "study", *words], cwd=rig, stdout=subprocess.PIPE, stderr=errors, text=True
-        )
-        assert server.stdout is not None
-        line = server.stdout.readline()
-        found = re.match(r"(http://127\.0\.0\.1:\d+/) shows", line)
-        assert found, line + (rig / "errors.txt").read_text()
-        yield found[1]
-        server.terminate()
-        server.wait(10)
-        server.stdout.close()
-    assert "Traceback" not in (rig / "errors.txt").read_text()
+def address(rig: Path, exploring: Any) -> Iterator[str]:
+    with exploring(rig, "rig.csv", "rig.yaml", "--out", "saved") as running:
+        yield running.address
 
 
 def watched(page: Page) -> tuple[list[str], list[str]]:
@@ -236,8 +222,9 @@ def _nothing_jumps(page: Page, before: dict[str, float]) -> None:
 
 
 def places(page: Page) -> dict[str, float]:
+    """Of cards, and of the rows of coefficients with their buttons."""
     return page.evaluate(
-        "Object.fromEntries([...document.querySelectorAll('.card')].map((c, i) => "
+        "Object.fromEntries([...document.querySelectorAll('.card, #coefficients tr')].map((c, i) => "
         "[i + ' ' + (c.querySelector('h2')?.firstChild.textContent ?? ''), c.getBoundingClientRect().top + scrollY]))"
     )
 

@@ -4,12 +4,11 @@ import base64
 import json
 import re
 import socket
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 from bokeh.util.token import generate_jwt_token, generate_session_id
@@ -77,25 +76,14 @@ def token_in(answer: bytes) -> str:
 
 
 @pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+def served(tmp_path_factory: pytest.TempPathFactory, exploring: Any) -> Iterator[Served]:
     folder = tmp_path_factory.mktemp("guard")
     (folder / "true.yaml").write_text(TRUE)
     (folder / "rig.yaml").write_text(MODEL)
     assert cli.main(["simulate", str(folder / "true.yaml"), "--samples", "1000", "--out", str(folder / "rig.csv")]) == 0
-    words = ["explore", "rig.csv", "--model", "rig.yaml", "--port", "0", "--no-browser", "--no-measurement"]
-    errors = folder / "errors.txt"
-    with errors.open("w") as stream:
-        server = subprocess.Popen(
-            [sys.executable, "-m", "study", *words], cwd=folder, stdout=subprocess.PIPE, stderr=stream, text=True
-        )
-        assert server.stdout is not None
-        line = server.stdout.readline()
-        found = re.match(r"http://127\.0\.0\.1:(\d+)/ shows", line)
-        assert found, line + errors.read_text()
-        yield Served(server.pid, int(found[1]), errors)
-        server.terminate()
-        server.wait(10)
-        server.stdout.close()
+    with exploring(folder, "rig.csv", "rig.yaml", "--no-measurement") as running:
+        yield Served(running.process, running.port, running.errors)
+    errors = running.errors
     said = errors.read_text().splitlines()  # no traceback, and nothing of what was refused
     assert len(said) <= 2, said
     assert all(line.startswith("study: ") and "message" in line for line in said)

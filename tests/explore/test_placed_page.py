@@ -1,9 +1,5 @@
 """``study explore`` of a structure in a real browser: a place is selected, what is missing there added, all saved."""
 
-import re
-import subprocess
-import sys
-
 import pytest
 from playwright.sync_api import Page
 
@@ -13,21 +9,10 @@ CUBIC = "cubic_stiffness[floor2-floor3]"
 
 
 @pytest.fixture(scope="module")
-def shown(hall):
+def shown(hall, exploring):
     """The address of a page that is served."""
-    words = ["explore", "frame.csv", "--model", "frame.yaml", "--port", "0", "--no-browser", "--out", "saved"]
-    with (hall / "errors.txt").open("w") as errors:
-        server = subprocess.Popen(
-            [sys.executable, "-m", "study", *words], cwd=hall, stdout=subprocess.PIPE, stderr=errors, text=True
-        )
-        line = server.stdout.readline()
-        found = re.match(r"(http://127\.0\.0\.1:\d+/) shows", line)
-        assert found, line + (hall / "errors.txt").read_text()
-        yield found[1]
-        server.terminate()
-        server.wait(10)
-        server.stdout.close()
-    assert "Traceback" not in (hall / "errors.txt").read_text()
+    with exploring(hall, "frame.csv", "frame.yaml", "--out", "saved") as running:
+        yield running.address
 
 
 def until(page: Page, condition: str) -> None:
@@ -56,6 +41,22 @@ def the_sketch_selects(page: Page) -> None:
     page.keyboard.press("Escape")
 
 
+def the_axes_have_ticks(page: Page) -> None:
+    """That of the history, and those of frequency, which may be logarithmic."""
+    ticks = "Array.from(Bokeh.documents[0].get_model_by_name('history_ticks').ticks)"
+    assert len(page.evaluate(ticks)) > 1
+    scale = "Bokeh.documents[0].get_model_by_name('panel_{}').x_scale.type"
+
+    def kinds() -> list[str]:
+        return [page.evaluate(scale.format(name)) for name in ("force", "stiffness", "spectrum", "motion")]
+
+    page.click("[data-act=logarithm]")
+    assert kinds() == ["LogScale", "LogScale", "LogScale", "LinearScale"]
+    assert page.evaluate("Bokeh.documents[0].get_model_by_name('range_frequency').start") > 0.0
+    page.click("[data-act=logarithm]")
+    assert kinds() == ["LinearScale"] * 4
+
+
 def test_a_session_of_a_structure_from_the_verdict_to_the_saved_page(page: Page, shown: str, hall) -> None:
     wrong: list[str] = []
     page.on("console", lambda m: wrong.append(m.text) if m.type in ("error", "warning") else None)
@@ -65,6 +66,7 @@ def test_a_session_of_a_structure_from_the_verdict_to_the_saved_page(page: Page,
     assert page.inner_text("#verdict h3") == "An effect is missing"
     assert "between floor2 and floor3" in page.inner_text("#verdict")
     the_sketch_selects(page)
+    the_axes_have_ticks(page)
     given = float(page.inner_text("#figure-error b").removesuffix("%"))
     page.click(f"[data-act=add][data-name='{CUBIC}']")
     until(page, f"parseFloat(document.querySelector('#figure-error b').textContent) < {0.7 * given}")

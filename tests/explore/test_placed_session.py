@@ -9,6 +9,7 @@ import pytest
 
 from study.compare import history
 from study.equations import model_file
+from study.explore import any_session
 from study.explore import placed_session as sessions
 from study.explore.desk import Desk
 from study.explore.placed_page import PLACED, structure_files
@@ -45,8 +46,8 @@ def test_what_is_added_where_it_is_missing_lets_the_error_fall_and_undo_brings_i
     assert after.error == pytest.approx(after.floor, rel=0.1)
     assert after.error < 0.7 * before.error
     assert [s["added"] for s in grown.steps] == [None, CUBIC]
-    assert sessions.undone(grown).stages == asked.stages
-    assert sessions.undone(asked) is asked
+    assert any_session.undone(grown).stages == asked.stages
+    assert any_session.undone(asked) is asked
     with pytest.raises(StudyError, match="no candidate of the present model"):
         sessions.with_placed(grown, CUBIC)
 

@@ -1,6 +1,5 @@
 """Several records in a session: one model on all, a record at a time in the panels, coefficients of each by itself."""
 
-import os
 import re
 from dataclasses import replace
 from functools import partial
@@ -8,9 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 from bokeh.document import Document
-from playwright.sync_api import sync_playwright
 
-from scripts.page_picture import MISSING, QUIET, browser
 from study.compare import panels
 from study.compare.comparison import across_records, compare, on_each_record
 from study.compare.each_record import separated
@@ -173,27 +170,22 @@ def test_the_live_page_turns_to_the_record_that_is_asked_for(grown, tmp_path):
     desk.close()
 
 
-def test_the_saved_page_turns_to_a_record_and_a_step(grown, tmp_path):
-    where = browser()
-    if where is None:
-        pytest.fail(MISSING) if os.environ.get("CI") else pytest.skip(MISSING)
+def test_the_saved_page_turns_to_a_record_and_a_step(grown, tmp_path, page):
     (tmp_path / "page.html").write_bytes(saved(grown))
-    with sync_playwright() as playwright:
-        page = playwright.chromium.launch(executable_path=where, args=list(QUIET)).new_page()
-        wrong: list[str] = []
-        page.on("pageerror", lambda error: wrong.append(str(error)))
-        page.goto((tmp_path / "page.html").as_uri())
-        page.wait_for_function("window.study && window.study.ready")
-        for step, number, name in ((1, 1, "high"), (0, 1, "high"), (0, 0, "low")):
-            page.click(f"[data-act=step][data-name='{step}']")
-            page.click(f"[data-act=record][data-name='{number}']")
-            assert page.inner_text("#of-record") == f"of {name}"
-            shown = float(page.inner_text("#figure-error b").removesuffix("%"))
-            error = 100.0 * grown.stages[step].on_each[number].prediction.error
-            assert shown == pytest.approx(error, rel=0.01)
-            ends = page.evaluate("(r => [r.start, r.end])(Bokeh.documents[0].get_model_by_name('range_time'))")
-            assert ends == pytest.approx(grown.now.on_each[number].prediction.time[[0, -1]], rel=1e-5)
-        assert not wrong
+    wrong: list[str] = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.goto((tmp_path / "page.html").as_uri())
+    page.wait_for_function("window.study && window.study.ready")
+    for step, number, name in ((1, 1, "high"), (0, 1, "high"), (0, 0, "low")):
+        page.click(f"[data-act=step][data-name='{step}']")
+        page.click(f"[data-act=record][data-name='{number}']")
+        assert page.inner_text("#of-record") == f"of {name}"
+        shown = float(page.inner_text("#figure-error b").removesuffix("%"))
+        error = 100.0 * grown.stages[step].on_each[number].prediction.error
+        assert shown == pytest.approx(error, rel=0.01)
+        ends = page.evaluate("(r => [r.start, r.end])(Bokeh.documents[0].get_model_by_name('range_time'))")
+        assert ends == pytest.approx(grown.now.on_each[number].prediction.time[[0, -1]], rel=1e-5)
+    assert not wrong
 
 
 def test_a_coefficient_may_differ_within_the_one_fit(records, monkeypatch):

@@ -172,6 +172,16 @@ def test_units_survive_the_way_through_a_file(tmp_path: Path) -> None:
     assert {k: read_record(tmp_path / "rig.csv").units[k] for k in units} == units
 
 
+@pytest.mark.parametrize("unit", ["m/s^2", "g"])
+def test_the_motion_of_a_base_is_none_of_the_response(unit: str, tmp_path: Path) -> None:
+    """As ``study trial --test base`` writes it: the unit alone would make it the measured acceleration."""
+    channels = {"base_acceleration": TIME, "force": 0.0 * FORCE, "displacement": DISPLACEMENT}
+    write_csv(Record(0.02, channels, {"base_acceleration": unit}), tmp_path / "shaken.csv")
+    read = read_record(tmp_path / "shaken.csv")
+    assert set(read.channels) == set(channels)
+    np.testing.assert_array_equal(read["base_acceleration"], TIME)
+
+
 def test_the_simulator_names_its_records_by_folder(tmp_path: Path) -> None:
     (tmp_path / "duffing").mkdir()
     write_csv(Record(0.02, {"force": FORCE, "displacement": DISPLACEMENT}), tmp_path / "duffing" / "record.csv")

@@ -19,6 +19,7 @@ from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.motion_start import from_the_motion, has_lost_the_motion
 from study.identify.time_domain.no_response import LINEAR, SURE, driven_at, one_frequency, unfit, why_no_response
 from study.identify.time_domain.part_fit import STEPS, covariance_of, fit_part, linearise
 from study.identify.time_domain.settling import KEPT, better_fit, continued, from_segments, settled
@@ -177,7 +178,8 @@ def with_term(fit: FreeRunFit, entry: ModelTerm, base: Baseline, prepared: Prepa
         raise StudyError(
             f"no values of {missing} let {entry.name} follow {prepared.record.name}; give them in the model file"
         ) from None
-    return replace(best, elsewhere=(*best.elsewhere, *fit.elsewhere))
+    found = from_the_motion(best, prepared) if has_lost_the_motion(best, prepared) else best
+    return replace(found, elsewhere=(*best.elsewhere, *fit.elsewhere))
 
 
 def best_fit(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model
 from study.identify.time_domain.free_run_fit import WHITE, FreeRunFit, fit_free_run
-from study.identify.time_domain.stretch_states import states_along
+from study.identify.time_domain.stretch_states import states_along, states_of_segments
 from study.records.prepared import Prepared
 from study.support.autoregression import whitened
 from study.support.errors import DivergenceError
@@ -114,8 +114,8 @@ def uncertainty(fit: FreeRunFit, prepared: Prepared, jacobian: Floats) -> Floats
 class JudgingRun:
     """The free run of a fitted model that covers the judging part.
 
-    Where that follows the fitting part the run goes on through both. Elsewhere, or where the fit begins anew at
-    restarts, its initial state, and nothing else, is estimated from the judging part.
+    Where that follows the fitting part the run goes on through both. Elsewhere its initial state, and nothing else, is
+    estimated from the judging part; of a chaotic system, which forgets any, the states of as few segments as it needs.
 
     Attributes
     ----------
@@ -125,14 +125,17 @@ class JudgingRun:
         The record and its parts.
     first : int
         Sample of the record at which the run begins.
-    initial : array, shape (states,)
-        State there.
+    initial : array, shape (states,) or (1 + restarts, states)
+        State there, and at each restart.
+    restarts : tuple of int
+        Samples of the record at which it begins anew.
     """
 
     fit: FreeRunFit
     prepared: Prepared
     first: int
     initial: Floats
+    restarts: tuple[int, ...] = ()
 
     def motion(self, name: str, finer: int = 1) -> Floats:
         """A motion on the judging part, shape (samples to judge,); with more steps if asked.
@@ -164,6 +167,7 @@ class JudgingRun:
         return prepare(
             model or self.fit.model, self.prepared.record, keys, response=motion,
             steps_per_sample=finer * self.fit.steps_per_sample, span=(self.first, self.prepared.plan.judge[1]),
+            restarts=self.restarts,
         )  # fmt: skip
 
 
@@ -179,4 +183,7 @@ def judging_run(fit: FreeRunFit, prepared: Prepared) -> JudgingRun:
     begun = plan.judge[0] in prepared.record.joints
     if plan.judge[0] == fit.span[1] and not (fit.restarts or begun):
         return JudgingRun(fit, prepared, fit.first, fit.initial)
+    if fit.restarts:
+        states, restarts = states_of_segments(fit, prepared, plan.judge)
+        return JudgingRun(fit, prepared, plan.judge[0], states, restarts)
     return JudgingRun(fit, prepared, plan.judge[0], states_along(fit, prepared, plan.judge))

@@ -10,6 +10,7 @@ from study.equations.model import Model
 from study.equations.substeps import needed_steps
 from study.identify.frequency_domain.starting_values import linear_start
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.motion_start import from_the_motion, has_lost_the_motion
 from study.identify.time_domain.multiple_shooting import fit_in_segments, is_chaotic
 from study.identify.time_domain.part_fit import STEPS, covariance_of, fit_part, integration_shift, linearise
 from study.identify.time_domain.stretch_states import POOR, is_poor
@@ -42,6 +43,11 @@ def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
 
 
 def _settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
+    found = _one_or_segments(fit, prepared)
+    return from_the_motion(found, prepared) if has_lost_the_motion(found, prepared) else found
+
+
+def _one_or_segments(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     if prepared.response == FORCE or _stands(fit, prepared):
         return fit
     if is_chaotic(fit, prepared):
@@ -95,6 +101,8 @@ def _stands(fit: FreeRunFit, prepared: Prepared) -> bool:
 
 def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit with so many steps per sample that halving them shifts no coefficient by what its error shows."""
+    if fit.restarts:  # multiple shooting has chosen them
+        return fit
     most = max(MOST_STEPS, needed_steps(fit.model, prepared.record, prepared.response))
     allowed = SHIFT if prepared.every == 1 else FINE
     while fit.keys and fit.steps_per_sample < most:

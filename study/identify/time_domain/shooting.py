@@ -13,7 +13,7 @@ import numpy as np
 
 from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model
-from study.records.record import Record
+from study.records.record import MOTIONS, Record
 from study.records.states import REACH, angular_rate, starting_states
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError
@@ -121,15 +121,15 @@ class ShootingSegments:
         return self._run(model).passing(dict(zip(numbers, np.atleast_2d(states), strict=True)))
 
     def first_states(self, model: Model) -> Floats:
-        """Initial states as the record shows them, smoothed as widely as fits each segment best.
+        """Initial states as the record shows them, smoothed as widely as fits each segment best, or not at all.
 
         Shape (segments, states). A width with which the model diverges is left out.
         """
         begins = (self.span[0], *self.restarts)
         best, least = np.zeros((len(begins), 2 + len(model.states))), np.full(len(begins), np.inf)
-        for reach in REACHES:
+        for moving in self._shown(begins):
             states = np.zeros_like(best)
-            states[:, :2] = starting_states(self.record, self.response, begins, reach)
+            states[:, :2] = moving
             try:
                 misfits = self.misfits(model, states)
             except DivergenceError:
@@ -137,3 +137,11 @@ class ShootingSegments:
             best = np.where((misfits < least)[:, None], states, best)
             least = np.minimum(misfits, least)
         return best
+
+    def _shown(self, begins: Sequence[int]) -> list[Floats]:
+        """Displacement and velocity at these samples, smoothed more and more widely; at last as they stand there."""
+        shown = [starting_states(self.record, self.response, begins, reach) for reach in REACHES]
+        names = MOTIONS[:2]
+        if set(names) <= set(self.record.channels):
+            shown.append(np.stack([self.record[name][list(begins)] for name in names], axis=1))
+        return shown

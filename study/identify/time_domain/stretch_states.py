@@ -6,12 +6,13 @@ so their states, each by itself, are found first (multiple shooting).
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from study.identify.time_domain.continuation import fit_segments
 from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
-from study.identify.time_domain.shooting import ShootingSegments, even_restarts, own_begins
+from study.identify.time_domain.shooting import ShootingSegments, even_restarts, needed_restarts, own_begins
 from study.records.prepared import FORCE, Prepared
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError
@@ -44,6 +45,32 @@ def states_along(fit: FreeRunFit, prepared: Prepared, span: tuple[int, int]) -> 
     except DivergenceError:
         return plain.initial
     return again.initial if again.rms < plain.rms else plain.initial
+
+
+def states_of_segments(
+    fit: FreeRunFit, prepared: Prepared, span: tuple[int, int]
+) -> tuple[Floats, tuple[int, ...]]:  # fmt: skip
+    """States with which a chaotic model follows a span best, and the samples where its memory ends and others begin.
+
+    Within a segment a disturbance grows no further than one may (:func:`shooting.needed_restarts`).
+
+    Raises
+    ------
+    DivergenceError
+        If the free run leaves the range of finite numbers.
+    """
+    record, response, steps, held = prepared.record, prepared.response, fit.steps_per_sample, tuple(fit.model.values)
+    short = ShootingSegments(record, response, span, even_restarts(record, response, span), steps)
+    loose = fit_segments(fit.model, short, short.first_states(fit.model), held, LOOSE)
+    begins = [span[0], *short.restarts]
+    kept = needed_restarts(fit.model, record, np.atleast_2d(loose.initial), span, short.restarts, steps)
+    while list(short.restarts) != list(kept):  # by little each time, or the fit of a long one ends in another minimum
+        spare = [b for b in short.restarts if b not in kept][::2]
+        fewer = tuple(b for b in short.restarts if b not in spare)
+        own = np.atleast_2d(loose.initial)[[begins.index(b) for b in (span[0], *fewer)]]
+        short, begins = replace(short, restarts=fewer), [span[0], *fewer]
+        loose = fit_segments(fit.model, short, own, held, LOOSE)
+    return loose.initial, kept
 
 
 def with_which_stretches_begin(segments: ShootingSegments, states: Floats) -> Floats:

@@ -103,7 +103,12 @@ def _spelt_out(column: Column, role: str) -> bool:
 
 
 def _role_of(column: Column) -> str:
-    """What a column is by what the file says, its name, or its unit; empty if these do not tell."""
+    """What a column is by what the file says, its name, or its unit; empty if these do not tell.
+
+    A motion of the base is none of the response, whatever its unit.
+    """
+    if _last(column) in BASE:
+        return ""
     return column.role or _suffixed(column)[0] or _plain_role(_last(column)) or _unit_role(column.unit)
 
 

@@ -1,0 +1,84 @@
+"""A fit that begins at the measured motion itself, for one that has lost it, as a free run between two wells does.
+
+Least squares of the force on the forces of all terms along the motion has no local minima and asks for no free run, but
+noise on the motion biases it. So it is where multiple shooting begins, and the end of nothing.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import rfft
+
+from study.equations.model import Model
+from study.identify.frequency_domain.inputs import Input, histories, reverse_inputs
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.multiple_shooting import fit_in_segments
+from study.identify.time_domain.stretch_states import is_smooth
+from study.records.completion import derivative
+from study.records.prepared import FORCE, Prepared
+from study.records.record import MOTIONS, Record
+from study.support.errors import StudyError
+from study.support.least_squares import least_squares
+
+Floats = NDArray[np.float64]
+LOST = 0.5  # of the power of a response: a fit that leaves more has lost the motion
+
+
+def has_lost_the_motion(fit: FreeRunFit, prepared: Prepared) -> bool:
+    """Whether a driven model leaves more than half of the response's power, and that as smooth as a motion."""
+    driven = not (prepared.free or prepared.response == FORCE or prepared.record.stretches)
+    return driven and fit.rms**2 > LOST * prepared.spread**2 and is_smooth(fit.residual)
+
+
+def from_the_motion(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
+    """The fit, or one in segments begun at the measured motion where that leaves far less of it."""
+    try:
+        start = motion_start(fit.model, prepared, fit.held)
+        apart = fit_in_segments(
+            fit.model, prepared.record, start=start, held=fit.held, response=prepared.response, span=prepared.plan.fit,
+            steps_per_sample=fit.steps_per_sample,
+        )  # fmt: skip
+    except StudyError:
+        return fit
+    return apart if apart.rms**2 < LOST * fit.rms**2 else fit
+
+
+def motion_start(model: Model, prepared: Prepared, held: tuple[str, ...]) -> dict[str, float]:
+    """Coefficients by least squares of the force along the measured motion; what is held stays.
+
+    Raises
+    ------
+    StudyError
+        If a shape parameter is not known, or a force has no finite value somewhere along the motion.
+    """
+    part = prepared.record.part(*prepared.inner(prepared.plan.fit))
+    inputs = reverse_inputs(model)
+    forces: dict[str, Floats] = {}
+    for item, shape in zip(inputs, histories(inputs, part), strict=True):
+        for place in item.parts:
+            added = place.factor * _of_order(item, shape, place.order, part)
+            forces[place.symbol] = forces.get(place.symbol, np.zeros(len(part))) + added
+    known = [(model.values[s] or 0.0) * forces[s] for s in forces if s in held]
+    target = part[FORCE] - np.sum([np.zeros(len(part)), *known], axis=0)
+    wanted = [s for s in forces if s not in held]
+    lines = _below_the_noise(np.column_stack([*(forces[s] for s in wanted), target]), part)
+    found = least_squares(lines[:, :-1], lines[:, -1], 1e-9)
+    return dict(zip(wanted, found.tolist(), strict=True))
+
+
+def _below_the_noise(forces: Floats, part: Record) -> Floats:
+    """Spectra of forces, passed where the force does work on the motion and less and less above, shape (2 lines, q).
+
+    Above, an acceleration is noise that grows with the square of frequency, and falls so behind the filter. A window
+    and a filter leave the balance of the forces as it is.
+    """
+    window = np.hanning(len(forces))
+    spectra = rfft(window[:, None] * forces, axis=0)
+    work = np.abs(rfft(window * part[FORCE]) * rfft(window * part["velocity"]))
+    middle = float(np.average(np.arange(len(work)), weights=work))
+    passed = spectra / (1.0 + (np.arange(len(work))[:, None] / middle) ** 2) ** 2
+    return np.concatenate([passed.real, passed.imag])
+
+
+def _of_order(item: Input, shape: Floats, order: int, part: Record) -> Floats:
+    """The shape's derivative; those of the displacement are channels of a prepared record."""
+    return part[MOTIONS[order]] if item.shape == "u" else derivative(shape, part.dt, order)
