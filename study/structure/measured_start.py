@@ -151,7 +151,8 @@ class _Modal:
             own = self.at[p][:, None] * (pushed * bend)[:, None, :] + felt * (acting[:, p : p + 1] * bend)[:, None, :]
             columns.append(own * lines.order[:, :, None])
         along = self.ways.T @ shape  # (coefficients, modes)
-        pulled = np.einsum("fc,cr,fr,sr->fsc", lines.unit, along, bend, felt, optimize=True)
+        through = (felt[:, None, :] * along).reshape(len(felt) * len(along), bend.shape[1])  # each sensor, coefficient
+        pulled = (bend @ through.T).reshape(len(bend), len(felt), len(along)) * lines.unit[:, None, :]
         columns.append(-pulled * lines.order[:, :, None])
         jacobian = np.concatenate(columns, axis=2).reshape(-1, len(x))
         return point_at(x, _real(residual.ravel()), _real(jacobian), len(x), (0,))
