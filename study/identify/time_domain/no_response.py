@@ -66,11 +66,14 @@ def unfit(model: Model, prepared: Prepared) -> str:
 
 
 def explains_nothing(fit: FreeRunFit, prepared: Prepared) -> bool:
-    """Whether a fit leaves no less of the response than chance lets its own values and states take, by the F test."""
+    """Whether a fit leaves no less of the response than chance lets its own values and states take, by the F test.
+
+    A free motion's frequency is chosen of as many as the samples tell apart (Bonferroni).
+    """
     taken = len(fit.keys) + np.size(fit.initial)
     rest = len(fit.residual) - taken
     ratio = (prepared.spread**2 / fit.rms**2 - 1.0) * rest / taken if fit.rms > 0.0 else np.inf
-    return float(fdtrc(taken, rest, max(ratio, 0.0))) > ALPHA
+    return float(fdtrc(taken, rest, max(ratio, 0.0))) * len(fit.residual) > ALPHA
 
 
 def driven_at(model: Model, prepared: Prepared) -> float:
