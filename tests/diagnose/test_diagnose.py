@@ -211,7 +211,7 @@ def test_the_judging_part_is_never_fitted(drag):
         fit_model(drag.believed, prepare_record(record))
         for record in (drag.record, drag.record.with_channels({"displacement": changed}))
     )
-    assert np.array_equal(one.values, other.values)
+    np.testing.assert_allclose(one.values, other.values, rtol=1e-9)  # the last bits belong to the linear algebra
 
 
 def test_a_model_that_runs_away_is_diagnosed_all_the_same() -> None:

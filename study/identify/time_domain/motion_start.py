@@ -12,7 +12,7 @@ from study.equations.model import Model
 from study.identify.frequency_domain.inputs import Input, histories, reverse_inputs
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.multiple_shooting import fit_in_segments
-from study.identify.time_domain.stretch_states import is_smooth
+from study.identify.time_domain.stretch_states import is_smooth, resembles_a_motion
 from study.records.completion import derivative
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record
@@ -30,7 +30,10 @@ def has_lost_the_motion(fit: FreeRunFit, prepared: Prepared) -> bool:
 
 
 def from_the_motion(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
-    """The fit, or one in segments begun at the measured motion where that leaves far less of it."""
+    """The fit, or one in segments begun at the measured motion where these leave nothing like a motion of it.
+
+    Segments with states of their own leave less than one free run of any model, and that says nothing for it.
+    """
     try:
         start = motion_start(fit.model, prepared, fit.held)
         apart = fit_in_segments(
@@ -39,7 +42,7 @@ def from_the_motion(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
         )  # fmt: skip
     except StudyError:
         return fit
-    return apart if apart.rms**2 < LOST * fit.rms**2 else fit
+    return fit if resembles_a_motion(apart, prepared.fitted) else apart
 
 
 def motion_start(model: Model, prepared: Prepared, held: tuple[str, ...]) -> dict[str, float]:

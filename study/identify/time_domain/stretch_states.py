@@ -85,8 +85,11 @@ def is_poor(fit: FreeRunFit, measured: Floats) -> bool:
 
     ``measured`` is the response that it was fitted to.
     """
-    if not fit.converged:
-        return True
+    return not fit.converged or resembles_a_motion(fit, measured)
+
+
+def resembles_a_motion(fit: FreeRunFit, measured: Floats) -> bool:
+    """Whether what a fit leaves is large and smooth."""
     return fit.rms >= POOR * float(np.std(measured)) and is_smooth(fit.residual)
 
 
