@@ -1,6 +1,7 @@
 """What the commands do with a model of several coordinates."""
 
 import argparse
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from study.commands.command import progress
@@ -14,9 +15,9 @@ from study.commands.record_arguments import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
-    from study.equations.model import Model, ModelTerm
+    from study.equations.model import Model
     from study.equations.term import Term
     from study.explore.placed_session import PlacedSession
     from study.structure.prepared_structure import PreparedStructure
@@ -175,24 +176,25 @@ def _listed(files: "Mapping[str, bytes]") -> str:
     return ", ".join(name for name in files if not name.endswith(".svg"))
 
 
+@dataclass(frozen=True)
+class Change:
+    """One term more or less."""
+
+    model: "Model"
+    follow: "Callable[[StructureComparison], StructureComparison]"  # beginning where the fit without the change ended
+    told: dict[str, str]  # in the history: what was ``added`` or ``dropped``
+
+
 def add(arguments: argparse.Namespace, model: "Model") -> None:
     """``study add`` to a structure."""
     from study.compare import history
-    from study.compare.comparison_report import as_json
     from study.equations import layout, terms
     from study.equations.model import free
     from study.equations.model_file import text_with
-    from study.structure.structure_comparison import (
-        compare_structure,
-        structure_document,
-        structure_history_step,
-        structure_summary,
-    )
     from study.structure.structure_verdict import added_term
     from study.support.errors import at
     from study.support.transaction import locked
 
-    folder = out_folder(arguments)
     term = terms.get(arguments.term) if arguments.force is None else terms.custom(arguments.term, arguments.force)
     with at(arguments.model):
         where: dict[object, object] = {"at": arguments.at} if arguments.at else {}
@@ -202,95 +204,44 @@ def add(arguments: argparse.Namespace, model: "Model") -> None:
         layout.check(model.with_term(entry))
     with locked(arguments.model):  # another run may have changed it meanwhile
         text, steps = text_with(arguments.model, entry), history.read_history(arguments.model)
-        if model.measured:
-            _add_measured(arguments, model, entry, text, steps)
-            return
-        comparisons: list[StructureComparison] = []
-        for prepared in prepared_structures(arguments, model):
-            before = compare_structure(model, prepared)
-            comparisons.append(added_term(before, entry))
-            steps = history.with_step(
-                steps, structure_history_step(before), structure_history_step(comparisons[-1], entry.name)
-            )
-        page = as_json(structure_document(comparisons[-1]))
-        written_together(arguments, text, steps, page, folder)
-    print("\n\n".join(structure_summary(c) for c in comparisons))
-    print("\n" + history.history_table(steps))
-
-
-def _add_measured(
-    arguments: argparse.Namespace, model: "Model", entry: "ModelTerm", text: str, steps: "list[dict[str, Any]]"
-) -> None:
-    """The same where the linear part is as measured."""
-    from study.compare import history
-    from study.compare.comparison_report import as_json
-    from study.structure.measured_comparison import (
-        MeasuredComparison,
-        compare_measured,
-        measured_document,
-        measured_step,
-        measured_summary,
-    )
-
-    comparisons: list[MeasuredComparison] = []
-    for prepared in prepared_structures(arguments, model):
-        before = compare_measured(model, prepared)
-        comparisons.append(compare_measured(model.with_term(entry), prepared))
-        steps = history.with_step(steps, measured_step(before), measured_step(comparisons[-1], entry.name))
-    written_together(arguments, text, steps, as_json(measured_document(comparisons[-1])), out_folder(arguments))
-    print("\n\n".join(measured_summary(c) for c in comparisons))
-    print("\n" + history.history_table(steps))
+        changed = Change(model.with_term(entry), lambda before: added_term(before, entry), {"added": entry.name})
+        _revise(arguments, model, changed, text, steps)
 
 
 def drop(arguments: argparse.Namespace, model: "Model", name: str, text: str) -> None:
     """``study drop`` from a structure; ``text`` is the model file's without the term."""
     from study.compare import history
-    from study.compare.comparison_report import as_json
     from study.structure.placed_dropping import dropped_term
-    from study.structure.structure_comparison import (
-        compare_structure,
-        structure_document,
-        structure_history_step,
-        structure_summary,
-    )
 
-    folder, steps = out_folder(arguments), history.read_history(arguments.model)
-    if model.measured:
-        _drop_measured(arguments, model, name, text, steps)
-        return
-    comparisons: list[StructureComparison] = []
-    for prepared in prepared_structures(arguments, model):
-        before = compare_structure(model, prepared)
-        comparisons.append(dropped_term(before, name))
-        steps = history.with_step(
-            steps, structure_history_step(before), structure_history_step(comparisons[-1], dropped=name)
-        )
-    written_together(arguments, text, steps, as_json(structure_document(comparisons[-1])), folder)
-    print("\n\n".join(structure_summary(c) for c in comparisons))
-    print("\n" + history.history_table(steps))
+    steps = history.read_history(arguments.model)
+    changed = Change(model.without_term(name), lambda before: dropped_term(before, name), {"dropped": name})
+    _revise(arguments, model, changed, text, steps)
 
 
-def _drop_measured(
-    arguments: argparse.Namespace, model: "Model", name: str, text: str, steps: "list[dict[str, Any]]"
-) -> None:
-    """The same where the linear part is as measured; its modes are fitted anew."""
+def _revise(
+    arguments: argparse.Namespace, model: "Model", change: Change, text: str, steps: "list[dict[str, Any]]"
+) -> None:  # fmt: skip
+    """Compare a model and a changed one with all records; write the changed one with its history, and tell."""
     from study.compare import history
     from study.compare.comparison_report import as_json
-    from study.structure.measured_comparison import (
-        MeasuredComparison,
-        compare_measured,
-        measured_document,
-        measured_step,
-        measured_summary,
-    )
+    from study.structure import measured_comparison, structure_comparison
 
-    comparisons: list[MeasuredComparison] = []
+    folder, summaries, document = out_folder(arguments), list[str](), b""
     for prepared in prepared_structures(arguments, model):
-        before = compare_measured(model, prepared)
-        comparisons.append(compare_measured(model.without_term(name), prepared))
-        steps = history.with_step(steps, measured_step(before), measured_step(comparisons[-1], dropped=name))
-    written_together(arguments, text, steps, as_json(measured_document(comparisons[-1])), out_folder(arguments))
-    print("\n\n".join(measured_summary(c) for c in comparisons))
+        if model.measured:  # its modes are fitted anew
+            linear, after = (measured_comparison.compare_measured(m, prepared) for m in (model, change.model))
+            told = (measured_comparison.measured_step(linear), measured_comparison.measured_step(after, **change.told))
+            document = as_json(measured_comparison.measured_document(after))
+            summaries.append(measured_comparison.measured_summary(after))
+        else:
+            before = structure_comparison.compare_structure(model, prepared)
+            revised, step = change.follow(before), structure_comparison.structure_history_step
+            told = (step(before), step(revised, **change.told))
+            document = as_json(structure_comparison.structure_document(revised))
+            summaries.append(structure_comparison.structure_summary(revised))
+        steps = history.with_step(steps, *told)
+    written_together(arguments, text, steps, document, folder)
+    print("\n\n".join(summaries))
     print("\n" + history.history_table(steps))
 
 

@@ -19,7 +19,7 @@ from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.motion_start import from_the_motion, has_lost_the_motion
+from study.identify.time_domain.motion_start import from_the_motion
 from study.identify.time_domain.no_response import (
     LINEAR,
     SURE,
@@ -191,8 +191,7 @@ def with_term(fit: FreeRunFit, entry: ModelTerm, base: Baseline, prepared: Prepa
         raise StudyError(
             f"no values of {missing} let {entry.name} follow {prepared.record.name}; give them in the model file"
         ) from None
-    found = from_the_motion(best, prepared) if has_lost_the_motion(best, prepared) else best
-    return replace(found, elsewhere=(*best.elsewhere, *fit.elsewhere))
+    return replace(from_the_motion(best, prepared), elsewhere=(*best.elsewhere, *fit.elsewhere))
 
 
 def best_fit(

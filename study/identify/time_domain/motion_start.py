@@ -20,20 +20,21 @@ from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 
 Floats = NDArray[np.float64]
-LOST = 0.5  # of the power of a response: a fit that leaves more has lost the motion
 
 
 def has_lost_the_motion(fit: FreeRunFit, prepared: Prepared) -> bool:
-    """Whether a driven model leaves more than half of the response's power, and that as smooth as a motion."""
+    """Whether a driven model leaves more of the response's power than it explains, and that as smooth as a motion."""
     driven = not (prepared.free or prepared.response == FORCE or prepared.record.stretches)
-    return driven and fit.rms**2 > LOST * prepared.spread**2 and is_smooth(fit.residual)
+    return driven and 2.0 * fit.rms**2 > prepared.spread**2 and is_smooth(fit.residual)
 
 
 def from_the_motion(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
-    """The fit, or one in segments begun at the measured motion where these leave nothing like a motion of it.
+    """The fit; where it has lost the motion, one in segments begun there if these leave nothing like a motion.
 
     Segments with states of their own leave less than one free run of any model, and that says nothing for it.
     """
+    if not has_lost_the_motion(fit, prepared):
+        return fit
     try:
         start = motion_start(fit.model, prepared, fit.held)
         apart = fit_in_segments(

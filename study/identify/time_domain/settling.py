@@ -10,7 +10,7 @@ from study.equations.model import Model
 from study.equations.substeps import needed_steps
 from study.identify.frequency_domain.starting_values import linear_start
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.motion_start import from_the_motion, has_lost_the_motion
+from study.identify.time_domain.motion_start import from_the_motion
 from study.identify.time_domain.multiple_shooting import fit_in_segments, is_chaotic
 from study.identify.time_domain.part_fit import STEPS, covariance_of, fit_part, integration_shift, linearise
 from study.identify.time_domain.stretch_states import POOR, is_poor
@@ -39,30 +39,23 @@ def continued(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
 
 def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit at its minimum with enough steps; in segments where a chaotic system loses the motion in one run."""
-    return replace(_settled(with_enough_steps(fit, prepared), prepared), elsewhere=fit.elsewhere)
+    return replace(
+        from_the_motion(_settled(with_enough_steps(fit, prepared), prepared), prepared), elsewhere=fit.elsewhere
+    )
 
 
 def _settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
-    found = _one_or_segments(fit, prepared)
-    return from_the_motion(found, prepared) if has_lost_the_motion(found, prepared) else found
-
-
-def _one_or_segments(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     if prepared.response == FORCE or _stands(fit, prepared):
         return fit
     if is_chaotic(fit, prepared):
-        apart = _in_segments(fit, prepared)
-        if apart is None or (fit.converged and not _more_than_states(apart, fit)):
-            return fit
-        return apart if apart.converged or apart.rms < LOST * fit.rms else fit
+        apart = _in_segments(fit, prepared, fit)
+        return apart if apart is not None and (apart.converged or apart.rms < LOST * fit.rms) else fit
     near = from_segments(fit.model, prepared, fit.held, fit.steps_per_sample)
     best = better_fit(fit, near) or fit
     if near is None or _stands(best, prepared) or not is_chaotic(near, prepared):
         return best
-    apart = _in_segments(near, prepared)  # a fit at wrong values may be regular where the true system is chaotic
-    if apart is None or (best.converged and not _more_than_states(apart, best)):
-        return best
-    return apart if apart.converged else best
+    apart = _in_segments(near, prepared, best)  # a fit at wrong values may be regular where the true system is chaotic
+    return apart if apart is not None and apart.converged else best
 
 
 def _more_than_states(apart: FreeRunFit, fit: FreeRunFit) -> bool:
@@ -71,8 +64,11 @@ def _more_than_states(apart: FreeRunFit, fit: FreeRunFit) -> bool:
     return apart.rms**2 < freedom * fit.rms**2
 
 
-def _in_segments(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit | None:
-    """Multiple shooting from where a fit stands, made one free run where that stands; None where it fails as well."""
+def _in_segments(fit: FreeRunFit, prepared: Prepared, best: FreeRunFit) -> FreeRunFit | None:
+    """Multiple shooting from where a fit stands, made one free run where that stands.
+
+    None where it fails as well, or the best free run so far leaves no more than chance beside so many states.
+    """
     try:
         apart = fit_in_segments(
             fit.model, prepared.record, held=fit.held, response=prepared.response, span=prepared.plan.fit,
@@ -85,6 +81,8 @@ def _in_segments(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit | None:
         return None
     if _stands(together, prepared) or (together.converged and not _more_than_states(apart, together)):
         return together
+    if best.converged and not _more_than_states(apart, best):
+        return None
     return apart if apart.rms <= fit.rms else None  # with a state for each segment, what ends worse is lost
 
 
