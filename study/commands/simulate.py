@@ -2,7 +2,6 @@
 
 import argparse
 import math
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -63,7 +62,8 @@ def _run(arguments: argparse.Namespace) -> None:
         model.numbers()
     excitation = Excitation(level=arguments.level, cutoff=arguments.cutoff)
     history = force(excitation, arguments.samples, arguments.dt, arguments.seed)
-    steps = arguments.steps or _enough(model.numbers(), arguments.dt)
+    values = model.numbers()
+    steps = arguments.steps or _enough(math.sqrt(abs(values.get("k", 0.0)) / values["m"]), arguments.dt)
     record = simulate(model, history, arguments.dt, Integrator(steps_per_sample=steps))
     with replacing(arguments.out) as beside:
         write_csv(record, beside)
@@ -87,20 +87,21 @@ def _structure(model: "Model", arguments: argparse.Namespace) -> None:
         name: force(excitation, arguments.samples, arguments.dt, arguments.seed + i)
         for i, (name, _) in enumerate(model.forces)
     }
-    record = simulate_structure(model, forces, arguments.dt, steps_per_sample=arguments.steps)
+    modes = modes_of(model)
+    steps = arguments.steps or _enough(2.0 * math.pi * modes.frequency.max(), arguments.dt)
+    record = simulate_structure(model, forces, arguments.dt, steps_per_sample=steps)
     with replacing(arguments.out) as beside:
         write_structure_csv(record, beside)
     driven = ", ".join(f"{name} at {where} of rms {forces[name].std():.4g} N" for name, where in model.forces)
     print(f"{arguments.out}: {len(record)} samples, {arguments.samples * arguments.dt:g} s of {model.name}, {driven}")
-    print(modes_table(modes_of(model), model.coordinates))
+    print(modes_table(modes, model.coordinates))
 
 
-def _enough(values: "Mapping[str, float]", dt: float) -> int:
-    """Steps per sample in which the linear system turns by no more than :data:`TURN`.
+def _enough(rate: float, dt: float) -> int:
+    """Steps per sample in which the linear system, of ``rate`` rad/s at most, turns by no more than :data:`TURN`.
 
     An integrator of order four errs by about the fourth power of that: what it leaves would be taken for an effect.
     """
-    rate = math.sqrt(abs(values.get("k", 0.0)) / values["m"])
     return min(max(USUAL, math.ceil(rate * dt / TURN)), MOST_STEPS)
 
 
