@@ -178,7 +178,7 @@
   let hovered = null
   document.addEventListener("click", (event) => {
     const candidate = under(event, "candidate")
-    if (candidate && !under(event, "act")) pin(Number(candidate.dataset.candidate))
+    if (candidate && window.study.ready && !under(event, "act")) pin(Number(candidate.dataset.candidate))
   })
   document.addEventListener("mouseover", (event) => {
     const element = under(event, "candidate"), next = element ? Number(element.dataset.candidate) : null
@@ -186,7 +186,7 @@
   })
   document.addEventListener("focusin", (event) => {
     const element = under(event, "candidate")
-    if (element) preview((hovered = Number(element.dataset.candidate)))
+    if (element && window.study.ready) preview((hovered = Number(element.dataset.candidate)))
   })
   document.addEventListener("keydown", (event) => {
     if (event.key === "Escape") { clear(); hovered = null; for (const i of pins) pin(i); preview(null) }

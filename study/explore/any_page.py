@@ -17,6 +17,7 @@ from study.explore import theme, words
 from study.explore.any_session import AnySession
 from study.explore.axis_scales import Columns
 
+ROOT = "study"  # of a document
 Row = tuple[str, str, Any]  # a model's name, one of its properties, and the value that a stage gives it
 Draw = Callable[[Mapping[str, ColumnDataSource], Range1d], dict[str, Any]]
 EMPTY: Columns = {"f": [0.0, 1.0], "zero": [0.0, 0.0]} | {n: [np.nan, np.nan] for n in ("value", "low", "high")}
@@ -28,10 +29,14 @@ DECADES = 300.0  # from the end of an axis of frequency down to its first decade
 
 @dataclass(frozen=True)
 class Page:
-    """A page of one document: what is drawn, by name, and the figures, by the name of their place in the template."""
+    """A page of one document: what is drawn, by name, and the figures, by the name of their place in the template.
+
+    The document has one root, which a browser draws nothing of: the page's script draws the panels, first those in view.
+    """
 
     sources: dict[str, ColumnDataSource]
     panels: dict[str, Any]
+    further: list[Any]  # what no panel draws and the script reads
 
     def show(self, columns: Mapping[str, Columns], history: Columns) -> None:
         """Draw another model; the words come last, since the page begins anew when they change."""
@@ -42,16 +47,23 @@ class Page:
         self.panels["history"].height = history_height(len(history["name"]))
         self.sources["words"].data = columns["words"]
 
-    def placed(self, diagnosed: bool) -> list[Any]:
-        """The panels that the template has places for."""
-        return [panel for name, panel in self.panels.items() if diagnosed or name != "constancy"]
+    def root(self, diagnosed: bool) -> ColumnDataSource:
+        """What holds all of it; a page that nobody diagnoses has no place for the constancy of a coefficient."""
+        panels = [panel for name, panel in self.panels.items() if diagnosed or name != "constancy"]
+        return ColumnDataSource(name=ROOT, tags=[*panels, *self.sources.values(), *self.further])
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """What the template takes from the page: its words, and the pixels kept free for each panel until it is drawn."""
+        words = self.sources["words"].data
+        said = dict(zip(words["place"], words["html"], strict=True))
+        return {"said": said, "heights": {name: panel.height for name, panel in self.panels.items()}}
 
     def lay(self, document: Document, name: str, values: Mapping[str, Any]) -> None:
         """Put panels, the template of this name and words into an empty document."""
-        for panel in self.placed(values["diagnosed"]):
-            document.add_root(panel)
+        document.add_root(self.root(values["diagnosed"]))
         document.title, document.template = values["title"], template(name)
-        document.template_variables.update(values)
+        document.template_variables.update({**values, **self.given})
         self.sources["words"].js_on_change("data", CustomJS(code="window.study.words()"))
 
 
@@ -66,13 +78,11 @@ def page_of(
     axis = theme.fixed("range_frequency", 0.0, frequencies[1])
     axis.tags = [frequencies[0]]  # where a logarithmic one begins
     panels = draw(sources, axis)
-    # What no panel draws has to hang on one all the same, to be part of the document.
     tickers = [
         BasicTicker(name="frequency_even", desired_num_ticks=4),
         FixedTicker(name="frequency_decades", ticks=[], minor_ticks=[]),
     ]
-    panels["history"].tags = [*sources.values(), *stores, *tickers]
-    return Page(sources, panels)
+    return Page(sources, panels, [*stores, *tickers])
 
 
 def frame(rows: Sequence[Row], frequencies: tuple[float, float], ends: Mapping[str, tuple[float, float]]) -> Columns:

@@ -9,6 +9,7 @@ import logging
 import time
 from typing import Any
 
+from bokeh.resources import Resources
 from bokeh.server.tornado import BokehTornado
 from bokeh.util.token import check_token_signature, get_token_payload
 from tornado.httputil import HTTPServerRequest
@@ -29,6 +30,12 @@ class GuardedTornado(BokehTornado):
         super().__init__(
             applications, secret_key=key, sign_sessions=True, extra_websocket_origins=sorted(self.hosts), **options
         )
+
+    def resources(self, absolute_url: str | bool | None = None) -> Resources:
+        """Scripts of Bokeh that the page asks for: it has no widgets, tables, formulas or WebGL."""
+        found = super().resources(absolute_url)
+        found.components = ["bokeh"]
+        return found
 
     def find_handler(self, request: HTTPServerRequest, **options: Any) -> Any:
         """The handler of a request, or one that refuses it."""

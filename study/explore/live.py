@@ -90,23 +90,26 @@ class AloneScene:
 
 
 class Watcher:
-    """One document that follows the desk and passes on what is clicked."""
+    """One page that follows the desk and passes on what is clicked: made ahead, and laid in the document of a visit."""
 
-    def __init__(
-        self, desk: Desk[Any], document: Document, scene: Callable[[Any, Sequence[ColumnDataSource]], Scene]
-    ) -> None:
-        self.desk, self.document = desk, document
+    def __init__(self, desk: Desk[Any], scene: Callable[[Any, Sequence[ColumnDataSource]], Scene]) -> None:
+        self.desk = desk
         self.shown = desk.session
         self.asked = ColumnDataSource({"act": [], "name": [], "count": []}, name="asked")
         self.state = ColumnDataSource(self._state(), name="state")
         self.scene = scene(self.shown, [self.asked, self.state])
-        with document.models.freeze():  # what belongs to the document is gathered once, not anew for each panel
+        self.state.js_on_change("data", CustomJS(code="window.study.state()"))
+
+    def lay(self, document: Document) -> None:
+        """Put the page into an empty document, as the desk stands now."""
+        self.document = document
+        self._draw()
+        with document.models.freeze():  # what belongs to the document is gathered once
             self.scene.lay(document)
             document.js_on_event("document_ready", CustomJS(code="window.study.begin()"))
-            self.state.js_on_change("data", CustomJS(code="window.study.state()"))
             self.asked.on_change("data", self._passed_on)
-        desk.watch(self, self._changed)
-        document.on_session_destroyed(lambda _: desk.leave(self))
+        self.desk.watch(self, self._changed)
+        document.on_session_destroyed(lambda _: self.desk.leave(self))
 
     def _state(self) -> dict[str, Any]:
         state, many = self.desk.state, len(self.shown.stages) > 1
@@ -120,13 +123,16 @@ class Watcher:
         self.document.add_next_tick_callback(self._show)
 
     def _show(self) -> None:
-        session = self.desk.session
         self.document.hold("combine")
+        self._draw()
+        self.document.unhold()
+
+    def _draw(self) -> None:
+        session = self.desk.session
         if session is not self.shown:
             self.shown = session
             self.scene.show(session)
         self.state.data = self._state()
-        self.document.unhold()
 
     def _passed_on(self, _attribute: str, _old: object, new: dict[str, list[Any]]) -> None:
         act, name = (new[key][0] if new[key] else "" for key in ("act", "name"))

@@ -114,6 +114,32 @@ window.study = (() => {
     }
   }
 
+  // ---- panels are drawn one by one: first those in view, then, while nothing else is done, whichever is next to it
+  const waiting = () => [...document.querySelectorAll("[data-panel]:not(.drawn)")]
+  const next = () => new Promise((done) => requestIdleCallback(done, {timeout: 1000}))
+
+  function beyond(shown) {
+    const box = shown.getBoundingClientRect()
+    return Math.max(0, box.top - innerHeight, -box.bottom)  // pixels from the view
+  }
+
+  async function draw(shown) {
+    shown.classList.add("drawn")
+    const view = await Bokeh.documents[0].views_manager.build_view(model(`panel_${shown.dataset.panel}`))
+    view.build(shown)
+    shown.style.height = ""
+    untabbed(shown)
+    setTimeout(() => untabbed(shown), 1500)  // tools come after it
+  }
+
+  async function draw_rest() {
+    for (let left = waiting(); left.length; left = waiting()) {
+      await next()
+      await draw(left.reduce((a, b) => (beyond(b) < beyond(a) ? b : a)))
+    }
+    window.study.drawn = true
+  }
+
   // Tools of the panels are for the mouse: the Tab key goes from one action to the next.
   function untabbed(root) {
     for (const element of root.querySelectorAll("*")) {
@@ -153,7 +179,7 @@ window.study = (() => {
 
   const under = (event, key) => event.composedPath().find((e) => e.dataset && e.dataset[key] !== undefined)
   document.addEventListener("click", (event) => {
-    const element = under(event, "act")
+    const element = window.study.ready && under(event, "act")  // words are there before what draws them anew
     if (element && !element.disabled)
       act(element.dataset.act, element.dataset.act === "try" ? place("formula").value : element.dataset.name ?? "")
   })
@@ -161,13 +187,13 @@ window.study = (() => {
     if (event.key === "Enter" && event.target.id === "formula") act("try", event.target.value)
   })
 
-  const begin = () => {
+  const begin = async () => {
     window.study.words()
     if (model("state")) { state(); put("asked", {act: ["hello"], name: [""], count: [++count]}) }
     buttons()
-    for (const shown of document.querySelectorAll("[data-panel]")) untabbed(shown)
-    setTimeout(() => { for (const shown of document.querySelectorAll("[data-panel]")) untabbed(shown) }, 1500)
+    for (const shown of waiting()) if (beyond(shown) === 0) await draw(shown)
     window.study.ready = true
+    await draw_rest()
   }
-  return {stage, step, begin, state, follow, said, under, model, column, put, place, DRAWN, ready: false}
+  return {stage, step, begin, state, follow, said, under, model, column, put, place, DRAWN, ready: false, drawn: false}
 })()

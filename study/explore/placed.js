@@ -65,7 +65,7 @@
   }
 
   function clicked(event) {
-    if (under(event, "act")) return
+    if (!window.study.ready || under(event, "act")) return
     const link = event.target.closest?.("#sketch [data-place]"), chosen = under(event, "row")
     if (link) { moved = true; select(link.dataset.place) }
     if (chosen) { moved = true; candidate(chosen.dataset.row); select(chosen.dataset.at) }

@@ -11,7 +11,7 @@ from bokeh.resources import Resources
 
 from study.compare.comparison import Comparison
 from study.explore import html_page
-from study.explore.any_page import Page, history_columns, template
+from study.explore.any_page import ROOT, Page, history_columns, template
 from study.explore.axis_scales import Columns
 from study.explore.by_record import worst
 from study.explore.session import Session, begin_with
@@ -45,18 +45,15 @@ def stored(columns: Mapping[tuple[int, int], Mapping[str, Columns]], history: Co
 
 def as_file(made: Page, name: str, values: Mapping[str, Any]) -> bytes:
     """A page as a file that needs no server; each panel has its place in the template of this name by its own."""
-    document, panels = Document(), made.placed(values["diagnosed"])
-    with document.models.freeze():  # what belongs to the document is gathered once, not anew for each panel
-        for panel in panels:
-            document.add_root(panel)
+    document, root = Document(), made.root(values["diagnosed"])
+    document.add_root(root)
     document.js_on_event("document_ready", CustomJS(code="window.study.begin()"))
     content, ids = _numbered(document.to_json(deferred=False))
-    roots = {p.name: SimpleNamespace(id=ids[p.id], elementid=f"study-{p.name}") for p in panels}
-    items = [{"docid": "study", "roots": {r.id: r.elementid for r in roots.values()},
-              "root_ids": [r.id for r in roots.values()]}]  # fmt: skip
+    place = SimpleNamespace(id=ids[root.id], elementid="study-root")
+    items = [{"docid": "study", "roots": {place.id: place.elementid}, "root_ids": [place.id]}]
     script = EMBED.format(docs=_in_script({"study": content}), items=_in_script(items))
     text = template(name).render(
-        **values, roots=roots, plot_script=f"<script>{script}</script>",
+        **values, **made.given, roots={ROOT: place}, plot_script=f"<script>{script}</script>",
         bokeh_js=Resources(mode="inline", components=["bokeh"], minified=True, log_level="error").render_js(),
     )  # fmt: skip
     return text.encode()

@@ -3,6 +3,7 @@
 import errno
 import secrets
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 from bokeh.application import Application
@@ -21,6 +22,7 @@ from study.support.errors import StudyError
 HOST = "127.0.0.1"
 USUAL = 5006
 LARGEST = 1_000_000  # bytes of a request: a page sends none
+AGAIN = 5.0  # seconds after a visit in which its page is drawn, before one is made for the next
 DAY = 86400  # seconds within which a page that was fetched must open its socket
 
 
@@ -33,13 +35,23 @@ def serve(
     is taken, any.
     """
 
+    ahead = ThreadPoolExecutor(1, "page")
+    made: list[Future[Watcher]] = []  # pages that wait for a visit: one is made before the browser has opened
+
+    def make() -> None:
+        made.append(ahead.submit(Watcher, desk, scene))
+
     def show(document: Document) -> None:
-        Watcher(desk, document, scene)
+        page = made.pop().result() if made else Watcher(desk, scene)
+        page.lay(document)
+        if not made:
+            IOLoop.current().call_later(AGAIN, make)
 
     application = Application(FunctionHandler(show))
     one_line_each()
     server, bound = _bound(application, port)
     server.start()
+    make()
     desk.diagnose()
     loop: Any = server.io_loop  # Tornado leaves what its callbacks give back untyped
     loop.add_callback(ready, f"http://{HOST}:{bound}/")
@@ -47,6 +59,7 @@ def serve(
         loop.start()
     finally:
         desk.close()
+        ahead.shutdown(wait=False, cancel_futures=True)
         server.stop()
 
 

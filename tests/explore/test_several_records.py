@@ -155,7 +155,8 @@ def test_the_saved_page_and_the_tables_hold_every_record(grown, monkeypatch):
 
 def test_the_live_page_turns_to_the_record_that_is_asked_for(grown, tmp_path):
     desk = Desk(grown, tmp_path / "rig.yaml", model_file.format_model(BELIEVED), tmp_path / "out")
-    watcher = Watcher(desk, Document(), AloneScene)
+    watcher = Watcher(desk, AloneScene)
+    watcher.lay(Document())
     scene = watcher.scene
     assert isinstance(scene, AloneScene)
     for place, name in ((1, "high"), (0, "low")):
