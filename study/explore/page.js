@@ -25,6 +25,7 @@ window.study = (() => {
       framed[key] = values[i]
       if (target && before !== values[i]) target[properties[i]] = values[i]
     }
+    catch_up()
   }
 
   // ---- the coefficient of a candidate along frequency: the rows `keep` of a table that holds all
@@ -123,13 +124,40 @@ window.study = (() => {
     return Math.max(0, box.top - innerHeight, -box.bottom)  // pixels from the view
   }
 
+  // ---- what is out of view is painted anew when it comes near it, or after what is in view
+  const views = new Map(), resting = new Set(), NEAR = 200, SETTLED = 1500  // pixels; milliseconds
+  function rest(shown, on) {
+    if (on === resting.has(shown)) return
+    resting[on ? "add" : "delete"](shown)
+    if (on) views.get(shown).pause()
+    else views.get(shown).unpause()
+  }
+  const watched = new IntersectionObserver(
+    (all) => { for (const {target, isIntersecting} of all) rest(target, !isIntersecting) }, {rootMargin: `${NEAR}px`})
+  const frame = () => new Promise(requestAnimationFrame)
+
+  let turn = 0
+  async function catch_up() {
+    const mine = ++turn
+    for (const shown of [...resting]) {
+      await next()
+      rest(shown, false)
+      await frame()
+      await frame()
+      rest(shown, beyond(shown) > NEAR)
+      if (mine !== turn) return
+    }
+  }
+  addEventListener("beforeprint", () => { for (const shown of [...resting]) rest(shown, false) })
+
   async function draw(shown) {
     shown.classList.add("drawn")
     const view = await Bokeh.documents[0].views_manager.build_view(model(`panel_${shown.dataset.panel}`))
     view.build(shown)
     shown.style.height = ""
-    untabbed(shown)
-    setTimeout(() => untabbed(shown), 1500)  // tools come after it
+    untabbed(shown)  // and its tools, which come later
+    views.set(shown, view)
+    setTimeout(() => { untabbed(shown); watched.observe(shown) }, SETTLED)
   }
 
   async function draw_rest() {
