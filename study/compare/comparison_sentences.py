@@ -9,7 +9,7 @@ from study.compare.along_time import AlongTime
 from study.compare.comparison import Comparison
 from study.compare.growth import Growth, Growths
 from study.compare.noise import SCATTER
-from study.support.numbers import percent
+from study.support.numbers import by_chance, percent
 
 NEGLIGIBLE = 2e-3  # of the rms response: structure below this is no evidence that something is missing
 CHANCE = 0.01  # p value below which a change along the record is no chance
@@ -26,9 +26,9 @@ NAMES = {0: "constant size", 2: "square", 3: "cube", 4: "fourth power", 5: "fift
 PARITY = {"odd": "odd in it", "even": "even in it"}
 
 
-def comparison_in_words(comparison: Comparison) -> str:
-    """What a user should know of one record, in two or three sentences."""
-    sentences = [_how_good(comparison)]
+def comparison_in_words(comparison: Comparison, diagnosed: bool = False) -> str:
+    """What a user should know of one record, in two or three sentences; ``diagnosed`` if its reader has that too."""
+    sentences = [_how_good(comparison, diagnosed)]
     if comparison.prediction.error >= HOPELESS:
         sentences.append(_least(comparison))
     elif comparison.prediction.structure > NEGLIGIBLE:
@@ -55,7 +55,7 @@ def _plain(number: float) -> str:
     return np.format_float_positional(float(f"{number:.2g}"), trim="-")
 
 
-def _how_good(comparison: Comparison) -> str:
+def _how_good(comparison: Comparison, diagnosed: bool) -> str:
     error, floor = percent(comparison.prediction.error), percent(comparison.prediction.floor)
     start = f"the model misses the response by {error} of its rms"
     if comparison.prediction.error >= HOPELESS:
@@ -66,7 +66,7 @@ def _how_good(comparison: Comparison) -> str:
         )
     if comparison.prediction.noise.alone:
         source = " (from the scatter between periods)" if comparison.prediction.noise.source == SCATTER else ""
-        doubt = "" if source else "; 'study diagnose' looks closer"
+        doubt = "" if source or diagnosed else "; 'study diagnose' looks closer"
         return f"{start}, and that is noise{source}: nothing stands above the noise floor of {floor}{doubt}"
     if comparison.prediction.structure <= NEGLIGIBLE:
         return (
@@ -145,12 +145,12 @@ def _power(way: Growth, whole: int | None) -> str:
 
 def _along(along: AlongTime) -> str:
     if along.p_value >= CHANCE:
-        return f"it does not change along the record (p = {along.p_value:.2g})"
+        return f"it does not change along the record ({by_chance(along.p_value)})"
     if along.confounded:
         return "it changes along the record, but so does the level, and the two cannot be told apart here"
     worst = max(along.stretches, key=lambda s: s.ratio)
     return (
-        f"it changes along the record (p = {along.p_value:.1g}) and is largest from {worst.begin:.4g} to "
+        f"it changes along the record ({by_chance(along.p_value)}) and is largest from {worst.begin:.4g} to "
         f"{worst.end:.4g} s, {worst.ratio:.2g} times the power that is usual at that level"
     )
 

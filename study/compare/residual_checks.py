@@ -17,6 +17,7 @@ from study.support.arrays import Floats
 
 LAGS = 100  # to each side, at most
 LEVEL = 0.99  # of the bands, at each lag
+QUANTILE = float(ndtri(0.5 + LEVEL / 2.0))
 BINS = 41
 REACH = 4.0  # standard deviations of the histogram
 
@@ -35,25 +36,46 @@ class ResidualChecks:
     counts: Floats  # share of the samples over the width of a bin: a normal density if it is one; shape (bins,)
 
 
+@dataclass(frozen=True)
+class OwnChecks:
+    """What a residual shows of itself: see :class:`ResidualChecks`, whose names these are."""
+
+    lag: Floats
+    autocorrelation: Floats
+    band: float
+    edges: Floats
+    counts: Floats
+
+
+def own_checks(residual: Floats, dt: float) -> OwnChecks:
+    """Autocorrelation at lags in seconds, and distribution, of a residual of shape (n,) every ``dt`` seconds."""
+    n, lags = len(residual), _lags(residual)
+    residual = residual - np.mean(residual)
+    own = cross_correlation(residual, residual, lags)[lags - 1 :]
+    edges = np.linspace(-REACH, REACH, BINS + 1).astype(np.float64)
+    counts = np.histogram(residual / (float(np.std(residual)) or 1.0), edges)[0] / (n * (edges[1] - edges[0]))
+    return OwnChecks(dt * np.arange(lags, dtype=np.float64), own, QUANTILE / np.sqrt(n), edges, counts)
+
+
+def _lags(residual: Floats) -> int:
+    return min(LAGS, len(residual) // 4)
+
+
 def residual_checks(prediction: Prediction) -> ResidualChecks:
     """The checks of the residual on the judging part."""
     prepared, residual = prediction.prepared, prediction.residual
     residual = residual - np.mean(residual)
     force = prepared.record[drive_of(prepared)][slice(*prepared.plan.judge)]
     force = force - np.mean(force)
-    n, lags = len(residual), min(LAGS, len(residual) // 4)
+    n, lags, alone = len(residual), _lags(residual), own_checks(residual, prediction.dt)
     own, drive = cross_correlation(residual, residual, lags), cross_correlation(force, force, lags)
     both = cross_correlation(residual, force, lags)
-    quantile = float(ndtri(0.5 + LEVEL / 2.0))
     # n times the variance of an estimated cross-correlation is the sum of the autocorrelations' products (Ljung, 16.6)
     spread = max(float(np.sum(own * drive)), 0.0)
-    scaled = residual / (float(np.std(residual)) or 1.0)
-    edges = np.linspace(-REACH, REACH, BINS + 1).astype(np.float64)
-    counts = np.histogram(scaled, edges)[0] / (n * (edges[1] - edges[0]))
     steps = prediction.dt * np.arange(-(lags - 1), lags, dtype=np.float64)
     return ResidualChecks(
-        steps[lags - 1 :], own[lags - 1 :], quantile / np.sqrt(n), steps, both, quantile * float(np.sqrt(spread / n)),
-        edges, counts,
+        alone.lag, alone.autocorrelation, alone.band, steps, both, QUANTILE * float(np.sqrt(spread / n)),
+        alone.edges, alone.counts,
     )  # fmt: skip
 
 

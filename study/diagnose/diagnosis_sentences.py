@@ -8,7 +8,7 @@ from study.diagnose.held_out import held_out_of, residual_held_out
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
 from study.figures.labels import term_names
-from study.support.numbers import percent
+from study.support.numbers import by_chance, percent
 from study.support.thresholds import ALPHA, UNSTEADY
 
 DEPENDENCE = 0.1  # held-out share from which the unexplained force is said to depend on something
@@ -97,8 +97,8 @@ def _unknown(diagnosis: Diagnosis) -> list[str]:
 
 def _doubt(row: Ranked, diagnosis: Diagnosis) -> str:
     if row.steadiness is not None and wavers(row.steadiness, len(diagnosis.candidates)):
-        change, p = percent(row.steadiness.spread()), row.steadiness.p_value()
-        return f"its coefficient changes with the amplitude by {change} (p = {p:.1g})"
+        change, chance = percent(row.steadiness.spread()), by_chance(row.steadiness.p_value())
+        return f"its coefficient changes with the amplitude by {change} ({chance})"
     if row.flatness is not None and row.flatness.spread() > UNSTEADY:
         return f"its coefficient changes with the frequency by {percent(row.flatness.spread())}"
     return f"what remains still depends on the motion, its past or time ({percent(diagnosis.left)} of the response)"

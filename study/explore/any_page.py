@@ -31,7 +31,7 @@ DECADES = 300.0  # from the end of an axis of frequency down to its first decade
 class Page:
     """A page of one document: what is drawn, by name, and the figures, by the name of their place in the template.
 
-    The document has one root, which a browser draws nothing of: the page's script draws the panels, first those in view.
+    The document has one root, of which Bokeh draws nothing: the page's script draws the panels, those in view first.
     """
 
     sources: dict[str, ColumnDataSource]
@@ -54,7 +54,7 @@ class Page:
 
     @property
     def given(self) -> dict[str, Any]:
-        """What the template takes from the page: its words, and the pixels kept free for each panel until it is drawn."""
+        """What the template takes from it: words, and the pixels kept free for each panel until it is drawn."""
         words = self.sources["words"].data
         said = dict(zip(words["place"], words["html"], strict=True))
         return {"said": said, "heights": {name: panel.height for name, panel in self.panels.items()}}

@@ -7,7 +7,7 @@ import numpy as np
 from study.compare.comparison import Comparison
 from study.compare.decay import decays_of
 from study.compare.loops import loops
-from study.compare.residual_checks import residual_checks
+from study.compare.residual_checks import OwnChecks, ResidualChecks, residual_checks
 from study.compare.response_functions import response_functions
 from study.explore.axis_scales import Columns, Floats, Scales, heard
 from study.explore.decimate import BUCKETS
@@ -92,12 +92,18 @@ def _gapped(angle: Floats) -> Floats:
 
 def _checks(comparison: Comparison) -> dict[str, Columns]:
     found = residual_checks(comparison.prediction)
+    return by_itself(found) | {
+        "with_force": {"lag": found.lag_force, "value": found.with_force},
+        "with_force_band": _band(found.lag_force, found.band_force),
+    }
+
+
+def by_itself(found: OwnChecks | ResidualChecks) -> dict[str, Columns]:
+    """Autocorrelation and distribution of a residual, by the name of their source."""
     normal = np.linspace(float(found.edges[0]), float(found.edges[-1]), 81).astype(np.float64)
     return {
         "autocorrelation": {"lag": found.lag, "value": found.autocorrelation},
         "autocorrelation_band": _band(found.lag, found.band),
-        "with_force": {"lag": found.lag_force, "value": found.with_force},
-        "with_force_band": _band(found.lag_force, found.band_force),
         "histogram": {"left": found.edges[:-1], "right": found.edges[1:], "top": found.counts},
         "normal": {"x": normal, "y": np.exp(-0.5 * normal**2) / math.sqrt(2.0 * math.pi)},
     }

@@ -34,7 +34,7 @@
 
   function look(name) {
     sensor = name
-    for (const to of ["motion", "close", "spectrum"]) draw(`all_${to}`, to, name)
+    for (const to of ["motion", "close", "spectrum", "autocorrelation", "histogram"]) draw(`all_${to}`, to, name)
     const label = column("sensors", "unit")[column("sensors", "name").indexOf(name)]
     for (const axis of ["motion_y", "close_y"]) model(axis).axis_label = label
     model("difference_y").axis_label = label.replace(/^\S+/, "difference")

@@ -8,7 +8,7 @@ from bokeh.document import Document
 from bokeh.models import ColumnDataSource
 
 from study.compare.comparison_report import as_json
-from study.explore import any_session, placed_panels, placed_session, plots, theme
+from study.explore import any_session, check_plots, placed_panels, placed_session, plots, theme
 from study.explore.any_page import EMPTY, Page, frame, history_columns, history_ends, history_height, page_of
 from study.explore.any_page import variables as any_variables
 from study.explore.axis_scales import Columns
@@ -24,7 +24,7 @@ from study.structure.structure_pictures import diagnosis_pictures, structure_pic
 TEMPLATE = "placed.html"
 SHOWN = {  # of all places, sensors and candidates, by the source that the script fills with the selected one's
     "all_map": "map", "all_force": "force", "all_stiffness": "stiffness", "all_motion": "motion", "all_close": "close",
-    "all_spectrum": "spectrum",
+    "all_spectrum": "spectrum", "all_autocorrelation": "autocorrelation", "all_histogram": "histogram",
 }  # fmt: skip
 
 
@@ -61,6 +61,8 @@ def build(seen: PlacedView, lasting: Columns, stores: Sequence[ColumnDataSource]
             "stiffness": placed_panels.stiffness(s, frequency), "spectrum": placed_panels.spectrum(s, frequency),
             "motion": placed_panels.motion(s, time), "difference": placed_panels.difference(s, time),
             "close": placed_panels.close(s), "constancy": plots.constancy(s),
+            "autocorrelation": check_plots.correlation(s, "autocorrelation", "autocorrelation / 1"),
+            "histogram": check_plots.histogram(s),
         }  # fmt: skip
 
     given = {**columns(seen, lasting), **_selected(seen.columns), "history": lasting, "shown": EMPTY}

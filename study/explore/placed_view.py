@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 
 from study.compare.noise import segments_of
+from study.compare.residual_checks import own_checks
 from study.explore import decimate
 from study.explore.axis_scales import Columns, Floats
+from study.explore.check_columns import by_itself
 from study.explore.page_units import Scale, in_text, length, power, rate
 from study.explore.placed_session import PlacedStage
 from study.explore.placed_words import placed_words
@@ -53,6 +55,7 @@ def placed_view(stage: PlacedStage, step: int, live: bool = True) -> PlacedView:
         "all_stiffness": stiffness,
         "all_spectrum": _spectra(comparison),
         "all_constancy": _constancy(stage),
+        **_checks(comparison),
         "words": placed_words(stage, drawn, step, live),
     }  # fmt: skip
     force = in_text(forces.unit)
@@ -155,6 +158,20 @@ def _spectra(comparison: StructureComparison) -> Columns:
             yield str(sensor), values
 
     return _joined(parts(), ("f", "difference", "noise"))
+
+
+def _checks(comparison: StructureComparison) -> dict[str, Columns]:
+    """Autocorrelation and distribution of every sensor's residual; all have as many samples, so one band is for all."""
+    prediction = comparison.prediction
+    found = [by_itself(own_checks(x, prediction.prepared.dt)) for x in prediction.residual.T]
+
+    def parts(source: str) -> Iterator[tuple[str, Mapping[str, Floats]]]:
+        for sensor, columns in zip(prediction.prepared.sensors, found, strict=True):
+            yield str(sensor), columns[source]
+
+    each = {"autocorrelation": ("lag", "value"), "histogram": ("left", "right", "top")}
+    joined = {f"all_{source}": _joined(parts(source), names) for source, names in each.items()}
+    return {**joined, "autocorrelation_band": found[0]["autocorrelation_band"], "normal": found[0]["normal"]}
 
 
 def _maps(

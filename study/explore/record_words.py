@@ -7,9 +7,14 @@ from study.compare.across_levels import Level
 from study.compare.comparison import Comparison
 from study.explore.page_units import in_percent, in_text, number, with_error
 from study.explore.session import Stage
+from study.support.numbers import RARE, by_chance
 
 WAITING = "each record is being fitted by itself …"
 NOT_ASKED = "Not asked for here: <code>study compare</code> fits each record by itself."
+DIFFERS = (
+    "p: the share of records in which chance alone would make a coefficient that is one and the same differ as much; "
+    "p &lt; 0.001 is fewer than 1 of 1000."
+)
 OWN = "Error with coefficients of the record's own: far below the first, where the one model on all lacks something."
 
 
@@ -82,15 +87,20 @@ def _levels(stage: Stage, live: bool) -> str:
     unit = in_text(stage.comparison.record.units.get("force", ""))
     head = "".join(f"<th>{escape(name)}<small>{force} {escape(unit)}</small></th>" for name, force in columns)
     rows = "".join(_level(level) for level in found.levels)
-    return f"<table><tr><th></th>{head}<th>differs?</th></tr>{rows}</table>"
+    return f"<table><tr><th></th>{head}<th>differs?</th></tr>{rows}</table><p>{DIFFERS}</p>"
 
 
 def _level(level: Level) -> str:
     values = _cells(level.value, level.error)
-    answer = f"{'yes' if level.moves else 'no'}<small>p = {number(level.p_value, 1)}</small>"
+    answer = f"{'yes' if level.moves else 'no'}<small title='{by_chance(level.p_value)}'>{_p(level.p_value)}</small>"
     moves = " class='moves'" if level.moves else ""
     unit = f"<small>{escape(in_text(level.unit))}</small>"
     return f"<tr{moves}><th><i>{escape(_symbol(level.key))}</i>{unit}</th>{values}<td>{answer}</td></tr>"
+
+
+def _p(value: float) -> str:
+    """Nobody needs the digits of what is next to impossible."""
+    return f"p = {number(value, 1)}" if value >= RARE else "p &lt; 0.001"
 
 
 def _symbol(key: str) -> str:

@@ -34,7 +34,6 @@ def serve(
     ``scene`` draws a session of the desk's kind. A port of zero takes any that is free, None the usual one or, if that
     is taken, any.
     """
-
     ahead = ThreadPoolExecutor(1, "page")
     made: list[Future[Watcher]] = []  # pages that wait for a visit: one is made before the browser has opened
 

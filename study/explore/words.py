@@ -43,10 +43,10 @@ ONLY_NOISE = "What is left is noise: there is no missing force to show over disp
 
 def words(stage: Stage, rows: Sequence[Ranked], step: int, live: bool, force_unit: str) -> dict[str, Any]:
     """Every fragment of a model, as columns ``place`` and ``html``."""
-    comparison = stage.comparison
+    comparison, diagnosed = stage.comparison, live or stage.diagnosis is not None  # a live page diagnoses by itself
     fragments = {
         "figures": _figures(comparison),
-        "says": escape(in_sentence(comparison_in_words(comparison))),
+        "says": escape(in_sentence(comparison_in_words(comparison, diagnosed))),
         "verdict": _verdict(stage, live),
         "candidates": _candidates(stage, rows, live),
         "coefficients": _coefficients(stage, live),

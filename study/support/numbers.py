@@ -2,6 +2,7 @@
 
 import math
 
+RARE = 0.001  # of chances: nobody needs the digits of a smaller one
 ABSURD = 1e4  # a share beyond tells nothing but that there is none
 
 
@@ -15,3 +16,11 @@ def percent(share: float, form: str = ".3g", error: float | None = None, error_f
         form = ".0f"
     spread = "" if error is None else f" +- {100.0 * error:{error_form}}"
     return f"{100.0 * share:{form}}{spread} %"
+
+
+def by_chance(p_value: float) -> str:
+    """A p value in words: in how many records chance alone would do as much."""
+    if p_value < RARE:
+        return "chance alone would do as much in fewer than 1 of 1000 records"
+    of = 1000 if p_value < 0.01 else 100
+    return f"chance alone would do as much in about {p_value * of:.0f} of {of} records"

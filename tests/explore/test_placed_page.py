@@ -41,6 +41,37 @@ def the_sketch_selects(page: Page) -> None:
     page.keyboard.press("Escape")
 
 
+def the_residual_is_checked(page: Page) -> None:
+    """Of the sensor that is looked at: the autocorrelation begins at one, the histogram holds nearly all samples."""
+    seen: list[list[float]] = []
+    for button in page.locator("#sensor-buttons button").all_text_contents():
+        page.evaluate(f"window.study.look({button!r})")
+        own, left, right, top = (
+            page.evaluate(f"Array.from(Bokeh.documents[0].get_model_by_name('{name}').get_column('{column}'))")
+            for name, column in (("autocorrelation", "value"), *(("histogram", c) for c in ("left", "right", "top")))
+        )
+        assert own[0] == pytest.approx(1.0)
+        assert max(map(abs, own[1:])) < 1.0
+        held = sum(t * (r - q) for q, r, t in zip(left, right, top, strict=True))
+        assert 0.95 < held < 1.0 + 1e-5
+        seen.append(own)
+    assert len(seen) > 1
+    assert all(own != seen[0] for own in seen[1:])
+
+
+def the_panels_are_drawn(page: Page) -> None:
+    """Also those that nobody has scrolled to, and each is as high as the room that was kept for it."""
+    until(page, "window.study.drawn")
+    rooms = page.evaluate(
+        "[...document.querySelectorAll('[data-panel]')].map((p) => [p.dataset.panel, p.clientHeight, "
+        "p.firstElementChild.shadowRoot.querySelectorAll('canvas').length, "
+        "Bokeh.documents[0].get_model_by_name('panel_' + p.dataset.panel).height])"
+    )
+    assert len(rooms) > 10
+    for name, room, _, height in rooms:
+        assert abs(room - height) < 2.0, name
+
+
 def the_axes_have_ticks(page: Page) -> None:
     """That of the history, and those of frequency, which may be logarithmic."""
     ticks = "Array.from(Bokeh.documents[0].get_model_by_name('history_ticks').ticks)"
@@ -65,7 +96,9 @@ def test_a_session_of_a_structure_from_the_verdict_to_the_saved_page(page: Page,
     until(page, "document.querySelector('#verdict h3') && window.study.ready")
     assert page.inner_text("#verdict h3") == "An effect is missing"
     assert "between floor2 and floor3" in page.inner_text("#verdict")
+    the_panels_are_drawn(page)
     the_sketch_selects(page)
+    the_residual_is_checked(page)
     the_axes_have_ticks(page)
     given = float(page.inner_text("#figure-error b").removesuffix("%"))
     page.click(f"[data-act=add][data-name='{CUBIC}']")
@@ -78,5 +111,7 @@ def test_a_session_of_a_structure_from_the_verdict_to_the_saved_page(page: Page,
     until(page, "window.study && window.study.ready")
     page.locator("#steps button").first.click()
     assert float(page.inner_text("#figure-error b").removesuffix("%")) == given
+    the_panels_are_drawn(page)
     the_sketch_selects(page)
+    the_residual_is_checked(page)
     assert not wrong
