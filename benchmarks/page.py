@@ -29,6 +29,7 @@ from study import trials
 from study.equations import model_file
 from study.explore import any_page, html_page, session
 from study.explore.saved_files import files, of_stage
+from study.explore.server import AGAIN
 from study.explore.view import view
 from study.records.prepared import prepare_record
 from study.records.record import write_csv
@@ -129,6 +130,7 @@ def on_the_page(url: str, server: psutil.Process) -> Iterator[tuple[str, Took]]:
             visit = "first paint, at once" if number == 0 else "first paint, later"
             yield visit, seen.took(lambda page=page: page.goto(url, timeout=1000.0 * LIMIT, wait_until="commit"), READY)
             seen.wait("document.querySelector('[data-candidate]')")
+            time.sleep(AGAIN + 1.0)  # a page is made for the next visit
             seen.rest()
             if number < ROUNDS - 1:
                 page.close()

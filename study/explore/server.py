@@ -44,15 +44,15 @@ def serve(
         page = made.pop().result() if made else Watcher(desk, scene)
         page.lay(document)
         if not made:
-            IOLoop.current().call_later(AGAIN, make)
+            loop.call_later(AGAIN, make)
 
+    loop: Any = IOLoop.current()  # Tornado leaves what its callbacks give back untyped
     application = Application(FunctionHandler(show))
     one_line_each()
     server, bound = _bound(application, port)
     server.start()
     make()
     desk.diagnose()
-    loop: Any = server.io_loop  # Tornado leaves what its callbacks give back untyped
     loop.add_callback(ready, f"http://{HOST}:{bound}/")
     try:
         loop.start()
