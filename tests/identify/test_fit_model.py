@@ -10,7 +10,7 @@ from study.equations.model import Model, ModelTerm, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
 from study.identify.time_domain import fit_model as fits
-from study.identify.time_domain import shape_search
+from study.identify.time_domain import settling, shape_search
 from study.identify.time_domain.fit_model import fit_model, with_term
 from study.identify.time_domain.multiple_shooting import is_chaotic
 from study.identify.time_domain.no_response import LINEAR
@@ -207,3 +207,20 @@ def test_noise_is_no_decay():
     prepared = prepare_record(noise, Plan("displacement", (0, 2000), (2000, 4000)))
     with pytest.raises(StudyError, match=r"no free motion of 'linear' explains any .*; expected the record of a decay"):
         fit_model(model.with_values({"m": 1.0}), prepared)
+
+
+def test_segments_that_lead_astray_displace_no_better_free_run(monkeypatch):
+    """Of a beam's decay they ended at a damping that feeds energy in, and nothing of the motion was left explained."""
+    model = Model("beam", tuple(free(get(n)) for n in (*LINEAR, "cubic_stiffness")))
+    true = {"m": 1.0, "c": 1.8, "k": 53900.0, "k3": 0.47}
+    decay = simulate(model.with_values(true), np.zeros(8000), 0.001, Integrator("rk4", 8), initial=(120.0, 0.0))
+    prepared = prepare_record(noisy(decay), Plan("displacement", (0, 4000), (4000, 8000)))
+    linear = replace(model, terms=model.terms[:3]).with_values({"m": 1.0})
+    fit = fit_model(linear, prepared)
+    astray = fit_part(linear, prepared, ("m",), {"c": -26.8, "k": 318481.0}, max_iterations=20)
+    assert astray.rms > 1.5 * fit.rms
+    monkeypatch.setattr(settling, "from_segments", lambda *_: astray)
+    monkeypatch.setattr(settling, "is_chaotic", lambda f, _: f is astray)
+    monkeypatch.setattr(settling, "_in_segments", lambda *_: replace(astray, converged=True))
+    again = settling.settled(fit, prepared)
+    assert again.rms < 1.01 * fit.rms

@@ -55,7 +55,7 @@ def _settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     if near is None or _stands(best, prepared) or not is_chaotic(near, prepared):
         return best
     apart = _in_segments(near, prepared, best)  # a fit at wrong values may be regular where the true system is chaotic
-    return apart if apart is not None and apart.converged else best
+    return apart if apart is not None and apart.converged and apart.rms <= best.rms else best
 
 
 def _more_than_states(apart: FreeRunFit, fit: FreeRunFit) -> bool:
