@@ -100,7 +100,7 @@ def _stands(fit: FreeRunFit, prepared: Prepared) -> bool:
 def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit with so many steps per sample that halving them shifts no coefficient by what its error shows.
 
-    Held ones count too, with the errors that they would have: what the integration does to them is left of the response.
+    Held ones count too, with the errors that they would have: what the integration does to them is left of the motion.
     """
     if fit.restarts:  # multiple shooting has chosen them
         return fit
