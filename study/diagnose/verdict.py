@@ -131,11 +131,15 @@ def _decide(
 
 
 def believed(row: Ranked, prediction: Prediction, own: HeldOut) -> bool:
-    """Whether an effect is believed, by all samples that neither the model with it nor that without was fitted to."""
+    """Whether an effect is believed, by all samples that neither the model with it nor that without was fitted to.
+
+    Where these are both parts of a decay, the error of the judging part, which every table shows, falls as well.
+    """
     without, with_it = residual_held_out(prediction, own), residual_held_out(row.prediction, row.held_out)
     if not alike(without, with_it):
         return credible(prediction, row.prediction, row.interval, row.p_value)
-    return credible(without, with_it, row.interval, row.p_value)
+    falls = row.response_error < prediction.error
+    return falls and credible(without, with_it, row.interval, row.p_value)
 
 
 def _stands_out(first: Ranked, prepared: Prepared) -> bool:

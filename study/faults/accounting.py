@@ -8,10 +8,12 @@ from study.compare.comparison import Comparison, compare
 from study.equations.model import Model
 from study.faults.correction import corrected
 from study.faults.drift import mean_response, slow_response
-from study.faults.fault import DRIFT, FORCE_NOISE, OFFSET, Fault
+from study.faults.fault import DELAY, DRIFT, FORCE_NOISE, OFFSET, Fault
 from study.faults.force_noise import force_noise
 from study.faults.imposed import FAULTS
+from study.faults.late_response import late_response
 from study.faults.leftover import leaves_less, leftover
+from study.faults.physics import on_all
 from study.faults.search import first_faults, search_faults
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -24,6 +26,7 @@ from study.support.errors import StudyError
 from study.support.thresholds import TOLERANCE
 
 OF_THE_MOTION = (DRIFT, OFFSET, FORCE_NOISE)  # of which a model that has lost the motion tells nothing
+SearchEnd = tuple[tuple[Fault, ...], FreeRunFit]  # of a search: the faults, and the model fitted beside them
 NOT_ASKED = "faults of the measurement are looked for in a single stretch of a driven response alone"
 
 
@@ -86,14 +89,18 @@ def accounted(
     fit = fit_model(model, fewer)
     lost = has_lost_the_motion(fit, fewer)
     told = tuple(name for name in asked if not (lost and name in OF_THE_MOTION))
-    found, near = search_faults(prepared, fit if fewer is first else _on_all(fit, first), faults, told)
+    found, near = search_faults(prepared, fit if fewer is first else on_all(fit, first), faults, told)
     for begin in _begins(first, fit, asked):
         found, near = _beneath(begin, model, prepared, faults, asked, (found, near))
+    if DELAY in asked and DELAY not in [fault.fault for fault in found]:
+        late = late_response(model, prepared, fit, faults, needed)
+        if late is not None:
+            found, near = _begun_late(late.fault, late.left.fit, prepared, faults, asked, (found, near))
     if found == faults:
         return _compared(model, fewer, found, fit, estimator, progress)
     final = corrected(prepared, found)
     kept = needed(final)
-    best = _fitted(model, kept, near if kept is final else _on_all(near, kept))
+    best = _fitted(model, kept, near if kept is final else on_all(near, kept))
     return _compared(model, kept, found, best, estimator, progress)
 
 
@@ -107,8 +114,8 @@ def _begins(prepared: Prepared, fit: FreeRunFit, asked: Sequence[str]) -> list[F
 
 def _beneath(
     begin: Fault, model: Model, prepared: Prepared, faults: Sequence[Fault], asked: Sequence[str],
-    plain: tuple[tuple[Fault, ...], FreeRunFit],
-) -> tuple[tuple[Fault, ...], FreeRunFit]:  # fmt: skip
+    plain: SearchEnd,
+) -> SearchEnd:  # fmt: skip
     """The better end of two searches for faults: the plain one, and one that a drift or an offset cannot lead astray.
 
     The second begins with the model fitted to the response without what may lie beneath it.
@@ -124,21 +131,28 @@ def _beneath(
         return plain
     whole = replace(begun, residual=begun.residual + begin.waveform[slice(*begun.span)])  # of the record as it is
     other = search_faults(prepared, whole, faults, asked)
+    return _better(prepared, plain, other, (DRIFT, OFFSET))
+
+
+def _begun_late(
+    late: Fault, fit: FreeRunFit, prepared: Prepared, faults: Sequence[Fault], asked: Sequence[str], plain: SearchEnd
+) -> SearchEnd:
+    """The better end of two searches for faults, the other one of which begins with the response less late."""
+    known = (*faults, late)
+    other = search_faults(prepared, on_all(fit, corrected(prepared, known)), known, asked)
+    return _better(prepared, plain, other, (DELAY,))
+
+
+def _better(prepared: Prepared, plain: SearchEnd, other: SearchEnd, needed: Sequence[str]) -> SearchEnd:
+    """The other end if it leaves less by no chance, with one of the faults that it began with."""
     ends = [leftover(fit, corrected(prepared, found)) for found, fit in (plain, other)]
-    if ends[1] is None or not any(fault.fault in (DRIFT, OFFSET) for fault in other[0]):
+    if ends[1] is None or not any(fault.fault in needed for fault in other[0]):
         return plain
     return other if ends[0] is None or leaves_less(ends[0], ends[1], 1) else plain
 
 
 def _all_samples(prepared: Prepared) -> Prepared:
     return prepared
-
-
-def _on_all(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
-    """A fit to a record with other samples of the same motion, from the values where it stands."""
-    values = fit.model.numbers()
-    again = fit_model(fit.model.with_values(dict.fromkeys(fit.keys)), prepared, {key: values[key] for key in fit.keys})
-    return replace(again, elsewhere=())
 
 
 def _may_be_asked(prepared: Prepared) -> bool:

@@ -10,7 +10,7 @@ from study.equations.model import ModelTerm, free
 from study.equations.terms import LIBRARY, Term
 from study.faults.leftover import FittedResidual, leaves_less, leftover, share
 from study.identify.time_domain import shape_search
-from study.identify.time_domain.fit_model import with_term
+from study.identify.time_domain.fit_model import fit_model, with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part, run_of
 from study.records.prepared import Prepared
@@ -92,6 +92,13 @@ def refitted(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit | None:
         return fit_part(fit.model, prepared, fit.held, steps=fit.steps_per_sample, initial=initial)
     except StudyError:
         return None
+
+
+def on_all(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
+    """A fit to a record with other samples of the same motion, from the values where it stands."""
+    values = fit.model.numbers()
+    again = fit_model(fit.model.with_values(dict.fromkeys(fit.keys)), prepared, {key: values[key] for key in fit.keys})
+    return replace(again, elsewhere=())
 
 
 def without_effect(fit: FreeRunFit, name: str, prepared: Prepared) -> FreeRunFit | None:

@@ -52,7 +52,7 @@ def search_faults(
     corrected. The fit that is given back begins there and searches no further. Of a long record, faults that compete
     with physics are looked for in a stretch of either part; the others everywhere.
     """
-    look = limited(given, int(np.clip(given.samples_in(physics.PERIODS), SHORT, LONG)))
+    look = searched_part(given)
     if look is given:
         stage = _searched(given, fit, fit, faults, asked)
         return (tuple(faults), fit) if stage is None else (stage.faults, stage.left.fit)
@@ -68,6 +68,11 @@ def search_faults(
         return tuple(faults), fit
     stage = _values_again(stage)
     return stage.faults, stage.left.fit
+
+
+def searched_part(given: Prepared) -> Prepared:
+    """As much of either part of a record as a search for faults that compete with physics takes."""
+    return limited(given, int(np.clip(given.samples_in(physics.PERIODS), SHORT, LONG)))
 
 
 def _values_again(stage: SearchStage) -> SearchStage:

@@ -45,7 +45,7 @@ def dropped_term(comparison: StructureComparison, name: str) -> StructureCompari
     held = tuple(key for key in fit.held if key in model.values)
     fits: list[StructureFit] = []
     with suppress(StudyError):
-        fits.append(fit_structure(model, prepared, held, steps=fit.steps))
+        fits.append(fit_structure(model, prepared, held))
     given = comparison.model.without_term(name)
     with suppress(StudyError):
         fits.append(first_fit(given, prepared))

@@ -271,9 +271,10 @@ def settled_structure(fit: StructureFit, prepared: PreparedStructure) -> Structu
     """
     if fit.span != prepared.fit or not fit.converged:
         fit = fit_structure(fit.model, prepared, fit.held, steps=fit.steps, initial=same_states(fit, prepared))
-    while fit.keys and fit.steps < MOST_STEPS:
-        jacobian = linearise_structure(fit, prepared)
-        moved = np.abs(structure_shift(fit, prepared, jacobian))
+    while fit.steps < MOST_STEPS:
+        whole = replace(fit, keys=tuple(fit.model.values))  # what the integration does to a held one is left as well
+        jacobian = linearise_structure(whole, prepared)
+        moved = np.abs(structure_shift(whole, prepared, jacobian))
         deviations = np.sqrt(np.diag(clustered_covariance(flat(fit, jacobian), flat(fit, fit.residual))))
         if np.all(moved <= SHIFT * deviations):
             break

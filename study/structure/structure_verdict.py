@@ -88,7 +88,9 @@ def placed_search_base(comparison: StructureComparison) -> PlacedBaseline:
     first, last = prepared.fit
     wanted = LONG if prepared.anew else int(np.clip((last - first) // 2, SHORT, LONG))  # loud and quiet stretches
     look = prepared.shortened(wanted)
-    again = fit_structure(fit.model, look, fit.held, initial=same_states(fit, look), noise=sized(prepared.scale))
+    again = fit_structure(
+        fit.model, look, fit.held, steps=fit.steps, initial=same_states(fit, look), noise=sized(prepared.scale)
+    )
     return placed_baseline(again, look)
 
 

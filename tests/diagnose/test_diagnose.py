@@ -1,5 +1,6 @@
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -8,9 +9,10 @@ import pytest
 from study import trials
 from study.compare.comparison import compare
 from study.compare.prediction import predict
-from study.diagnose import constancy, diagnosis_report
+from study.diagnose import constancy, diagnosis_report, verdict
 from study.diagnose.adding import added
 from study.diagnose.diagnosis_sentences import diagnosis_sentences
+from study.diagnose.held_out import HeldOutResidual
 from study.diagnose.separating_test import separating_level
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN, Diagnosis, diagnose
 from study.equations.model import Model, ModelTerm
@@ -242,3 +244,16 @@ def test_a_constant_is_a_constant_and_a_moving_coefficient_is_not() -> None:
     p_values = np.array([curve.p_value() for curve in flat])
     assert np.mean(p_values < 0.1) == pytest.approx(0.1, abs=0.05)
     assert constancy.CoefficientCurve(np.arange(8.0), 5.0 + 0.2 * np.arange(8.0) + 0j, error).p_value() < 1e-6
+
+
+@pytest.mark.parametrize(("shown", "expected"), [(0.045, True), (0.065, False)])
+def test_an_effect_of_a_decay_with_which_the_error_that_is_shown_grows_is_not_believed(monkeypatch, shown, expected):
+    """Both parts of the wing's heave fell from 5.0 to 3.9 %, the judging part, and so every table, rose to 6.5."""
+    evidence = {0.05: HeldOutResidual(np.ones(4), 0.05), shown: HeldOutResidual(np.ones(4), 0.04)}
+    monkeypatch.setattr(verdict, "residual_held_out", lambda prediction, _: evidence[prediction.error])
+    row: Any = SimpleNamespace(
+        prediction=SimpleNamespace(error=shown), response_error=shown, held_out=None, interval=(1.0, 2.0), p_value=1e-6
+    )
+    before: Any = SimpleNamespace(error=0.05)
+    own: Any = None
+    assert verdict.believed(row, before, own) == expected

@@ -61,6 +61,15 @@ def test_a_fault_found_in_a_stretch_has_the_value_that_the_whole_record_tells():
     assert abs(delay.value - made.fault["value"]) < 3.0 * delay.error < 0.03
 
 
+def test_a_delay_that_loses_the_fit_is_found_along_the_motion() -> None:
+    """A complete model, its velocity read 1.42 samples early: "nothing missing" was said at 72 %."""
+    made = trials.make_trial(560354, (), 0.0, "velocity", "delay", WIDE)
+    result = accounted(made.believed, prepare_record(made.record))
+    (delay,) = result.faults
+    assert abs(delay.value - made.fault["value"]) < 3.0 * delay.error < 0.03
+    assert result.comparison.prediction.error < 0.01
+
+
 def test_drop_outs_beside_noise_are_counted_where_the_motion_passes_through_zero_too():
     made = trials.make_trial(520339, ("signed_quadratic_stiffness",), 0.01, "velocity", "drop_outs", WIDE)
     (fault,) = accounted(made.completed, prepare_record(made.record)).faults

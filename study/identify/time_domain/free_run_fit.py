@@ -101,6 +101,12 @@ class FreeRunFit:
         return Estimate(self.keys, self.values, self.covariance)
 
 
+def released(fit: FreeRunFit) -> FreeRunFit:
+    """The same motion with every key of the model to differentiate by, held ones too."""
+    numbers = fit.model.numbers()
+    return replace(fit, keys=tuple(numbers), values=np.array(list(numbers.values())))
+
+
 def fit_free_run(
     model: Model,
     record: Record,

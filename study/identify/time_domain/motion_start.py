@@ -20,6 +20,7 @@ from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 
 Floats = NDArray[np.float64]
+REACH, STEP = 4.0, 0.1  # samples by which a response may be late, tried so far apart
 
 
 def has_lost_the_motion(fit: FreeRunFit, prepared: Prepared) -> bool:
@@ -55,18 +56,48 @@ def motion_start(model: Model, prepared: Prepared, held: tuple[str, ...]) -> dic
         If a shape parameter is not known, or a force has no finite value somewhere along the motion.
     """
     part = prepared.record.part(*prepared.inner(prepared.plan.fit))
-    inputs = reverse_inputs(model)
-    forces: dict[str, Floats] = {}
-    for item, shape in zip(inputs, histories(inputs, part), strict=True):
-        for place in item.parts:
-            added = place.factor * _of_order(item, shape, place.order, part)
-            forces[place.symbol] = forces.get(place.symbol, np.zeros(len(part))) + added
+    forces = _unit_forces(model, part)
     known = [(model.values[s] or 0.0) * forces[s] for s in forces if s in held]
     target = part[FORCE] - np.sum([np.zeros(len(part)), *known], axis=0)
     wanted = [s for s in forces if s not in held]
     lines = _below_the_noise(np.column_stack([*(forces[s] for s in wanted), target]), part)
     found = least_squares(lines[:, :-1], lines[:, -1], 1e-9)
     return dict(zip(wanted, found.tolist(), strict=True))
+
+
+def delay_along_the_motion(model: Model, prepared: Prepared) -> float:
+    """Samples by which the response seems to be late; nan where no delay within reach lets the terms explain most.
+
+    Least squares of the force on the forces of all terms along the motion, the force as late as the motion, asks for no
+    free run, which a record that is late by a part of a period sends to a minimum of its own. Noise and missing effects
+    move it: a start.
+
+    Raises
+    ------
+    StudyError
+        If a shape parameter is not known, or a force has no finite value somewhere along the motion.
+    """
+    part = prepared.record.part(*prepared.inner(prepared.plan.fit))
+    lines = _below_the_noise(np.column_stack([*_unit_forces(model, part).values(), part[FORCE]]), part)
+    basis = np.linalg.qr(lines[:, :-1] / np.maximum(np.linalg.norm(lines[:, :-1], axis=0), np.finfo(float).tiny))[0]
+    count = len(lines) // 2
+    force, turn = lines[:count, -1] + 1j * lines[count:, -1], -2j * np.pi * np.arange(count) / len(part)
+    late = np.arange(-REACH, REACH + STEP, STEP)
+    turned = force[:, None] * np.exp(turn[:, None] * late)
+    explained = np.sum((basis.T @ np.concatenate([turned.real, turned.imag])) ** 2, axis=0)
+    most = int(np.argmax(explained))
+    return float(late[most]) if 0 < most < len(late) - 1 else float("nan")
+
+
+def _unit_forces(model: Model, part: Record) -> dict[str, Floats]:
+    """The force of each coefficient's unit along the measured motion, each shape (n,)."""
+    inputs = reverse_inputs(model)
+    forces: dict[str, Floats] = {}
+    for item, shape in zip(inputs, histories(inputs, part), strict=True):
+        for place in item.parts:
+            added = place.factor * _of_order(item, shape, place.order, part)
+            forces[place.symbol] = forces.get(place.symbol, np.zeros(len(part))) + added
+    return forces
 
 
 def _below_the_noise(forces: Floats, part: Record) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 from study.equations.model import Model
 from study.equations.substeps import needed_steps
 from study.identify.frequency_domain.starting_values import linear_start
-from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.free_run_fit import FreeRunFit, released
 from study.identify.time_domain.motion_start import from_the_motion
 from study.identify.time_domain.multiple_shooting import fit_in_segments, is_chaotic
 from study.identify.time_domain.part_fit import STEPS, covariance_of, fit_part, integration_shift, linearise
@@ -55,7 +55,7 @@ def _settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     if near is None or _stands(best, prepared) or not is_chaotic(near, prepared):
         return best
     apart = _in_segments(near, prepared, best)  # a fit at wrong values may be regular where the true system is chaotic
-    return apart if apart is not None and apart.converged else best
+    return apart if apart is not None and apart.converged and apart.rms <= best.rms else best
 
 
 def _more_than_states(apart: FreeRunFit, fit: FreeRunFit) -> bool:
@@ -98,15 +98,19 @@ def _stands(fit: FreeRunFit, prepared: Prepared) -> bool:
 
 
 def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
-    """The fit with so many steps per sample that halving them shifts no coefficient by what its error shows."""
+    """The fit with so many steps per sample that halving them shifts no coefficient by what its error shows.
+
+    Held ones count too, with the errors that they would have: what the integration does to them is left of the motion.
+    """
     if fit.restarts:  # multiple shooting has chosen them
         return fit
     most = max(MOST_STEPS, needed_steps(fit.model, prepared.record, prepared.response))
     allowed = SHIFT if prepared.every == 1 else FINE
-    while fit.keys and fit.steps_per_sample < most:
-        jacobian = linearise(fit, prepared)
-        moved = integration_shift(fit, prepared, jacobian)
-        deviations = np.sqrt(np.diag(covariance_of(fit, jacobian)))
+    while fit.steps_per_sample < most:
+        whole = released(fit)
+        jacobian = linearise(whole, prepared)
+        moved = integration_shift(whole, prepared, jacobian)
+        deviations = np.sqrt(np.diag(covariance_of(whole, jacobian)))
         with np.errstate(over="ignore"):  # where nothing is left, any shift is beyond all measure
             excess = float(np.max(np.abs(moved) / np.maximum(allowed * deviations, np.finfo(float).tiny)))
         if excess <= 1.0:
