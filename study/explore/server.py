@@ -38,13 +38,13 @@ def serve(
     made: list[Future[Watcher]] = []  # pages that wait for a visit: one is made before the browser has opened
 
     def make() -> None:
-        made.append(ahead.submit(Watcher, desk, scene))
+        if not made:
+            made.append(ahead.submit(Watcher, desk, scene))
 
     def show(document: Document) -> None:
         page = made.pop().result() if made else Watcher(desk, scene)
         page.lay(document)
-        if not made:
-            loop.call_later(AGAIN, make)
+        loop.call_later(AGAIN, make)
 
     loop: Any = IOLoop.current()  # Tornado leaves what its callbacks give back untyped
     application = Application(FunctionHandler(show))
