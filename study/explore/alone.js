@@ -63,18 +63,25 @@
     u: ["box_against_u"], v: ["box_against_v"],
   }
 
+  // what a table has of a block of time
+  function block(name, key, b) {
+    const table = column(name, key), many = column("blocks", "left").length, mine = new Float64Array(table.length / many)
+    for (let i = 0; i < mine.length; i++) mine[i] = table[i * many + b]
+    return mine
+  }
+
   function weights(kind, from, to) {
     const left = column("blocks", "left"), right = column("blocks", "right"), w = new Float64Array(left.length)
     const inside = (a, b) => Math.max(0, Math.min(b, to) - Math.max(a, from)) / (b - a)
     for (let b = 0; b < w.length; b++) {
       if (kind === "time") { w[b] = inside(left[b], right[b]); continue }
       if (kind === "band") {
-        const f = column("lines", "f"), p = column("lines", `p${b}`)
+        const f = column("lines", "f"), p = block("lines", "p", b)
         for (let i = 0; i < f.length; i++) if (f[i] >= from && f[i] <= to) w[b] += p[i]
         continue
       }
       const low = column(`classes_${kind}`, "left"), high = column(`classes_${kind}`, "right")
-      const n = column(`classes_${kind}`, `n${b}`)
+      const n = block(`classes_${kind}`, "n", b)
       let all = 0
       for (let i = 0; i < n.length; i++) { w[b] += n[i] * inside(low[i], high[i]); all += n[i] }
       w[b] = all > 0 ? w[b] / all : 0
@@ -83,11 +90,11 @@
     return most > 0 ? w.map((x) => x / most) : w
   }
 
-  function sums(name, prefix, w) {
-    const total = new Float64Array(column(name, `${prefix}0`).length)
+  function sums(name, key, w) {
+    const total = new Float64Array(column(name, key).length / w.length)
     for (let b = 0; b < w.length; b++) {
-      const row = column(name, prefix + b)
-      for (let i = 0; i < total.length; i++) total[i] += w[b] * row[i]
+      const mine = block(name, key, b)
+      for (let i = 0; i < total.length; i++) total[i] += w[b] * mine[i]
     }
     return total
   }

@@ -200,7 +200,7 @@ def _constancy(rows: Sequence[Ranked]) -> Columns:
 
 
 def _links(comparison: Comparison, scales: Scales) -> dict[str, Columns]:
-    """The tables that join selections: rows are blocks of time, columns lines, classes or cells."""
+    """The tables that join selections: a row a line, a class or a cell, a column a block of time."""
     tied = links(comparison)
     keep = heard(comparison, tied.frequency)
     left, right = tied.edges[:-1], tied.edges[1:]
@@ -209,16 +209,17 @@ def _links(comparison: Comparison, scales: Scales) -> dict[str, Columns]:
             "left": left, "right": right, "middle": 0.5 * (right + left), "weight": np.zeros(len(left)),
             "all": np.ones(len(left)),
         },
-        "lines": {"f": tied.frequency[keep]} | _rows("p", tied.power[:, keep] / scales.difference.factor**2),
-        "cells": _rows("n", np.minimum(tied.cells, 255).astype(np.uint8)),
+        "lines": {"f": tied.frequency[keep], "p": _by_block(tied.power[:, keep] / scales.difference.factor**2)},
+        "cells": {"n": _by_block(np.minimum(tied.cells, 255).astype(np.uint8))},
     }  # fmt: skip
     motions = {"u": (tied.displacement, scales.displacement), "v": (tied.velocity, scales.velocity)}
     for name, (classes, scale) in motions.items():
         bounds, force = classes.edges / scale.factor, classes.force / scales.force.factor
-        table = _rows("n", classes.visits) | _rows("s", force)
+        table = {"n": _by_block(classes.visits.astype(np.float64)), "s": _by_block(force)}
         columns[f"classes_{name}"] = {"left": bounds[:-1], "right": bounds[1:], **table}
     return columns
 
 
-def _rows(prefix: str, table: NDArray[Any]) -> Columns:
-    return {f"{prefix}{k}": row for k, row in enumerate(table)}
+def _by_block(table: NDArray[Any]) -> NDArray[Any]:
+    """One array of all blocks: each array is a message of its own to a page."""
+    return np.ascontiguousarray(table.T)
