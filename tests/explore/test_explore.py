@@ -74,6 +74,14 @@ def test_decimated_peaks_stand_where_they_are():
     assert abs(time[np.argmin(shown)] - 7777) <= 100
 
 
+def test_who_has_the_diagnosis_is_not_sent_to_it(grown):
+    assert grown.now.comparison.prediction.noise.alone
+    asked = sessions.examined(grown)[0]
+    for stage, live, sent in ((grown.now, False, True), (grown.now, True, False), (asked, False, False)):
+        said = words.words(stage, (), 1, live, "N")
+        assert ("looks closer" in dict(zip(*said.values(), strict=True))["says"]) == sent
+
+
 def test_adding_what_is_missing_lets_the_error_fall_and_undoing_brings_it_back(asked, grown):
     before, after = asked.now.comparison, grown.now.comparison
     assert asked.now.diagnosis.candidates[0].name == "quadratic_damping"

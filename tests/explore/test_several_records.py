@@ -19,6 +19,7 @@ from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY, get
 from study.explore import decimate, saved_files, view
 from study.explore import session as sessions
+from study.explore.any_session import undone
 from study.explore.by_record import Several, by_record, of_own
 from study.explore.desk import Desk
 from study.explore.live import AloneScene, Watcher
@@ -151,6 +152,18 @@ def test_the_saved_page_and_the_tables_hold_every_record(grown, monkeypatch):
     assert {f"time@{step}.{record}" for step in (0, 1) for record in (0, 1)} <= set(re.findall(r"time@\d\.\d", text))
     names = [dict(zip(*view.view(s, 0).columns["words"].values(), strict=True))["records"] for s in grown.stages]
     assert [re.findall(r"data-name='(\d)' aria-pressed='true'", fragment) for fragment in names] == [["0"], ["0"]]
+
+
+def test_a_page_that_was_made_ahead_of_its_visit_shows_what_was_done_since(grown, tmp_path):
+    desk = Desk(undone(grown), tmp_path / "rig.yaml", model_file.format_model(BELIEVED), tmp_path / "out")
+    watcher, document = Watcher(desk, AloneScene), Document()
+    desk.session = grown
+    watcher.lay(document)
+    said, known = document.template_variables["said"], view.view(grown.now, 1).columns["words"]
+    assert said["figures"] == dict(zip(*known.values(), strict=True))["figures"]
+    assert len(document.template_variables["steps"]) == 2
+    assert watcher.state.data["undo"] == [True]
+    desk.close()
 
 
 def test_the_live_page_turns_to_the_record_that_is_asked_for(grown, tmp_path):
