@@ -1,6 +1,11 @@
-"""A term added to a fitted model: the fit begins where the candidate ended, and never ends worse."""
+"""A term added to a fitted model: the fit begins where the candidate ended, and never ends worse.
+
+Of a decay whose motion the model had lost without it, so that it began anew every few periods, it then runs on for as
+long as the model with it follows: the error is that of the longer motion.
+"""
 
 from study.compare.comparison import Comparison, compare
+from study.compare.running_on import running_on
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import search_base, search_part
 from study.equations.model import free
@@ -20,11 +25,11 @@ def added(comparison: Comparison, term: Term) -> Comparison:
     prepared, base = comparison.prepared, search_base(comparison)
     fit = with_term(base.fit, free(term), base, search_part(prepared))
     fit = finished(fit, prepared)
-    return compare(comparison.model.with_term(term), prepared, fit=fit)
+    return running_on(compare(comparison.model.with_term(term), prepared, fit=fit))
 
 
 def added_candidate(comparison: Comparison, candidate: Ranked) -> Comparison:
     """The comparison of the model with a candidate of its diagnosis, begun where the candidate's fit ended."""
     prepared = comparison.prepared
     fit = finished(candidate.fit, prepared)
-    return compare(comparison.model.with_term(candidate.term), prepared, fit=fit)
+    return running_on(compare(comparison.model.with_term(candidate.term), prepared, fit=fit))

@@ -8,18 +8,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from study.compare.prediction import Prediction
+from study.compare.running_on import has_lost_its_way
 from study.equations.common_factor import per_unit_mass, with_known_mass
 from study.equations.model import Model, has_spring
 from study.faults.accounting import Accounted, accounted
-from study.identify.time_domain.stretch_states import is_smooth
 from study.records.moving_base import on_a_moving_base, relative_to_base
 from study.records.prepared import Prepared
 from study.records.record import Record
 from study.records.record_layout import Layout, laid_out
 from study.records.stretches import apart, runs_on
-
-LOST = 0.3  # of the rms response: a free run through several blocks that misses so much has lost the motion
 
 
 def made_ready(
@@ -70,11 +67,6 @@ def accounted_test(
     found = accounted(model, prepared, **options)
     if runs_on(prepared):
         anew = apart(prepared)
-        while _lost(found.comparison.prediction) and (shorter := next(anew, None)) is not None:
+        while has_lost_its_way(found.comparison.prediction) and (shorter := next(anew, None)) is not None:
             found = accounted(model, shorter, **options)
     return found
-
-
-def _lost(prediction: Prediction) -> bool:
-    """Whether a free run has lost the motion: it misses much, and what it leaves looks like a motion, not as noise."""
-    return prediction.error > LOST and is_smooth(prediction.residual)

@@ -44,6 +44,8 @@ class Prepared:
         (:mod:`study.records.oversampling`).
     as_sampled : Prepared, optional
         The record with all of its samples, where this has fewer.
+    running_on : Prepared, optional
+        The record with motions that run on for longer, where here they begin anew (``study.records.stretches.apart``).
     """
 
     record: Record
@@ -56,6 +58,7 @@ class Prepared:
     lost: NDArray[np.bool_] | None = None
     every: int = 1
     as_sampled: "Prepared | None" = None
+    running_on: "Prepared | None" = None
 
     @property
     def response(self) -> str:

@@ -123,14 +123,15 @@ def apart(prepared: Prepared) -> Iterator[Prepared]:
 
     First in every stretch, then every few periods.
     """
-    yield _begun_anew(prepared, [replace(s, continues=False) for s in prepared.record.stretches])
+    whole = _begun_anew(prepared, [replace(s, continues=False) for s in prepared.record.stretches])
+    yield whole
     response = MOTIONS[0] if prepared.response == FORCE else prepared.response
     samples = PERIODS * period(prepared.record[response])
     pieces: list[Stretch] = []
     for stretch in prepared.record.stretches:
         pieces += cut(replace(stretch, continues=False), max(round(len(stretch) / max(samples, FEWEST)), 1))
     if len(pieces) > len(prepared.record.stretches):
-        yield _begun_anew(prepared, pieces)
+        yield replace(_begun_anew(prepared, pieces), running_on=whole)
 
 
 def _begun_anew(prepared: Prepared, pieces: Sequence[Stretch]) -> Prepared:
@@ -139,7 +140,7 @@ def _begun_anew(prepared: Prepared, pieces: Sequence[Stretch]) -> Prepared:
         f"{len(prepared.record) / len(pieces) * prepared.dt:.3g} s, from a state of its own"
     )
     record = replace(prepared.record, stretches=tuple(pieces))
-    return replace(prepared, record=record, notes=(*prepared.notes, said))
+    return replace(prepared, record=record, notes=(*prepared.notes, said), running_on=prepared)
 
 
 def _blocks(stretch: Stretch, response: str) -> list[Stretch]:

@@ -23,7 +23,7 @@ COUNTED = 1e-6  # relative: what is counted or read off has no interval, and no 
 WITHIN = 1.05  # held-out error after adding, over that of the true model
 WORDS = (
     "kind", "hidden", "response", "known", "faults", "fault", "fault_channel", "faults_found", "fault_rivals",
-    "found", "found_channel", "verdict", "first",
+    "fault_shown", "found", "found_channel", "verdict", "first",
     "tie_set", "second_verdict", "second_tie_set", "whole_tie_set", "pair", "trouble",
 )  # fmt: skip
 Wanted = Mapping[str, Sequence[float]]
@@ -113,6 +113,10 @@ def _faulty(row: Row) -> bool:
     return row["fault"] != ""
 
 
+def _shown(row: Row) -> bool:
+    return row["fault_shown"] == "yes"
+
+
 RATES: tuple[tuple[str, Member, Score, str], ...] = (
     ("true effect first, noise to 5 %", _single(lambda r: r["noise"] <= LITTLE), first_score, "first"),
     ("true effect first, noise 10 %", _single(lambda r: r["noise"] > LITTLE), first_score, "first_in_noise"),
@@ -124,6 +128,7 @@ RATES: tuple[tuple[str, Member, Score, str], ...] = (
     ("out of the library: unknown, or in the tie set", _kinds(REMOVED), removed_score, "removed"),
     ("... or what is said leaves as little as the true model", _kinds(REMOVED), removed_or_as_good, ""),
     ("the fault named, its value within its interval", _faulty, fault_score, "fault"),
+    ("... of those that the record shows beside the true equation", _shown, fault_score, ""),
     ("no fault named where there is none", lambda r: not _faulty(r), no_fault_score, ""),
     ("error after adding within 5 % of the true model's", _single(), as_good_as_truth, ""),
 )

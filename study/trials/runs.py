@@ -33,7 +33,7 @@ WITHOUT, WITH = "without", "with"  # a fault of the measurement
 COLUMNS = (
     "kind", "seed", "hidden", "noise", "faults", "response", "samples_a_period", "samples", "damping", "excitation",
     "known", "share", "fault", "fault_channel", "fault_value", "fault_unit",
-    "faults_found", "fault_rivals", "found", "found_channel", "found_value", "found_low", "found_high",
+    "faults_found", "fault_rivals", "fault_shown", "found", "found_channel", "found_value", "found_low", "found_high",
     "verdict", "first", "tie_set", "tie_size", "pair", "second_verdict", "second_tie_set", "whole_tie_set",
     "error_before", "error_after", "error_after_two", "error_true", "noise_floor", "left", "held", "asked",
     "smallest_p", "true_p", "distance", "rivals", "seconds", "trouble",
@@ -134,6 +134,7 @@ def _judged(order: Order, trial: Trial) -> Row:
         "noise_floor": before.prediction.floor,
     }  # fmt: skip
     found = [fault_fields(fault) for fault in confirmed(faults, diagnosis)]
+    row["fault_shown"] = fault_shown(trial, prepared, [str(field["fault"]) for field in found])
     row |= evidence_row(diagnosis, order.hidden) | measurement(found, trial.fault) | intervals(after, trial.truth)
     if named and order.kind == PAIR:
         row |= _second(after, trial)
@@ -159,6 +160,21 @@ def error_of_truth(trial: Trial, prepared: Prepared, steps: int) -> float:
         return predict(fit_part(trial.truth, prepared, (), steps=steps), prepared).error
     except StudyError:
         return math.nan
+
+
+def fault_shown(trial: Trial, prepared: Prepared, found: Sequence[str]) -> str:
+    """Whether the record shows its fault, ``yes`` or ``no``: it was found, or is beside the true equation.
+
+    Empty without a fault. What no search finds beside the very equation that made the record is too small for it.
+    """
+    imposed = trial.fault.get("fault", "")
+    if not imposed or imposed in found:
+        return "yes" if imposed else ""
+    try:
+        seen = [fault.fault for fault in accounted_comparison(trial.completed, prepared)[1]]
+    except StudyError:
+        seen = []
+    return "yes" if imposed in seen else "no"
 
 
 def chunk(every: Sequence[Order], number: int, count: int) -> list[Order]:

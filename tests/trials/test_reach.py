@@ -17,6 +17,7 @@ from study.reproduction.settings import TrialSettings
 from study.support.errors import StudyError
 from study.trials import constants_table, findings, kept, make_trial, reach, runs
 from study.trials.draw import HIDDEN
+from study.trials.experiment import WIDE
 from study.trials.findings import accounted_comparison
 from study.trials.rates import mean, proportion
 from study.trials.runs import COLUMNS, Order
@@ -104,6 +105,16 @@ def test_a_fault_counts_by_name_channel_and_value() -> None:
     assert reach.fault_score(row(**told)) == 1.0
     for other in ({"fault_value": 0.7}, {"found": "hum"}, {"found_channel": "force"}, {"found_low": np.nan}):
         assert reach.fault_score(row(**(told | other))) == 0.0
+
+
+def test_a_fault_that_the_true_equation_does_not_show_is_told_apart() -> None:
+    for seed, hidden, noise, fault, shown in (
+        (560269, (), 0.1, "drop_outs", "no"),
+        (560266, ("quintic_stiffness",), 0.0, "delay", "yes"),
+    ):
+        trial = make_trial(seed, hidden, noise, "velocity", fault, WIDE)
+        assert runs.fault_shown(trial, prepare_record(trial.record), []) == shown
+        assert runs.fault_shown(trial, prepare_record(trial.record), [fault]) == "yes"
 
 
 @pytest.mark.parametrize(("good", "of"), [(40, 40), (38, 40), (0, 7), (1, 2)])
