@@ -79,7 +79,7 @@ def _levels(stage: Stage, live: bool) -> str:
             f"<tr><th><i>{escape(_symbol(c.key))}</i><small>{escape(in_text(c.unit))}</small></th><td>&nbsp;</td></tr>"
             for c in fitted
         )
-        return f"<table><tr><th></th><th>{WAITING}<small>&nbsp;</small></th></tr>{rows}</table>"
+        return f"<table><tr><th></th><th>{WAITING}<small>&nbsp;</small></th></tr>{rows}</table><p>{DIFFERS}</p>"
     if not found.levels:
         return "<p>every coefficient is held</p>"
     forces = [number(force, 3) for force in found.levels[0].force]
