@@ -113,6 +113,11 @@ def _faulty(row: Row) -> bool:
     return row["fault"] != ""
 
 
+def _visible(row: Row) -> bool:
+    """Whether the hidden effect leaves anything to be seen: a constant force behind a high-pass does not."""
+    return not row["error_true"] >= row["error_before"]
+
+
 def _shown(row: Row) -> bool:
     return row["fault_shown"] == "yes"
 
@@ -121,6 +126,7 @@ RATES: tuple[tuple[str, Member, Score, str], ...] = (
     ("true effect first, noise to 5 %", _single(lambda r: r["noise"] <= LITTLE), first_score, "first"),
     ("true effect first, noise 10 %", _single(lambda r: r["noise"] > LITTLE), first_score, "first_in_noise"),
     ("tie set holds the truth", _single(), tied_score, "tied"),
+    ("... where the true model leaves less than that without the effect", _single(_visible), tied_score, ""),
     ("nothing missing where nothing is, and of completed models", _kinds(NONE, COMPLETED), nothing_score, "nothing"),
     ("... where nothing is", _kinds(NONE), nothing_score, ""),
     ("... of completed models", _kinds(COMPLETED), nothing_score, ""),
