@@ -8,6 +8,7 @@ import pytest
 from study.support.document import markdown
 from study.trials import kind_rates
 from study.trials.kind_runs import COLUMNS, FIRST_SEED, run_test
+from study.trials.likelihoods import log_likelihood_ratio, second_places
 
 DOCS = Path("docs")
 
@@ -39,3 +40,13 @@ def test_a_row_that_could_not_be_diagnosed_counts_as_failed():
     failed = int(table["trouble"].notna().sum())
     assert f"; {failed} could not be diagnosed" in before
     assert f"; {failed + 1} could not be diagnosed" in after
+
+
+def test_the_whole_record_of_a_decay_tells_two_laws_of_damping_no_better():
+    """The likelihoods that the page has beside the trials, of the first of these; of another law they tell a lot."""
+    first = second_places(kept()).iloc[0]
+    ratio = log_likelihood_ratio(int(first["seed"]), first["hidden"], first["first"])
+    page = (DOCS / "kinds_of_tests.md").read_text()
+    line = next(row for row in page.splitlines() if row.startswith(f"| {first['seed']} "))
+    assert float(line.split("|")[-2]) == pytest.approx(ratio, abs=0.02)
+    assert log_likelihood_ratio(int(first["seed"]), first["hidden"], "quintic_stiffness") > 20.0
