@@ -83,12 +83,12 @@ def _scales(comparison: StructureComparison) -> tuple[Scale, Scale]:
 
 
 def _turns(comparison: StructureComparison) -> bool:
-    """Whether a coordinate may be a rotation: two motions of one body are coupled by its inertia."""
-    return any(t.place is not None and t.place.kind == "couples" for t in comparison.model.terms)
+    """Whether a coordinate is a rotation."""
+    return bool(comparison.prepared.record.rotations)
 
 
 def _length(comparison: StructureComparison, largest: float) -> Scale:
-    """Metres become mm where that is easier to read; what may be an angle stays."""
+    """Metres become mm where that is easier to read; beside angles they stay."""
     return power("m or rad", largest) if _turns(comparison) else length("m", largest)
 
 
@@ -115,10 +115,11 @@ def _joined(parts: Iterator[tuple[str, Mapping[str, Floats]]], names: Sequence[s
 
 def _motion_scale(comparison: StructureComparison, i: int) -> Scale:
     """Unit in which the motion of a sensor is easy to read."""
-    unit = SI_UNITS[comparison.prediction.prepared.sensors[i].motion]
+    sensor = comparison.prediction.prepared.sensors[i]
+    unit = SI_UNITS[sensor.motion]
     most = float(np.max(np.abs(comparison.prediction.measured[:, i]), initial=0.0))
-    if _turns(comparison):
-        return power(unit.replace("m", "(m or rad)", 1) if "/" in unit else "m or rad", most)
+    if sensor.coordinate in comparison.prepared.record.rotations:
+        return power(unit.replace("m", "rad", 1), most)
     return length(unit, most) if unit == "m" else rate(unit, most)
 
 

@@ -146,11 +146,11 @@ def _drawn_label(place: Place | None, stage: PlacedStage) -> str:
 
 def _axis(row: PlacedRanked) -> str:
     before = power_of_ten(abs(row.coefficient))[1]
-    return f"{row.term.symbols[0]} / {in_text(before + row.term.unit(row.term.symbols[0], 'N', 'm'))}"
+    return f"{row.term.symbols[0]} / {in_text(before + row.unit)}"
 
 
 def _detail(row: PlacedRanked) -> str:
-    unit = in_text(row.term.unit(row.term.symbols[0], "N", "m"))
+    unit = in_text(row.unit)
     size = f"{' ± '.join(with_error(row.coefficient, 1.96 * row.error))} {unit}"
     where = f" {escape(placed(row.entry.place))}" if row.entry.place else ""
     return (

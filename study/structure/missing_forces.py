@@ -23,6 +23,7 @@ from study.records.record import MOTIONS, Record
 from study.records.spectra import Segments, autospectrum
 from study.structure.equations_of_motion import motion_program
 from study.structure.mass_matrix import checked_mass_matrix, matrices
+from study.structure.placed_units import units_at
 from study.structure.places import alignment, connections, transfer
 from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_prediction import StructurePrediction
@@ -47,7 +48,7 @@ class MissingForces:
     displacement, velocity : array, shape (samples, all coordinates)
         The motion, free of noise.
     residual : array, shape (samples, coordinates)
-        Force that is left, in newtons.
+        Force that is left, in newtons, or newton metres on a rotation.
     size : array, shape (coordinates,)
         Rms force of inertia, to compare it with.
     matrix : array, shape (coordinates, coordinates)
@@ -58,6 +59,8 @@ class MissingForces:
         connections, neighbours and the ground. Unlike the matrix it needs no derivatives of noisy motions.
     curves : dict of str
         Force over relative displacement of each of these places by label: a restoring-force map.
+    rotations : frozenset of str
+        Coordinates that were measured as angles: their forces are moments.
     """
 
     coordinates: tuple[str, ...]
@@ -69,6 +72,12 @@ class MissingForces:
     matrix: Floats
     aligned: tuple[tuple[Place, float], ...]
     curves: dict[str, ForceCurve]
+    rotations: frozenset[str]
+
+    def units(self, label: str) -> dict[str, str]:
+        """Units of force and displacement of the map of a place, or of the equation of a coordinate."""
+        place = next((p for p, _ in self.aligned if p.label == label), None) or Place("at", (label,))
+        return dict(zip(("force", "displacement"), units_at(place, self.rotations), strict=True))
 
     @property
     def rms(self) -> Floats:
@@ -97,6 +106,7 @@ def missing_forces(prediction: StructurePrediction) -> MissingForces:
     return MissingForces(
         tuple(measured), tuple(c for c in model.coordinates if c not in measured), motion[0][inner], motion[1][inner],
         left, size, matrix, aligned, _maps(known, measured, motion[0][inner][:, rows], left),
+        prediction.prepared.record.rotations,
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from study.diagnose.ranking import in_order
 from study.equations.model import ModelTerm
 from study.equations.term import Term
 from study.structure.placed_candidates import PlacedCandidate, physical
+from study.structure.placed_units import coefficient_unit
 from study.structure.structure_fit import (
     SensorNoise,
     StructureFit,
@@ -59,6 +60,16 @@ class PlacedRanked:
     def term(self) -> Term:
         """The effect."""
         return self.entry.term
+
+    @property
+    def rotations(self) -> frozenset[str]:
+        """Coordinates that were measured as angles."""
+        return self.prediction.prepared.record.rotations
+
+    @property
+    def unit(self) -> str:
+        """Unit of the coefficient."""
+        return coefficient_unit(self.entry, self.term.symbols[0], self.rotations)
 
     @property
     def response_error(self) -> float:

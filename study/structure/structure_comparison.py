@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from study.equations import dimensions, model_file
-from study.equations.model import Model
+from study.equations import model_file
+from study.equations.model import Model, ModelTerm
 from study.equations.place import Place, place_in_words
-from study.equations.term import QUANTITIES
 from study.structure.missing_forces import MissingForces, missing_forces
 from study.structure.modes import Modes, modes_of, modes_table
+from study.structure.placed_units import coefficient_unit, parameter_units
 from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_fit import StructureFit, linearise_structure, settled_structure, structure_covariance
 from study.structure.structure_leftover import FamilyGain, explained_by_place, family_gains
@@ -93,28 +93,24 @@ def compare_structure(
     if fit.undecided:
         notes.append(f"this record cannot tell apart, or does not show, {', '.join(fit.undecided)}")
     return StructureComparison(
-        model, prepared, fit, covariance, _coefficients(fit, covariance), prediction, modes,
+        model, prepared, fit, covariance, _coefficients(fit, covariance, prepared.record.rotations), prediction, modes,
         missing_forces(prediction), tuple(notes),
     )  # fmt: skip
 
 
-def _coefficients(fit: StructureFit, covariance: Floats) -> tuple[PlacedCoefficient, ...]:
+def _coefficients(fit: StructureFit, covariance: Floats, rotations: frozenset[str]) -> tuple[PlacedCoefficient, ...]:
     errors = dict(zip(fit.keys, np.sqrt(np.diag(covariance)).tolist(), strict=True))
     return tuple(
         PlacedCoefficient(key, entry.term.name, entry.place, float(value), errors.get(key), unit)
         for entry in fit.model.terms
-        for (key, value), unit in zip(entry.values.items(), _units(entry), strict=True)
+        for (key, value), unit in zip(entry.values.items(), _units(entry, rotations), strict=True)
         if value is not None
     )
 
 
-def _units(entry: Any) -> list[str]:
-    own = [entry.term.unit(symbol, "N", "m") for symbol in entry.term.symbols]
-    for parameter in entry.term.parameters:
-        powers = QUANTITIES[parameter.quantity]
-        unit = dimensions.compose("", "m", (-powers[0], -powers[1])).strip().replace("/", "1/")
-        own.append("Hz" if parameter.quantity == "frequency" else unit)
-    return own
+def _units(entry: ModelTerm, rotations: frozenset[str]) -> list[str]:
+    own = [coefficient_unit(entry, symbol, rotations) for symbol in entry.term.symbols]
+    return [*own, *parameter_units(entry, rotations).values()]
 
 
 def structure_in_words(comparison: StructureComparison) -> str:
@@ -129,7 +125,8 @@ def structure_in_words(comparison: StructureComparison) -> str:
         said.append(f"The reverse system says no force of {', '.join(forces.lacking)}, which no sensor shows.")
     if np.any(forces.rms > 0.0):
         i = int(np.argmax(forces.rms))
-        left = f"{forces.rms[i]:.3g} N rms are left of its forces"
+        unit = forces.units(forces.coordinates[i])["force"]
+        left = f"{forces.rms[i]:.3g} {unit} rms are left of its forces"
         said.append(f"The equation of {forces.coordinates[i]} is violated most: {left}.")
     if len(prediction.prepared.sensors) > 1 and forces.aligned:
         place, share = forces.aligned[0]
@@ -209,9 +206,14 @@ def structure_summary(comparison: StructureComparison) -> str:
     from tabulate import tabulate
 
     prediction, forces = comparison.prediction, comparison.forces
-    left = dict(zip(forces.coordinates, forces.rms, strict=True))
+    left = {c: f"{rms:.3g} {forces.units(c)['force']}" for c, rms in zip(forces.coordinates, forces.rms, strict=True)}
     rows = [
-        [str(s), percent(e), percent(f), f"{left[s.coordinate]:.3g} N" if s.coordinate in left else "-"]
+        [
+            str(s),
+            percent(e),
+            percent(f),
+            left.get(s.coordinate, "-"),
+        ]
         for s, e, f in zip(prediction.prepared.sensors, prediction.errors, prediction.floors, strict=True)
     ]
     first, last = prediction.prepared.fit, prediction.prepared.judge

@@ -132,7 +132,7 @@ def _candidates(rows: Sequence[PlacedRanked]) -> str:
     lines = [
         f"<tr><td>{escape(term_names(r.term.name))}<td>{percent(r.gain.explained, 'z.1f', r.gain.error, '.1f')}"
         f"<td>{percent(r.response_error)}<td>{r.coefficient:.4g} ± {1.96 * r.error:.2g} "
-        f"{_unit(r.term.unit(r.term.symbols[0], 'N', 'm'))}<td>{r.p_value:.1g}"
+        f"{_unit(r.unit)}<td>{r.p_value:.1g}"
         for r in rows
     ]
     head = "<tr><th>candidate<th>explains<th>error with it<th>coefficient<th>p"

@@ -44,9 +44,11 @@ def coordinate_forces(axes: Axes, forces: MissingForces) -> Axes:
     axes.set_yticks(place, forces.coordinates)
     axes.invert_yaxis()
     axes.set_xlim(0.0, 1.2 * float(max(np.max(forces.size), np.max(forces.rms), 1e-300)))
-    for y, left in zip(place, forces.rms, strict=True):
-        axes.annotate(f"{left:.3g} N", (float(left), y), xytext=(4, 0), textcoords="offset points", va="center",
-                      fontsize=8)  # fmt: skip
+    for y, left, name in zip(place, forces.rms, forces.coordinates, strict=True):
+        axes.annotate(
+            f"{left:.3g} {forces.units(name)['force']}", (float(left), y), xytext=(4, 0), textcoords="offset points",
+            va="center", fontsize=8,
+        )  # fmt: skip
     axes.set_xlabel("rms force (N; N m on a rotation)")
     return axes
 
@@ -68,7 +70,7 @@ def shared_force(axes: Axes, forces: MissingForces) -> Axes:
 
 def connection_force(axes: Axes, forces: MissingForces, label: str) -> Axes:
     """Missing force of one connection against its relative displacement."""
-    return force_curve(axes, forces.curves[label], "displacement", {"displacement": "m", "force": "N"})
+    return force_curve(axes, forces.curves[label], "displacement", forces.units(label))
 
 
 def mode_frequencies(axes: Axes, sets: Sequence[tuple[str, Modes]]) -> Axes:

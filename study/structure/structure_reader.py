@@ -62,9 +62,10 @@ def read_structure(path: Path, model: Model, options: ReadOptions | None = None)
         _same_kind(usable, volts, given)
     dt, start = _sampling(path, table, given, cut)
     named = path.resolve().parent.name if path.stem == "record" else path.stem
+    turning = (s.coordinate for s, c in sensors.items() if _is_angle(_unit_text(s, c, given)))
     return StructureRecord(
         dt, {str(k): scaled[k] for k in forces}, {k: scaled[k] for k in sensors}, _extra(table, columns, cut),
-        dict(SI_UNITS), named, start,
+        dict(SI_UNITS), named, start, frozenset(turning),
     )  # fmt: skip
 
 
@@ -149,6 +150,10 @@ def _straight(unit: str) -> tuple[str, float]:
     first, slash, rest = unit.strip().partition("/")
     factor = ANGLES.get(first.strip())
     return (f"m{slash}{rest}", factor) if factor is not None else (unit, 1.0)
+
+
+def _is_angle(unit: str) -> bool:
+    return unit.strip().partition("/")[0].strip() in ANGLES
 
 
 def _check(column: Column, table: Table, options: ReadOptions) -> None:

@@ -51,6 +51,8 @@ class StructureRecord:
         What it is called in tables and file names.
     start : float
         Time of the first sample in seconds.
+    rotations : frozenset of str
+        Coordinates that were measured as angles: their forces are moments.
     stretches : tuple of Stretch
         What it is strung together of, each a motion from a state of its own; empty for a record of its own.
     whole : StructureRecord, optional
@@ -64,6 +66,7 @@ class StructureRecord:
     units: Mapping[str, str] = field(default_factory=lambda: dict(SI_UNITS))
     name: str = "record"
     start: float = 0.0
+    rotations: frozenset[str] = frozenset()
     stretches: tuple[Stretch, ...] = ()
     whole: "StructureRecord | None" = None
 

@@ -14,6 +14,7 @@ from study.figures.labels import term_names
 from study.structure.modes import modes_table
 from study.structure.placed_needless import PlacedNeedless
 from study.structure.placed_ranking import PlacedRanked
+from study.structure.placed_units import parameter_units
 from study.structure.structure_comparison import mode_rows, structure_document
 from study.structure.structure_record import Sensor
 from study.structure.structure_verdict import StructureDiagnosis
@@ -37,14 +38,13 @@ def placed_candidate_table(diagnosis: StructureDiagnosis) -> str:
 
 
 def _shown(number: int, row: PlacedRanked) -> list[str]:
-    unit = row.term.unit(row.term.symbols[0], "N", "m")
     ties = ", ".join(row.tied_with[:TIES]) + (
         f" and {len(row.tied_with) - TIES} more" if len(row.tied_with) > TIES else ""
     )
     return [
         str(number), row.term.name, row.entry.place.label if row.entry.place else "",
         percent(row.gain.explained, "z.1f", row.gain.error, ".1f"), percent(row.prediction.error),
-        f"{row.coefficient:.4g} +- {1.96 * row.error:.2g} {unit}", f"{row.p_value:.1g}", ties,
+        f"{row.coefficient:.4g} +- {1.96 * row.error:.2g} {row.unit}", f"{row.p_value:.1g}", ties,
     ]  # fmt: skip
 
 
@@ -64,12 +64,12 @@ def _missing(diagnosis: StructureDiagnosis) -> list[str]:
     first = diagnosis.candidates[0]
     words = term_names(first.term.name)
     low, high = first.interval
-    unit = first.term.unit(first.term.symbols[0], "N", "m")
+    known = f"95 % interval {low:.5g} to {high:.5g}"
     said = [
         f"{words[0].upper()}{words[1:]} is missing {_place(first.entry.place)} ({first.term.meaning}).",
         f"With it the held-out error of the motions falls from {percent(diagnosis.comparison.prediction.error)} to "
         f"{percent(first.prediction.error)}; the noise floor is {percent(first.prediction.floor)}.",
-        f"Its coefficient is {first.coefficient:.5g} {unit} (95 % interval {low:.5g} to {high:.5g}){_shape(first)}.",
+        f"Its coefficient is {first.coefficient:.5g} {first.unit} ({known}){_shape(first)}.",
     ]
     if diagnosis.left > 0.0:
         said.append(f"Structure of {percent(diagnosis.left)} of the response is left beside it.")
@@ -88,8 +88,7 @@ def _place(place: Place | None) -> str:
 
 
 def _shape(row: PlacedRanked) -> str:
-    units = {"length": "m", "time": "s", "frequency": "Hz", "1/length": "1/m"}
-    known = {p.name: units[p.quantity] for p in row.term.parameters} | {"phase": "rad"}
+    known = parameter_units(row.entry, row.rotations) | {"phase": "rad"}
     parts = [f"{n} = {x:.4g} +- {1.96 * row.parameter_errors[n]:.2g} {known[n]}" for n, x in row.parameters.items()]
     return f", with {', '.join(parts)}" if parts else ""
 

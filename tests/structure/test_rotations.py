@@ -1,0 +1,59 @@
+"""Coordinates that were measured as angles: forces on them are moments, and every unit says so."""
+
+import pytest
+
+from study.equations.model import free
+from study.equations.place import Place
+from study.equations.terms import get
+from study.structure.placed_units import coefficient_unit, parameter_units, units_at
+from study.structure.prepared_structure import prepare_structure
+from study.structure.structure_comparison import compare_structure, structure_summary
+from study.structure.structure_reader import read_structure
+from study.structure.structure_record import write_structure_csv
+
+TURNS = frozenset({"pitch"})
+PITCH = Place("between", ("ground", "pitch"))
+
+
+@pytest.mark.parametrize(
+    ("term", "place", "unit"),
+    [
+        ("linear_stiffness", PITCH, "N m/rad"),
+        ("linear_damping", Place("at", ("pitch",)), "N m s/rad"),
+        ("cubic_stiffness", PITCH, "N m/rad^3"),
+        ("coulomb_friction", PITCH, "N m"),
+        ("linear_stiffness", Place("between", ("ground", "heave")), "N/m"),
+        ("inertia", Place("at", ("pitch",)), "kg m^2"),
+        ("inertia", Place("couples", ("heave", "pitch")), "kg m"),
+        ("inertia", Place("at", ("heave",)), "kg"),
+    ],
+)
+def test_a_coefficient_has_the_unit_of_its_place(term, place, unit):
+    entry = free(get(term), place)
+    assert coefficient_unit(entry, entry.term.symbols[0], TURNS) == unit
+
+
+def test_a_gap_of_a_rotation_is_an_angle():
+    assert parameter_units(free(get("dead_band"), PITCH), TURNS) == {"u_g": "rad"}
+    assert parameter_units(free(get("periodic_stiffness"), PITCH), TURNS)["f_m"] == "Hz"
+    assert units_at(Place("between", ("heave", "pitch")), TURNS) == ("N", "m")  # one end moves in metres
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("rad", 1.0), ("deg", 57.29577951308232)])
+def test_a_record_tells_which_coordinates_turn(tmp_path, frame, quiet_frame, unit, factor):
+    path = tmp_path / "rig.csv"
+    kept = {s: x for s, x in quiet_frame.motions.items() if s.motion == "displacement"}
+    turned = {s: x * (factor if s.coordinate == "floor3" else 1.0) for s, x in kept.items()}
+    write_structure_csv(quiet_frame.with_motions(turned), path)
+    head, rest = path.read_text().split("\n", 1)
+    path.write_text(
+        head.replace("floor1 displacement", "floor1 (m)").replace("floor2 displacement", "floor2 (m)")
+        .replace("floor3 displacement", f"floor3 ({unit})") + "\n" + rest
+    )  # fmt: skip
+    record = read_structure(path, frame)
+    assert record.rotations == {"floor3"}
+    comparison = compare_structure(frame, prepare_structure(record, frame))
+    said = structure_summary(comparison)
+    assert comparison.prediction.error < 1e-5
+    assert "kg m^2" in said
+    assert " N m" in said
