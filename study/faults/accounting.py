@@ -1,5 +1,6 @@
 """A comparison with the faults of the measurement accounted for: compare, find, correct, compare again."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -23,6 +24,7 @@ from study.records.coarse_sampling import too_coarse
 from study.records.oversampling import without_spare_samples
 from study.records.prepared import FORCE, Prepared
 from study.support.errors import StudyError
+from study.support.statistics import gain
 from study.support.thresholds import TOLERANCE
 
 OF_THE_MOTION = (DRIFT, OFFSET, FORCE_NOISE)  # of which a model that has lost the motion tells nothing
@@ -138,9 +140,14 @@ def _begun_late(
     late: Fault, fit: FreeRunFit, prepared: Prepared, faults: Sequence[Fault], asked: Sequence[str], plain: SearchEnd
 ) -> SearchEnd:
     """The better end of two searches for faults, the other one of which begins with the response less late."""
-    known = (*faults, late)
-    other = search_faults(prepared, on_all(fit, corrected(prepared, known)), known, asked)
-    return _better(prepared, plain, other, (DELAY,))
+    without = leftover(plain[1], corrected(prepared, plain[0]))
+    following = on_all(fit, corrected(prepared, (*faults, late)))
+    left = leftover(following, corrected(prepared, (*faults, late)))
+    if left is None:
+        return plain
+    explained = math.nan if without is None else gain(without.residual[1], left.residual[1]).explained
+    known = (*faults, replace(late, explained=explained))
+    return _better(prepared, plain, search_faults(prepared, following, known, asked), (DELAY,))
 
 
 def _better(prepared: Prepared, plain: SearchEnd, other: SearchEnd, needed: Sequence[str]) -> SearchEnd:

@@ -1,12 +1,14 @@
 """A delay that loses the fit: found along the motion, before any free run, and then fitted with the model."""
 
+import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from study.equations.model import Model
-from study.faults.adjustable import unit
+from study.faults.adjustable import fault_columns, unit
 from study.faults.correction import corrected
 from study.faults.fault import DELAY, Fault
-from study.faults.leftover import leftover
+from study.faults.leftover import amounts_on_both, leftover
 from study.faults.physics import on_all
 from study.faults.refinement import Refined, refined
 from study.faults.search import searched_part
@@ -16,6 +18,7 @@ from study.identify.time_domain.motion_start import delay_along_the_motion
 from study.identify.time_domain.stretch_states import is_poor
 from study.records.prepared import Prepared
 from study.support.errors import StudyError
+from study.support.thresholds import TOLERANCE
 
 
 def late_response(
@@ -47,4 +50,9 @@ def _refined(begin: Fault, prepared: Prepared, begun: FreeRunFit, faults: Sequen
     look = searched_part(prepared)
     fit = on_all(begun, corrected(look, (*faults, begin)))
     left = leftover(fit, corrected(look, (*faults, begin)))
-    return None if left is None else refined(DELAY, look, faults, left, begin.value)
+    if left is None:
+        return None
+    covariance = amounts_on_both(left, fault_columns(DELAY, left, begin.value))[1]
+    error = math.hypot(math.sqrt(max(float(covariance[0, 0]), 0.0)), TOLERANCE * begin.value)
+    right = Refined(replace(begin, error=error), left)  # where the search begins may be the very value
+    return refined(DELAY, look, faults, left, begin.value) or right

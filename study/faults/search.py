@@ -24,6 +24,7 @@ from study.faults.spotted import drop_outs, spotted, widened
 from study.faults.stage import SearchStage, fitted_again
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.settling import settled
+from study.identify.time_domain.stretch_states import is_poor
 from study.records.prepared import Prepared, limited
 from study.support.arrays import Floats
 from study.support.statistics import gain
@@ -103,7 +104,7 @@ def _searched(
         if following is None:
             break
         stage = following
-    return _needed(stage, len(asked))
+    return _needed(stage, len(asked), [fault.fault for fault in faults])
 
 
 def _beyond_the_limits(stage: SearchStage) -> SearchStage:
@@ -276,8 +277,8 @@ def _beyond_reason(stage: SearchStage, effect: FittedResidual) -> bool:
     return any(math.hypot(*(values[s] for s in symbols)) > largest for symbols in harmonic)
 
 
-def _needed(stage: SearchStage, asked: int) -> SearchStage:
-    """Without the faults that the effects found after them have made needless."""
+def _needed(stage: SearchStage, asked: int, begun: Sequence[str]) -> SearchStage:
+    """Without the faults that the effects found after them have made needless; ``begun`` were known from the start."""
     for fault in stage.faults:
         if fault.fault in (*adjustable.ADJUSTABLE, DRIFT) and fault.corrected and not fault.held:
             others = tuple(f for f in stage.faults if f is not fault)
@@ -285,9 +286,15 @@ def _needed(stage: SearchStage, asked: int) -> SearchStage:
             left, rich = (fitted_again(one, prepared) for one in (stage.left, stage.rich))
             if left is None or rich is None:
                 continue
-            if not _still_there(fault, rich, asked):
+            lost = fault.fault in begun and _loses_its_way(rich, stage.rich, asked)
+            if not (lost or _still_there(fault, rich, asked)):
                 stage = SearchStage(stage.given, others, left, rich)
     return stage
+
+
+def _loses_its_way(without: FittedResidual, with_it: FittedResidual, asked: int) -> bool:
+    """Whether a model loses the motion without a correction: what a little of the fault would do tells nothing then."""
+    return is_poor(without.fit, without.prepared.fitted) and leaves_less(without, with_it, asked)
 
 
 def _still_there(fault: Fault, rich: FittedResidual, asked: int) -> bool:

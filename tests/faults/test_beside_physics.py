@@ -5,7 +5,7 @@ import pytest
 
 from study import trials
 from study.faults.accounting import accounted
-from study.faults.imposed import impose
+from study.faults.imposed import impose, shifted
 from study.records.prepared import prepare_record
 from study.trials.experiment import WIDE
 
@@ -61,12 +61,15 @@ def test_a_fault_found_in_a_stretch_has_the_value_that_the_whole_record_tells():
     assert abs(delay.value - made.fault["value"]) < 3.0 * delay.error < 0.03
 
 
-def test_a_delay_that_loses_the_fit_is_found_along_the_motion() -> None:
+@pytest.mark.parametrize("late", [-1.42, -1.0, 1.5])
+def test_a_delay_that_loses_the_fit_is_found_along_the_motion(late: float) -> None:
     """A complete model, its velocity read 1.42 samples early: "nothing missing" was said at 72 %."""
-    made = trials.make_trial(560354, (), 0.0, "velocity", "delay", WIDE)
-    result = accounted(made.believed, prepare_record(made.record))
+    made = trials.make_trial(560354, (), 0.0, "velocity", "none", WIDE)
+    read = shifted(made.record["velocity"], late)
+    result = accounted(made.believed, prepare_record(made.record.with_channels({"velocity": read})))
     (delay,) = result.faults
-    assert abs(delay.value - made.fault["value"]) < 3.0 * delay.error < 0.03
+    assert delay.fault == "delay"
+    assert abs(delay.value - late) < 3.0 * delay.error < 0.03
     assert result.comparison.prediction.error < 0.01
 
 
