@@ -112,6 +112,9 @@ COMMAND = Command(
     "  study diagnose roll.csv --free --model rig.yaml  # a free decay: no force acts\n"
     "  study diagnose blows.csv --use 2.0:9.5 --use 12.0:30.0 --model rig.yaml  # the stretches between blows\n"
     "  study diagnose damper.csv --model damper.yaml  # a component test: the model has no inertia\n"
+    "  study diagnose table.csv --absolute --model rig.yaml  # a moving base: its column is base_acceleration\n"
+    "  study diagnose axis.csv --model axis.yaml  # no spring: nothing in the model depends on the displacement\n"
+    "  study diagnose frame.csv --model frame.yaml  # a structure: the effect and its place\n"
     "  study diagnose sweep.csv --model rig.yaml  # judged in every other block, if its halves have other frequencies\n"
     "  study diagnose rig.csv --model rig.yaml --candidate \"bracket=u*abs(u) + 0.1*v**3\" --without hysteresis",
     _arguments, _run,
