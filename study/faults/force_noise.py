@@ -93,7 +93,7 @@ def _passed(left: FittedResidual, memory: float, size: float) -> Floats | None:
 
     The mean over runs with noise of this rms, of some neighbouring lines: a nonlinear structure answers noise of each
     size and colour and along each motion in another way, and a lightly damped one rings beyond the ends of a part. Runs
-    that noise lets escape are left out; None where all do.
+    that noise lets escape, or does not move at all, are left out; None where these are all.
     """
     rng, record = np.random.default_rng(0), left.prepared.record
     quiet = np.concatenate(left.predicted)
@@ -104,7 +104,9 @@ def _passed(left: FittedResidual, memory: float, size: float) -> Floats | None:
         noisy = record.with_channels({FORCE: record[FORCE] + size * noise})
         with suppress(DivergenceError):
             response = _response(left, replace(left.prepared, record=noisy))
-            logarithms.append(np.log(_periodogram((response - quiet) / size)))
+            power = _periodogram((response - quiet) / size)
+            if np.all(power > 0.0):
+                logarithms.append(np.log(power))
     if not logarithms:
         return None
     near, whole = np.ones(LINES), np.ones(len(logarithms[0]))
