@@ -11,7 +11,7 @@ from study.faults.fault import DELAY, Fault
 from study.faults.leftover import amounts_on_both, leftover
 from study.faults.physics import on_all
 from study.faults.refinement import Refined, refined
-from study.faults.search import searched_part
+from study.faults.stage import searched_part
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.motion_start import delay_along_the_motion

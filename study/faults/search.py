@@ -21,18 +21,17 @@ from study.faults.leftover import FittedResidual, leaves_less, leftover, share
 from study.faults.refinement import Refined, refined, relative_power
 from study.faults.spikes import spikes
 from study.faults.spotted import drop_outs, spotted, widened
-from study.faults.stage import SearchStage, fitted_again
+from study.faults.stage import SearchStage, fitted_again, searched_part
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.settling import settled
 from study.identify.time_domain.stretch_states import is_poor
-from study.records.prepared import Prepared, limited
+from study.records.prepared import Prepared
 from study.support.arrays import Floats
 from study.support.statistics import gain
 from study.support.thresholds import ALPHA
 
 ROUNDS = 12  # faults and effects looked for one after the other
 PLAIN = (DRIFT, SPIKES, DROP_OUTS)  # which no physics imitates
-SHORT, LONG = 8192, 16384  # samples of either part in which faults compete with physics
 EFFECTS = 3  # of the library that are added before a fault is believed
 
 
@@ -69,11 +68,6 @@ def search_faults(
         return tuple(faults), fit
     stage = _values_again(stage)
     return stage.faults, stage.left.fit
-
-
-def searched_part(given: Prepared) -> Prepared:
-    """As much of either part of a record as a search for faults that compete with physics takes."""
-    return limited(given, int(np.clip(given.samples_in(physics.PERIODS), SHORT, LONG)))
 
 
 def _values_again(stage: SearchStage) -> SearchStage:

@@ -2,11 +2,20 @@
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from study.faults import physics
 from study.faults.correction import corrected
 from study.faults.fault import SPIKES, Fault
 from study.faults.leftover import FittedResidual, leaves_less, leftover
-from study.records.prepared import Prepared
+from study.records.prepared import Prepared, limited
+
+SHORT, LONG = 8192, 16384  # samples of either part in which faults compete with physics
+
+
+def searched_part(given: Prepared) -> Prepared:
+    """As much of either part of a record as a search for faults that compete with physics takes."""
+    return limited(given, int(np.clip(given.samples_in(physics.PERIODS), SHORT, LONG)))
 
 
 @dataclass(frozen=True, eq=False)
