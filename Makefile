@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+COMPILED := setup.py $(wildcard study/equations/c/*)
 
 .PHONY: study report test test-cluster checks lint picture fault_pictures notebooks docs gallery readme estimators trials structure_trials clean
 
@@ -64,7 +65,7 @@ structure_trials: $(READY)
 	$(BIN)/python scripts/structure_trial_docs.py results/trials_mdof/trials.csv \
 	  figures/trials_of_structures_effects.png figures/trials_of_structures_places.png
 
-$(READY): requirements.lock pyproject.toml
+$(READY): requirements.lock pyproject.toml $(COMPILED)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
 	  || { echo "study: $(PYTHON) is older than 3.11; name a newer one: make PYTHON=python3.12 study"; exit 2; }
 	@$(PYTHON) -m venv $(VENV) \

@@ -1,4 +1,5 @@
-"""Simulation beside SciPy's integrators at equal error; run with `pytest benchmarks/test_simulation.py`.
+"""Simulation beside SciPy's integrators at equal error; run with `pytest benchmarks/test_simulation.py`, after
+`pip install numba`.
 
 Everyone integrates the same Duffing record. A SciPy integrator gets the loosest tolerance with which it is at least as
 near to the reference as we are, a compiled right-hand side, and the force between the samples from a table.

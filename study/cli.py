@@ -1,5 +1,6 @@
 """The command line: run a command, and turn whatever goes wrong into one sentence."""
 
+import gc
 import os
 import re
 import sys
@@ -12,6 +13,7 @@ from study.support.errors import StudyError, expect
 from study.support.terminal import harmless, shown_on
 
 LONG = re.compile(r"\S{400,}")  # a word that no path and no value needs: a message is to be read
+KEPT = (50_000, 20, 50)  # what modules make while they load lives to the end: a search for garbage finds none there
 BAD_INPUT, FAULT, INTERRUPTED, PIPE_CLOSED = 2, 1, 130, 141  # the last two as shells report SIGINT and SIGPIPE
 
 
@@ -49,6 +51,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str] | None) -> None:
+    if argv is None:
+        gc.set_threshold(*KEPT)
     words = sys.argv[1:] if argv is None else argv
     for word in words:  # a shell cannot pass one on, a caller in Python can
         expect("\0" not in word, f"the word {word!r} holds a null byte; expected words without")

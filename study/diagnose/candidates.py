@@ -1,7 +1,6 @@
 """One candidate: the model with it, fitted on one part of the record and judged on the other."""
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +14,7 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.shape_search import Baseline
 from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import FORCE, Prepared
-from study.support.cores import cores
+from study.support.cores import side_by_side
 from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
@@ -51,13 +50,17 @@ def try_all(
     def fitted(term: Term) -> FittedCandidate | None:
         return attempt(term, base, prepared)
 
-    with ThreadPoolExecutor(cores()) as pool:
-        for count, candidate in enumerate(pool.map(fitted, terms), start=1):
-            if candidate is not None:
-                done.append(candidate)
-            if progress is not None:
-                progress(count)
+    for count, candidate in enumerate(side_by_side(fitted, terms, effort_of), start=1):
+        if candidate is not None:
+            done.append(candidate)
+        if progress is not None:
+            progress(count)
     return done
+
+
+def effort_of(term: Term) -> int:
+    """How much there is to search for: shape parameters, and a memory."""
+    return len(term.parameters) + (term.state is not None)
 
 
 def attempt(term: Term, base: Baseline, prepared: Prepared) -> FittedCandidate | None:
@@ -99,5 +102,4 @@ def all_settled(candidates: Sequence[FittedCandidate], prepared: Prepared) -> li
         except StudyError:
             return candidate
 
-    with ThreadPoolExecutor(cores()) as pool:
-        return list(pool.map(settle, candidates))
+    return list(side_by_side(settle, candidates, lambda candidate: effort_of(candidate.term)))

@@ -16,7 +16,6 @@ import numpy as np
 
 from study.equations import kernels
 from study.equations.graph import Op, Program
-from study.equations.machine_code import OFTEN, Variation, machine_code
 from study.equations.model import Model, forward_graph, named_channels, with_registers
 from study.records.interpolation import BAND_LIMITED, between_runs, between_samples, runs_of
 from study.records.record import MOTIONS, Record
@@ -28,6 +27,33 @@ REMEMBERED = 4  # channels whose values between the samples are cached
 COMPILED = 128  # programs that are cached
 FORCE = "force"  # the response of a model without inertia, whose motion is prescribed
 SIDE = "side of v"  # the input that stands for sgn v during a step
+
+
+@dataclass(frozen=True, eq=False)
+class Variation:
+    """A program of slopes and their partial derivatives, and where its results lie; compared by identity.
+
+    Attributes
+    ----------
+    program : Program
+        Slopes of the states, then their partial derivatives.
+    slots : int array, shape (states - 1, 1 + states + keys)
+        Registers of each slope (but velocity), of its partial derivatives by the states and by the keys.
+    side : int
+        Register that stands for sgn v, -1 if no force of the model jumps with it.
+    channels : int
+        Channels of the drive, the force among them.
+    """
+
+    program: Program
+    slots: Ints
+    side: int
+    channels: int
+
+    @property
+    def states(self) -> int:
+        """Displacement, velocity and the terms' own."""
+        return len(self.slots) + 1
 
 
 @dataclass(frozen=True)
@@ -199,10 +225,9 @@ class FreeRun:
                 self.steps, self.drive, np.array(bounds), states, out,
             )  # fmt: skip
         else:
-            code = machine_code(self.variation, out.shape[1], self.length * self.steps >= OFTEN)
             failed = kernels.integrate_segments(
-                code.addresses, program.registers.copy(), self.variation.side, starts, self.dt,
-                self.steps, self.drive, np.array(bounds), states, self.row, out,
+                program.code, len(program.inputs), program.first, program.registers.copy(), self.variation.slots,
+                self.variation.side, starts, self.dt, self.steps, self.drive, np.array(bounds), states, self.row, out,
             )  # fmt: skip
         if failed >= 0:
             time = self.time(failed)

@@ -15,6 +15,7 @@ from study.faults.leftover import FittedResidual
 from study.identify.time_domain.part_fit import run_of
 from study.records.prepared import FORCE, Prepared
 from study.support.arrays import Floats
+from study.support.cores import side_by_side
 from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares
 from study.support.thresholds import ALPHA, TOLERANCE
@@ -51,14 +52,17 @@ class _Noise:
         return self.error / float(np.sqrt(max(self.amount, 1e-300))) / 2.0
 
 
-def force_noise(left: FittedResidual, asked: int) -> Fault | None:
-    """Noise on the force; None where noise on the response is as likely, by the ratio of the likelihoods."""
+def force_noise(left: FittedResidual, asked: int, repeats: int = REPEATS) -> Fault | None:
+    """Noise on the force; None where noise on the response is as likely, by the ratio of the likelihoods.
+
+    With fewer ``repeats`` its size and colour are those of the first runs.
+    """
     residual = np.concatenate(left.residual)
     power = _periodogram(residual)
     turn = 2.0 * np.pi * np.asarray(rfftfreq(len(residual)))[1:-1]
     on_response = min(_likely(power, _first_order(memory, turn)).cost for memory in MEMORIES)
     memory, size, found = 0.0, LITTLE * float(np.std(left.prepared.record[FORCE])), list[_Noise]()
-    for _ in range(REPEATS):
+    for _ in range(repeats):
         passed = _passed(left, memory, size)
         if passed is None:
             break
@@ -98,15 +102,17 @@ def _passed(left: FittedResidual, memory: float, size: float) -> Floats | None:
     rng, record = np.random.default_rng(0), left.prepared.record
     quiet = np.concatenate(left.predicted)
     colour = np.sqrt(_first_order(memory, 2.0 * np.pi * np.asarray(rfftfreq(len(record)))))
-    logarithms: list[Floats] = []
-    for _ in range(RUNS):
-        noise = np.asarray(irfft(np.asarray(rfft(rng.standard_normal(len(record)))) * colour, len(record)))
+
+    def logarithm(white: Floats) -> Floats | None:
+        noise = np.asarray(irfft(np.asarray(rfft(white)) * colour, len(record)))
         noisy = record.with_channels({FORCE: record[FORCE] + size * noise})
         with suppress(DivergenceError):
-            response = _response(left, replace(left.prepared, record=noisy))
-            power = _periodogram((response - quiet) / size)
-            if np.all(power > 0.0):
-                logarithms.append(np.log(power))
+            power = _periodogram((_response(left, replace(left.prepared, record=noisy)) - quiet) / size)
+            return np.log(power) if np.all(power > 0.0) else None
+        return None
+
+    drawn = [rng.standard_normal(len(record)) for _ in range(RUNS)]
+    logarithms = [found for found in side_by_side(logarithm, drawn) if found is not None]
     if not logarithms:
         return None
     near, whole = np.ones(LINES), np.ones(len(logarithms[0]))

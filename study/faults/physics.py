@@ -1,7 +1,6 @@
 """Physical effects that a record asks for beside a model: what a fault has to prove itself against."""
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +14,7 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part, run_of
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
-from study.support.cores import cores
+from study.support.cores import side_by_side
 from study.support.errors import StudyError
 from study.support.statistics import worse
 
@@ -57,10 +56,10 @@ def missing(left: FittedResidual) -> FittedResidual | None:
     def fitted(start: tuple[Term, list[shape_search.Start]]) -> FittedResidual | None:
         return _fitted(start[0], base, look, prepared)
 
-    with ThreadPoolExecutor(cores()) as pool:
-        starts = [(term, found) for term, found in zip(terms, pool.map(begun, terms), strict=True) if found]
-        promising = sorted(starts, key=lambda s: -s[1][0].share)[:FITTED]
-        tried = [t for t in pool.map(fitted, promising) if t is not None]
+    begins = side_by_side(begun, terms, lambda term: len(term.parameters))
+    starts = [(term, found) for term, found in zip(terms, begins, strict=True) if found]
+    promising = sorted(starts, key=lambda s: -s[1][0].share)[:FITTED]
+    tried = [t for t in side_by_side(fitted, promising, lambda s: len(s[0].parameters)) if t is not None]
     names = [t.name for t in terms]
     for group in ([t for t in tried if not unphysical(t.fit, names)], tried):
         best = _simplest_of_the_best(group)

@@ -180,15 +180,15 @@ def _added(effect: FittedResidual, stage: SearchStage) -> list[str]:
 
 def _noisy_force(stage: SearchStage, names: Sequence[str], asked: int) -> SearchStage | None:
     """The stage with noise on the force, which is said of what no effect explains; None if it is not seen or known."""
-    if FORCE_NOISE not in names or force_noise(stage.rich, asked) is None:
+    if FORCE_NOISE not in names or force_noise(stage.rich, asked, repeats=1) is None:
         return None
-    effect = physics.missing(stage.rich) if len(stage.effects) < EFFECTS else None
-    if effect is not None:
-        return _beside(effect, stage)
     # What an integration in few steps leaves is shaped by the structure too.
     left = leftover(settled(stage.rich.fit, stage.rich.prepared), stage.rich.prepared)
     noise = None if left is None else force_noise(left, asked)
-    return None if noise is None else replace(stage, faults=(*stage.faults, noise))
+    if noise is None:
+        return None
+    effect = physics.missing(stage.rich) if len(stage.effects) < EFFECTS else None
+    return replace(stage, faults=(*stage.faults, noise)) if effect is None else _beside(effect, stage)
 
 
 def _may_be_none(fault: Fault, asked: int) -> bool:

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from study.equations import kernels
 from study.equations.graph import Program
 from study.equations.model import Model, with_registers
 from study.records.interpolation import between_samples
 from study.records.record import MOTIONS
-from study.structure import structure_kernels as kernels
 from study.structure.equations_of_motion import MotionProgram, motion_program
 from study.structure.structure_record import Sensor, StructureRecord
 from study.support.arrays import Floats, Ints
@@ -122,9 +122,8 @@ class StructureRun:
         begun = initial[: own.states]
         state[: len(begun), 0] = begun
         state[list(free), range(first, out.shape[2])] = 1.0
-        sides = own.sides if len(own.sides) else None
         failed = kernels.integrate_structure(
-            program.code, program.first, program.registers.copy(), own.slopes, own.by_state, own.by_key, sides,
+            program.code, program.first, program.registers.copy(), own.slopes, own.by_state, own.by_key, own.sides,
             own.by_side, own.directions, drive.start, self.dt, self.steps, drive.values, state, self.rows, out,
         )  # fmt: skip
         if failed >= 0:

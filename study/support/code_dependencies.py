@@ -8,6 +8,7 @@ from pathlib import Path
 from study.support.errors import StudyError
 
 BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")
+KERNELS = "kernels.py"  # the module whose loops are in C, in the folder beside it
 
 
 def rests_on(script: Path, *, also: Iterable[str] = (), without: Collection[str] = ()) -> list[str]:
@@ -25,7 +26,8 @@ def rests_on(script: Path, *, also: Iterable[str] = (), without: Collection[str]
         if path not in reached and path not in skipped:
             reached.add(path)
             waiting += _next(path, root)
-    return sorted(str(path) for path in reached - {script})
+    compiled = {source for path in reached for source in (path.parent / "c").glob("*") if path.name == KERNELS}
+    return sorted(str(path) for path in (reached | compiled) - {script})
 
 
 @cache

@@ -27,7 +27,7 @@ from study.support.errors import StudyError
 DUFFING = str(Path(__file__).parents[2] / "models" / "duffing.yaml")
 STUDY = [sys.executable, "-m", "study"]
 HEAVY = {
-    "numpy", "scipy", "pandas", "numba", "matplotlib", "ruamel", "pydantic", "tabulate", "h5py", "bokeh", "snakemake",
+    "numpy", "scipy", "pandas", "matplotlib", "ruamel", "pydantic", "tabulate", "h5py", "bokeh", "snakemake",
 }  # fmt: skip
 
 

@@ -13,7 +13,7 @@ import pytest
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parents[2]
-SOURCES = ("study", "pyproject.toml", "README.md", "LICENSE")
+SOURCES = ("study", "scripts", "setup.py", "pyproject.toml", "README.md", "LICENSE")
 EXTRAS = ("bokeh", "h5py", "snakemake", "pytest")
 
 
@@ -68,19 +68,7 @@ def python(wheel, tmp_path_factory):
             place = Path(str(importlib.metadata.distribution(name).locate_file(str(top))))
             if top.name not in ("..", "__pycache__") and not (site / top).exists():
                 (site / top).symlink_to(place)
-    take_compiled_along(site)
     return folder / "bin" / "python"
-
-
-def take_compiled_along(site):
-    """The kernels' machine code of these very sources, if it is there: half a minute of compiling saved."""
-    for code in (ROOT / "study").rglob("__pycache__/*.nb[ic]"):
-        target = site / code.relative_to(ROOT)
-        target.parent.mkdir(exist_ok=True)
-        shutil.copy(code, target)
-    for module in (ROOT / "study").rglob("*.py"):
-        times = module.stat()
-        os.utime(site / module.relative_to(ROOT), ns=(times.st_atime_ns, times.st_mtime_ns))
 
 
 def test_the_wheel_holds_the_package_its_types_and_its_looks(wheel):

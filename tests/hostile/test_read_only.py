@@ -1,4 +1,4 @@
-"""A read-only installation whose user has no writable home, as in a container: it works, and says what it lacks."""
+"""A read-only installation whose user has no writable home, as in a container: it works, and asks for no more."""
 
 import ctypes
 import os
@@ -13,18 +13,13 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 DROP_CAPABILITY, OVERRIDES = 24, (1, 2)  # prctl's PR_CAPBSET_DROP; what lets root write where nobody may
-SEEN = """import study.equations.jit as jit
+SEEN = """import numpy as np
+from study.equations import kernels
+from study.equations.graph import Op
 
-@jit.compiled
-def more(x):
-    return x + 1.0
-
-@jit.inlined
-def same(x):
-    return x
-
-assert more(1.0) == 2.0
-assert same(1.0) == 1.0
+r = np.array([2.0, 3.0, 0.0])
+kernels.run(np.array([[int(Op.MUL), 0, 1]]), 2, r)
+assert r[2] == 6.0
 """
 
 
@@ -53,13 +48,11 @@ def installed() -> Iterator[Path]:
     shutil.rmtree(folder)
 
 
-def test_a_read_only_installation_works_and_says_once_what_it_cannot_keep(installed: Path) -> None:
-    bare = {k: v for k, v in os.environ.items() if not k.startswith(("NUMBA", "XDG", "PYTHON"))}
+def test_a_read_only_installation_works_and_says_nothing(installed: Path) -> None:
+    bare = {k: v for k, v in os.environ.items() if not k.startswith(("XDG", "PYTHON"))}
     done = subprocess.run(
         [sys.executable, str(installed / "probe.py")], cwd=installed, capture_output=True, text=True, timeout=120,
         env={**bare, "HOME": str(installed / "home"), "PYTHONPATH": str(installed)}, preexec_fn=_without_privileges,
         check=False,
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert done.stderr.startswith("study: compiled code cannot be kept")
-    assert done.stderr.count("\n") == 1
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from study.equations import free_run, kernels
+from study.equations import kernels
 from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model, with_registers
 from study.records.record import Record
@@ -63,13 +63,3 @@ def test_steps_are_those_of_the_instructions_one_by_one(make_model: Make, effect
     response, jacobian = run.respond(values, initial, run.states)
     assert response[-1] == pytest.approx(end[0, 0], rel=1e-12)
     np.testing.assert_allclose(jacobian[-1], end[0, 1:], rtol=1e-10, atol=1e-13 * float(np.max(np.abs(end[0, 1:]))))
-
-
-def test_optimised_code_gives_the_same_bits(make_model: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    model = with_effect(make_model, "hysteresis")
-    force = np.random.default_rng(2).standard_normal(500)
-    run = prepare(model, Record(DT, {"force": force, "displacement": np.zeros(500)}, {}, "runs"), tuple(model.values))
-    plain = run.respond(numbers(model), [0.0, 0.0], 2)
-    monkeypatch.setattr(free_run, "OFTEN", 1)
-    for one, other in zip(plain, run.respond(numbers(model), [0.0, 0.0], 2), strict=True):
-        np.testing.assert_array_equal(one, other)

@@ -1,0 +1,43 @@
+/* Programs: straight-line code over one array of registers (see graph.py, whose numbers of instructions these are). */
+
+#ifndef STUDY_PROGRAM_H
+#define STUDY_PROGRAM_H
+
+#include <stdint.h>
+
+#if defined(_WIN32)
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+
+enum { END = 4 * 17 }; /* beyond the operations of graph.Op */
+enum { ALL_FINITE = -1, NO_MEMORY = -2 }; /* what an integrator returns beside the first sample that is not finite */
+
+typedef struct {
+    int64_t op;
+    const double *a, *b; /* registers of the operands */
+    double *to;          /* and of the result */
+} Instruction;
+
+typedef struct {
+    Instruction *code; /* without the instructions whose results never change; ends with END */
+    double *r;
+} Program;
+
+/* Run `count` instructions of three numbers each (operation, operands), the first of which writes register `first`. */
+EXPORT void run_program(const int64_t *code, int64_t count, int64_t first, double *r);
+
+/*
+ * A program made ready for many runs: what depends on nothing that changes is computed now and left out of the code.
+ * Registers below `changing` change from run to run, and those in `others` (a negative one is passed over). Returns 0
+ * where there is no memory.
+ */
+int prepare_program(
+    Program *program, const int64_t *code, int64_t count, int64_t first, double *r, int64_t changing,
+    const int64_t *others, int64_t other_count
+);
+void forget_program(Program *program);
+void run_prepared(const Program *program);
+
+#endif
