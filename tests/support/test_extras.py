@@ -81,7 +81,7 @@ def test_what_is_no_python_is_installed_too():
     beside = {
         (".".join(path.parent.relative_to(ROOT).parts), path.name)
         for path in (ROOT / "study").rglob("*")
-        if path.is_file() and path.suffix not in (".py", ".pyc", ".c", ".h", ".so", ".dll")
+        if path.is_file() and "__pycache__" not in path.parts and path.suffix not in (".py", ".c", ".h", ".so", ".dll")
     }
     assert listed == beside
     assert all(files(package).joinpath(name).is_file() for package, name in listed)
