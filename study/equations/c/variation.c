@@ -65,7 +65,7 @@ static inline void stage_of(
     drive_registers(v, time, drive);
     run_prepared(&v->program);
     for (int64_t i = 0; i < v->states; i++) {
-        double own[WIDEST], *total = width <= WIDEST ? own : v->total;
+        double own[WIDEST] = {0.0}, *total = width <= WIDEST ? own : v->total;
         double *restrict sum = v->sum + i * width, *restrict to = next + i * width;
         const double *restrict state = v->state + i * width;
         slope_row(v, i, trial, total, width);
