@@ -65,11 +65,7 @@ FIRST = (
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The longest files begin first, else one core waits for another at the end.
-
-    One core compiles the kernels while the other does what needs none: both would compile them anew, and so would
-    the workflow's many processes.
-    """
+    """The longest files begin first, else one core waits for another at the end."""
     items.sort(key=lambda item: FIRST.index(item.path.name) if item.path.name in FIRST else len(FIRST))
 
 

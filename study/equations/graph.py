@@ -2,7 +2,7 @@
 
 Every force in a model is a node here. Equal subexpressions share one node (``u*u`` in ``u**3`` and in
 its derivative is computed once), derivatives are exact, and :meth:`Graph.program` turns the nodes into
-the instructions that ``kernels.py`` runs at compiled speed. No text is ever evaluated.
+the instructions that the compiled loops run. No text is ever evaluated.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,7 +15,7 @@ from study.support.arrays import Floats, Ints
 
 
 class Op(IntEnum):
-    """Instructions of the kernels; the numbers are what ``kernels.run`` switches on."""
+    """Instructions of the kernels; the numbers are those of ``c/program.c``."""
 
     ADD = 0
     SUB = 1
