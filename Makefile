@@ -1,11 +1,12 @@
-# The two commands: `make study` and `make test`. Both set themselves up in .venv first.
+# The two commands: `make study` and `make test`. Both set themselves up in .venv first. `make test-long` runs the tests that
+# `make test` leaves out: whole workflows, sessions in a browser, climbs, other processors, rows of the long trials.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 COMPILED := setup.py $(wildcard study/equations/c/*)
 
-.PHONY: study report test test-cluster checks lint picture fault_pictures notebooks docs gallery readme estimators trials structure_trials clean
+.PHONY: study report test test-long test-cluster checks lint picture fault_pictures notebooks docs gallery readme estimators trials structure_trials clean
 
 study: $(READY)
 	$(BIN)/snakemake -j2
@@ -22,8 +23,13 @@ test-cluster: $(READY)
 	scripts/test_store.sh
 
 # As many workers as cores: more threads would only wait for each other.
+PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n logical --dist loadfile --no-loadscope-reorder -p no:benchmark
+
 checks: $(READY)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n logical --dist loadfile --no-loadscope-reorder -p no:benchmark
+	$(PYTEST) -m "not long"
+
+test-long: $(READY)
+	$(PYTEST) -m long
 
 lint: $(READY)
 	$(BIN)/ruff check

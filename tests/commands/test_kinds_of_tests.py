@@ -52,6 +52,7 @@ def lightly(model):
     return model.with_values({"c": 0.6})
 
 
+@pytest.mark.long
 def test_a_free_decay_fixes_all_but_one_common_factor(systems):
     decay(lightly(systems["linear"]), noise=0.01)
     found = compared("decay.csv", "--model", "rig.yaml")
@@ -74,6 +75,7 @@ def test_a_coefficient_that_is_given_fixes_the_common_factor(systems):
     assert values["m"]["unit"] == "kg"
 
 
+@pytest.mark.long
 def test_an_effect_hidden_in_decays_from_several_heights_is_found(systems):
     decay(lightly(systems["duffing"]), (0.008, 0.004), 1200, 0.01)
     found = verdict("decay.csv", "--model", "rig.yaml", "--use", "0:23.9", "--use", "24:47.9")

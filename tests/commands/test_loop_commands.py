@@ -103,6 +103,7 @@ def test_the_only_term_left_is_not_dropped(rig, capsys):
     assert (rig / "rig.yaml").read_text() == "terms: [inertia, linear_stiffness]\n"
 
 
+@pytest.mark.long
 def test_what_is_not_needed_is_said_and_dropped(rig, capsys):
     """What an earlier guess added, and what the record shows once the hidden drag is in the model."""
     text = (rig / "rig.yaml").read_text() + "  # tried in March\n"
@@ -146,6 +147,7 @@ def test_a_layout_that_cannot_be_changed_is_refused_before_anything_is_written(r
     assert not history.path_of(rig / "rig.yaml").exists()
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few")
 def test_a_climb_goes_forwards_and_backwards(rig, capsys):
     """It begins with an effect that does some of the work of the missing one, and ends without it."""
@@ -162,6 +164,7 @@ def test_a_climb_goes_forwards_and_backwards(rig, capsys):
     assert not (rig / "out" / "climb" / PAGE).exists()
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few")
 def test_a_climb_does_not_go_in_a_circle(rig, capsys, monkeypatch):
     """A diagnosis that asks for what was just taken out, again and again, ends the climb."""

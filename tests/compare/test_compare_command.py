@@ -74,6 +74,7 @@ def test_a_comparison_is_printed_and_written(capsys: pytest.CaptureFixture[str])
         assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.long
 def test_the_same_input_gives_the_same_bytes() -> None:
     for folder in ("one", "two"):
         assert cli.main(["compare", "rig.csv", "--model", "rig.yaml", "--out", folder]) == 0
@@ -81,6 +82,7 @@ def test_the_same_input_gives_the_same_bytes() -> None:
         assert path.read_bytes() == (Path("two") / path.name).read_bytes(), path.name
 
 
+@pytest.mark.long
 def test_several_records_give_a_table_by_level(capsys: pytest.CaptureFixture[str]) -> None:
     for level in (0.3, 3.0):
         write_csv(record(level, round(10 * level)), Path(f"level_{level:g}.csv".replace("0.", "0")))
@@ -205,6 +207,7 @@ def test_help_is_quick_and_imports_nothing_heavy() -> None:
 # ---- public records
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not (DATA / "silverbox").is_dir(), reason="the public records are not there")
 def test_the_silverbox_lacks_a_cubic_stiffness_and_then_little(capsys: pytest.CaptureFixture[str]) -> None:
     words = [
@@ -223,6 +226,7 @@ def test_the_silverbox_lacks_a_cubic_stiffness_and_then_little(capsys: pytest.Ca
     assert drag["response_error"] < 0.32e-3
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not (DATA / "boucwen").is_dir(), reason="the public records are not there")
 def test_the_bouc_wen_record_is_no_function_of_the_motion_and_hysteresis_reaches_its_noise(
     capsys: pytest.CaptureFixture[str],

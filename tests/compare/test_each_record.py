@@ -47,6 +47,7 @@ def test_a_separate_coefficient_is_that_of_each_record_and_a_shared_one_is_not_s
     assert (damping["differs"], stiffness["differs"]) == (True, False)
 
 
+@pytest.mark.long
 def test_errors_by_record_are_those_of_fits_to_each_alone():
     together = by_key("compare", "--each-record", "c", "--model", "full.yaml")["c"]["standard_error"]
     for name, error in zip(DAMPING, together, strict=True):
@@ -56,6 +57,7 @@ def test_errors_by_record_are_those_of_fits_to_each_alone():
         assert error == pytest.approx(next(c["standard_error"] for c in alone if c["key"] == "c"), rel=0.6)
 
 
+@pytest.mark.long
 def test_an_effect_that_all_records_share_is_found_beside_a_coefficient_that_differs():
     rows = by_key("diagnose", "--each-record", "c", "--model", "linear.yaml")
     found = json.loads(Path("out/diagnosis.json").read_text())

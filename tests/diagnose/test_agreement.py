@@ -23,6 +23,7 @@ TRIALS += [(33, "dead_band", 0.05, "velocity")]
 OVERSAMPLED = 520001, "quadratic_damping", 0.05, "velocity"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("seed", "hidden", "noise", "response"), [*TRIALS, OVERSAMPLED])
 def test_one_error_and_one_floor(seed, hidden, noise, response, tmp_path, capsys):
     fine = seed == OVERSAMPLED[0]
@@ -68,6 +69,7 @@ def assert_same(one, other):
         assert other[key]["response"] == pytest.approx(one[key]["response"], rel=ALIKE)
 
 
+@pytest.mark.long
 def test_a_cut_off_is_heeded_by_all(tmp_path, capsys):
     data, model, _ = write_trial(make_trial(32, ("quadratic_damping",), 0.01, "acceleration"), tmp_path)
     errors = {}

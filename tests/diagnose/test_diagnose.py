@@ -88,6 +88,7 @@ def test_nothing_missing_is_said_where_nothing_is():
     assert "Nothing is missing" in diagnosis_sentences(diagnosis)[0]
 
 
+@pytest.mark.long
 def test_an_effect_that_is_not_in_the_library_is_unknown_and_its_kind_is_said():
     trial = trials.make_trial(903, hidden=["periodic_stiffness"], noise=0.0)
     diagnosis = diagnosed(trial.believed, trial.record, without=["periodic_stiffness"])

@@ -50,6 +50,7 @@ def test_the_true_model_is_found_and_judged_in_segments(wells: Prepared) -> None
     assert prediction.error == pytest.approx(prediction.floor, rel=0.1)
 
 
+@pytest.mark.long
 def test_the_cubic_spring_is_named_and_then_nothing_is_missing(wells: Prepared) -> None:
     without = tuple(name for name in LIBRARY if name not in RIVALS)
     before = accounted(LINEAR, wells)

@@ -39,6 +39,7 @@ def believed():
     return model().with_values(dict.fromkeys(model().values, None))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("between", "said"), [("held", "is held from each sample"), ("straight", "straight lines")])
 def test_a_force_that_a_program_made_is_read_as_it_was_before_an_effect_is_called_missing(between, said):
     comparison = compare(believed(), prepare_record(record(between)))

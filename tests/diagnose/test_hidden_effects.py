@@ -39,12 +39,14 @@ def test_hidden_effect_comes_first_or_is_named_in_the_tie(place: int, name: str)
     assert first.response_error < 1.05 * truth + 1e-6  # where nothing is noise, the rounding of the fit
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("noise", [0.0, 0.05])
 def test_nothing_is_invented_where_nothing_is_hidden(noise: float) -> None:
     trial = make_trial(FIRST_SEED + 100 + int(100 * noise), (), noise, "displacement")
     assert diagnosed(trial).verdict == NOTHING
 
 
+@pytest.mark.long
 def test_two_hidden_effects_are_found_one_after_the_other() -> None:
     """The seed is the first from 200 on whose first system stays finite; that of 200 was the 67th, and took longest."""
     hidden = ("cubic_stiffness", "quadratic_damping")
@@ -53,6 +55,7 @@ def test_two_hidden_effects_are_found_one_after_the_other() -> None:
     assert row["error_after_two"] < row["error_after"] < row["error_before"]
 
 
+@pytest.mark.long
 def test_effect_that_is_not_in_the_library_is_not_given_another_name_with_confidence() -> None:
     trial = make_trial(FIRST_SEED + 300, ("coulomb_friction",), 0.0, "displacement")
     others = ("quadratic_damping", "cubic_damping", "van_der_pol_damping", "dead_band", "relaxation")

@@ -137,6 +137,7 @@ def elsewhere(processor: str) -> dict[str, Any]:
     return json.loads(done.stdout)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("processor", PROCESSORS)
 def test_the_processor_does_not_matter(processor, case):
     """The kernels of linear algebra of four processors, with one thread and two: sums are ordered otherwise in each."""

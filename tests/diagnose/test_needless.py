@@ -165,6 +165,7 @@ FIRST_SEED, TRIALS = 880_000, 24
 CHANCE = 1  # of so many trials, with a term that the record does not show: measured were 2 of 120
 
 
+@pytest.mark.long
 def test_true_terms_are_not_called_needless():
     """Completed models of seeds fixed before they were first run, at 0, 1 and 5 % noise, displacement or acceleration.
 

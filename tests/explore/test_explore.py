@@ -137,6 +137,7 @@ def test_what_is_not_needed_has_a_button_that_takes_it_out(grown, superfluous):
     assert "data-act='drop'" not in needed
 
 
+@pytest.mark.long
 def test_a_dropped_term_is_gone_and_undoing_brings_it_back(grown, superfluous):
     after = sessions.dropped(superfluous, "quadratic_stiffness")
     assert after.now.label == "- quadratic_stiffness"

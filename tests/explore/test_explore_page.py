@@ -78,6 +78,7 @@ def drag(page: Page, panel: str, first: float, last: float) -> None:
     page.mouse.up()
 
 
+@pytest.mark.long
 def test_a_session_from_the_first_verdict_to_the_saved_page(page: Page, address: str, rig: Path) -> None:
     wrong, asked = watched(page)
     page.goto(address)

@@ -180,6 +180,7 @@ def test_a_bad_token_is_refused(served: Served, token: str) -> None:
     assert status(served.answer("/", "Bokeh-Session-Id: x")) == 403
 
 
+@pytest.mark.long
 def test_what_is_no_request_and_no_message_leaves_the_page_as_it_was(served: Served) -> None:
     connection, line = served.opened(served.token())
     with connection:
@@ -191,6 +192,7 @@ def test_what_is_no_request_and_no_message_leaves_the_page_as_it_was(served: Ser
     assert status(served.answer()) == 200
 
 
+@pytest.mark.long
 def test_thousands_of_requests_leave_no_memory_behind(served: Served) -> None:
     """2,000 requests, of them 10 for whole pages, and 50 sockets; five pages first, so that what is kept once is there.
 

@@ -88,6 +88,7 @@ def the_axes_have_ticks(page: Page) -> None:
     assert kinds() == ["LinearScale"] * 4
 
 
+@pytest.mark.long
 def test_a_session_of_a_structure_from_the_verdict_to_the_saved_page(page: Page, shown: str, hall) -> None:
     wrong: list[str] = []
     page.on("console", lambda m: wrong.append(m.text) if m.type in ("error", "warning") else None)

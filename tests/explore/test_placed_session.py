@@ -118,6 +118,7 @@ def test_what_is_saved_holds_model_history_tables_pictures_and_the_page(hall, gr
     assert made[PAGE] == structure_files(grown, "frame.yaml", (hall / "frame.yaml").read_text(), values=True)[PAGE]
 
 
+@pytest.mark.long
 def test_the_desk_takes_a_structure_as_it_takes_one_coordinate(asked, hall, tmp_path):
     desk = Desk(asked, hall / "frame.yaml", (hall / "frame.yaml").read_text(), tmp_path / "out", deeds=PLACED)
     done = threading.Event()

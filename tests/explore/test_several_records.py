@@ -184,6 +184,7 @@ def test_the_live_page_turns_to_the_record_that_is_asked_for(grown, tmp_path):
     desk.close()
 
 
+@pytest.mark.long
 def test_the_saved_page_turns_to_a_record_and_a_step(grown, tmp_path, page):
     (tmp_path / "page.html").write_bytes(saved(grown))
     wrong: list[str] = []

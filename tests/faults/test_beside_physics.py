@@ -54,6 +54,7 @@ def test_noise_on_the_force_of_a_nonlinear_system_is_measured_as_its_motion_pass
     assert noise.value == pytest.approx(made.fault["value"], rel=0.03)
 
 
+@pytest.mark.long
 def test_a_fault_found_in_a_stretch_has_the_value_that_the_whole_record_tells():
     """In 8,192 samples of either part, 113 periods of a structure that remembers 65, the delay is -0.64 samples."""
     made = trials.make_trial(520303, (), 0.01, "velocity", "delay", WIDE)
@@ -61,6 +62,7 @@ def test_a_fault_found_in_a_stretch_has_the_value_that_the_whole_record_tells():
     assert abs(delay.value - made.fault["value"]) < 3.0 * delay.error < 0.03
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("late", [-1.42, -1.0, 1.5])
 def test_a_delay_that_loses_the_fit_is_found_along_the_motion(late: float) -> None:
     """A complete model, its velocity read 1.42 samples early: "nothing missing" was said at 72 %."""
@@ -96,6 +98,7 @@ def test_spikes_and_drop_outs_beside_friction_are_found(fault):
     assert faults[0].value == pytest.approx(known["value"], rel=0.25)
 
 
+@pytest.mark.long
 def test_a_record_that_is_over_in_its_middle_has_lost_nothing():
     """Zeros to the end of the file, where nothing was written, were called 50 % drop-outs."""
     made = trials.make_trial(520303, (), 0.0, "displacement", "none", WIDE)

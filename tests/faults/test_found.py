@@ -113,6 +113,7 @@ def test_what_an_effect_does_as_well_is_said_and_left_alone(measured, systems):
     assert found.value == pytest.approx(known["value"], rel=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", [0.5, 3.0])
 @pytest.mark.parametrize("shape", ["ramp", "walk"])
 def test_a_drift_from_zero_is_no_constant_force_however_large(shape, size, measured, systems):
@@ -140,6 +141,7 @@ def test_a_held_value_is_undone_and_not_searched_for(measured, systems):
     assert all(abs(z) < FAR for z in off_by(result, systems["duffing"]).values())
 
 
+@pytest.mark.long
 def test_two_faults_are_both_found(measured, systems):
     rng = np.random.default_rng(8)
     late, delay = impose(measured("duffing"), "displacement", "delay", rng)

@@ -53,6 +53,7 @@ def test_the_authors_model_of_the_damper(run):
         assert values["c"] == pytest.approx(kx, rel=0.15)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("run", list(AUTHORS))
 def test_the_damper_is_hysteretic_before_it_is_any_polynomial(run):
     model, prepared = damper(run, "viscous_damper")
@@ -103,6 +104,7 @@ def by_periods() -> float:
     return float(np.mean((4.0 * ellipk(np.sin(0.5 * amplitude) ** 2) / np.diff(crossings)) ** 2))
 
 
+@pytest.mark.long
 def test_a_climb_of_a_structure_leaves_what_the_gallery_reads(tmp_path):
     """Each diagnosis is kept, and the structure reached."""
     options = ["--fit", "0:700", "--judge", "700:1200"]

@@ -104,6 +104,7 @@ def test_a_fit_of_the_beginning_goes_on_to_the_whole_fitting_part(systems, recor
     assert np.all(np.diag(longer.covariance) < np.diag(fit.covariance))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [6000, 6007])
 def test_a_width_is_found_within_its_error_where_no_free_run_follows(seed, systems):
     """None with the width held may stand for one that has it open, and none in a side valley for the record."""

@@ -29,6 +29,7 @@ def test_your_own_rig():
     assert ends["right"].moving == ()
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not (DATA / "silverbox" / "SNLS80mV.csv").is_file(), reason="the Silverbox's record is not here")
 def test_silverbox(monkeypatch):
     monkeypatch.setenv("STUDY_DATA", str(DATA))

@@ -47,6 +47,7 @@ def folder(tmp_path_factory):
     return made
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("page", ["README.md", "docs/howto.md"])
 def test_every_example_of_a_page_runs(page, folder, monkeypatch):
     monkeypatch.chdir(folder)
@@ -99,6 +100,7 @@ class Asked(HTMLParser):
             self.sources += [value for name, value in attrs if name in ("src", "href") and value]
 
 
+@pytest.mark.long
 def test_the_site_is_built_strictly_and_asks_no_other_host(tmp_path):
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path / "site")]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)

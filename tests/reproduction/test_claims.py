@@ -138,6 +138,7 @@ def test_the_gaussian_is_refused_as_often_as_the_level_says(found: evidence.Evid
     assert not sample.is_gaussian(random.standard_t(4, size=8192))
 
 
+@pytest.mark.long
 def test_every_statement_is_judged_once(judged: pd.DataFrame, report: Reported) -> None:
     own = [s for s in report.statements if "." not in s]
     assert list(judged["id"]) == own

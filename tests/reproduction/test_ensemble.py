@@ -50,6 +50,7 @@ def test_one_worker_or_two_give_the_same_table(systems):
     assert one.groupby(["estimator", "parameter"])["estimate"].nunique().min() == 3
 
 
+@pytest.mark.long
 def test_standard_errors_do_not_promise_too_much(systems):
     """Without noise all that is left is leakage, which the Bendat-Piersol formulas count as if it were noise:
 

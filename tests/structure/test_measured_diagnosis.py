@@ -43,6 +43,7 @@ def folder(tmp_path_factory, record):
     return place
 
 
+@pytest.mark.long
 def test_effect_and_place_are_named_and_add_finds_the_coefficient(folder, capsys):
     data, model, out = str(folder / "beam.csv"), str(folder / "bare.yaml"), str(folder / "out")
     without = [word for name in OTHERS for word in ("--without", name)]

@@ -33,6 +33,7 @@ def diagnosed(folder):
     return json.loads((folder / "out" / "diagnosis.json").read_text())
 
 
+@pytest.mark.long
 def test_effect_and_place_come_first(diagnosed):
     first = diagnosed["candidates"][0]
     assert diagnosed["verdict"] == "missing_effect"
@@ -61,6 +62,7 @@ def test_the_reverse_system_puts_the_effect_where_it_is(believed, record_of):
     assert elsewhere < 0.8 * cubic.share
 
 
+@pytest.mark.long
 def test_a_term_is_added_between_two_coordinates(folder, capsys):
     model = folder / "frame.yaml"
     command = [

@@ -124,6 +124,7 @@ def test_what_cannot_be_dropped_gets_its_sentence(given, capsys, words, said):
     assert (given / "frame.yaml").read_bytes() == before
 
 
+@pytest.mark.long
 def test_diagnose_writes_a_page_that_needs_no_server(given):
     command = ["diagnose", str(given / "short.csv"), "--model", str(given / "frame.yaml")]
     assert main([*command, "--fit", "0:700", "--judge", "700:1400", "--out", str(given / "e")]) == 0

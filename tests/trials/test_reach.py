@@ -236,6 +236,7 @@ def test_every_trial_with_a_fault_has_one_and_all_have_their_turn(monkeypatch: p
     assert runs.run_trial(Order("none", 5000, (), 0.01, "velocity"))["fault"] == ""
 
 
+@pytest.mark.long
 def test_the_kept_table_is_what_this_code_gives(tmp_path: Path) -> None:
     """Its first trials again; where this fails, `make trials` is due."""
     table = pd.read_csv(KEPT)

@@ -110,6 +110,7 @@ def test_confusions_count_effects_and_places():
     assert places.loc["to the ground, or a force on it, 3 coordinates", "the same place"] == 1
 
 
+@pytest.mark.long
 def test_the_kept_table_is_what_this_code_gives():
     """Its first trials again; where this fails, `make structure_trials` is due."""
     table = pd.read_csv(KEPT, keep_default_na=False, na_values=["nan", ""])

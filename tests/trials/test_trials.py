@@ -93,6 +93,7 @@ def test_a_trial_with_a_fault_is_the_same_trial_before_it() -> None:
     assert apart == pytest.approx(abs(faulty.fault["value"]) * rate, rel=0.2)
 
 
+@pytest.mark.long
 def test_any_fault_means_one_in_half_of_the_trials() -> None:
     named = [make_trial(seed, (), 0.0, "displacement", "any", WIDE).fault.get("fault") for seed in range(40)]
     without = named.count(None)
