@@ -9,23 +9,20 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 
 from study.equations import kernels
+from study.equations.drive import FORCE, along_motions
 from study.equations.graph import Program
 from study.equations.model import Model, named_channels, with_registers
 from study.equations.variation import Variation, differentiated
-from study.records.interpolation import BAND_LIMITED, between_runs, between_samples, runs_of
 from study.records.record import MOTIONS, Record
 from study.support.arrays import Floats, Ints
 from study.support.errors import DivergenceError, StudyError
 
 SHARED = 4096  # steps from which on two threads share the segments; with fewer, a thread costs more than it saves
-REMEMBERED = 4  # channels whose values between the samples are cached
-FORCE = "force"  # the response of a model without inertia, whose motion is prescribed
 
 
 @dataclass(frozen=True)
@@ -258,52 +255,13 @@ def prepare(
     )
     factor = 2 * steps_per_sample
     driving = (*MOTIONS[:2], *channels) if known else (FORCE, *channels)
-    starts, places = ((0, record.start + first * record.dt),), None
-    if record.stretches:
-        drive, starts, places = _along_stretches(record, (first, last), driving, factor)
-    else:
-        part = slice(factor * first, factor * (last - 1) + 1)
-        drive = np.column_stack(
-            [_between(record[name].tobytes(), factor, _reading(record, name))[part] for name in driving]
-        )
+    drive, starts, places = along_motions(record, (first, last), driving, factor)
     row = MOTIONS.index(response) if response in MOTIONS else len(MOTIONS)
     motion = record[response][first:last] if known and response in MOTIONS else None
     return FreeRun(
         program, variation, tuple(keys), drive, record.dt, steps_per_sample, starts, last - first, row,
         tuple(c - first for c in cuts), motion, known, places,
     )  # fmt: skip
-
-
-@lru_cache(maxsize=REMEMBERED)
-def _along_stretches(
-    record: Record, span: tuple[int, int], driving: tuple[str, ...], factor: int
-) -> tuple[Floats, tuple[tuple[int, float], ...], Ints]:
-    """What drives the motions of a record that is strung together, where they begin and when, and its samples' places.
-
-    The motions of a span begin with its first sample.
-    """
-    part = record.part(*span)
-    runs, places = runs_of(part)
-    starts, begin = list[tuple[int, float]](), 0
-    for run in runs:
-        starts.append((begin, float(run.source.time[run.first])))
-        begin += len(run)
-    drive = np.column_stack([between_runs(part, name, factor) for name in driving])
-    drive.flags.writeable = False
-    return drive, tuple(starts), places
-
-
-@lru_cache(maxsize=REMEMBERED)
-def _between(values: bytes, factor: int, reading: str) -> Floats:
-    """A channel between its samples; a diagnosis makes hundreds of runs under the same force."""
-    fine = between_samples(np.frombuffer(values), factor, reading)
-    fine.flags.writeable = False
-    return fine
-
-
-def _reading(record: Record, name: str) -> str:
-    """How a channel goes on between its samples: a motion is band-limited."""
-    return record.between if name == FORCE else BAND_LIMITED
 
 
 def _checked_span(record: Record, span: tuple[int, int] | None) -> tuple[int, int]:
