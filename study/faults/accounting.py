@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from study.compare.by_estimator import FREE_RUN
 from study.compare.comparison import Comparison, compare
@@ -16,6 +17,7 @@ from study.faults.late_response import late_response
 from study.faults.leftover import leaves_less, leftover
 from study.faults.physics import on_all
 from study.faults.search import first_faults, search_faults
+from study.faults.stage import SearchEnd
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.motion_start import has_lost_the_motion
@@ -28,7 +30,6 @@ from study.support.statistics import gain
 from study.support.thresholds import TOLERANCE
 
 OF_THE_MOTION = (DRIFT, OFFSET, FORCE_NOISE)  # of which a model that has lost the motion tells nothing
-SearchEnd = tuple[tuple[Fault, ...], FreeRunFit]  # of a search: the faults, and the model fitted beside them
 NOT_ASKED = "faults of the measurement are looked for in a single stretch of a driven response alone"
 
 
@@ -91,19 +92,19 @@ def accounted(
     fit = fit_model(model, fewer)
     lost = has_lost_the_motion(fit, fewer)
     told = tuple(name for name in asked if not (lost and name in OF_THE_MOTION))
-    found, near = search_faults(prepared, fit if fewer is first else on_all(fit, first), faults, told)
+    end = search_faults(prepared, fit if fewer is first else on_all(fit, first), faults, told)
     for begin in _begins(first, fit, asked):
-        found, near = _beneath(begin, model, prepared, faults, asked, (found, near))
-    if DELAY in asked and DELAY not in [fault.fault for fault in found]:
+        end = _beneath(begin, model, prepared, faults, asked, end)
+    if DELAY in asked and DELAY not in [fault.fault for fault in end.faults]:
         late = late_response(model, prepared, fit, faults, needed)
         if late is not None:
-            found, near = _begun_late(late.fault, late.left.fit, prepared, faults, asked, (found, near))
-    if found == faults:
-        return _compared(model, fewer, found, fit, estimator, progress)
-    final = corrected(prepared, found)
+            end = _begun_late(late.fault, late.left.fit, prepared, faults, asked, end)
+    if end.faults == faults:
+        return _compared(model, fewer, end.faults, fit, estimator, progress)
+    final = corrected(prepared, end.faults)
     kept = needed(final)
-    best = _fitted(model, kept, near if kept is final else on_all(near, kept))
-    return _compared(model, kept, found, best, estimator, progress)
+    best = _fitted(model, kept, end.fit if kept is final else on_all(end.fit, kept))
+    return _compared(model, kept, end.faults, best, estimator, progress)
 
 
 def _begins(prepared: Prepared, fit: FreeRunFit, asked: Sequence[str]) -> list[Fault]:
@@ -133,29 +134,33 @@ def _beneath(
         return plain
     whole = replace(begun, residual=begun.residual + begin.waveform[slice(*begun.span)])  # of the record as it is
     other = search_faults(prepared, whole, faults, asked)
-    return _better(prepared, plain, other, (DRIFT, OFFSET))
+    begun_with = any(fault.fault in (DRIFT, OFFSET) for fault in other.faults)
+    return other if begun_with and _leaves_less(prepared, plain, other, "fit") else plain
 
 
 def _begun_late(
     late: Fault, fit: FreeRunFit, prepared: Prepared, faults: Sequence[Fault], asked: Sequence[str], plain: SearchEnd
 ) -> SearchEnd:
-    """The better end of two searches for faults, the other one of which begins with the response less late."""
-    without = leftover(plain[1], corrected(prepared, plain[0]))
+    """The better end of two searches for faults, the other one of which begins with the response less late.
+
+    A delay takes a part of what any missing effect leaves: it has to leave less beside the effects too.
+    """
+    without = leftover(plain.fit, corrected(prepared, plain.faults))
     following = on_all(fit, corrected(prepared, (*faults, late)))
     left = leftover(following, corrected(prepared, (*faults, late)))
     if left is None:
         return plain
     explained = math.nan if without is None else gain(without.residual[1], left.residual[1]).explained
-    known = (*faults, replace(late, explained=explained))
-    return _better(prepared, plain, search_faults(prepared, following, known, asked), (DELAY,))
+    other = search_faults(prepared, following, (*faults, replace(late, explained=explained)), asked)
+    kept = any(fault.fault == DELAY for fault in other.faults)
+    better = kept and all(_leaves_less(prepared, plain, other, which) for which in ("fit", "rich"))
+    return other if better else plain
 
 
-def _better(prepared: Prepared, plain: SearchEnd, other: SearchEnd, needed: Sequence[str]) -> SearchEnd:
-    """The other end if it leaves less by no chance, with one of the faults that it began with."""
-    ends = [leftover(fit, corrected(prepared, found)) for found, fit in (plain, other)]
-    if ends[1] is None or not any(fault.fault in needed for fault in other[0]):
-        return plain
-    return other if ends[0] is None or leaves_less(ends[0], ends[1], 1) else plain
+def _leaves_less(prepared: Prepared, plain: SearchEnd, other: SearchEnd, which: Literal["fit", "rich"]) -> bool:
+    """Whether a model at the other end leaves less by no chance, or runs where that at the plain end does not."""
+    before, after = (leftover(getattr(end, which), corrected(prepared, end.faults)) for end in (plain, other))
+    return after is not None and (before is None or leaves_less(before, after, 1))
 
 
 def _all_samples(prepared: Prepared) -> Prepared:

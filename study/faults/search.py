@@ -21,7 +21,7 @@ from study.faults.leftover import FittedResidual, leaves_less, leftover, share
 from study.faults.refinement import Refined, refined, relative_power
 from study.faults.spikes import spikes
 from study.faults.spotted import drop_outs, spotted, widened
-from study.faults.stage import SearchStage, fitted_again, searched_part
+from study.faults.stage import SearchEnd, SearchStage, fitted_again, searched_part
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.settling import settled
 from study.identify.time_domain.stretch_states import is_poor
@@ -45,29 +45,30 @@ def first_faults(prepared: Prepared, held: Mapping[str, float], asked: Sequence[
 
 def search_faults(
     given: Prepared, fit: FreeRunFit, faults: Sequence[Fault], asked: Sequence[str]
-) -> tuple[tuple[Fault, ...], FreeRunFit]:  # fmt: skip
+) -> SearchEnd:  # fmt: skip
     """All faults of a record, those that are known first, and the model fitted to the corrected record.
 
     ``asked`` are the names that are looked for, ``fit`` is the model fitted to the record with the known faults
-    corrected. The fit that is given back begins there and searches no further. Of a long record, faults that compete
-    with physics are looked for in a stretch of either part; the others everywhere.
+    corrected. Of a long record, faults that compete with physics are looked for in a stretch of either part; the
+    others everywhere.
     """
+    nothing = SearchEnd(tuple(faults), fit, fit)
     look = searched_part(given)
     if look is given:
         stage = _searched(given, fit, fit, faults, asked)
-        return (tuple(faults), fit) if stage is None else (stage.faults, stage.left.fit)
+        return nothing if stage is None else SearchEnd(stage.faults, stage.left.fit, stage.rich.fit)
     near = physics.refitted(fit, corrected(look, faults))
     part = None if near is None else _searched(look, near, near, faults, asked)
     if part is None:
-        return tuple(faults), fit
+        return nothing
     known = tuple(f for f in part.faults if f.fault not in PLAIN)
     left, rich = (physics.refitted(one.fit, corrected(given, known)) for one in (part.left, part.rich))
     plain = tuple(name for name in asked if name in PLAIN)
     stage = None if left is None or rich is None else _searched(given, left, rich, known, plain)
     if stage is None:
-        return tuple(faults), fit
+        return nothing
     stage = _values_again(stage)
-    return stage.faults, stage.left.fit
+    return SearchEnd(stage.faults, stage.left.fit, stage.rich.fit)
 
 
 def _values_again(stage: SearchStage) -> SearchStage:

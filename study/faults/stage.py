@@ -8,6 +8,7 @@ from study.faults import physics
 from study.faults.correction import corrected
 from study.faults.fault import SPIKES, Fault
 from study.faults.leftover import FittedResidual, leaves_less, leftover
+from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.prepared import Prepared, limited
 
 SHORT, LONG = 8192, 16384  # samples of either part in which faults compete with physics
@@ -42,6 +43,25 @@ class SearchStage:
         prepared = corrected(self.given, known)
         left, rich = (fitted_again(one, prepared) for one in (self.left, self.rich))
         return None if left is None or rich is None else SearchStage(self.given, known, left, _pruned(rich, left))
+
+
+@dataclass(frozen=True, eq=False)
+class SearchEnd:
+    """Where a search for faults has ended.
+
+    Attributes
+    ----------
+    faults : tuple of Fault
+        Those that were known and those that were found.
+    fit : FreeRunFit
+        The model fitted to the corrected record; it searches no further than from where it began.
+    rich : FreeRunFit
+        The model with the effects that the record asks for beside the faults.
+    """
+
+    faults: tuple[Fault, ...]
+    fit: FreeRunFit
+    rich: FreeRunFit
 
 
 def _pruned(rich: FittedResidual, left: FittedResidual) -> FittedResidual:
