@@ -75,6 +75,12 @@ def test_a_delay_that_loses_the_fit_is_found_along_the_motion(late: float) -> No
     assert result.comparison.prediction.error < 0.01
 
 
+@pytest.mark.long
+def test_a_delay_that_takes_a_part_of_a_missing_effect_does_not_displace_it():
+    _, faults = found(560297, "signed_quadratic_stiffness", 0.1, "velocity", "drift")
+    assert [fault.fault for fault in faults] == ["drift"]
+
+
 def test_drop_outs_beside_noise_are_counted_where_the_motion_passes_through_zero_too():
     made = trials.make_trial(520339, ("signed_quadratic_stiffness",), 0.01, "velocity", "drop_outs", WIDE)
     (fault,) = accounted(made.completed, prepare_record(made.record)).faults
