@@ -71,6 +71,7 @@ def python(wheel, tmp_path_factory):
     return folder / "bin" / "python"
 
 
+@pytest.mark.long
 def test_the_wheel_holds_the_package_its_types_and_its_looks(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     wanted = {
@@ -85,6 +86,7 @@ def test_the_wheel_holds_the_package_its_types_and_its_looks(wheel):
     assert not any(name.startswith(("tests", "scripts", "benchmarks")) for name in names)
 
 
+@pytest.mark.long
 def test_compare_works_without_extras_and_draws_in_the_projects_style(python, tmp_path):
     absent = f"import importlib.util; print([n for n in {EXTRAS!r} if importlib.util.find_spec(n)])"
     environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}

@@ -114,6 +114,7 @@ def drawn(test: str, seed: int, hidden: tuple[str, ...], noise: float = 0.01) ->
     write_csv(make_test(test, seed, hidden, noise).record, Path("record.csv"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("hidden", ["hysteresis", "quadratic_damping"])
 def test_a_component_test_predicts_the_force(hidden, request):
     if hidden != "hysteresis":
@@ -137,6 +138,7 @@ def test_a_line_in_the_noise_of_a_component_is_not_called_a_force(seed):
     assert found["verdict"] == "nothing_missing"
 
 
+@pytest.mark.long
 def test_a_component_has_loops_and_takes_terms_with_a_memory():
     drawn("component", 4, ("hysteresis",))
     Path("part.yaml").write_text("name: part\nterms: [linear_damping, linear_stiffness, hysteresis]\n")
@@ -177,6 +179,7 @@ def test_a_base_acts_through_the_mass_alone(systems, capsys):
     assert "base_displacement" in refused(capsys, "compare", "shaken.csv", "--absolute", "--model", "rig.yaml")
 
 
+@pytest.mark.long
 def test_several_records_have_one_verdict(systems):
     for seed, level in ((1, 0.5), (2, 1.0)):
         drive = level * force(Excitation(), 1500, DT, seed=seed)
@@ -197,6 +200,7 @@ def test_every_other_block_of_a_sweep_is_judged(systems):
     assert any("every other block is judged" in note for note in found["notes"])
 
 
+@pytest.mark.long
 def test_an_axis_is_judged_over_a_horizon_and_never_called_chaotic():
     drawn("axis", 3, ("coulomb_friction",))
     Path("axis.yaml").write_text("name: axis\nterms: [inertia, linear_damping]\n")

@@ -39,6 +39,7 @@ def silverbox() -> Record:
 
 
 @present
+@pytest.mark.long
 def test_the_silverbox_is_first_of_all_a_duffing_oscillator(silverbox):
     """With the offset of V1 in the model; without it, hysteresis with its free state competes on a short stretch."""
     prepared = prepare_record(silverbox, make_plan(silverbox, (40650, 48842), (20000, 28192)))

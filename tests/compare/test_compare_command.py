@@ -142,6 +142,7 @@ def test_a_record_too_short_is_refused(capsys: pytest.CaptureFixture[str]) -> No
     assert "64 samples or more" in refused(capsys, "short.csv", "--model", "rig.yaml")
 
 
+@pytest.mark.long
 def test_a_blow_with_a_long_rest_behind_it_is_compared_where_no_force_acts() -> None:
     """The judged half has no force: what it balances there is the force of inertia, as in a free decay."""
     values = {"m": 1.0, "c": 0.8, "k": 400.0}
@@ -249,6 +250,7 @@ def test_a_record_too_short_to_be_fitted_is_refused_for_that(capsys: pytest.Capt
     assert "has 65 samples, too few" in refused(capsys, "short.csv", "--model", "rig.yaml")
 
 
+@pytest.mark.long
 def test_a_short_record_has_a_noise_floor_all_the_same(capsys: pytest.CaptureFixture[str]) -> None:
     write_csv(record().part(0, 500), Path("short.csv"))
     assert cli.main(["compare", "short.csv", "--model", "rig.yaml", "--out", "short"]) == 0
@@ -259,6 +261,7 @@ def test_a_short_record_has_a_noise_floor_all_the_same(capsys: pytest.CaptureFix
     assert json.loads(Path("short/diagnosis.json").read_text())["noise_floor"]["response"] > 0.005
 
 
+@pytest.mark.long
 def test_a_model_that_cannot_follow_is_said_to_mean_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     Path("bare.yaml").write_text("name: bare\nterms: [inertia, {term: linear_stiffness, value: 1.0e-9}]\n")
     assert cli.main(["compare", "rig.csv", "--model", "bare.yaml", "--out", "bare"]) == 0

@@ -38,6 +38,7 @@ def by_key(command: str, *words: str) -> dict[str, dict]:
     return {row["key"]: row for row in json.loads(Path(f"out/{name}.json").read_text())["coefficients_by_record"]}
 
 
+@pytest.mark.long
 def test_a_separate_coefficient_is_that_of_each_record_and_a_shared_one_is_not_said_to_differ():
     rows = by_key("compare", "--each-record", "linear_damping", "--each-record", "k", "--model", "full.yaml")
     damping, stiffness = rows["c"], rows["k"]

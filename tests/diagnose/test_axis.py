@@ -18,6 +18,7 @@ from tests.axis import axis
 TRIED = ("coulomb_friction", "constant_force", "quadratic_damping")
 
 
+@pytest.mark.long
 def test_a_positioning_axis_is_compared_and_diagnosed():
     believed = Model("axis", (free(get("inertia")), free(get("linear_damping"))))
     comparison = compare(believed, prepare_record(axis()))

@@ -50,6 +50,7 @@ def test_a_force_that_a_program_made_is_read_as_it_was_before_an_effect_is_calle
     assert found.comparison.fit.model.numbers()["m"] == pytest.approx(TRUE["inertia"], rel=0.01)
 
 
+@pytest.mark.long
 def test_an_effect_that_is_missing_is_not_explained_by_the_force_between_its_samples():
     """Simulated with many samples between those that are kept."""
     fine = np.interp(np.arange(SAMPLES * FINER) / FINER, np.arange(SAMPLES), drawn())

@@ -342,6 +342,7 @@ def test_the_desk_does_one_thing_at_a_time_and_says_what_went_wrong(asked, tmp_p
     desk.close()
 
 
+@pytest.mark.long
 def test_what_save_writes_is_drawn_before_it_is_asked_for(asked, tmp_path, monkeypatch):
     drawn: list[Comparison] = []
     ahead = threading.Event()

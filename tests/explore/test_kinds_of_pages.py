@@ -68,6 +68,7 @@ def test_a_page_shows_what_the_test_can_show(kind: str) -> None:
             assert all(len(column) for column in source.values()), name
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", [DRIVEN, PRESCRIBED, FREE])
 def test_a_browser_draws_every_panel_of_it(kind: str, page: Page, tmp_path: Path) -> None:
     (tmp_path / "page.html").write_bytes(saved(begun(kind)))

@@ -40,6 +40,7 @@ def grown(asked):
     return sessions.with_placed(asked, CUBIC)
 
 
+@pytest.mark.long
 def test_what_is_added_where_it_is_missing_lets_the_error_fall_and_undo_brings_it_back(asked, grown):
     before, after = asked.now.comparison.prediction, grown.now.comparison.prediction
     assert asked.now.diagnosis.candidates[0].name == CUBIC
@@ -107,6 +108,7 @@ def test_words_name_effect_and_place_and_only_a_live_page_has_buttons(asked):
     assert 'class="link selected" data-place="floor2-floor3"' in live["sketch"]
 
 
+@pytest.mark.long
 def test_what_is_saved_holds_model_history_tables_pictures_and_the_page(hall, grown, tmp_path):
     made = structure_files(grown, "frame.yaml", (hall / "frame.yaml").read_text(), values=True)
     assert {"frame.yaml", "frame.history.json", "comparison.json", PAGE, "structure.png", "history.png"} <= set(made)

@@ -16,6 +16,7 @@ def found(seed, hidden, noise, response, fault, completed=False):
     return made.fault["value"], accounted(model, prepare_record(made.record)).faults
 
 
+@pytest.mark.long
 def test_the_value_of_a_fault_is_found_again_beside_an_effect_that_the_search_adds():
     """The delay is first found beside a linear model, which a quintic stiffness has spoilt: 0.69 samples."""
     value, faults = found(520270, "quintic_stiffness", 0.1, "velocity", "delay")
@@ -25,6 +26,7 @@ def test_the_value_of_a_fault_is_found_again_beside_an_effect_that_the_search_ad
     assert abs(delay.value - value) < 3.0 * delay.error
 
 
+@pytest.mark.long
 def test_an_effect_that_is_none_does_not_rival_a_fault():
     """A response that is read early looks like a Maxwell element of negative stiffness."""
     value, faults = found(520259, "harmonic_force", 0.01, "displacement", "delay")
@@ -40,6 +42,7 @@ def test_an_effect_whose_linear_share_is_too_much_of_it_is_tried_from_nothing():
     assert ("relaxation",) in [f.rivals for f in faults]
 
 
+@pytest.mark.long
 def test_a_mass_that_friction_holds_has_not_dropped_out_and_its_reversals_are_no_spikes():
     """What the noise on the force leaves of an acceleration is nearly that of noise on the response."""
     _, faults = found(520277, "coulomb_friction", 0.0, "acceleration", "force_noise", completed=True)
@@ -95,6 +98,7 @@ def test_a_clipped_record_that_is_looked_at_in_part_first_keeps_what_was_read_wi
     assert 0.02 < np.mean(fault.lost) < 0.2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fault", ["spikes", "drop_outs"])
 def test_spikes_and_drop_outs_beside_friction_are_found(fault):
     made = trials.make_trial(520277, ("coulomb_friction",), 0.0, "acceleration", ranges=WIDE)

@@ -71,6 +71,7 @@ def test_without_its_correction_a_fault_leaves_wrong_coefficients(measured, syst
     assert max(abs(z) for z in off_by(result, systems["duffing"]).values()) > FAR
 
 
+@pytest.mark.long
 def test_noise_on_the_force_is_told_from_noise_on_the_response(records, systems):
     whole = records["linear"]
     record = Record(whole.dt, {"force": whole["force"], "acceleration": whole["acceleration"]}, whole.units, "linear")
@@ -91,6 +92,7 @@ def test_a_record_without_faults_is_compared_as_it_is(system, measured, systems)
     assert [c.value for c in result.comparison.coefficients] == [c.value for c in plain.coefficients]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fault", ["delay", "drift", "hum", "gain_change", "spikes", "high_pass"])
 def test_a_fault_is_found_beside_a_hidden_effect_and_the_effect_is_left(fault, measured, systems):
     faulty, known = impose(measured("duffing"), "displacement", fault, np.random.default_rng(3))
@@ -164,6 +166,7 @@ def test_lost_samples_are_neither_fitted_nor_judged(measured, systems):
     assert comparison.prediction.error == pytest.approx(np.sqrt(NOISE), rel=0.1)
 
 
+@pytest.mark.long
 def test_what_was_read_far_from_the_limits_is_kept_though_the_model_lacks_something() -> None:
     """A record whose every sample is lost would be followed without any error."""
     trial = make_trial(12, ("cubic_stiffness",), 0.01, "displacement", "clipping")

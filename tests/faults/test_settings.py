@@ -60,6 +60,7 @@ def test_it_can_be_switched_off(rig, options):
     assert document["error"]["response"] > 0.3  # what the delay leaves
 
 
+@pytest.mark.long
 def test_a_value_can_be_held(rig, capsys):
     folder, known = rig
     (folder / "rig.record.yaml").write_text(f"measurement: {{delay: {known['value']!r}, drift: off}}\n")

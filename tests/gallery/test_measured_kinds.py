@@ -86,6 +86,7 @@ def test_the_pendulum_and_the_law_of_its_friction():
     assert errors[0] > errors[1] > errors[2]
 
 
+@pytest.mark.long
 def test_more_than_a_decay_is_asked_for_by_its_amplitude():
     """Dry friction and a dead band are a tie on this record: only a decay from further out could tell them apart."""
     model, prepared = pendulum()

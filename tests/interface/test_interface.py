@@ -117,6 +117,7 @@ def test_models_are_ranked_with_the_error_of_the_difference(fit, better):
     assert np.isnan(table["explained"].iloc[0])
 
 
+@pytest.mark.long
 def test_what_a_wrong_model_has_moves_with_the_level_and_a_right_one_not(record, fit, better):
     low = st.simulate(NONLINEAR, st.gaussian(0.2, samples=2048, seed=4), name="low")
     wrong, right = fit.across([record, low]), better.across([record, low])

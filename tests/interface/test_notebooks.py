@@ -20,6 +20,7 @@ def test_duffing():
     assert ends["miso"].parameters["k3"] == pytest.approx(2e7, rel=1e-2)
 
 
+@pytest.mark.long
 def test_your_own_rig():
     _, ends = run(NOTEBOOKS / "your_own_rig.ipynb")
     assert ends["found"].best.name == "quadratic_damping"

@@ -69,6 +69,7 @@ def test_the_sites_first_example_is_the_beginning_of_the_readmes():
     assert [line for line in own.splitlines() if line not in longer.splitlines()] == ["found = fit.diagnose()"]
 
 
+@pytest.mark.long
 def test_the_first_page_is_short_and_shows_what_the_command_says(folder, monkeypatch, capsys):
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     assert len(text.splitlines()) < 120

@@ -185,6 +185,7 @@ def test_compare_on_the_command_line(tmp_path, beam, comparison, capsys):
     assert "Line by line" in measured_says(comparison)
 
 
+@pytest.mark.long
 def test_a_term_is_dropped_beside_a_measured_linear_part(tmp_path, beam, capsys):
     write_structure_csv(at_sensors(beam, samples=4000), tmp_path / "beam.csv")
     model = tmp_path / "beam.yaml"

@@ -89,6 +89,7 @@ def test_candidates_are_nonlinear_effects_between_sensors(record):
     }
 
 
+@pytest.mark.long
 def test_an_open_shape_parameter_is_searched_for():
     """The report's Dead-Band system as a structure of one mode."""
     text = (ROOT / "models" / "dead_band.yaml").read_text().replace("value", "at: x, value")

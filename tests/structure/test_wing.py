@@ -117,6 +117,7 @@ def test_without_a_force_masses_must_be_given():
 SEARCHED = ("quadratic_stiffness", "cubic_stiffness", "bilinear_stiffness", "coulomb_friction")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", list(AUTHORS))
 def test_as_a_user_runs_it_the_missing_stiffness_is_in_pitch(name):
     """Without parts named: every other stretch of one and a half periods is judged, from a state of its own."""

@@ -107,6 +107,7 @@ def test_a_fault_counts_by_name_channel_and_value() -> None:
         assert reach.fault_score(row(**(told | other))) == 0.0
 
 
+@pytest.mark.long
 def test_a_fault_that_the_true_equation_does_not_show_is_told_apart() -> None:
     for seed, hidden, noise, fault, shown in (
         (560269, (), 0.1, "drop_outs", "no"),
@@ -192,6 +193,7 @@ def test_any_alpha_and_any_k_after_the_fact(tmp_path: Path) -> None:
     assert factors["size"].loc[[0.5, 2.0, 3.0]].tolist() == [1.0, 1.5, 2.0]
 
 
+@pytest.mark.long
 def test_evidence_and_intervals_are_those_of_the_diagnosis() -> None:
     trial = make_trial(901, ("quadratic_damping",), 0.01, "displacement")
     comparison, faults = accounted_comparison(trial.completed, prepare_record(trial.record))

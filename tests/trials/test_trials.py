@@ -165,6 +165,7 @@ def test_steady_force_beside_effects_that_know_no_place_is_hidden_only_behind_an
     assert {t.name for t in trial.believed.terms} & {"cubic_stiffness", "van_der_pol_damping"}
 
 
+@pytest.mark.long
 def test_command_writes_record_model_and_sealed_answer(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["trial", "--seed", "7", "--hidden", "quadratic_damping", "--noise", "0.05", "--response", "acceleration"]
     assert main([*words, "--out", str(tmp_path / "new")]) == 0
