@@ -23,7 +23,7 @@ NAMES = {
 }  # fmt: skip
 MARKS = ("o-", "s--", "^-.", "D-", "v:")  # told apart in grey
 REFERENCE = 10**5
-ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 PLACE = re.compile(r"(<!-- cost -->\n).*?(<!-- /cost -->)", re.DOTALL)
 Measured = dict[tuple[str, int], tuple[float, float]]
 
