@@ -42,7 +42,7 @@ folder = Path(sys.argv[2])
 if sys.argv[1] == "put":
     bucket.create()
     for path in [p for part in ("models", "config", "study") for p in (folder / part).rglob("*") if p.is_file()]:
-        if path.suffix not in (".pyc", ".nbi", ".nbc"):
+        if path.suffix not in (".pyc", ".so"):
             bucket.upload_file(str(path), str(path.relative_to(folder)))
 else:
     for item in [i for part in ("results/", "figures/") for i in bucket.objects.filter(Prefix=part)]:
@@ -53,11 +53,11 @@ CODE
 for _ in $(seq 60); do grep -q "Running on" "$work/server" && break; sleep 1; done
 store put "$work/away"
 
-# A pod is an empty folder: what a job needs comes with it or from the bucket.
+# A pod is an empty folder: what a job needs comes with it, from the bucket, or is installed, as the compiled loops are.
 mkdir "$work/pods"
 cat > "$work/submit" <<POD
 #!/usr/bin/env bash
-folder=\$(mktemp -d "$work/pods/XXXXXX") && cd "\$folder" && export PYTHONPATH=.
+folder=\$(mktemp -d "$work/pods/XXXXXX") && cd "\$folder" && unset PYTHONPATH
 (if bash "\$1" >out 2>&1; then echo success; else echo failed; fi >ending; mv ending ended) </dev/null >/dev/null 2>&1 &
 echo "\$folder"
 POD
@@ -68,7 +68,7 @@ POD
 chmod +x "$work/submit" "$work/status"
 (
   cd "$work/away"
-  printf '%s\n' __pycache__/ .snakemake/ /results/ /figures/ > .gitignore
+  printf '%s\n' __pycache__/ .snakemake/ /results/ /figures/ '*.so' > .gitignore
   git init -q . && git add -A
   export PATH="$(dirname "$python"):$PATH"
   time PYTHONPATH=$work/away "$python" -m snakemake --profile profiles/kubernetes --executor cluster-generic --jobs 2 \

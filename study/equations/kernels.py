@@ -7,6 +7,7 @@ are overwritten; ``drive`` has two rows a step, of which there are ``steps`` a s
 
 import ctypes
 import os
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,44 +18,46 @@ from study.support.errors import StudyError
 
 LIBRARY = Path(__file__).parent / f"_kernels{'.dll' if os.name == 'nt' else '.so'}"
 NO_MEMORY = -2  # what an integrator returns that found none
-_WHOLE, _ARRAY, _NUMBER = ctypes.c_int64, ctypes.c_void_p, ctypes.c_double
+ARGUMENTS = {  # of each function of the library: a(rrays), w(hole numbers) and n(umbers)
+    "run_program": "aww a",
+    "evaluate": "aww a aw aw aw a",
+    "integrate": "w aww a a nnw aw aw w a",
+    "integrate_state": "aww a aw ww nw aw a",
+    "integrate_segments": "awww a aww anw aw aw aww w wa",
+    "integrate_known": "aww a aw anw aw aw aww a",
+    "integrate_structure": "aww a aw aw aw aw aaw nnw aw aww aw wa",
+}
 
 
-def _loaded() -> ctypes.CDLL:
+@cache
+def _function(name: str) -> Any:
+    """A function of the library, which is loaded when the first one is called: who only imports this needs none.
+
+    Raises
+    ------
+    StudyError
+        If the library was not built.
+    """
     if not LIBRARY.exists():
         raise StudyError(f"{LIBRARY} is not there, which installing builds; expected `pip install .` to have been run")
-    return ctypes.CDLL(str(LIBRARY))
-
-
-def _function(name: str, arguments: str) -> Any:
-    """A function of the library: its arguments are a(rrays), w(hole numbers) and n(umbers)."""
-    function = getattr(_LIBRARY, name)
-    function.argtypes = [{"a": _ARRAY, "w": _WHOLE, "n": _NUMBER}[letter] for letter in arguments.replace(" ", "")]
-    function.restype = _WHOLE
+    function = getattr(ctypes.CDLL(str(LIBRARY)), name)
+    kinds = {"a": ctypes.c_void_p, "w": ctypes.c_int64, "n": ctypes.c_double}
+    function.argtypes = [kinds[letter] for letter in ARGUMENTS[name].replace(" ", "")]
+    function.restype = ctypes.c_int64
     return function
-
-
-_LIBRARY = _loaded()
-_run = _function("run_program", "aww a")
-_evaluate = _function("evaluate", "aww a aw aw aw a")
-_integrate = _function("integrate", "w aww a a nnw aw aw w a")
-_integrate_state = _function("integrate_state", "aww a aw ww nw aw a")
-_integrate_segments = _function("integrate_segments", "awww a aww anw aw aw aww w wa")
-_integrate_known = _function("integrate_known", "aww a aw anw aw aw aww a")
-_integrate_structure = _function("integrate_structure", "aww a aw aw aw aw aaw nnw aw aww aw wa")
 
 
 def run(code: Ints, first: int, r: Floats) -> None:
     """Run a program once."""
     code = _whole(code)
-    _run(_at(code), len(code), first, _filled(r))
+    _function("run_program")(_at(code), len(code), first, _filled(r))
 
 
 def evaluate(code: Ints, first: int, r: Floats, columns: Ints, data: Floats, outputs: Ints, out: Floats) -> None:
     """Run a program for every sample: ``data[i]`` into registers ``columns``, results into ``out[i]``."""
     code, columns, data, outputs = _whole(code), _whole(columns), _numbers(data), _whole(outputs)
     _expect(data.shape == (len(out), len(columns)) and out.shape[1] == len(outputs))
-    _evaluate(
+    _function("evaluate")(
         _at(code), len(code), first, _filled(r), _at(columns), len(columns), _at(data), len(data), _at(outputs),
         len(outputs), _filled(out),
     )  # fmt: skip
@@ -90,7 +93,7 @@ def _integrated(
     code, outputs, drive = _whole(code), _whole(outputs), _numbers(drive)
     _expect(len(outputs) == len(x) - 1 and out.shape[1] == 1 + len(x) and len(drive) > 2 * steps * (len(out) - 1))
     return _checked(
-        _integrate(
+        _function("integrate")(
             method, _at(code), len(code), first, _filled(r), _at(outputs), start, dt, steps, _at(drive), drive.shape[1],
             _filled(x), len(x), len(out), _filled(out),
         )
@@ -107,7 +110,7 @@ def integrate_state(
     """
     code, columns, data = _whole(code), _whole(columns), _numbers(data)
     _expect(data.shape[1] == len(columns) and len(data) > 2 * steps * (len(out) - 1))
-    _integrate_state(
+    _function("integrate_state")(
         _at(code), len(code), first, _filled(r), _at(columns), len(columns), state, output, h, steps, _at(data),
         len(out), _filled(out),
     )  # fmt: skip
@@ -129,7 +132,7 @@ def integrate_segments(
     _expect(states.shape[1:] == (len(slots) + 1, out.shape[1]) and len(states) == len(starts) == len(bounds) - 1)
     _expect(bounds[-1] <= len(out) and len(drive) > 2 * steps * (min(int(bounds[-1]) + 1, len(out)) - 1))
     return _checked(
-        _integrate_segments(
+        _function("integrate_segments")(
             _at(code), len(code), inputs, first, _filled(r), _at(slots), slots.shape[1], side, _at(starts), dt, steps,
             _at(drive), drive.shape[1], _at(bounds), len(bounds), _filled(states), states.shape[1], states.shape[2],
             row, len(out), _filled(out),
@@ -152,7 +155,7 @@ def integrate_known(
     _expect(states.shape[1:] == (len(slots) - 1, out.shape[1]) and len(states) == len(starts) == len(bounds) - 1)
     _expect(bounds[-1] <= len(out) and len(drive) > 2 * steps * (len(out) - 1))
     return _checked(
-        _integrate_known(
+        _function("integrate_known")(
             _at(code), len(code), first, _filled(r), _at(slots), slots.shape[1], _at(starts), dt, steps, _at(drive),
             drive.shape[1] - 2, _at(bounds), len(bounds), _at(states), states.shape[1], states.shape[2], _filled(out),
         )
@@ -174,7 +177,7 @@ def integrate_structure(
     drive, rows = _numbers(drive), _whole(rows)
     _expect(y.shape[1] == out.shape[2] and len(rows) == len(out) and len(drive) > 2 * steps * (out.shape[1] - 1))
     return _checked(
-        _integrate_structure(
+        _function("integrate_structure")(
             _at(code), len(code), first, _filled(r), _at(slopes), len(slopes), _at(by_state), len(by_state),
             _at(by_key), len(by_key), _at(sides), len(sides), _at(by_side), _at(directions), directions.shape[1],
             start, dt, steps, _at(drive), drive.shape[1], _filled(y), y.shape[0], y.shape[1], _at(rows), len(rows),

@@ -1,7 +1,5 @@
 """The library of compiled loops: built from the sources beside it, and safe to call."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +7,7 @@ import pytest
 
 from study.equations import kernels
 from study.equations.graph import Graph, Op
+from study.support.errors import StudyError
 
 SOURCES = Path(kernels.__file__).parent / "c"
 
@@ -46,18 +45,12 @@ def test_arrays_that_do_not_fit_are_refused() -> None:
         kernels.run(code, 3, np.zeros(8)[::2])
 
 
-def test_a_library_that_was_not_built_is_said(tmp_path: Path) -> None:
-    code = f"""from pathlib import Path
-import study.support.errors as errors
-source = Path({str(kernels.__file__)!r}).read_text()
-try:
-    exec(compile(source, {str(tmp_path / "kernels.py")!r}, "exec"), {{"__file__": {str(tmp_path / "kernels.py")!r}}})
-except errors.StudyError as error:
-    print(error)
-"""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.startswith(str(tmp_path / kernels.LIBRARY.name))
-    assert "pip install" in done.stdout
+def test_a_library_that_was_not_built_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """When a loop is called, not when the module is imported: a job that only plans has no library beside it."""
+    monkeypatch.setattr(kernels, "LIBRARY", tmp_path / kernels.LIBRARY.name)
+    kernels._function.cache_clear()  # pyright: ignore[reportPrivateUsage]
+    with pytest.raises(StudyError, match=rf"{tmp_path}.* is not there.*pip install"):
+        kernels.run(np.array([[int(Op.ADD), 0, 1]]), 2, np.zeros(3))
 
 
 def test_the_library_is_of_these_sources() -> None:
