@@ -53,11 +53,12 @@ CODE
 for _ in $(seq 60); do grep -q "Running on" "$work/server" && break; sleep 1; done
 store put "$work/away"
 
-# A pod is an empty folder: what a job needs comes with it, from the bucket, or is installed, as the compiled loops are.
+# A pod is an empty folder: what a job needs comes with it, from the bucket, or is installed in its image.
+"$python" -m pip install --quiet --disable-pip-version-check --no-deps --target "$work/image" "$project"
 mkdir "$work/pods"
 cat > "$work/submit" <<POD
 #!/usr/bin/env bash
-folder=\$(mktemp -d "$work/pods/XXXXXX") && cd "\$folder" && unset PYTHONPATH
+folder=\$(mktemp -d "$work/pods/XXXXXX") && cd "\$folder" && export PYTHONPATH="$work/image"
 (if bash "\$1" >out 2>&1; then echo success; else echo failed; fi >ending; mv ending ended) </dev/null >/dev/null 2>&1 &
 echo "\$folder"
 POD

@@ -7,7 +7,9 @@ are overwritten; ``drive`` has two rows a step, of which there are ``steps`` a s
 
 import ctypes
 import os
+from contextlib import suppress
 from functools import cache
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from study.support.arrays import Floats, Ints
 from study.support.errors import StudyError
 
 LIBRARY = Path(__file__).parent / f"_kernels{'.dll' if os.name == 'nt' else '.so'}"
+PROJECT = "reverse-miso-study"
 NO_MEMORY = -2  # what an integrator returns that found none
 ARGUMENTS = {  # of each function of the library: a(rrays), w(hole numbers) and n(umbers)
     "run_program": "aww a",
@@ -31,20 +34,28 @@ ARGUMENTS = {  # of each function of the library: a(rrays), w(hole numbers) and 
 
 @cache
 def _function(name: str) -> Any:
-    """A function of the library, which is loaded when the first one is called: who only imports this needs none.
+    function = getattr(ctypes.CDLL(str(_library())), name)
+    kinds = {"a": ctypes.c_void_p, "w": ctypes.c_int64, "n": ctypes.c_double}
+    function.argtypes = [kinds[letter] for letter in ARGUMENTS[name].replace(" ", "")]
+    function.restype = ctypes.c_int64
+    return function
+
+
+def _library() -> Path:
+    """The library beside this file; beside sources that came without one, as a job's on a cluster, the installed one.
 
     Raises
     ------
     StudyError
         If the library was not built.
     """
-    if not LIBRARY.exists():
-        raise StudyError(f"{LIBRARY} is not there, which installing builds; expected `pip install .` to have been run")
-    function = getattr(ctypes.CDLL(str(LIBRARY)), name)
-    kinds = {"a": ctypes.c_void_p, "w": ctypes.c_int64, "n": ctypes.c_double}
-    function.argtypes = [kinds[letter] for letter in ARGUMENTS[name].replace(" ", "")]
-    function.restype = ctypes.c_int64
-    return function
+    if LIBRARY.exists():
+        return LIBRARY
+    with suppress(PackageNotFoundError):
+        installed = Path(str(distribution(PROJECT).locate_file(f"study/equations/{LIBRARY.name}")))
+        if installed.exists():
+            return installed
+    raise StudyError(f"{LIBRARY} is not there, which installing builds; expected `pip install .` to have been run")
 
 
 def run(code: Ints, first: int, r: Floats) -> None:

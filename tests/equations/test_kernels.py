@@ -1,5 +1,6 @@
 """The library of compiled loops: built from the sources beside it, and safe to call."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -46,11 +47,28 @@ def test_arrays_that_do_not_fit_are_refused() -> None:
 
 
 def test_a_library_that_was_not_built_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """When a loop is called, not when the module is imported: a job that only plans has no library beside it."""
+    monkeypatch.setattr(kernels, "LIBRARY", tmp_path / kernels.LIBRARY.name)
+    monkeypatch.setattr(kernels, "PROJECT", "a project that is not installed")
+    kernels._function.cache_clear()  # pyright: ignore[reportPrivateUsage]
+    with pytest.raises(StudyError, match=r"_kernels.* is not there.*pip install"):
+        kernels.run(np.array([[int(Op.ADD), 0, 1]]), 2, np.zeros(3))
+
+
+def test_sources_without_a_library_take_that_of_the_installed_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a job of a cluster does, whose sources are those that Git knows."""
+    installed = tmp_path / "study" / "equations"
+    installed.mkdir(parents=True)
+    shutil.copy(kernels.LIBRARY, installed)
+    (tmp_path / "reverse_miso_study-0.1.0.dist-info").mkdir()
+    (tmp_path / "reverse_miso_study-0.1.0.dist-info" / "METADATA").write_text("Name: reverse-miso-study\n")
+    monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(kernels, "LIBRARY", tmp_path / kernels.LIBRARY.name)
     kernels._function.cache_clear()  # pyright: ignore[reportPrivateUsage]
-    with pytest.raises(StudyError, match=rf"{tmp_path}.* is not there.*pip install"):
-        kernels.run(np.array([[int(Op.ADD), 0, 1]]), 2, np.zeros(3))
+    r = np.array([2.0, 3.0, 0.0])
+    kernels.run(np.array([[int(Op.MUL), 0, 1]]), 2, r)
+    assert r[2] == 6.0
 
 
 def test_the_library_is_of_these_sources() -> None:
