@@ -13,7 +13,7 @@ from setuptools.command.build_ext import build_ext
 
 SOURCES = Path("study/equations/c")
 # A sum is rounded as it is written: contracted to one operation it would differ from processor to processor.
-OPTIONS = {"msvc": ["/O2", "/fp:precise"]}
+MICROSOFT = ["/O2", "/fp:precise"]
 UNIX = ["-std=c99", "-O3", "-fno-gcse", "-ffp-contract=off", "-fvisibility=hidden"]
 
 
@@ -29,7 +29,7 @@ class SharedLibrary(build_ext):
     def build_extension(self, ext):
         """Compile with the options of this compiler."""
         unix = self.compiler.compiler_type != "msvc"
-        ext.extra_compile_args = UNIX if unix else OPTIONS["msvc"]
+        ext.extra_compile_args = UNIX if unix else MICROSOFT
         ext.libraries = ["m"] if unix else []
         super().build_extension(ext)
 
