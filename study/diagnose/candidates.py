@@ -50,17 +50,12 @@ def try_all(
     def fitted(term: Term) -> FittedCandidate | None:
         return attempt(term, base, prepared)
 
-    for count, candidate in enumerate(side_by_side(fitted, terms, effort_of), start=1):
+    for count, candidate in enumerate(side_by_side(fitted, terms, lambda term: term.effort), start=1):
         if candidate is not None:
             done.append(candidate)
         if progress is not None:
             progress(count)
     return done
-
-
-def effort_of(term: Term) -> int:
-    """How much there is to search for: shape parameters, and a memory."""
-    return len(term.parameters) + (term.state is not None)
 
 
 def attempt(term: Term, base: Baseline, prepared: Prepared) -> FittedCandidate | None:
@@ -102,4 +97,4 @@ def all_settled(candidates: Sequence[FittedCandidate], prepared: Prepared) -> li
         except StudyError:
             return candidate
 
-    return list(side_by_side(settle, candidates, lambda candidate: effort_of(candidate.term)))
+    return list(side_by_side(settle, candidates, lambda candidate: candidate.term.effort))

@@ -172,6 +172,11 @@ class Term:
         return tuple(c.symbol for c in self.components)
 
     @property
+    def effort(self) -> int:
+        """How much a fit of it has to search for: shape parameters, and a memory."""
+        return len(self.parameters) + (self.state is not None)
+
+    @property
     def keys(self) -> tuple[str, ...]:
         """Names of the coefficients, then of the shape parameters as ``term.parameter``."""
         return self.symbols + tuple(f"{self.name}.{p.name}" for p in self.parameters)

@@ -56,10 +56,10 @@ def missing(left: FittedResidual) -> FittedResidual | None:
     def fitted(start: tuple[Term, list[shape_search.Start]]) -> FittedResidual | None:
         return _fitted(start[0], base, look, prepared)
 
-    begins = side_by_side(begun, terms, lambda term: len(term.parameters))
+    begins = side_by_side(begun, terms, lambda term: term.effort)
     starts = [(term, found) for term, found in zip(terms, begins, strict=True) if found]
     promising = sorted(starts, key=lambda s: -s[1][0].share)[:FITTED]
-    tried = [t for t in side_by_side(fitted, promising, lambda s: len(s[0].parameters)) if t is not None]
+    tried = [t for t in side_by_side(fitted, promising, lambda s: s[0].effort) if t is not None]
     names = [t.name for t in terms]
     for group in ([t for t in tried if not unphysical(t.fit, names)], tried):
         best = _simplest_of_the_best(group)
