@@ -43,7 +43,7 @@ def _run(arguments: argparse.Namespace) -> None:
 
     folder = out_folder(arguments)
     first = read_model(arguments.model)
-    if first.coordinates:
+    if first.named:
         structures.add(arguments, first)
         return
     term = _term(arguments)

@@ -39,7 +39,7 @@ def climb(
     first = parse_model(text, model)
     work = folder / "climb"
     shutil.rmtree(work, ignore_errors=True)
-    if first.coordinates:
+    if first.named:
         return structure_climb(arguments, first, steps, folder)
     together = accounted_together(arguments, first, read_records(arguments), records[0])
     session = sessions.begin_with(together.comparison)

@@ -47,7 +47,7 @@ def _run(arguments: argparse.Namespace) -> None:
 
     folder = out_folder(arguments)
     model = read_model(arguments.model)
-    if model.coordinates:
+    if model.named:
         structures.compare_command(arguments, model)
         return
     records = read_records(arguments)

@@ -46,7 +46,7 @@ def _run(arguments: argparse.Namespace) -> None:
     expect(not (arguments.each and arguments.each_record), "--each and --each-record exclude each other; expected one")
     folder = out_folder(arguments)
     model = read_model(arguments.model)
-    if model.coordinates:
+    if model.named:
         structures.diagnose_command(arguments, model)
         return
     own = own_candidates(arguments.candidate, model)

@@ -43,7 +43,7 @@ def _run(arguments: argparse.Namespace) -> None:
     read_model(arguments.model)
     with locked(arguments.model):  # another run may have changed it meanwhile
         model, name = read_model(arguments.model), arguments.term
-        if model.coordinates:
+        if model.named:
             with at(arguments.model):
                 name = _placed(arguments, model)
             structures.drop(arguments, model, name, text_without(arguments.model, name))

@@ -48,7 +48,7 @@ def _run(arguments: argparse.Namespace) -> None:
     model = parse_model(text, arguments.model)
     place = arguments.model, text, folder, inputs_of(arguments)
     desk: Desk[Any]
-    if model.coordinates:
+    if model.named:
         from study.explore.placed_page import PLACED, PlacedScene
 
         desk, scene = Desk(structures.session(arguments, model, steps), *place, deeds=PLACED), PlacedScene

@@ -90,7 +90,7 @@ def load_measurements(
 
 def is_structure(row: Measurement) -> bool:
     """Whether the model of a row has coordinates; it was read by :func:`load_measurements`."""
-    return bool(read_model(Path(row.model)).coordinates)
+    return read_model(Path(row.model)).named
 
 
 def check_present(path: Path) -> None:

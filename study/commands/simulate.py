@@ -54,7 +54,7 @@ def _run(arguments: argparse.Namespace) -> None:
 
     keep([arguments.model, path_of(arguments.model)], [arguments.out])
     model = read_model(arguments.model)
-    if model.coordinates:
+    if model.named:
         _structure(model, arguments)
         return
     expect("inertia" in model, f"{arguments.model}: the model has no inertia; expected a term 'inertia'")

@@ -20,7 +20,7 @@ from difflib import get_close_matches
 from typing import cast
 
 from study.equations.model import Model, ModelTerm
-from study.equations.place import GROUND, Kind, Place
+from study.equations.place import ALONE, GROUND, HERE, Kind, Place
 from study.equations.redundancy import repeated_force
 from study.support.errors import StudyError, expect
 from study.support.yaml_text import as_list, as_mapping, scalar, shown
@@ -35,10 +35,10 @@ Forces = tuple[tuple[str, str], ...]
 
 
 def coordinates_and_forces(top: Mapping[object, object]) -> tuple[tuple[str, ...], Forces]:
-    """Names of the coordinates, and each force with the coordinate on which it acts; both empty for a single mass."""
+    """Names of the coordinates, and each force with the coordinate on which it acts."""
     if "coordinates" not in top:
         expect("forces" not in top, "the model has 'forces' and no 'coordinates'; expected both, or neither")
-        return (), ()
+        return (ALONE,), (("force", ALONE),)
     given = as_list(top["coordinates"])
     if not given:
         raise StudyError(f"'coordinates' is {shown(top['coordinates'])}; expected a list such as [floor1, floor2]")
@@ -87,12 +87,12 @@ def _known(value: object, what: str, names: Sequence[str]) -> str:
     return value
 
 
-def place_of_entry(item: Mapping[object, object], term: object, coordinates: Sequence[str]) -> Place | None:
-    """The place in an entry of ``terms``; None in a model of a single coordinate, whose entries have none."""
+def place_of_entry(item: Mapping[object, object], term: object, coordinates: Sequence[str]) -> Place:
+    """The place in an entry of ``terms``; entries of a model whose coordinate has no name say none."""
     ways = [key for key in PLACES if key in item]
-    if not coordinates:
+    if tuple(coordinates) == (ALONE,):
         expect(not ways, f"{term} has {''.join(ways[:1])!r}, and the model no 'coordinates'; expected both, or neither")
-        return None
+        return HERE
     like = f"'at: {coordinates[0]}' or 'between: [{GROUND}, {coordinates[0]}]'"
     expect(len(ways) == 1, f"{term} says {' and '.join(ways) or 'not'} where it acts; expected one of {like}")
     kind = cast(Kind, ways[0])
@@ -122,9 +122,9 @@ def place_of_pair(kind: Kind, given: Sequence[object], term: str, coordinates: S
     return Place(kind, (first, second))
 
 
-def place_fields(place: Place | None) -> dict[str, str]:
-    """A place as fields of an entry in YAML."""
-    if place is None:
+def place_fields(place: Place) -> dict[str, str]:
+    """A place as fields of an entry in YAML; none where there is no other."""
+    if place == HERE:
         return {}
     given = place.plain()[place.kind]
     return {place.kind: scalar(given) if isinstance(given, str) else f"[{', '.join(scalar(end) for end in given)}]"}
@@ -132,7 +132,7 @@ def place_fields(place: Place | None) -> dict[str, str]:
 
 def written(model: Model) -> str:
     """Coordinates and forces as lines of a model file; empty for a single mass."""
-    if not model.coordinates:
+    if not model.named:
         return ""
     forces = ", ".join(f"{scalar(name)}: {scalar(where)}" for name, where in model.forces)
     measured = f"linear: {MEASURED}\n" if model.measured else ""
@@ -158,9 +158,8 @@ def check(model: Model) -> None:
         for entries in _same_place(model):
             _check_alike(model, entries)
         return
-    placed = [(entry, entry.place) for entry in model.terms if entry.place is not None]
-    masses = {place.ends[0] for entry, place in placed if _is_mass(entry)}
-    acted = {end for entry, place in placed if not _is_mass(entry) for end in place.moving}
+    masses = {entry.place.ends[0] for entry in model.terms if _is_mass(entry)}
+    acted = {end for entry in model.terms if not _is_mass(entry) for end in entry.place.moving}
     acted |= {where for _, where in model.forces}
     for name in model.coordinates:
         expect(name in masses, f"the coordinate {name!r} has no inertia; expected {{term: inertia, at: {name}}}")
@@ -172,22 +171,21 @@ def check(model: Model) -> None:
 
 def _is_mass(entry: ModelTerm) -> bool:
     """Whether it is on the diagonal of the mass matrix alone."""
-    return entry.term.name == "inertia" and entry.place is not None and entry.place.kind == "at"
+    return entry.term.name == "inertia" and entry.place.kind == "at"
 
 
 def _same_place(model: Model) -> list[list[ModelTerm]]:
     """Terms by what they lie between; couplings of inertia are another thing than an inertia between two."""
     groups: dict[tuple[frozenset[str], bool], list[ModelTerm]] = {}
     for entry in model.terms:
-        if entry.place is not None:
-            groups.setdefault((entry.place.path, entry.place.kind == "couples"), []).append(entry)
+        groups.setdefault((entry.place.path, entry.place.kind == "couples"), []).append(entry)
     return list(groups.values())
 
 
 def _check_alike(model: Model, entries: Sequence[ModelTerm]) -> None:
     """Refuse two terms at one place that are the same, or that no record could tell apart."""
-    names, label = [entry.term.name for entry in entries], entries[0].place.label if entries[0].place else ""
+    names, label = [entry.term.name for entry in entries], entries[0].place.label
     for name in names:
         expect(names.count(name) == 1, f"model {model.name!r} lists {name} twice at {label}; expected once")
-    fault = repeated_force(Model(model.name, tuple(replace(entry, place=None) for entry in entries)))
+    fault = repeated_force(Model(model.name, tuple(replace(entry, place=HERE) for entry in entries)))
     expect(fault is None, f"at {label}, {fault}")

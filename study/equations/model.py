@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from study.equations import formulas
 from study.equations.graph import Graph, Program
-from study.equations.place import Place
+from study.equations.place import ALONE, HERE, Place
 from study.equations.term import Component, Term
 from study.support.arrays import Floats
 from study.support.errors import StudyError
@@ -29,19 +29,23 @@ class ModelTerm:
         One for each component, in the order of ``term.symbols``; None where it is to be fitted.
     parameters : tuple of float or None
         One for each shape parameter; None where it is to be estimated.
-    place : Place, optional
-        Where it acts, in a structure of several coordinates.
+    place : Place
+        Where it acts.
     """
 
     term: Term
     coefficients: tuple[float | None, ...]
     parameters: tuple[float | None, ...]
-    place: Place | None = None
+    place: Place = HERE
 
     @property
     def name(self) -> str:
         """Name of the term, with its place if it has one: ``cubic_stiffness[floor2-floor3]``."""
-        return self.term.name if self.place is None else f"{self.term.name}[{self.place.label}]"
+        return self.term.name + self._suffix
+
+    @property
+    def _suffix(self) -> str:
+        return f"[{self.place.label}]" if self.place.label else ""
 
     @property
     def symbols(self) -> tuple[str, ...]:
@@ -51,9 +55,7 @@ class ModelTerm:
     @property
     def keys(self) -> tuple[str, ...]:
         """Names of its coefficients, then of its shape parameters as ``term.parameter``."""
-        if self.place is None:
-            return self.term.keys
-        own = tuple(f"{symbol}[{self.place.label}]" for symbol in self.term.symbols)
+        own = tuple(symbol + self._suffix for symbol in self.term.symbols)
         return own + tuple(f"{self.name}.{p.name}" for p in self.term.parameters)
 
     @property
@@ -68,7 +70,7 @@ class ModelTerm:
         return replace(self, coefficients=numbers[:split], parameters=numbers[split:])
 
 
-def free(term: Term, place: Place | None = None) -> ModelTerm:
+def free(term: Term, place: Place = HERE) -> ModelTerm:
     """A term of which nothing is known yet."""
     return ModelTerm(term, (None,) * len(term.components), (None,) * len(term.parameters), place)
 
@@ -84,9 +86,9 @@ class Model:
     terms : tuple of ModelTerm
         Its terms, each at most once (at each place).
     coordinates : tuple of str
-        Of a structure; empty for a single mass, whose terms have no place.
+        Where sensors, forces and terms are; a single mass has one without a name.
     forces : tuple of pairs of str
-        Name of each measured force, and the coordinate of the structure on which it acts.
+        Name of each measured force, and the coordinate on which it acts.
     measured : bool
         Whether the linear part of a structure is as it is measured: coordinates are those with sensors, terms what acts
         between them beside it.
@@ -94,8 +96,8 @@ class Model:
 
     name: str
     terms: tuple[ModelTerm, ...]
-    coordinates: tuple[str, ...] = ()
-    forces: tuple[tuple[str, str], ...] = ()
+    coordinates: tuple[str, ...] = (ALONE,)
+    forces: tuple[tuple[str, str], ...] = (("force", ALONE),)
     measured: bool = False
 
     def __post_init__(self) -> None:
@@ -108,6 +110,11 @@ class Model:
     def __contains__(self, name: str) -> bool:
         """Whether a term of this name is in the model."""
         return any(t.name == name for t in self.terms)
+
+    @property
+    def named(self) -> bool:
+        """Whether its coordinates have names."""
+        return self.coordinates != (ALONE,)
 
     @property
     def values(self) -> dict[str, float | None]:
@@ -152,7 +159,7 @@ class Model:
         missing = [key for key in self.values if key not in known]
         if missing:
             raise StudyError(f"model {self.name!r} gives no value for {', '.join(missing)}; a simulation needs all")
-        if not self.coordinates and "m" in known and not known["m"] > 0.0:
+        if not self.named and "m" in known and not known["m"] > 0.0:
             raise StudyError(f"model {self.name!r} has the mass {known.get('m', 0.0):g}; it must be above zero")
         return known
 

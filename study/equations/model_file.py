@@ -197,7 +197,7 @@ def _model(document: object, stem: str) -> Model:
     coordinates, forces = layout.coordinates_and_forces(top)
     listed = tuple(_entry(item, number, coordinates) for number, item in enumerate(entries, 1))
     model = Model(name, listed, coordinates, forces, measured)
-    if coordinates:
+    if model.named:
         layout.check(model)
     elif fault := repeated_force(model):
         raise StudyError(fault)
@@ -213,7 +213,7 @@ def _entry(item: object, number: int, coordinates: Sequence[str]) -> ModelTerm:
         if mapping is None:
             raise StudyError(f"is {shown(item)}; expected a name or a mapping such as {{term: inertia, value: 1.0}}")
         place = layout.place_of_entry(mapping, mapping.get("term"), coordinates)
-        plain = {key: value for key, value in mapping.items() if place is None or key not in layout.PLACES}
+        plain = {key: value for key, value in mapping.items() if key not in layout.PLACES}
         return replace(entry_from(plain), place=place)
     except StudyError as error:
         raise StudyError(f"entry {number} of 'terms': {error}") from None

@@ -1,10 +1,11 @@
-"""Where a term acts in a structure of several coordinates."""
+"""Where a term acts: at a coordinate, or between two."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 GROUND = "ground"  # never moves
+ALONE = ""  # the only coordinate of a single mass: what is there needs no name
 Kind = Literal["at", "between", "couples"]
 
 
@@ -29,7 +30,7 @@ class Place:
 
     @property
     def label(self) -> str:
-        """What coefficients are called by: ``floor2``, ``floor2-floor3``, or ``heave,pitch`` for a coupling."""
+        """What coefficients are called by: ``floor2``, ``floor2-floor3``, ``heave,pitch`` of a coupling, or nothing."""
         return (",", "-")[self.kind != "couples"].join(self.ends)
 
     @property
@@ -50,6 +51,9 @@ class Place:
     def plain(self) -> dict[str, str | list[str]]:
         """As models and ``diagnosis.json`` hold it: ``{"between": ["floor2", "floor3"]}``."""
         return {self.kind: self.ends[0] if self.kind == "at" else list(self.ends)}
+
+
+HERE = Place("at", (ALONE,))  # where all terms of a single mass act
 
 
 def place_in_words(place: Place) -> str:

@@ -86,7 +86,7 @@ def _places(stage: PlacedStage, drawn: Sketch) -> str:
                 f"functions of its own motion explain {in_percent(general.get(path, 0.0))} of what is left, held "
                 "out.</p>"
             )
-        own = [r for r in rows if r.entry.place is not None and r.entry.place.path == path]
+        own = [r for r in rows if r.entry.place.path == path]
         if own:
             more = f"; {len(own) - TRIED} more" if len(own) > TRIED else ""
             known.append("<p>Tried there: " + "; ".join(_tried(r) for r in own[:TRIED]) + f"{more}.</p>")
@@ -136,12 +136,12 @@ def _tied(row: PlacedRanked) -> str:
     return f"cannot be told from {', '.join(in_words(n) for n in row.tied_with)}"
 
 
-def _drawn_label(place: Place | None, stage: PlacedStage) -> str:
+def _drawn_label(place: Place, stage: PlacedStage) -> str:
     """The label under which the sketch has a place, whichever end comes first."""
     from study.structure.places import connections
 
     known = {p.path: p.label for p in connections(stage.comparison.model)}
-    return known.get(place.path, place.label) if place is not None else ""
+    return known.get(place.path, place.label)
 
 
 def _axis(row: PlacedRanked) -> str:

@@ -78,7 +78,7 @@ def dynamic_stiffnesses(comparison: StructureComparison) -> dict[frozenset[str],
         equations, _ = equations_of(model, prepared)
     except StudyError:
         return {}
-    paths = {t.place.label: t.place.path for t in model.terms if t.place is not None and t.place.kind != "couples"}
+    paths = {t.place.label: t.place.path for t in model.terms if t.place.kind != "couples"}
     best: dict[frozenset[str], tuple[float, DynamicStiffness]] = {}
     for equation in equations:
         matrix = spectra.cross_spectra(equation.channels, prepared.dt, segments_of(len(equation.channels[0])))

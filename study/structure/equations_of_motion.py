@@ -162,7 +162,7 @@ class Builder:
             force, rate = self.force(entry)
             if rate is not None:
                 rates.append(rate)
-            for i, weight in enumerate(term_place(entry).direction(self.model.coordinates)):
+            for i, weight in enumerate(entry.place.direction(self.model.coordinates)):
                 if weight != 0.0 and entry.term.name != "inertia":
                     left[i] = (self.graph.sub if weight > 0.0 else self.graph.add)(left[i], force)
         return left, rates
@@ -170,7 +170,7 @@ class Builder:
     def force(self, entry: ModelTerm) -> tuple[int, int | None]:
         """Force of a term on the second end of its place, and the rate of its own state."""
         u, v, time = self.motion
-        place = term_place(entry)
+        place = entry.place
         names = {"u": self.along(place, u), "v": self.along(place, v), "t": time}
         names |= {n: self.channels[n] for n in entry.term.channels}
         names |= {p.name: self.values[f"{entry.name}.{p.name}"] for p in entry.term.parameters}
@@ -201,7 +201,7 @@ def mass_entries(model: Model) -> list[tuple[int, int, float, str]]:
     for entry in model.terms:
         if entry.term.name != "inertia":
             continue
-        place, key = term_place(entry), entry.symbols[0]
+        place, key = entry.place, entry.symbols[0]
         if place.kind == "couples":
             i, j = (model.coordinates.index(end) for end in place.ends)
             found += [(i, j, 1.0, key), (j, i, 1.0, key)]
@@ -210,12 +210,6 @@ def mass_entries(model: Model) -> list[tuple[int, int, float, str]]:
         at = [i for i, weight in enumerate(e) if weight != 0.0]
         found += [(i, j, e[i] * e[j], key) for i in at for j in at]
     return found
-
-
-def term_place(entry: ModelTerm) -> Place:
-    """Where a term of a structure acts."""
-    assert entry.place is not None, "every term of a structure has a place"
-    return entry.place
 
 
 def _solved(graph: Graph, matrix: list[list[int]], right: list[int]) -> list[int]:
@@ -241,7 +235,7 @@ def _sides(model: Model, graph: Graph, builder: Builder, slopes: Sequence[int]) 
     needed = graph.needed(slopes)
     table: list[tuple[int, int]] = []
     rows: list[tuple[float, ...]] = []
-    for place in dict.fromkeys(term_place(t) for t in model.terms):
+    for place in dict.fromkeys(t.place for t in model.terms):
         velocity = builder.along(place, builder.motion[1])
         sgn = next((n for n in needed if graph.nodes[n] == (Op.SGN, velocity, velocity)), None)
         if sgn is not None and all(sgn != known for known, _ in table):

@@ -25,7 +25,7 @@ def patterns(model: Model) -> dict[str, Floats]:
     for i, j, weight, key in mass_entries(model):
         found.setdefault(key, np.zeros((n, n)))[i, j] += weight
     for entry in model.terms:
-        if entry.term.name in LINEAR and entry.term.name != "inertia" and entry.place is not None:
+        if entry.term.name in LINEAR and entry.term.name != "inertia":
             e = np.array(entry.place.direction(model.coordinates))
             found[entry.symbols[0]] = np.outer(e, e)
     return found
@@ -84,7 +84,7 @@ def loose_motions(model: Model) -> int:
     ties = [
         np.array(entry.place.direction(model.coordinates))
         for entry in model.terms
-        if entry.place is not None and any("u" in formulas.names(text) for text in _texts(entry))
+        if any("u" in formulas.names(text) for text in _texts(entry))
     ]
     return len(model.coordinates) - (int(np.linalg.matrix_rank(np.stack(ties))) if ties else 0)
 

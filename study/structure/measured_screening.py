@@ -41,7 +41,7 @@ def between_sensors(model: Model, prepared: PreparedStructure) -> tuple[Place, .
     """Every place that the sensors show: each to the ground, and each two of them."""
     seen = [s.coordinate for s in prepared.sensors]
     pairs = [*((GROUND, c) for c in seen), *combinations(seen, 2)]
-    known = {t.place.path: t.place for t in model.terms if t.place is not None and t.place.kind == "between"}
+    known = {t.place.path: t.place for t in model.terms if t.place.kind == "between"}
     return tuple(known.get(frozenset(ends), Place("between", ends)) for ends in pairs)
 
 
@@ -52,7 +52,7 @@ def measured_entries(
 
     A force from outside is none: it is no property of a place.
     """
-    known = {(t.term.name, t.place.path) for t in model.terms if t.place is not None}
+    known = {(t.term.name, t.place.path) for t in model.terms}
     effects = [t for t in (*LIBRARY.values(), *extra) if t.name not in (*LINEAR, *without)]
     found: list[ModelTerm] = []
     for term in (t for t in effects if not external(t) and not _linear(t)):
@@ -123,7 +123,6 @@ def _left(model: Model, prepared: PreparedStructure, modes: int) -> float:
 def _points(
     entry: ModelTerm, model: Model, prepared: PreparedStructure, lines: Floats
 ) -> list[tuple[float, ...]]:  # fmt: skip
-    assert entry.place is not None, "every term of a structure has a place"
     e = entry.place.direction(model.coordinates)
     u = np.sum([w * prepared.complete[c][0] for c, w in zip(model.coordinates, e, strict=True) if w], axis=0)
     u = u[slice(*prepared.fit)]

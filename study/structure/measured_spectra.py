@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.equations.model import Model
-from study.equations.place import Place
+from study.equations.place import HERE, Place
 from study.identify.frequency_domain import instruments
 from study.identify.frequency_domain.inputs import Input, input_history, reverse_inputs
 from study.identify.frequency_domain.responses import Responses
@@ -123,9 +123,9 @@ def _free_motion(fit: MeasuredFit, prepared: PreparedStructure) -> dict[str, Flo
 
 def _inputs(model: Model) -> list[tuple[Place, tuple[Input, ...]]]:
     """Inputs of the terms at each place, as if they were a single mass's."""
-    places = dict.fromkeys(t.place for t in model.terms if t.place is not None)
+    places = dict.fromkeys(t.place for t in model.terms)
     return [
-        (place, reverse_inputs(Model("alone", tuple(replace(t, place=None) for t in model.terms if t.place == place))))
+        (place, reverse_inputs(Model("alone", tuple(replace(t, place=HERE) for t in model.terms if t.place == place))))
         for place in places
     ]
 

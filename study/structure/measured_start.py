@@ -97,7 +97,6 @@ def unit_histories(model: Model, prepared: PreparedStructure) -> list[Floats]:
     """
     found: list[Floats] = []
     for entry in model.terms:
-        assert entry.place is not None, "every term of a structure has a place"
         blind = [c for c in entry.place.moving if c not in prepared.complete]
         sentence = f"{entry.name} lies at {', '.join(blind)}, where no sensor is; expected terms between sensors"
         expect(not blind, sentence)
@@ -212,7 +211,7 @@ def line_fits(model: Model, prepared: PreparedStructure, most: int = MOST) -> It
     where = ", ".join(dict.fromkeys(w for _, w in model.forces))
     driven = any(w in sensors for _, w in model.forces)
     expect(driven, f"no sensor is at {where}, where the force acts; 'linear: measured' needs one there")
-    ends = [c for t in model.terms if t.place is not None for c in t.place.moving]
+    ends = [c for t in model.terms for c in t.place.moving]
     points = tuple(c for c in model.coordinates if c in (*sensors, *ends) or any(c == w for _, w in model.forces))
     directions = [t.place.direction(model.coordinates) for t in model.terms if t.place for _ in t.term.symbols]
     rows = [model.coordinates.index(c) for c in points]

@@ -15,7 +15,7 @@ from study.compare.force_map import ForceCurve, curve
 from study.compare.noise import SIGNIFICANT
 from study.equations import kernels
 from study.equations.model import Model, ModelTerm
-from study.equations.place import Place
+from study.equations.place import HERE, Place
 from study.identify.frequency_domain.inputs import Input, input_history, reverse_inputs
 from study.records import noise_floor
 from study.records.completion import derivative
@@ -208,12 +208,11 @@ def _state(entry: ModelTerm, model: Model, motion: Floats, dt: float) -> Floats:
 
 def placed_inputs(entry: ModelTerm) -> tuple[Input, ...]:
     """The shapes of a term, whatever its place; its shape parameters are known."""
-    return reverse_inputs(Model("alone", (replace(entry, place=None),)))
+    return reverse_inputs(Model("alone", (replace(entry, place=HERE),)))
 
 
-def relative_record(place: Place | None, model: Model, motion: Floats, dt: float) -> Record:
+def relative_record(place: Place, model: Model, motion: Floats, dt: float) -> Record:
     """Relative motion at a place as a record of a single coordinate; ``motion`` as :func:`corrected_motion` has it."""
-    assert place is not None, "every term of a structure has a place"
     e = np.array(place.direction(model.coordinates))
     displacement, velocity = (np.asarray(x @ e, dtype=np.float64) for x in motion[:2])
     return Record(dt, {"force": np.zeros(len(displacement)), "displacement": displacement, "velocity": velocity})

@@ -106,7 +106,6 @@ def modal_program(
             loads[r] = graph.add(loads[r], graph.mul(values[key], force))
     rates = list[int]()
     for entry in model.terms:
-        assert entry.place is not None, "every term of a structure has a place"
         force, own = builder.force(entry)
         rates += [] if own is None else [own]
         for r in range(n):

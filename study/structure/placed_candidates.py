@@ -89,7 +89,7 @@ def candidate_entries(model: Model, extra: Sequence[Term] = (), without: Sequenc
 
     What depends on the sign of the motion alone, a stop on one side, is tried on either side of its place.
     """
-    known = {(t.term.name, t.place.path) for t in model.terms if t.place is not None}
+    known = {(t.term.name, t.place.path) for t in model.terms}
     effects = [t for t in (*LIBRARY.values(), *extra) if t.name not in (*NEVER_CANDIDATES, *without)]
     found: list[ModelTerm] = []
     for term in effects:
@@ -107,7 +107,6 @@ def screened(entries: Sequence[ModelTerm], base: PlacedBaseline) -> list[tuple[M
     """Candidates with the points that explain most, the most promising first; those that explain nothing left out."""
 
     def points(entry: ModelTerm) -> tuple[ModelTerm, list[PlacedStart]]:
-        assert entry.place is not None, "every candidate of a structure has a place"
         return entry, placed_starts(entry.term, entry.place, base)
 
     with ThreadPoolExecutor(cores()) as pool:
@@ -179,7 +178,6 @@ def one_side(candidates: Sequence[PlacedCandidate]) -> list[PlacedCandidate]:
     """Of candidates that are the same effect on two sides of a place the better."""
     best: dict[tuple[str, frozenset[str]], PlacedCandidate] = {}
     for candidate in sorted(candidates, key=lambda c: (bool(c.unphysical), c.left)):
-        assert candidate.entry.place is not None, "every candidate of a structure has a place"
         best.setdefault((candidate.entry.term.name, candidate.entry.place.path), candidate)
     return list(best.values())
 

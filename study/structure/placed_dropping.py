@@ -21,7 +21,7 @@ def term_at(model: Model, name: str, place: Place | None) -> str:
     """
     own = [
         t.name for t in model.terms
-        if t.name == name or (t.term.name == name and (place is None or (t.place and t.place.path == place.path)))
+        if t.name == name or (t.term.name == name and (place is None or t.place.path == place.path))
     ]  # fmt: skip
     said = name if place is None else f"{name} {'-'.join(place.ends)}"
     expect(own, f"{said!r} is not in the model; expected one of {', '.join(t.name for t in model.terms)}")

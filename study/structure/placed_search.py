@@ -155,7 +155,7 @@ def _own_columns(base: PlacedBaseline) -> dict[int, Floats]:
             force = base.lines(base.motion[orders[key]] @ own[key])
             found[fit.keys.index(key)] = flat(fit, base.transforms.back(-np.einsum("fsc,kfc->kfs", base.paths, force)))
     for entry in model.terms:
-        if entry.place is None or not set(entry.symbols) & set(fit.keys) or entry.symbols[0] in orders:
+        if not set(entry.symbols) & set(fit.keys) or entry.symbols[0] in orders:
             continue
         record = base.dated(relative_record(entry.place, model, base.motion, base.prepared.dt))
         columns = base.passed(entry.place, unit_lines(entry, record, base))
@@ -169,7 +169,7 @@ def _drifted(base: PlacedBaseline, free: Floats) -> Floats:
     total = np.zeros_like(base.residual)
     run = free.reshape(len(free), len(MOTIONS), -1).transpose(1, 0, 2)
     for entry in model.terms:
-        if entry.term.name in LINEAR or entry.place is None:
+        if entry.term.name in LINEAR:
             continue
         there, here = (
             base.passed(
@@ -249,7 +249,6 @@ def with_placed_term(
     StudyError
         If none of them has a finite motion.
     """
-    assert entry.place is not None, "every term of a structure has a place"
     base = base or placed_baseline(fit, prepared)
     tried = list(points or placed_starts(entry.term, entry.place, base, entry))[:STARTS]
     given = {key: value for key, value in entry.values.items() if value is not None}

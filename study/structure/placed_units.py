@@ -8,16 +8,16 @@ from study.equations.place import GROUND, Place
 from study.equations.term import QUANTITIES
 
 
-def units_at(place: Place | None, rotations: Collection[str]) -> tuple[str, str]:
+def units_at(place: Place, rotations: Collection[str]) -> tuple[str, str]:
     """Units of force and displacement at a place; ``rotations`` are the coordinates that were measured as angles."""
-    ends = [end for end in place.ends if end != GROUND] if place is not None else []
+    ends = [end for end in place.ends if end != GROUND]
     return ("N m", "rad") if ends and all(end in rotations for end in ends) else ("N", "m")
 
 
 def coefficient_unit(entry: ModelTerm, symbol: str, rotations: Collection[str]) -> str:
     """Unit of one coefficient of a term at its place; ``kg m^2`` of a moment of inertia, ``kg m`` of a coupled mass."""
     own = symbol.split("[")[0]
-    if entry.term.name == "inertia" and entry.place is not None:
+    if entry.term.name == "inertia":
         turning = sum(end in rotations for end in entry.place.ends)
         return "kg m^2" if turning == len(entry.place.ends) else "kg m" if turning else "kg"
     return entry.term.unit(own, *units_at(entry.place, rotations))

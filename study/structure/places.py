@@ -20,7 +20,7 @@ def connections(model: Model) -> tuple[Place, ...]:
     """
     found: dict[frozenset[str], Place] = {}
     for entry in model.terms:
-        if entry.place is not None and entry.place.kind == "between":
+        if entry.place.kind == "between":
             found.setdefault(entry.place.path, entry.place)
     for name in model.coordinates:
         found.setdefault(frozenset((GROUND, name)), Place("between", (GROUND, name)))

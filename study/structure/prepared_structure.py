@@ -139,7 +139,7 @@ def prepare_structure(
 def _check_tied(model: Model, blind: Sequence[str]) -> None:
     """Refuse a coordinate that nothing measures and nothing ties to what is measured."""
     for name in blind:
-        ties = [t for t in model.terms if t.place is not None and name in t.place.moving and len(t.place.moving) > 1]
+        ties = [t for t in model.terms if name in t.place.moving and len(t.place.moving) > 1]
         if not ties:
             raise StudyError(
                 f"nothing measures the coordinate {name!r} and nothing ties it to another; expected a column "

@@ -16,7 +16,7 @@ from study.identify.estimators import siso
 from study.identify.estimators.base import Identified, Settings, named_parameters
 from study.identify.estimators.local_polynomial import identify_lines
 from study.identify.frequency_domain import conditioned, joint_coefficients, local_polynomial_fit
-from study.identify.frequency_domain.inputs import INERTIA, Input, equation_inputs, histories
+from study.identify.frequency_domain.inputs import INERTIA, Input, histories, reverse_inputs
 from study.identify.frequency_domain.local_polynomial_method import Lines, transform
 from study.records import spectra
 from study.records.record import MOTIONS, Record
@@ -95,7 +95,7 @@ def equations_of(
     own, lacking = list[Equation](), dict[str, str]()
     cache: dict[tuple[float, ...], Record] = {}
     for coordinate in model.coordinates:
-        inputs = equation_inputs(model, coordinate)
+        inputs = reverse_inputs(model, coordinate)
         needed = [c for c, *weights in _columns(model, inputs) if any(weights) or c == coordinate]
         blind = [c for c in needed if c not in prepared.complete]
         if blind:
@@ -122,7 +122,7 @@ def _equation(
     if not drives:
         mass = next(
             t.symbols[0] for t in model.terms
-            if t.term.name == "inertia" and t.place is not None and t.place.kind == "at" and coordinate in t.place.ends
+            if t.term.name == "inertia" and t.place.kind == "at" and coordinate in t.place.ends
         )  # fmt: skip
         inputs = _without(inputs, mass)
     part, values = slice(*span), list[Floats]()

@@ -72,7 +72,7 @@ def sketch(model: Model, measured: Sequence[str], shares: Mapping[frozenset[str]
         Box(name, x, 0.0, tuple(f for f, where in model.forces if where == name), name in measured)
         for name, x in at.items()
     )
-    tied = {e.place.path for e in model.terms if e.place is not None and (e.place.kind != "at" or not _mass(e))}
+    tied = {e.place.path for e in model.terms if (e.place.kind != "at" or not _mass(e))}
     links = [_link(place, at, place.path in tied, shares.get(place.path, 0.0)) for place in _drawn(model)]
     top = max(0.5 * HIGH, *(link.middle[1] for link in links)) + ABOVE
     return Sketch(boxes, tuple(links), GROUND_AT - 2.0 * HATCH, top)
@@ -86,7 +86,7 @@ def _drawn(model: Model) -> list[Place]:
     """All connections, and the bodies that inertia couples, each once."""
     found = {place.path: place for place in connections(model)}
     for entry in model.terms:
-        if entry.place is not None and entry.place.kind == "couples":
+        if entry.place.kind == "couples":
             found.setdefault(entry.place.path, entry.place)
     return list(found.values())
 

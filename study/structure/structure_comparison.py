@@ -9,7 +9,7 @@ import numpy as np
 
 from study.equations import model_file
 from study.equations.model import Model, ModelTerm
-from study.equations.place import Place, place_in_words
+from study.equations.place import HERE, Place, place_in_words
 from study.structure.missing_forces import MissingForces, missing_forces
 from study.structure.modes import Modes, modes_of, modes_table
 from study.structure.placed_units import coefficient_unit, parameter_units
@@ -29,7 +29,7 @@ class PlacedCoefficient:
 
     key: str
     term: str
-    place: Place | None
+    place: Place
     value: float
     error: float | None  # standard error; None where the value was held
     unit: str
@@ -183,7 +183,7 @@ def structure_document(comparison: StructureComparison) -> dict[str, Any]:
 def placed_coefficient_row(c: PlacedCoefficient) -> dict[str, Any]:
     """A coefficient as a plain row."""
     return {
-        "key": c.key, "term": c.term, **(c.place.plain() if c.place else {}), "value": c.value,
+        "key": c.key, "term": c.term, **({} if c.place == HERE else c.place.plain()), "value": c.value,
         "interval": None if c.interval is None else list(c.interval), "standard_error": c.error, "unit": c.unit,
         "held": c.error is None,
     }  # fmt: skip

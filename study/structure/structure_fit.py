@@ -152,7 +152,7 @@ class _Problem:
 
 def positive_keys(entry: ModelTerm) -> tuple[str, ...]:
     """Keys of a term that have no meaning at or below zero; an inertia that couples may have either sign."""
-    if entry.term.name == "inertia" and entry.place is not None and entry.place.kind == "couples":
+    if entry.term.name == "inertia" and entry.place.kind == "couples":
         return ()
     own = dict(zip(entry.term.keys, entry.keys, strict=True))
     return tuple(own[key] for key in entry.term.positive)

@@ -101,7 +101,7 @@ def _places(
         known = [f"<h2>{escape(_capital(placed(place)))}</h2>", f"<p>{escape(terms_there(comparison, path))}</p>"]
         if path in shares:
             known.append(f"<p>Any force there could make {percent(shares[path])} of what stands above the noise.</p>")
-        own = [r for r in rows if r.entry.place is not None and r.entry.place.path == path]
+        own = [r for r in rows if r.entry.place.path == path]
         if own:
             known.append(_candidates(own))
         elif diagnosis is not None and path in shares:
@@ -122,7 +122,7 @@ def terms_there(comparison: StructureComparison, path: frozenset[str]) -> str:
     names = [
         term_names(e.term.name)
         for e in comparison.model.terms
-        if e.place is not None and e.place.path == path and (e.term.name != "inertia" or e.place.kind != "at")
+        if e.place.path == path and (e.term.name != "inertia" or e.place.kind != "at")
     ]
     return f"The model has {', '.join(names)} there." if names else "The model has no term there."
 

@@ -77,7 +77,7 @@ def sketch_of_diagnosis(diagnosis: StructureDiagnosis) -> Sketch:
     first = diagnosis.candidates[0]
     shares: dict[frozenset[str], float] = {}
     for row in diagnosis.candidates:
-        if row.entry.place is not None and row.name in (first.name, *first.tied_with):
+        if row.name in (first.name, *first.tied_with):
             shares.setdefault(row.entry.place.path, float(np.clip(row.gain.explained, 0.0, 1.0)))
     return sketch(comparison.model, comparison.forces.coordinates, shares)
 

@@ -8,7 +8,6 @@ import numpy as np
 
 from study.diagnose.needless import needless_fields
 from study.diagnose.verdict import MISSING, NOTHING
-from study.equations.place import Place
 from study.equations.place import place_in_words as placed
 from study.figures.labels import term_names
 from study.structure.modes import modes_table
@@ -66,7 +65,7 @@ def _missing(diagnosis: StructureDiagnosis) -> list[str]:
     low, high = first.interval
     known = f"95 % interval {low:.5g} to {high:.5g}"
     said = [
-        f"{words[0].upper()}{words[1:]} is missing {_place(first.entry.place)} ({first.term.meaning}).",
+        f"{words[0].upper()}{words[1:]} is missing {placed(first.entry.place)} ({first.term.meaning}).",
         f"With it the held-out error of the motions falls from {percent(diagnosis.comparison.prediction.error)} to "
         f"{percent(first.prediction.error)}; the noise floor is {percent(first.prediction.floor)}.",
         f"Its coefficient is {first.coefficient:.5g} {first.unit} ({known}){_shape(first)}.",
@@ -77,14 +76,10 @@ def _missing(diagnosis: StructureDiagnosis) -> list[str]:
         said.append(f"As fitted it is no physical effect: {first.unphysical}.")
     if first.tied_with:
         rows = {r.name: r for r in diagnosis.candidates}
-        named = [f"{term_names(rows[n].term.name)} {_place(rows[n].entry.place)}" for n in first.tied_with]
+        named = [f"{term_names(rows[n].term.name)} {placed(rows[n].entry.place)}" for n in first.tied_with]
         said.append(f"This record cannot tell it from {', '.join(named)}.")
         said.append(separating_sensor(first, [rows[n] for n in first.tied_with]))
     return [s for s in said if s]
-
-
-def _place(place: Place | None) -> str:
-    return placed(place) if place is not None else ""
 
 
 def _shape(row: PlacedRanked) -> str:
@@ -122,13 +117,13 @@ def _unknown(diagnosis: StructureDiagnosis) -> list[str]:
     if diagnosis.candidates and diagnosis.candidates[0].gain.explained > 0.0:
         best = diagnosis.candidates[0]
         said.append(
-            f"The nearest, {term_names(best.term.name)} {_place(best.entry.place)}, leaves "
+            f"The nearest, {term_names(best.term.name)} {placed(best.entry.place)}, leaves "
             f"{percent(best.prediction.error)}."
         )
     if diagnosis.families and diagnosis.families[0].gain.explained > DEPENDENCE:
         most = diagnosis.families[0]
         said.append(
-            f"The missing force depends on {most.family} {_place(most.place)}: general functions of it explain "
+            f"The missing force depends on {most.family} {placed(most.place)}: general functions of it explain "
             f"{percent(most.gain.explained)} of what is unexplained, held out."
         )
     return said

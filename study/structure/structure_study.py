@@ -148,15 +148,15 @@ def _check(case: StructureCase, models: Path) -> None:
     known = ", ".join(sorted(p.relative_to(models).as_posix()[:-5] for p in models.rglob("*.yaml")))
     expect(path.is_file(), f"there is no model {case.model!r}; models/ holds {known}")
     model = read_model(path)
-    expect(model.coordinates, f"{case.model!r} has no 'coordinates'; expected a structure")
+    expect(model.named, f"{case.model!r} has no 'coordinates'; expected a structure")
     unknown = [name for name in case.sensors if name not in model.coordinates]
     expect(not unknown, f"sensors name {unknown[:1]}; {case.model!r} has {', '.join(model.coordinates)}")
     expect(len(model.forces) == 1, f"{case.model!r} has {len(model.forces)} forces; expected one")
     if case.also_assumed:
         get(case.also_assumed)
     if case.measured:
-        kept = [t for t in model.terms if t.place is not None and t.term.name not in LINEAR]
-        ends = [c for t in kept if t.place is not None for c in t.place.moving]
+        kept = [t for t in model.terms if t.term.name not in LINEAR]
+        ends = [c for t in kept for c in t.place.moving]
         needed = dict.fromkeys([*(where for _, where in model.forces), *ends])
         blind = [name for name in needed if name not in case.sensors]
         expect(not blind, f"sensors lack {', '.join(blind)}, where the force or a nonlinear term acts; expected one")
@@ -182,8 +182,8 @@ def assumed_structure(model: Model, also_assumed: str) -> Model:
     if not also_assumed:
         return model
     term = get(also_assumed)
-    there = {t.place.path for t in model.terms if t.place is not None and t.term.name == also_assumed}
-    tied = {t.place.path for t in model.terms if t.place is not None and t.term.name != "inertia"}
+    there = {t.place.path for t in model.terms if t.term.name == also_assumed}
+    tied = {t.place.path for t in model.terms if t.term.name != "inertia"}
     added = [p for p in connections(model) if p.path in tied and p.path not in there]
     entries = [ModelTerm(term, (0.0,) * len(term.symbols), free(term).parameters, place) for place in added]
     return replace(model, terms=(*model.terms, *entries))

@@ -180,7 +180,6 @@ def _strength(unit: ModelTerm, base: Model, record: StructureRecord, dt: float) 
                 c or 0.0 for c, s in zip(unit.coefficients, unit.term.symbols, strict=True) if s == part.symbol
             )
             total = total + coefficient * part.factor * (values if part.order == 0 else np.gradient(values, dt))
-    assert unit.place is not None, "every term of a structure has a place"
     e = np.array(unit.place.direction(base.coordinates))
     linear = np.column_stack([*(x @ e for x in motion)])
     rest = total - linear @ least_squares(linear, total)
@@ -189,7 +188,7 @@ def _strength(unit: ModelTerm, base: Model, record: StructureRecord, dt: float) 
     springs = [
         values[t.symbols[0]] * (motion[orders[t.term.name]] @ np.array(t.place.direction(base.coordinates)))
         for t in base.terms
-        if t.place is not None and t.place.path == unit.place.path and t.term.name in orders
+        if t.place.path == unit.place.path and t.term.name in orders
     ]
     masses = [values[f"m[{c}]"] for c in base.coordinates]
     inertia = max(float(np.std(motion[2][:, i])) * masses[i] for i in np.flatnonzero(e))

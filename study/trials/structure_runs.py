@@ -80,7 +80,7 @@ def _found(trial: StructureTrial, diagnosis: StructureDiagnosis) -> Row:
         "left": diagnosis.left, "asked": diagnosis.asked, "effect_first": False, "place_first": False,
         "tie_holds": hidden is None and diagnosis.verdict == NOTHING,
     }  # fmt: skip
-    if first is None or first.entry.place is None:
+    if first is None:
         return row
     ties = [r for r in rows if r.name in (first.name, *first.tied_with)]
     return row | {
@@ -93,7 +93,7 @@ def _found(trial: StructureTrial, diagnosis: StructureDiagnosis) -> Row:
 
 
 def _there(row: PlacedRanked, hidden: ModelTerm) -> bool:
-    return row.entry.place is not None and hidden.place is not None and row.entry.place.path == hidden.place.path
+    return row.entry.place.path == hidden.place.path
 
 
 def _true(trial: StructureTrial, prepared: PreparedStructure) -> Row:

@@ -53,12 +53,11 @@ def test_the_reverse_system_puts_the_effect_where_it_is(believed, record_of):
     comparison = compare_structure(believed, prepare_structure(record_of(), believed))
     ordered = screened(candidate_entries(believed), placed_search_base(comparison))
     entry, points = ordered[0]
-    assert entry.place is not None
     assert entry.place.path == {"floor2", "floor3"}
     cubic = next(p[0] for e, p in ordered if e.name == "cubic_stiffness[floor2-floor3]")
     assert cubic.share > 0.95 * points[0].share
     assert cubic.coefficients[0] == pytest.approx(1e6, rel=0.2)
-    elsewhere = max(p[0].share for e, p in ordered if e.place is not None and e.place.path != {"floor2", "floor3"})
+    elsewhere = max(p[0].share for e, p in ordered if e.place.path != {"floor2", "floor3"})
     assert elsewhere < 0.8 * cubic.share
 
 

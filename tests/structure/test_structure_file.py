@@ -85,5 +85,6 @@ def test_a_single_mass_has_no_places():
     with pytest.raises(StudyError, match="has 'at', and the model no 'coordinates'"):
         parse_model("name: x\nterms: [{term: inertia, at: a}]\n", HERE)
     plain = read_model(Path(__file__).parents[2] / "models" / "duffing.yaml")
-    assert plain.coordinates == ()
+    assert (plain.coordinates, plain.named) == (("",), False)
+    assert {t.place.label for t in plain.terms} == {""}
     assert list(plain.values) == ["m", "c", "k", "k3"]

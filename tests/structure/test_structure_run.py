@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from study.equations.model import Model, ModelTerm
 from study.equations.model_file import read_model
-from study.equations.place import Place
+from study.equations.place import HERE, Place
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
 from study.structure.modes import modes_of
@@ -129,7 +129,7 @@ def test_one_coordinate_moves_as_a_model_without_coordinates():
         at("coulomb_friction", "mass", 0.4), at("one_sided_contact", "mass", 900.0, 0.01),
     ]  # fmt: skip
     structure = Model("one", tuple(terms), ("mass",), (("shaker", "mass"),))
-    plain = Model("one", tuple(replace(t, place=None) for t in terms))
+    plain = Model("one", tuple(replace(t, place=HERE) for t in terms))
     force = slow_force(N, DT, 3.0)
     from study.equations.free_run import predict_response
 

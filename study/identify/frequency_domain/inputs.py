@@ -14,6 +14,7 @@ import numpy as np
 from study.equations import formulas
 from study.equations.graph import Graph
 from study.equations.model import Model, ModelTerm, with_registers
+from study.equations.place import ALONE
 from study.records.interpolation import between_samples
 from study.records.record import Record
 from study.support.arrays import Complexes, Floats
@@ -52,7 +53,7 @@ class Input:
     state : str or None
         dz/dt, where the shape is a state z with a memory.
     direction : tuple of float
-        Weights of a structure's coordinates in the motion u that the shape is of; empty for a single mass.
+        Weights of the coordinates in the motion u that the shape is of.
     """
 
     shape: str
@@ -72,12 +73,7 @@ class Input:
         return self.powers(frequency) @ np.array([values.get(p.symbol, 0.0) for p in self.parts])
 
 
-def reverse_inputs(model: Model) -> tuple[Input, ...]:
-    """Inputs of a model of a single mass, in the order in which its terms first need them."""
-    return _collected((entry, (), 1.0) for entry in model.terms)
-
-
-def equation_inputs(model: Model, coordinate: str) -> tuple[Input, ...]:
+def reverse_inputs(model: Model, coordinate: str = ALONE) -> tuple[Input, ...]:
     """Inputs of one coordinate's equation of motion, in the order in which its terms first need them.
 
     Coefficients go by the keys of the whole structure: one that stands in two equations has one name, and what acts
@@ -87,7 +83,7 @@ def equation_inputs(model: Model, coordinate: str) -> tuple[Input, ...]:
     acting: list[tuple[ModelTerm, tuple[float, ...], float]] = []
     for entry in model.terms:
         place = entry.place
-        if place is None or coordinate not in place.ends:
+        if coordinate not in place.ends:
             continue
         if place.kind == "couples":
             other = place.ends[1 - place.ends.index(coordinate)]
