@@ -16,6 +16,7 @@ from study.compare.release import at_the_release
 from study.equations.free_run import prepare
 from study.identify.frequency_domain.decay_start import frequency_and_rate
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.records.outputs import alone
 from study.records.prepared import Prepared
 from study.records.record import Record, Stretch
 from study.records.states import starting_states
@@ -96,13 +97,14 @@ def _whole_stretches(record: Record) -> list[Stretch]:
 
 def _free_motion(fit: FreeRunFit, stretch: Stretch, response: str) -> Floats:
     """The fitted model let go where a stretch begins."""
-    span = (stretch.first, stretch.last)
+    outputs = alone(response)
     run = prepare(
-        fit.model, stretch.source, response=response, steps_per_sample=max(fit.steps_per_sample, 2), span=span
-    )
+        fit.model, stretch.source, sensors=outputs.sensors, steps_per_sample=max(fit.steps_per_sample, 2),
+        span=(stretch.first, stretch.last),
+    )  # fmt: skip
     state = np.zeros(run.states)
-    state[:2] = starting_states(stretch.source, response, (stretch.first,))[0]
-    return run.respond({}, state)[0]
+    state[:2] = starting_states(stretch.source, outputs, (stretch.first,))[0]
+    return run.respond({}, state)[0][:, 0]
 
 
 def _decay(values: Floats, dt: float, omega: float, least: float) -> Decay:

@@ -134,7 +134,7 @@ def predict(fit: FreeRunFit, prepared: Prepared) -> Prediction:
     """Run a fitted model along the judging part (:class:`study.identify.time_domain.part_fit.JudgingRun`)."""
     try:
         run = judging_run(fit, prepared)
-        predicted, finer = (run.motion(prepared.response, times) for times in (1, 2))
+        predicted, finer = (run.motions(finer=times)[:, 0] for times in (1, 2))
     except DivergenceError:
         return Prediction(prepared, None, np.full_like(prepared.judged, np.mean(prepared.judged)), 0.0)
     return Prediction(prepared, run, predicted, float(np.sqrt(np.mean(np.subtract(finer, predicted) ** 2))))

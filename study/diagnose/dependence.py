@@ -19,6 +19,7 @@ from study.equations.terms import custom
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import judging_run, run_of, with_states
 from study.identify.time_domain.shape_search import Baseline, modulation_lines, residual_lines
+from study.records.outputs import alone
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS
 from study.support import statistics
@@ -51,7 +52,8 @@ def unexplained(base: Baseline, prepared: Prepared) -> Unexplained:
     """What a fitted model leaves; where its free run does not stay finite to the end, on the fitting part alone."""
     fit, (first, last) = base.fit, prepared.plan.judge
     prepared = replace(prepared, plan=replace(prepared.plan, judge=(first, min(last, first + LONGEST))))
-    motions = [run_of(fit, prepared, motion=name).respond({}, fit.initial)[0] for name in MOTIONS[:2]]
+    runs = [run_of(fit, prepared, sensors=alone(name).sensors) for name in MOTIONS[:2]]
+    motions = [run.respond({}, fit.initial)[0][:, 0] for run in runs]
     families = _formulas(*(float(np.std(x)) for x in motions))
     shaped = _with_shapes(fit, [text for texts in families.values() for text in texts])
     # Of segments, each initial state matters to its own samples alone; those of stretches are taken out of all columns.

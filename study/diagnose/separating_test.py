@@ -35,7 +35,7 @@ def separating_level(one: Ranked, other: Ranked, prepared: Prepared) -> float | 
         louder, span, begin = _at_level(prepared, level)
         fine = prepared.free or prepared.response == FORCE
         steps = max(one.fit.steps_per_sample, other.fit.steps_per_sample) if fine else STEPS
-        ready = partial(prepare, record=louder, response=prepared.response, span=span, steps_per_sample=steps)
+        ready = partial(prepare, record=louder, sensors=prepared.outputs.sensors, span=span, steps_per_sample=steps)
         try:
             ahead = ready(one.fit.model)
             initial = np.zeros((len(ahead.cuts) + 1, ahead.moving)) if begin is None else begin
@@ -43,7 +43,7 @@ def separating_level(one: Ranked, other: Ranked, prepared: Prepared) -> float | 
             nearest, jacobian = ready(other.fit.model, keys=other.fit.keys).respond(values, initial)
         except StudyError:
             continue
-        gap = target - nearest
+        gap, jacobian = (prepared.outputs.stacked(x) for x in (target - nearest, jacobian))
         gap = gap - jacobian @ least_squares(jacobian, gap, 1e-9)
         # The difference of the two misfits is about |gap|^2, its standard error 2 |gap| sigma.
         if np.sum(gap**2) > (2.0 * DISTINCT) ** 2 * noise:
@@ -62,7 +62,7 @@ def _at_level(prepared: Prepared, level: float) -> tuple[Record, tuple[int, int]
     if prepared.free:
         stretch = (*record.stretches, Stretch(record, *span))[0]
         last = min(len(stretch.source), stretch.first + LONGEST)
-        begin = starting_states(stretch.source, response, (stretch.first,))
+        begin = starting_states(stretch.source, prepared.outputs, (stretch.first,))
         return stretch.source, (stretch.first, last), level * begin
     return record.with_channels({FORCE: level * record[FORCE]}), span, None
 

@@ -18,7 +18,7 @@ from study.equations.drive import FORCE, along_motions
 from study.equations.graph import Program
 from study.equations.model import Model, named_channels, with_registers
 from study.equations.variation import Variation, differentiated
-from study.records.record import MOTIONS, Record
+from study.records.record import ALONE, MOTIONS, Record, Sensor
 from study.support.arrays import Floats, Ints
 from study.support.errors import DivergenceError, StudyError
 
@@ -116,8 +116,8 @@ class FreeRun:
 
         Returns
         -------
-        response : array, shape (samples,)
-        jacobian : array, shape (samples, keys + (cuts + 1) free_states)
+        response : array, shape (samples, sensors)
+        jacobian : array, shape (samples, sensors, keys + (cuts + 1) free_states)
 
         Raises
         ------
@@ -128,10 +128,10 @@ class FreeRun:
         if not self.cuts:
             return response, own
         keys, bounds = len(self.keys), (0, *self.cuts, self.samples)
-        jacobian = np.zeros((self.samples, keys + (len(bounds) - 1) * free_states))
-        jacobian[:, :keys] = own[:, :keys]
+        jacobian = np.zeros((*own.shape[:2], keys + (len(bounds) - 1) * free_states))
+        jacobian[:, :, :keys] = own[:, :, :keys]
         for i, (begin, end) in enumerate(pairwise(bounds)):
-            jacobian[begin:end, keys + i * free_states : keys + (i + 1) * free_states] = own[begin:end, keys:]
+            jacobian[begin:end, :, keys + i * free_states : keys + (i + 1) * free_states] = own[begin:end, :, keys:]
         return response, jacobian
 
     def respond_by_segment(
@@ -141,8 +141,8 @@ class FreeRun:
 
         Returns
         -------
-        response : array, shape (samples,)
-        jacobian : array, shape (samples, keys + free_states)
+        response : array, shape (samples, sensors)
+        jacobian : array, shape (samples, sensors, keys + free_states)
         arrivals : array, shape (cuts, states, 1 + keys + free_states)
             State in which each segment but the last arrives where the next begins, beside its derivatives.
         """
@@ -166,8 +166,8 @@ class FreeRun:
         if self.places is not None:
             out = out[self.places]
         if self.motion is not None:
-            return self.motion, np.zeros_like(out[:, 1:]), state[:-1]
-        return out[:, 0], out[:, 1:], state[:-1]
+            return self.motion[:, None], np.zeros_like(out[:, None, 1:]), state[:-1]
+        return out[:, None, 0], out[:, None, 1:], state[:-1]
 
     def passing(self, initial: Mapping[int, Floats]) -> Floats:
         """State at the first sample of each segment, shape (cuts + 1, states), of a motion with fewer restarts.
@@ -208,7 +208,7 @@ def prepare(
     record: Record,
     keys: Sequence[str] = (),
     *,
-    response: str = "displacement",
+    sensors: Sequence[Sensor] = (Sensor(ALONE, "displacement"),),
     steps_per_sample: int = 2,
     span: tuple[int, int] | None = None,
     restarts: Sequence[int] = (),
@@ -225,8 +225,8 @@ def prepare(
         Gives the force, and the extra channels which the user's own terms name.
     keys : sequence of str
         The coefficients and shape parameters to differentiate by.
-    response : str
-        ``displacement``, ``velocity`` or ``acceleration``; ``force`` of a model without inertia.
+    sensors : sequence of Sensor
+        The motions that are wanted; ``force`` of a model without inertia.
     steps_per_sample : int
         Runge-Kutta steps in each sampling interval.
     span : pair of int, optional
@@ -239,6 +239,7 @@ def prepare(
     StudyError
         If a value, a channel, the span or a restart is invalid.
     """
+    (response,) = (sensor.motion for sensor in sensors)
     first, last = _checked_span(record, span)
     cuts = tuple(sorted({*restarts, *(b for b in record.begins if first < b < last)}))
     if list(restarts) != sorted(set(restarts)) or any(b - a < 2 for a, b in pairwise((first, *cuts, last))):
@@ -288,5 +289,5 @@ def predict_response(
     ``initial`` has displacement, velocity and, if given, the terms' own states at the first sample of the span.
     """
     model.numbers()
-    run = prepare(model, record, response=response, steps_per_sample=steps_per_sample, span=span)
-    return run.respond({}, initial)[0]
+    run = prepare(model, record, sensors=(Sensor(ALONE, response),), steps_per_sample=steps_per_sample, span=span)
+    return run.respond({}, initial)[0][:, 0]

@@ -59,6 +59,14 @@ class ModelTerm:
         return own + tuple(f"{self.name}.{p.name}" for p in self.term.parameters)
 
     @property
+    def positive(self) -> tuple[str, ...]:
+        """Keys that have no meaning at or below zero; an inertia that couples may have either sign."""
+        if self.term.name == "inertia" and self.place.kind == "couples":
+            return ()
+        own = dict(zip(self.term.keys, self.keys, strict=True))
+        return tuple(own[key] for key in self.term.positive)
+
+    @property
     def values(self) -> dict[str, float | None]:
         """Coefficients and shape parameters by key."""
         return dict(zip(self.keys, self.coefficients + self.parameters, strict=True))

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from study.records.record import ALONE
+
 GROUND = "ground"  # never moves
-ALONE = ""  # the only coordinate of a single mass: what is there needs no name
 Kind = Literal["at", "between", "couples"]
 
 

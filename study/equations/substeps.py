@@ -5,6 +5,7 @@ import numpy as np
 from study.equations import kernels
 from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model
+from study.records.outputs import DISPLACEMENT, Outputs
 from study.records.record import Record
 from study.records.states import angular_rate, starting_states
 from study.support.arrays import Floats, Ints
@@ -15,7 +16,9 @@ FINE = 0.125  # largest step times the median rate: a short time of fast rates a
 FEWEST, MOST = 4, 32  # steps a sample between which the median rate sets the bound
 
 
-def needed_steps(model: Model, record: Record, response: str = "displacement", most: int | None = None) -> int:
+def needed_steps(
+    model: Model, record: Record, outputs: Outputs = DISPLACEMENT, most: int | None = None
+) -> int:  # fmt: skip
     """Steps in each sampling interval with which a search may begin, the values of the model all known.
 
     ``most`` are taken at most; the median rate bounds them if it is left out. A Runge-Kutta step h of an oscillation of
@@ -23,22 +26,23 @@ def needed_steps(model: Model, record: Record, response: str = "displacement", m
     short memory reaches though the motion is slow. So rates are the largest eigenvalues of the equation of motion,
     linearised along the motion.
     """
-    rates = _rates(model, record, response)
+    rates = _rates(model, record, outputs)
     if not np.all(np.isfinite(rates)):
         return most or FEWEST
     most = most or int(np.clip(np.ceil(np.median(rates) * record.dt / FINE), FEWEST, MOST))
-    fastest = max(float(np.max(rates)), angular_rate(record[response], record.dt))
+    motions = outputs.measured(record, (0, len(record)))
+    fastest = max(float(np.max(rates)), *(angular_rate(motion, record.dt) for motion in motions.T))
     return int(np.clip(np.ceil(fastest * record.dt / ROUGH), 1, most))
 
 
-def _rates(model: Model, record: Record, response: str) -> Floats:
+def _rates(model: Model, record: Record, outputs: Outputs) -> Floats:
     """Magnitude of the largest eigenvalue at each point, in rad/s, shape (points,)."""
     run = prepare(model, record, steps_per_sample=1)
     samples = np.unique(np.linspace(0, len(record) - 1, POINTS).astype(np.int64))
     if run.known:
         return _rates_of_memories(run, record, samples)
     states = run.states
-    point = np.column_stack([starting_states(record, response, samples.tolist()), record.time[samples]])
+    point = np.column_stack([starting_states(record, outputs, samples.tolist()), record.time[samples]])
     data = np.column_stack([point, run.drive[2 * np.array(run.along(samples.tolist()))]])
     columns = np.arange(data.shape[1], dtype=np.int64)
     partial = np.empty((len(samples), (states - 1) * states))

@@ -44,7 +44,7 @@ class FittedResidual:
     @cached_property
     def predicted(self) -> tuple[Floats, Floats]:
         """Response of the free run on both parts: free of noise."""
-        fitted = run_of(self.fit, self.prepared).respond({}, self.fit.initial)[0]
+        fitted = run_of(self.fit, self.prepared).respond({}, self.fit.initial)[0][:, 0]
         return fitted, self.prediction.predicted
 
     @property

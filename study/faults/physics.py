@@ -139,7 +139,7 @@ def _sensitivities(left: FittedResidual) -> tuple[Floats, Floats] | None:
         return None
     extended = replace(fit, model=model, keys=tuple(keys), values=np.zeros(len(keys)))
     try:
-        fitted = run_of(extended, left.prepared, keys).respond(dict.fromkeys(keys, 0.0), fit.initial, 0)[1]
+        fitted = run_of(extended, left.prepared, keys).respond(dict.fromkeys(keys, 0.0), fit.initial, 0)[1][:, 0]
         judged = run.derivatives(extended)[:, : len(keys)]
     except StudyError:
         return None

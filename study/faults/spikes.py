@@ -7,6 +7,7 @@ from scipy.special import stdtr
 from study.faults.fault import SPIKES, Fault
 from study.faults.leftover import FittedResidual
 from study.identify.time_domain.part_fit import run_of
+from study.records.outputs import alone
 from study.support.arrays import Floats
 from study.support.thresholds import ALPHA, TOLERANCE
 
@@ -43,7 +44,7 @@ def reversals(left: FittedResidual) -> tuple[NDArray[np.bool_], NDArray[np.bool_
     jumps = any("sgn(v)" in c.shape for entry in left.fit.model.terms for c in entry.term.components)
     if left.prepared.response != "acceleration" or not jumps or left.prediction.run is None:
         return np.zeros(len(left.residual[0]), np.bool_), np.zeros(len(left.residual[1]), np.bool_)
-    fitted = run_of(left.fit, left.prepared, motion="velocity").respond({}, left.fit.initial)[0]
+    fitted = run_of(left.fit, left.prepared, sensors=alone("velocity").sensors).respond({}, left.fit.initial)[0][:, 0]
     return _turning(fitted), _turning(left.prediction.run.motion("velocity"))
 
 

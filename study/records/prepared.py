@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.records.completion import complete
+from study.records.outputs import Outputs
 from study.records.plan import FEWEST, Plan, make_plan
-from study.records.record import MOTIONS, Record
+from study.records.record import ALONE, MOTIONS, Record, Sensor
 from study.support.arrays import Floats
 
 FORCE = "force"  # what is predicted where the motion is prescribed
@@ -46,6 +47,8 @@ class Prepared:
         The record with all of its samples, where this has fewer.
     running_on : Prepared, optional
         The record with motions that run on for longer, where here they begin anew (``study.records.stretches.apart``).
+    sensors : tuple of Sensor
+        The motions that free runs are held against; that of the plan's response if left out.
     """
 
     record: Record
@@ -59,6 +62,16 @@ class Prepared:
     every: int = 1
     as_sampled: "Prepared | None" = None
     running_on: "Prepared | None" = None
+    sensors: tuple[Sensor, ...] = ()
+
+    @cached_property
+    def outputs(self) -> Outputs:
+        """What free runs are held against: several sensors in shares of their size in the fitting part."""
+        sensors = self.sensors or (Sensor(ALONE, self.plan.response),)
+        if len(sensors) == 1:
+            return Outputs(sensors, (1.0,))
+        sizes = np.std(Outputs(sensors, (1.0,) * len(sensors)).measured(self.record, self.plan.fit), axis=0)
+        return Outputs(sensors, tuple((1.0 / np.where(sizes > 0.0, sizes, 1.0)).tolist()))
 
     @property
     def response(self) -> str:
@@ -93,10 +106,10 @@ class Prepared:
         return math.ceil(periods * len(values) / middle)
 
     def known(self, values: Floats, span: tuple[int, int]) -> Floats:
-        """Values along a span, shape (samples, ...), zero where the sample of the response is lost."""
+        """Stacked values along a span, zero where a sensor's sample is lost, the same shape."""
         if self.lost is None:
             return values
-        kept = ~self.lost[slice(*span)]
+        kept = ~np.repeat(self.lost[slice(*span)], len(self.outputs))
         return values * (kept if values.ndim == 1 else kept[:, None])
 
     def inner(self, span: tuple[int, int]) -> tuple[int, int]:

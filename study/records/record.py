@@ -10,8 +10,21 @@ import numpy as np
 
 from study.support.arrays import Floats
 
+ALONE = ""  # the only coordinate of a single mass has no name, so that its channels are called as their motions are
 MOTIONS = ("displacement", "velocity", "acceleration")
 SI_UNITS = {"time": "s", "force": "N", "displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+
+
+@dataclass(frozen=True, order=True)
+class Sensor:
+    """A measured motion of a coordinate."""
+
+    coordinate: str
+    motion: str  # one of MOTIONS
+
+    def __str__(self) -> str:
+        """As channels are called: ``floor1 acceleration``, or ``acceleration`` of a single mass."""
+        return f"{self.coordinate} {self.motion}".lstrip()
 
 
 @dataclass(frozen=True, eq=False)

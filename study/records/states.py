@@ -6,7 +6,8 @@ from functools import lru_cache
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
-from study.records.record import Record
+from study.records.outputs import Outputs
+from study.records.record import ALONE, MOTIONS, Record, Sensor
 from study.support.arrays import Floats
 
 REACH = 0.2  # half width, in periods, of the cubic that smooths a displacement into a state
@@ -30,18 +31,30 @@ def period(values: Floats) -> float:
     return 4.0 * float(below[0]) if len(below) else 4.0 * n
 
 
-def starting_states(record: Record, response: str, samples: Sequence[int], reach: float = REACH) -> Floats:
-    """Displacement and velocity at some samples, shape (samples, 2).
+def starting_states(
+    record: Record, outputs: Outputs, samples: Sequence[int], reach: float = REACH,
+    coordinates: Sequence[str] = (ALONE,),
+) -> Floats:  # fmt: skip
+    """Displacements, then velocities of all coordinates at some samples, shape (samples, 2 coordinates).
 
-    A displacement is smoothed by a cubic over a part of its period, which yields the velocity too; what neither it
-    nor a channel of the record shows is zero.
+    A displacement that is compared is smoothed by a cubic over a part of its period, which yields the velocity too;
+    what neither it nor a channel of the record shows is zero.
     """
-    if response != "displacement":  # of a prescribed motion too, where the force is what is predicted
-        columns = [
-            record[c][list(samples)] if c in record else np.zeros(len(samples)) for c in ("displacement", "velocity")
-        ]
-        return np.column_stack(columns)
-    values = record[response]
+    states = np.empty((len(samples), 2, len(coordinates)))
+    for i, coordinate in enumerate(coordinates):
+        own = Sensor(coordinate, "displacement")
+        if own in outputs.sensors:
+            states[:, :, i] = _smoothed(record, str(own), samples, reach)
+            continue
+        for row, motion in enumerate(MOTIONS[:2]):  # of a prescribed motion too, where the force is what is predicted
+            channel = str(Sensor(coordinate, motion))
+            states[:, row, i] = record[channel][list(samples)] if channel in record else 0.0
+    return states.reshape(len(samples), -1)
+
+
+def _smoothed(record: Record, displacement: str, samples: Sequence[int], reach: float) -> Floats:
+    """Displacement and velocity of one coordinate from its displacement, shape (samples, 2)."""
+    values = record[displacement]
     if record.stretches:  # a wrong velocity may keep the fit of a stretch's state from its minimum
         wanted = round(reach * period(values))
     else:

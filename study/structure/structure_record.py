@@ -7,28 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from study.records.record import SI_UNITS, Stretch
+from study.records.record import SI_UNITS, Sensor, Stretch
 from study.support.arrays import Floats
-
-
-@dataclass(frozen=True, order=True)
-class Sensor:
-    """A measured motion.
-
-    Attributes
-    ----------
-    coordinate : str
-        Which coordinate of the structure moves.
-    motion : str
-        ``displacement``, ``velocity`` or ``acceleration``.
-    """
-
-    coordinate: str
-    motion: str
-
-    def __str__(self) -> str:
-        """As columns are called: ``floor1 acceleration``."""
-        return f"{self.coordinate} {self.motion}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from study.equations.free_run import FreeRun, predict_response, prepare
 from study.equations.model import Model
 from study.equations.terms import LIBRARY
+from study.records.outputs import alone
 from study.records.record import MOTIONS, Record
 from study.support.errors import StudyError
 
@@ -57,7 +58,7 @@ def central_differences(run: FreeRun, values: dict[str, float], initial: Floats,
         for sign in (1.0, -1.0):
             moved = point.copy()
             moved[i] = value * (1.0 + sign * step)
-            ends.append(run.respond(dict(zip(values, moved, strict=False)), moved[len(values) :])[0])
+            ends.append(run.respond(dict(zip(values, moved, strict=False)), moved[len(values) :])[0][:, 0])
         columns.append((ends[0] - ends[1]) / (2.0 * step * value))
     return np.stack(columns, axis=1)
 
@@ -73,8 +74,8 @@ def test_jacobian_equals_central_differences(name: str, response: str, make_mode
     values = numbers(model)
     initial = np.array([1e-3, 0.02, 5e-4])[: 2 + len(model.states)]
     record = Record(DT, {"force": report_force[:1024]})
-    run = prepare(model, record, tuple(values), response=response)
-    _, jacobian = run.respond(values, initial, len(initial))
+    run = prepare(model, record, tuple(values), sensors=alone(response).sensors)
+    jacobian = run.respond(values, initial, len(initial))[1][:, 0]
     errors: list[Floats] = []
     for step in (1e-4, 1e-5, 1e-6, 1e-7):  # a step across a kink of the force is no derivative: another one is
         differences = central_differences(run, values, initial, step)
@@ -97,7 +98,7 @@ def test_friction_stops_the_mass_where_it_should(rubbing: Model) -> None:
     halves = int(np.ceil((begin - fc / k) / (2.0 * fc / k)))
     end = (-1.0) ** halves * (begin - 2.0 * halves * fc / k)
     run = prepare(rubbing, Record(DT, {"force": np.zeros(200)}), ("m", "k", "fc"), steps_per_sample=8)
-    response, jacobian = run.respond({"m": 1.0, "k": k, "fc": fc}, (begin, 0.0), 2)
+    response, jacobian = (x[:, 0] for x in run.respond({"m": 1.0, "k": k, "fc": fc}, (begin, 0.0), 2))
     assert response[-1] == pytest.approx(end, rel=1e-5)
     assert np.ptp(response[-50:]) == 0.0
     sign = (-1.0) ** halves
@@ -137,7 +138,7 @@ def test_pieces_are_free_runs_of_their_own(systems: dict[str, Model], records: d
     values, cuts = numbers(model), (300, 450)
     states = np.stack([record["displacement"][[200, *cuts]], record["velocity"][[200, *cuts]]], axis=1)
     run = prepare(model, record, tuple(values), steps_per_sample=8, span=(200, 700), restarts=cuts)
-    response, jacobian = run.respond(values, states, 2)
+    response, jacobian = (x[:, 0] for x in run.respond(values, states, 2))
     np.testing.assert_allclose(response, record["displacement"][200:700], rtol=0.0, atol=1e-12)
     differences = central_differences_of_a_state(run, values, states)
     np.testing.assert_allclose(jacobian[:, len(values) + 2], differences, atol=1e-7)
@@ -151,5 +152,5 @@ def central_differences_of_a_state(run: FreeRun, values: dict[str, float], state
     moved, step = [], np.zeros_like(states)
     step[1, 0] = 1e-7
     for sign in (1.0, -1.0):
-        moved.append(run.respond(values, states + sign * step)[0])
+        moved.append(run.respond(values, states + sign * step)[0][:, 0])
     return (moved[0] - moved[1]) / 2e-7

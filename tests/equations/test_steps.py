@@ -60,6 +60,6 @@ def test_steps_are_those_of_the_instructions_one_by_one(make_model: Make, effect
     begin[:, 0] = initial
     begin[:, 1 + len(values) :] = np.eye(run.states)
     end = runge_kutta(run, values, begin)
-    response, jacobian = run.respond(values, initial, run.states)
+    response, jacobian = (x[:, 0] for x in run.respond(values, initial, run.states))
     assert response[-1] == pytest.approx(end[0, 0], rel=1e-12)
     np.testing.assert_allclose(jacobian[-1], end[0, 1:], rtol=1e-10, atol=1e-13 * float(np.max(np.abs(end[0, 1:]))))

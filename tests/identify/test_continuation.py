@@ -11,6 +11,7 @@ from study.identify.time_domain.continuation import fit_segments, lengthen
 from study.identify.time_domain.multiple_shooting import fit_in_segments
 from study.identify.time_domain.shooting import ShootingSegments, even_restarts
 from study.records.excitation import displacement_noise
+from study.records.outputs import DISPLACEMENT
 from study.records.record import Record
 
 NOISE = 0.05
@@ -28,8 +29,8 @@ def chaotic(systems, records):
 def in_pieces(record, restarts=None):
     span = (0, len(record))
     if restarts is None:
-        restarts = even_restarts(record, "displacement", span)
-    return ShootingSegments(record, "displacement", span, tuple(restarts), 4)
+        restarts = even_restarts(record, DISPLACEMENT, span)
+    return ShootingSegments(record, DISPLACEMENT, span, tuple(restarts), 4)
 
 
 def test_a_motion_passes_the_ends_of_pieces_as_it_is(make_model, report_force):

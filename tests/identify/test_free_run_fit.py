@@ -15,6 +15,7 @@ from study.identify.frequency_domain.conditioned import analyse
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
 from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
 from study.records.excitation import displacement_noise
+from study.records.outputs import alone
 from study.records.record import SI_UNITS, Record
 from study.records.spectra import Segments, cross_spectra
 from study.support.errors import DivergenceError, StudyError
@@ -111,7 +112,7 @@ def test_residual_and_covariance_are_those_of_the_estimates(
     fit = fit_free_run(model, record, span=(100, 3000))
     again = predict_response(fit.model, record, span=(100, 3000), initial=tuple(fit.initial))
     np.testing.assert_allclose(record["displacement"][100:3000] - again, fit.residual, atol=1e-12)
-    jacobian = prepare(model, record, fit.keys, span=(100, 3000)).respond(numbers(fit.model), fit.initial, 2)[1]
+    jacobian = prepare(model, record, fit.keys, span=(100, 3000)).respond(numbers(fit.model), fit.initial, 2)[1][:, 0]
     scale = np.linalg.norm(jacobian, axis=0)
     inverse = np.linalg.inv((jacobian / scale).T @ (jacobian / scale)) / np.outer(scale, scale)
     variance = np.sum(fit.residual**2) / (2900 - jacobian.shape[1])
@@ -161,7 +162,7 @@ def test_acceleration_is_enough(systems: dict[str, Model], records: dict[str, Re
     model, record = systems["duffing"], records["duffing"]
     measured = Record(DT, {name: record[name] for name in ("force", "acceleration")})
     start = {"m": 1.1, "c": 5.0, "k": 400.0, "k3": 1e7}
-    fit = fit_free_run(model, measured, start=start, response="acceleration", steps_per_sample=8)
+    fit = fit_free_run(model, measured, start=start, outputs=alone("acceleration"), steps_per_sample=8)
     assert fit.converged
     np.testing.assert_allclose(fit.values, known(model, fit), rtol=1e-8)
 

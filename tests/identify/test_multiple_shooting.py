@@ -12,6 +12,7 @@ from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
 from study.identify.time_domain.multiple_shooting import fit_in_segments
 from study.identify.time_domain.shooting import REACHES, ShootingSegments
 from study.records.excitation import displacement_noise
+from study.records.outputs import DISPLACEMENT
 from study.records.record import Record
 from study.records.spectra import Segments, cross_spectra
 from study.records.states import starting_states
@@ -58,10 +59,10 @@ def test_a_regular_system_needs_no_pieces(systems: dict[str, Model], records: di
 
 def test_first_states_are_the_best_of_several_widths(systems: dict[str, Model], records: dict[str, Record]) -> None:
     model, record, cuts = systems["duffing"], noisy(records["duffing"], 0.05, 2), (100, 200, 300)
-    pieces = ShootingSegments(record, "displacement", (0, 400), cuts, 4)
+    pieces = ShootingSegments(record, DISPLACEMENT, (0, 400), cuts, 4)
     begun = pieces.misfits(model, pieces.first_states(model))
     for reach in REACHES:
-        one = starting_states(record, "displacement", (0, *cuts), reach)
+        one = starting_states(record, DISPLACEMENT, (0, *cuts), reach)
         assert np.all(begun <= pieces.misfits(model, one))
 
 
@@ -69,7 +70,7 @@ def test_tied_pieces_are_one_motion(systems: dict[str, Model], records: dict[str
     """... with the estimates and the covariance of a free run; loose ones know less."""
     model, record = systems["duffing"], noisy(records["duffing"], 0.05, 2).part(0, 2048)
     whole, cuts = fit_free_run(model, record), tuple(range(128, 2048, 128))
-    states = starting_states(record, "displacement", (0, *cuts))
+    states = starting_states(record, DISPLACEMENT, (0, *cuts))
     loose = fit_free_run(model, record, restarts=cuts, initial=states)
     tied = fit_free_run(model, record, restarts=cuts, initial=loose.initial, continuity=1000.0)
     assert tied.converged

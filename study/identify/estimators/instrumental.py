@@ -8,6 +8,7 @@ from study.identify.frequency_domain import conditioned, from_coefficients, inst
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records import spectra
+from study.records.outputs import alone
 from study.records.record import MOTIONS, Record
 
 
@@ -38,8 +39,8 @@ def clean_motion(fit: FreeRunFit, record: Record) -> Record:
     """The record with displacement and velocity of the fitted model in free run."""
     motions = {
         name: prepare(
-            fit.model, record, response=name, steps_per_sample=fit.steps_per_sample, restarts=fit.restarts
-        ).respond_by_segment({}, fit.initial)[0]
+            fit.model, record, sensors=alone(name).sensors, steps_per_sample=fit.steps_per_sample, restarts=fit.restarts
+        ).respond_by_segment({}, fit.initial)[0][:, 0]
         for name in MOTIONS[:2]
     }
     return record.with_channels(motions)

@@ -6,6 +6,7 @@ from scipy.fft import rfft, rfftfreq
 from study.equations.free_run import prepare
 from study.equations.model import Model
 from study.equations.substeps import needed_steps
+from study.records.outputs import alone
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record
 from study.support.arrays import Floats
@@ -80,12 +81,13 @@ def along_the_motion(model: Model, prepared: Prepared, wanted: list[str]) -> dic
     """
     symbols = [s for t in model.terms for s in t.term.symbols]
     begun = model.with_values(dict.fromkeys(symbols, 0.0))
-    steps = needed_steps(begun, prepared.record, FORCE)
+    steps = needed_steps(begun, prepared.record, alone(FORCE))
     run = prepare(
-        begun, prepared.record, symbols, response=FORCE, span=prepared.plan.fit, steps_per_sample=max(steps, 2)
-    )
+        begun, prepared.record, symbols, sensors=alone(FORCE).sensors, span=prepared.plan.fit,
+        steps_per_sample=max(steps, 2),
+    )  # fmt: skip
     zeros = np.zeros((len(run.cuts) + 1, run.states))
-    shapes = prepared.known(run.respond(dict.fromkeys(symbols, 0.0), zeros)[1], prepared.plan.fit)
+    shapes = prepared.known(run.respond(dict.fromkeys(symbols, 0.0), zeros)[1][:, 0], prepared.plan.fit)
     columns = [symbols.index(s) for s in wanted]
     if not np.all(np.isfinite(shapes)):
         raise StudyError(f"the forces of {model.name!r} are no numbers all along {prepared.record.name!r}")

@@ -26,7 +26,7 @@ def fit_segments(
 ) -> FreeRunFit:  # fmt: skip
     """:func:`free_run_fit.fit_free_run` from these initial states of the segments."""
     return fit_free_run(
-        model, segments.record, held=held, response=segments.response, steps_per_sample=segments.steps_per_sample,
+        model, segments.record, held=held, outputs=segments.outputs, steps_per_sample=segments.steps_per_sample,
         span=segments.span, restarts=segments.restarts, max_iterations=max_iterations, initial=states,
         continuity=continuity, offset=offset,
     )  # fmt: skip
@@ -55,7 +55,8 @@ def _merged(fit: FreeRunFit, segments: ShootingSegments, held: Collection[str]) 
     states, begins = np.atleast_2d(fit.initial), np.array([segments.span[0], *fit.restarts])
     pair = np.arange(len(begins)) // 2
     wide = fit_segments(fit.model, _restarted(segments, begins[::2]), states[::2], held, TRIALS, offset=NEAR)
-    rise = np.add.reduceat(wide.residual**2 - fit.residual**2, begins[::2] - begins[0])
+    firsts = len(segments.outputs) * (begins[::2] - begins[0])
+    rise = np.add.reduceat(wide.residual**2 - fit.residual**2, firsts)
     split = rise > _quantile(states.shape[1], RARE) * _variance(fit, segments)
     if not split.any():
         return wide

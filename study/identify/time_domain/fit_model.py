@@ -247,7 +247,7 @@ def _unphysical(fit: FreeRunFit) -> bool:
 
 def _rough(model: Model, prepared: Prepared, start: Values) -> int:
     """Steps of a search's runs: those of every search, or more where the model's own rates ask for them."""
-    return max(STEPS, needed_steps(model.with_values(start), prepared.record, prepared.response))
+    return max(STEPS, needed_steps(model.with_values(start), prepared.record, prepared.outputs))
 
 
 def _tried(

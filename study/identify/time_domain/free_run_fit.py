@@ -7,7 +7,7 @@ minimised by the method of Levenberg and Marquardt (``levenberg_marquardt``) wit
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,21 +15,20 @@ from numpy.typing import NDArray
 from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model
 from study.identify.frequency_domain.coefficients import Estimate
+from study.records.outputs import DISPLACEMENT, Outputs
 from study.records.record import Record
 from study.records.states import starting_states
 from study.support.arrays import Floats
-from study.support.autoregression import whitened
 from study.support.block_normal import ContinuityGaps
 from study.support.errors import DivergenceError, StudyError
 from study.support.levenberg_marquardt import OFFSET, End, Point, minimise, point_at
 
 FAR = 1e9  # times its start: a mass that the motion does not show at all runs off without end
-WHITE = np.ones(1)  # autoregressive coefficients of white noise
 
 
 @dataclass(frozen=True)
 class FreeRunFit:
-    """Result of a fit in free run; n samples, p keys.
+    """Result of a fit in free run; n samples, s sensors, p keys.
 
     Attributes
     ----------
@@ -45,8 +44,8 @@ class FreeRunFit:
         for white Gaussian noise.
     initial : array, shape (states,), or (segments, states) with restarts
         Displacement, velocity and the terms' own states at the first sample, of each segment.
-    residual : array, shape (n,)
-        Measured minus predicted response.
+    residual : array, shape (n s,)
+        Measured minus predicted motion, stacked (``records.outputs``).
     converged : bool
         Whether the fit arrived at a minimum.
     iterations : int
@@ -59,8 +58,10 @@ class FreeRunFit:
         Samples of the record at which segments after the first begin.
     steps_per_sample : int
         Runge-Kutta steps that were taken in each sampling interval.
-    noise : array, shape (order + 1,)
-        Autoregressive coefficients of the noise that the residual was weighted with; 1 alone for white noise.
+    outputs : Outputs
+        What was fitted.
+    noise : tuple of arrays, shape (order + 1,)
+        Autoregressive coefficients of each sensor's noise, with which the residual was weighted; empty for white noise.
     elsewhere : tuple of FreeRunFit
         Where the other starts of the search led whose best this is, as far as they were followed (``rivals``).
     """
@@ -77,13 +78,23 @@ class FreeRunFit:
     restarts: tuple[int, ...] = ()
     first: int = 0
     steps_per_sample: int = 2
-    noise: Floats = field(default_factory=lambda: WHITE)
+    outputs: Outputs = DISPLACEMENT
+    noise: tuple[Floats, ...] = ()
     elsewhere: tuple["FreeRunFit", ...] = ()
 
     @property
     def span(self) -> tuple[int, int]:
         """First sample of the record that was fitted, and the one after the last."""
-        return self.first, self.first + len(self.residual)
+        return self.first, self.first + self.samples
+
+    @property
+    def samples(self) -> int:
+        """How many samples of the record were fitted."""
+        return len(self.residual) // len(self.outputs)
+
+    def whitened(self, stacked: Floats) -> Floats:
+        """Stacked values weighted as the residual was."""
+        return self.outputs.whitened(stacked, self.noise)
 
     @property
     def held(self) -> tuple[str, ...]:
@@ -92,7 +103,7 @@ class FreeRunFit:
 
     @property
     def rms(self) -> float:
-        """Root mean square of the residual, in the unit of the response."""
+        """Root mean square of the residual, in the unit of a single sensor."""
         return float(np.sqrt(np.mean(self.residual**2)))
 
     @property
@@ -113,7 +124,7 @@ def fit_free_run(
     *,
     start: Mapping[str, float] | None = None,
     held: Collection[str] = (),
-    response: str = "displacement",
+    outputs: Outputs = DISPLACEMENT,
     steps_per_sample: int = 2,
     span: tuple[int, int] | None = None,
     restarts: Sequence[int] = (),
@@ -121,7 +132,7 @@ def fit_free_run(
     initial: str | Floats = "estimate",
     continuity: float = 0.0,
     offset: float = OFFSET,
-    noise: Floats = WHITE,
+    noise: tuple[Floats, ...] = (),
     lost: NDArray[np.bool_] | None = None,
 ) -> FreeRunFit:
     """Fit a model in free run.
@@ -130,8 +141,10 @@ def fit_free_run(
     ----------
     model : Model
         Which terms act. Values of ``held`` keys are taken from it; so are starting values that ``start`` lacks.
-    record, response, steps_per_sample, span, restarts
+    record, steps_per_sample, span, restarts
         As for :func:`free_run.prepare`. The state after each restart is estimated too.
+    outputs : Outputs
+        The sensors that are fitted.
     start : mapping of float
         Starting values by key, for example from MI/SO.
     held : collection of str
@@ -146,11 +159,11 @@ def fit_free_run(
         states, the residual as a share of the response's. From 100 on the segments are one motion, all but exactly.
     offset : float
         Length of the next step, in standard errors, at which a search has converged.
-    noise : array, shape (order + 1,)
-        Autoregressive coefficients of the noise, as :func:`study.support.autoregression.autoregression` gives them; the
-        residual filtered with them is minimised. White noise by default, and wherever there are restarts.
+    noise : tuple of arrays, shape (order + 1,)
+        Autoregressive coefficients of each sensor's noise, as :func:`study.support.autoregression.autoregression` gives
+        them; the residual filtered with them is minimised. White noise by default, and wherever there are restarts.
     lost : bool array, shape (samples of the record,), optional
-        Samples of the response that say nothing: their residual counts as zero.
+        Samples that say nothing: their residual counts as zero.
 
     Raises
     ------
@@ -159,8 +172,9 @@ def fit_free_run(
     StudyError
         If a starting value, a channel or an option is invalid.
     """
-    if response not in record:
-        raise StudyError(f"record {record.name!r} has no {response}; it has {', '.join(record.channels)}")
+    for sensor in outputs.sensors:
+        if str(sensor) not in record:
+            raise StudyError(f"record {record.name!r} has no {sensor}; it has {', '.join(record.channels)}")
     if isinstance(initial, str) and initial not in ("estimate", "rest"):
         raise StudyError(f"initial is {initial!r}; it must be 'estimate' or 'rest'")
     resting = isinstance(initial, str) and initial == "rest"
@@ -168,8 +182,9 @@ def fit_free_run(
         raise StudyError(f"restarts at {tuple(restarts)} begin from estimated states; initial cannot be 'rest'")
     begin = _starting_values(model, start or {}, held)
     run = prepare(
-        model, record, tuple(begin), response=response, steps_per_sample=steps_per_sample, span=span, restarts=restarts
-    )
+        model, record, tuple(begin), sensors=outputs.sensors, steps_per_sample=steps_per_sample, span=span,
+        restarts=restarts,
+    )  # fmt: skip
     first = 0 if span is None else span[0]
     free = 0 if resting else run.states
     states = np.zeros((len(run.cuts) + 1, free))
@@ -177,16 +192,16 @@ def fit_free_run(
         states[:] = initial
     elif free:
         begins = (first, *(first + cut for cut in run.cuts))
-        states[:, : run.moving] = starting_states(record, response, begins)[:, : run.moving]
-    measured = record[response][first : first + run.samples]
-    positive = {key: FAR * begin[key] for entry in model.terms for key in entry.term.positive if key in begin}
-    kept = None if lost is None else (~lost[first : first + run.samples]).astype(np.float64)
-    problem = _Problem(run, measured, free, _weights(continuity, measured, states), positive, noise, kept)
+        shown = starting_states(record, outputs, begins, coordinates=model.coordinates)
+        states[:, : run.moving] = shown[:, : run.moving]
+    measured = outputs.stacked(outputs.measured(record, (first, first + run.samples)))
+    positive = {key: FAR * begin[key] for entry in model.terms for key in entry.positive if key in begin}
+    kept = None if lost is None else np.repeat(~lost[first : first + run.samples], len(outputs)).astype(np.float64)
+    problem = _Problem(run, outputs, measured, free, _weights(continuity, measured, states), positive, noise, kept)
     end = problem.search(np.array([*begin.values(), *states.ravel()]), max_iterations, offset)
     return replace(
-        _result(model, problem, end), restarts=tuple(restarts), first=first, steps_per_sample=steps_per_sample,
-        noise=noise,
-    )  # fmt: skip
+        _result(model, problem, end), restarts=tuple(restarts), first=first, steps_per_sample=steps_per_sample
+    )
 
 
 def _weights(continuity: float, measured: Floats, states: Floats) -> Floats | None:
@@ -217,11 +232,12 @@ class _Problem:
     """A search over the keys and, segment by segment, the free initial states."""
 
     run: FreeRun
+    outputs: Outputs
     measured: Floats
     free_states: int
     weights: Floats | None
     positive: Mapping[str, float]  # keys above zero, and how far they may run off
-    noise: Floats
+    noise: tuple[Floats, ...]
     kept: Floats | None  # 0 for samples that are lost, 1 for others
 
     def states(self, x: Floats) -> Floats:
@@ -245,17 +261,17 @@ class _Problem:
             with np.errstate(over="ignore", invalid="ignore"):  # what is out of range is refused by point_at
                 gaps = self.weights * (arrivals[:, :, 0] - states[1:])
                 continuity = ContinuityGaps(gaps, self.weights[:, None] * arrivals[:, :, 1:], self.weights)
-        residual = self.measured - response
+        residual, jacobian = self.measured - self.outputs.stacked(response), self.outputs.stacked(jacobian)
         if self.kept is not None:
             residual, jacobian = residual * self.kept, jacobian * self.kept[:, None]
-        if len(self.noise) > 1:
-            residual, jacobian = whitened(residual, self.noise), whitened(jacobian, self.noise)
-        return point_at(x, residual, jacobian, len(self.run.keys), (0, *self.run.cuts), continuity)
+        residual, jacobian = (self.outputs.whitened(x, self.noise) for x in (residual, jacobian))
+        begins = (0, *(len(self.outputs) * cut for cut in self.run.cuts))
+        return point_at(x, residual, jacobian, len(self.run.keys), begins, continuity)
 
     def residual(self, x: Floats) -> Floats:
-        """Measured minus predicted response at x, shape (samples,)."""
+        """Measured minus predicted motion at x, stacked."""
         values = dict(zip(self.run.keys, (float(v) for v in x), strict=False))
-        residual = self.measured - self.run.respond(values, self.states(x))[0]
+        residual = self.measured - self.outputs.stacked(self.run.respond_by_segment(values, self.states(x))[0])
         return residual if self.kept is None else residual * self.kept
 
     def search(self, x: Floats, max_iterations: int, offset: float) -> End:
@@ -279,7 +295,9 @@ def _result(model: Model, problem: _Problem, end: End) -> FreeRunFit:
         values=point.x[: len(keys)],
         covariance=point.covariance(),
         initial=states if problem.run.cuts else states[0],
-        residual=point.residual[: problem.run.samples] if len(problem.noise) == 1 else problem.residual(point.x),
+        residual=problem.residual(point.x) if problem.noise else point.residual[: len(problem.measured)],
+        outputs=problem.outputs,
+        noise=problem.noise,
         converged=end.converged,
         iterations=end.iterations,
         message=message,

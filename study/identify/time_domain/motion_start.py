@@ -26,7 +26,7 @@ REACH, STEP = 4.0, 0.1  # samples by which a response may be late, tried so far 
 def has_lost_the_motion(fit: FreeRunFit, prepared: Prepared) -> bool:
     """Whether a driven model leaves more of the response's power than it explains, and that as smooth as a motion."""
     driven = not (prepared.free or prepared.response == FORCE or prepared.record.stretches)
-    return driven and 2.0 * fit.rms**2 > prepared.spread**2 and is_smooth(fit.residual)
+    return driven and 2.0 * fit.rms**2 > prepared.spread**2 and is_smooth(fit.residual, len(fit.outputs))
 
 
 def from_the_motion(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
@@ -39,7 +39,7 @@ def from_the_motion(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     try:
         start = motion_start(fit.model, prepared, fit.held)
         apart = fit_in_segments(
-            fit.model, prepared.record, start=start, held=fit.held, response=prepared.response, span=prepared.plan.fit,
+            fit.model, prepared.record, start=start, held=fit.held, outputs=prepared.outputs, span=prepared.plan.fit,
             steps_per_sample=fit.steps_per_sample,
         )  # fmt: skip
     except StudyError:

@@ -16,6 +16,7 @@ from study.identify.time_domain.shooting import (
     own_begins,
 )
 from study.identify.time_domain.stretch_states import LOOSE, with_which_stretches_begin
+from study.records.outputs import DISPLACEMENT, Outputs
 from study.records.prepared import Prepared
 from study.records.record import Record
 from study.support.errors import DivergenceError
@@ -34,7 +35,7 @@ def fit_in_segments(
     *,
     start: Mapping[str, float] | None = None,
     held: Collection[str] = (),
-    response: str = "displacement",
+    outputs: Outputs = DISPLACEMENT,
     steps_per_sample: int = 2,
     span: tuple[int, int] | None = None,
     max_iterations: int = 60,
@@ -51,9 +52,9 @@ def fit_in_segments(
     for each segment.
     """
     whole = span or (0, len(record))
-    segments = ShootingSegments(record, response, whole, even_restarts(record, response, whole), steps_per_sample)
+    segments = ShootingSegments(record, outputs, whole, even_restarts(record, outputs, whole), steps_per_sample)
     begun = model.with_values(dict(start or {}))
-    rough = replace(segments, steps_per_sample=needed_steps(begun, record, response, steps_per_sample))
+    rough = replace(segments, steps_per_sample=needed_steps(begun, record, outputs, steps_per_sample))
     runs = min(LOOSE, max_iterations)
     loose = fit_segments(begun, rough, rough.first_states(begun), held, runs)
     if loose.rms < CLEAN * segments.spread:  # errors of long steps would matter
@@ -62,7 +63,7 @@ def fit_in_segments(
     apart = own_begins(record, whole)  # stretches are short: a state for each is all that they need
     if apart or not needed_restarts(loose.model, record, states, whole, segments.restarts, steps_per_sample):
         return fit_free_run(
-            loose.model, record, held=held, response=response, steps_per_sample=steps_per_sample,
+            loose.model, record, held=held, outputs=outputs, steps_per_sample=steps_per_sample,
             span=whole, max_iterations=max_iterations,
             initial=with_which_stretches_begin(segments, states) if apart else "estimate",
         )  # fmt: skip
@@ -82,8 +83,8 @@ def is_chaotic(fit: FreeRunFit, prepared: Prepared) -> bool:
     """
     if not has_spring(fit.model):
         return False
-    record, response, span = prepared.record, prepared.response, fit.span
-    segments = ShootingSegments(record, response, span, even_restarts(record, response, span), fit.steps_per_sample)
+    record, outputs, span = prepared.record, prepared.outputs, fit.span
+    segments = ShootingSegments(record, outputs, span, even_restarts(record, outputs, span), fit.steps_per_sample)
     begins = sorted({*fit.restarts, *own_begins(record, span)})
     states = segments.passing(fit.model, begins, fit.initial)
     return bool(needed_restarts(fit.model, record, states, span, segments.restarts, fit.steps_per_sample))

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model
-from study.identify.time_domain.free_run_fit import WHITE, FreeRunFit, fit_free_run
+from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
 from study.identify.time_domain.stretch_states import states_along, states_of_segments
 from study.records.prepared import Prepared
-from study.support.autoregression import whitened
+from study.records.record import ALONE, Sensor
 from study.support.errors import DivergenceError
 from study.support.least_squares import least_squares
 from study.support.levenberg_marquardt import OFFSET
@@ -33,7 +33,7 @@ def fit_part(
     max_iterations: int = 60,
     initial: Floats | None = None,
     offset: float = OFFSET,
-    noise: Floats = WHITE,
+    noise: tuple[Floats, ...] = (),
 ) -> FreeRunFit:
     """Fit what is not held on the fitting part, from ``start`` where it has a value and from the model elsewhere.
 
@@ -44,45 +44,52 @@ def fit_part(
     """
     begin = {key: value for key, value in (start or {}).items() if key not in held}
     return fit_free_run(
-        model, prepared.record, start=begin, held=held, response=prepared.response, steps_per_sample=steps,
+        model, prepared.record, start=begin, held=held, outputs=prepared.outputs, steps_per_sample=steps,
         span=prepared.plan.fit, max_iterations=max_iterations, offset=offset,
         initial="estimate" if initial is None else initial, noise=noise, lost=prepared.lost,
     )  # fmt: skip
 
 
 def run_of(
-    fit: FreeRunFit, prepared: Prepared, keys: Sequence[str] = (), *, motion: str | None = None, finer: int = 1
-) -> FreeRun:
+    fit: FreeRunFit, prepared: Prepared, keys: Sequence[str] = (), *,
+    sensors: Sequence[Sensor] | None = None, finer: int = 1,
+) -> FreeRun:  # fmt: skip
     """The free run of a fit along the samples that it was fitted to, ``finer`` times as many steps taken."""
     return prepare(
-        fit.model, prepared.record, keys, response=motion or prepared.response,
+        fit.model, prepared.record, keys, sensors=prepared.outputs.sensors if sensors is None else sensors,
         steps_per_sample=finer * fit.steps_per_sample, span=fit.span, restarts=fit.restarts,
     )  # fmt: skip
 
 
 def linearise(fit: FreeRunFit, prepared: Prepared) -> Floats:
-    """Derivatives of the response on the samples that were fitted, shape (n, keys + 2): keys, then initial states.
+    """Stacked derivatives of the motion on the samples that were fitted, by keys, then by initial states.
 
-    These are two for each stretch of the record, and none where the motion is prescribed. Where the fit begins anew at
-    restarts there may be thousands: the derivatives by the keys are then those beside all of them, shape (n, keys),
-    whose regression has the same coefficients and errors (Frisch and Waugh, 1933).
+    Shape (n s, keys + 2 degrees of freedom). States are as many for each stretch of the record, and none where the
+    motion is prescribed. Where the fit begins anew at restarts there may be thousands: the derivatives by the keys are
+    then those beside all of them, shape (n s, keys), whose regression has the same coefficients and errors (Frisch and
+    Waugh, 1933).
     """
     if not fit.restarts:
         return with_states(fit, prepared)
     values, run = dict(zip(fit.keys, fit.values.tolist(), strict=True)), run_of(fit, prepared, fit.keys)
-    derivatives = prepared.known(run.respond_by_segment(values, fit.initial, run.moving)[1], fit.span)
-    keys = len(fit.keys)
-    for segment in pairwise((0, *run.cuts, run.samples)):
-        own = derivatives[slice(*segment)]
+    derivatives = _known(run.respond_by_segment(values, fit.initial, run.moving)[1], prepared, fit.span)
+    keys, width = len(fit.keys), len(prepared.outputs)
+    for first, last in pairwise((0, *run.cuts, run.samples)):
+        own = derivatives[width * first : width * last]
         states = own[:, keys:] / np.maximum(np.linalg.norm(own[:, keys:], axis=0), np.finfo(float).tiny)
         own[:, :keys] -= states @ np.linalg.lstsq(states, own[:, :keys], rcond=1e-10)[0]
     return derivatives[:, :keys]
 
 
 def with_states(fit: FreeRunFit, prepared: Prepared) -> Floats:
-    """The same with the derivatives by the initial states of all segments, shape (n, keys + 2 segments)."""
+    """The same with the derivatives by the initial states of all segments, shape (n s, keys + states)."""
     values, run = dict(zip(fit.keys, fit.values.tolist(), strict=True)), run_of(fit, prepared, fit.keys)
-    return prepared.known(run.respond(values, fit.initial, run.moving)[1], fit.span)
+    return _known(run.respond(values, fit.initial, run.moving)[1], prepared, fit.span)
+
+
+def _known(values: Floats, prepared: Prepared, span: tuple[int, int]) -> Floats:
+    """Values of all sensors along a span stacked, zero where a sample is lost."""
+    return prepared.known(prepared.outputs.stacked(values), span)
 
 
 def covariance_of(fit: FreeRunFit, jacobian: Floats) -> Floats:
@@ -91,16 +98,16 @@ def covariance_of(fit: FreeRunFit, jacobian: Floats) -> Floats:
     ``jacobian`` is what :func:`linearise` gives of the fit.
     """
     others = fit.initial.size if fit.restarts and jacobian.shape[1] == len(fit.keys) else 0
-    return clustered_covariance(whitened(jacobian, fit.noise), whitened(fit.residual, fit.noise), others)
+    return clustered_covariance(fit.whitened(jacobian), fit.whitened(fit.residual), others)
 
 
 def integration_shift(fit: FreeRunFit, prepared: Prepared, jacobian: Floats) -> Floats:
     """By how much halving the steps would move the estimates, shape (keys + 2,), by one step of Gauss and Newton."""
     try:
-        runs = [run_of(fit, prepared, finer=n).respond({}, fit.initial)[0] for n in (1, 2)]
+        coarse, fine = (run_of(fit, prepared, finer=n).respond({}, fit.initial)[0] for n in (1, 2))
     except DivergenceError:  # a motion that stays finite by the error of its integration alone
         return FAR * np.ones(jacobian.shape[1])
-    return least_squares(whitened(jacobian, fit.noise), whitened(runs[0] - runs[1], fit.noise))
+    return least_squares(fit.whitened(jacobian), fit.whitened(prepared.outputs.stacked(coarse - fine)))
 
 
 def uncertainty(fit: FreeRunFit, prepared: Prepared, jacobian: Floats) -> Floats:
@@ -137,16 +144,22 @@ class JudgingRun:
     initial: Floats
     restarts: tuple[int, ...] = ()
 
-    def motion(self, name: str, finer: int = 1) -> Floats:
-        """A motion on the judging part, shape (samples to judge,); with more steps if asked.
+    def motions(self, sensors: Sequence[Sensor] | None = None, finer: int = 1) -> Floats:
+        """Motions on the judging part, shape (samples to judge, sensors); with more steps if asked.
+
+        Those that are compared if ``sensors`` are left out.
 
         Raises
         ------
         DivergenceError
             If the free run leaves the range of finite numbers.
         """
-        run = self._run((), name, finer)
+        run = self._run((), finer, sensors=sensors)
         return run.respond({}, self.initial)[0][self.prepared.plan.judge[0] - self.first :]
+
+    def motion(self, name: str) -> Floats:
+        """A motion of a single mass on the judging part, shape (samples to judge,)."""
+        return self.motions([Sensor(ALONE, name)])[:, 0]
 
     def derivatives(self, fit: FreeRunFit) -> Floats:
         """As :func:`linearise`, on the judging part, of a fit with the same motion.
@@ -157,15 +170,18 @@ class JudgingRun:
             If they leave the range of finite numbers, as they do long before the motion of a chaotic system.
         """
         values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
-        run = self._run(fit.keys, self.prepared.response, 1, fit.model)
+        run = self._run(fit.keys, 1, fit.model)
         derivatives = run.respond(values, self.initial, run.moving)[1][self.prepared.plan.judge[0] - self.first :]
         if not np.all(np.abs(derivatives) < FAR):
             raise DivergenceError("the derivatives of the free run leave the range of numbers", run.time(0))
-        return self.prepared.known(derivatives, self.prepared.plan.judge)
+        return _known(derivatives, self.prepared, self.prepared.plan.judge)
 
-    def _run(self, keys: Sequence[str], motion: str, finer: int, model: Model | None = None) -> FreeRun:
+    def _run(
+        self, keys: Sequence[str], finer: int, model: Model | None = None, sensors: Sequence[Sensor] | None = None
+    ) -> FreeRun:  # fmt: skip
         return prepare(
-            model or self.fit.model, self.prepared.record, keys, response=motion,
+            model or self.fit.model, self.prepared.record, keys,
+            sensors=self.prepared.outputs.sensors if sensors is None else sensors,
             steps_per_sample=finer * self.fit.steps_per_sample, span=(self.first, self.prepared.plan.judge[1]),
             restarts=self.restarts,
         )  # fmt: skip

@@ -63,9 +63,11 @@ def _followed(other: FreeRunFit, fit: FreeRunFit, covariance: Floats, prepared: 
         response, jacobian = run.respond(
             dict(zip(begun.keys, begun.values.tolist(), strict=True)), begun.initial, run.moving
         )
-        residual = prepared.record[prepared.response][slice(*begun.span)] - response
+        outputs = prepared.outputs
+        jacobian = outputs.stacked(jacobian)
+        residual = outputs.stacked(outputs.measured(prepared.record, begun.span) - response)
         step = least_squares(jacobian, residual, 1e-12)
-        here = fit.residual[begun.first - fit.first :][: len(residual)]
+        here = fit.residual[len(outputs) * (begun.first - fit.first) :][: len(residual)]
         moved = begun.values + step[: len(begun.values)] - fit.values
         if larger(residual - jacobian @ step, here) or not _far(moved, covariance):
             return None

@@ -71,7 +71,7 @@ def _in_segments(fit: FreeRunFit, prepared: Prepared, best: FreeRunFit) -> FreeR
     """
     try:
         apart = fit_in_segments(
-            fit.model, prepared.record, held=fit.held, response=prepared.response, span=prepared.plan.fit,
+            fit.model, prepared.record, held=fit.held, outputs=prepared.outputs, span=prepared.plan.fit,
             steps_per_sample=fit.steps_per_sample,
         )  # fmt: skip
         together = fit_part(
@@ -104,7 +104,7 @@ def with_enough_steps(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """
     if fit.restarts:  # multiple shooting has chosen them
         return fit
-    most = max(MOST_STEPS, needed_steps(fit.model, prepared.record, prepared.response))
+    most = max(MOST_STEPS, needed_steps(fit.model, prepared.record, prepared.outputs))
     allowed = SHIFT if prepared.every == 1 else FINE
     while fit.steps_per_sample < most:
         whole = released(fit)
@@ -143,7 +143,7 @@ def from_segments(model: Model, prepared: Prepared, held: Sequence[str], steps: 
         linear = linear_start(model, prepared)  # a short stretch may hold hardly any motion
         start = {key: value for key, value in linear.items() if key not in held and "." not in key}
         near = fit_in_segments(
-            model, prepared.record, start=start, held=held, response=prepared.response, span=stretch.plan.fit
+            model, prepared.record, start=start, held=held, outputs=prepared.outputs, span=stretch.plan.fit
         )
         again = near.span == prepared.plan.fit and not near.restarts and bool(prepared.record.stretches)
         begin = np.atleast_2d(near.initial) if again else None

@@ -17,6 +17,7 @@ from study.equations.term import ShapeParameter, Term
 from study.identify.frequency_domain.starting_values import linear_start, oscillator
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import run_of, with_states
+from study.records.outputs import DISPLACEMENT, alone
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS
 from study.support.arrays import Complexes, Floats
@@ -96,7 +97,7 @@ def baseline(fit: FreeRunFit, prepared: Prepared) -> Baseline:
     jacobian = with_states(fit, prepared)
     scale = np.linalg.norm(jacobian, axis=0)
     basis = np.linalg.qr(jacobian / np.where(scale > 0.0, scale, 1.0))[0]
-    displacement, _ = run_of(fit, prepared, motion="displacement").respond({}, fit.initial)
+    displacement = run_of(fit, prepared, sensors=DISPLACEMENT.sensors).respond({}, fit.initial)[0][:, 0]
     linear, approximation = _linear(fit, prepared)
     row = MOTIONS.index(prepared.response) if prepared.response in MOTIONS else None
     return Baseline(fit, basis, displacement, linear, approximation, prepared.dt, row)
@@ -137,13 +138,13 @@ def sensitivity(
     model = base.fit.model.with_term(entry)
     steps = base.fit.steps_per_sample
     if prepared.response == FORCE:  # a loop that closes sharply asks for more than any motion would
-        steps = max(steps, needed_steps(model, prepared.record, FORCE))
+        steps = max(steps, needed_steps(model, prepared.record, alone(FORCE)))
     try:
         run = run_of(replace(base.fit, model=model, steps_per_sample=steps), prepared, term.symbols)
         _, added = run.respond(dict.fromkeys(term.symbols, 0.0), base.fit.initial)
     except StudyError:
         return None
-    added = prepared.known(added, base.fit.span)
+    added = prepared.known(prepared.outputs.stacked(added), base.fit.span)
     added = added - base.basis @ (base.basis.T @ added)
     return added if np.all(np.isfinite(added)) and np.any(added) else None
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model
-from study.records.record import MOTIONS, Record
+from study.records.outputs import Outputs
+from study.records.record import MOTIONS, Record, Sensor
 from study.records.states import REACH, angular_rate, starting_states
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError
@@ -23,16 +24,21 @@ PERIODS = 1.0  # length of the segments that a search from afar begins with
 REACHES = (0.07, 0.15, REACH, 0.3)  # widths of smoothing, in periods, that are tried for the first states
 
 
-def even_restarts(record: Record, response: str, span: tuple[int, int]) -> tuple[int, ...]:
+def even_restarts(record: Record, outputs: Outputs, span: tuple[int, int]) -> tuple[int, ...]:
     """Restarts that cut a span into segments of ``PERIODS`` periods of the motion, and where a stretch begins in it."""
     first, last = span
-    rate = angular_rate(record[response][first:last], record.dt)
+    rate = slowest_rate(outputs.measured(record, span), record.dt)
     begins = own_begins(record, span)
     restarts = list[int]()
     for begin, end in pairwise((first, *begins, last)):
         count = max(1, round((end - begin) * record.dt * rate / (2.0 * np.pi * PERIODS)))
         restarts += [int(r) for r in np.linspace(begin, end, count + 1).round()[1:]]
     return tuple(restarts[:-1])
+
+
+def slowest_rate(motions: Floats, dt: float) -> float:
+    """Angular frequency in rad/s of the slowest of some motions, shape (n, motions)."""
+    return min(angular_rate(motion, dt) for motion in motions.T)
 
 
 def own_begins(record: Record, span: tuple[int, int]) -> tuple[int, ...]:
@@ -51,10 +57,11 @@ def needed_restarts(
     """
     if not restarts:  # a motion of a single period or less
         return ()
-    run = prepare(model, record, steps_per_sample=steps_per_sample, span=span, restarts=restarts)
-    motion, _, arrivals = run.respond_by_segment({}, states, 2)
-    rate = angular_rate(motion, record.dt)
-    weighted = arrivals[:, :2, 1:] * np.array([[1.0, rate], [1.0 / rate, 1.0]])
+    sensors = [Sensor(coordinate, "displacement") for coordinate in model.coordinates]
+    run = prepare(model, record, sensors=sensors, steps_per_sample=steps_per_sample, span=span, restarts=restarts)
+    motion, _, arrivals = run.respond_by_segment({}, states, run.moving)
+    rate, n = slowest_rate(motion, record.dt), run.moving // 2
+    weighted = arrivals[:, : 2 * n, 1:] * np.kron(np.array([[1.0, rate], [1.0 / rate, 1.0]]), np.ones((n, n)))
     kept: list[int] = []
     grown: list[Floats] = []  # from each restart that matters to where the present segment ends
     own = own_begins(record, span)
@@ -79,8 +86,8 @@ class ShootingSegments:
     ----------
     record : Record
         Force and response.
-    response : str
-        The measured motion that is compared.
+    outputs : Outputs
+        The measured motions that are compared.
     span : pair of int
         First sample, and the one after the last.
     restarts : tuple of int
@@ -90,26 +97,31 @@ class ShootingSegments:
     """
 
     record: Record
-    response: str
+    outputs: Outputs
     span: tuple[int, int]
     restarts: tuple[int, ...]
     steps_per_sample: int
 
     @property
     def spread(self) -> float:
-        """Standard deviation of the measured response within the span."""
-        return float(np.std(self.record[self.response][slice(*self.span)]))
+        """Standard deviation of the measured motion within the span."""
+        return float(np.std(self._measured))
+
+    @property
+    def _measured(self) -> Floats:
+        return self.outputs.stacked(self.outputs.measured(self.record, self.span))
 
     def _run(self, model: Model) -> FreeRun:
         return prepare(
-            model, self.record, response=self.response, steps_per_sample=self.steps_per_sample,
+            model, self.record, sensors=self.outputs.sensors, steps_per_sample=self.steps_per_sample,
             span=self.span, restarts=self.restarts,
         )  # fmt: skip
 
     def misfits(self, model: Model, states: Floats) -> Floats:
         """Sum of squares of the residual of each segment, shape (segments,)."""
-        residual = self.record[self.response][slice(*self.span)] - self._run(model).respond_by_segment({}, states)[0]
-        return np.add.reduceat(residual**2, [0, *(r - self.span[0] for r in self.restarts)])
+        residual = self._measured - self.outputs.stacked(self._run(model).respond_by_segment({}, states)[0])
+        firsts = [0, *(len(self.outputs) * (r - self.span[0]) for r in self.restarts)]
+        return np.add.reduceat(residual**2, firsts)
 
     def passing(self, model: Model, restarts: Sequence[int], states: Floats) -> Floats:
         """State at the beginning of each segment, of a motion with fewer restarts, shape (segments, states).
@@ -126,10 +138,11 @@ class ShootingSegments:
         Shape (segments, states). A width with which the model diverges is left out.
         """
         begins = (self.span[0], *self.restarts)
-        best, least = np.zeros((len(begins), 2 + len(model.states))), np.full(len(begins), np.inf)
-        for moving in self._shown(begins):
+        count = 2 * len(model.coordinates)
+        best, least = np.zeros((len(begins), count + len(model.states))), np.full(len(begins), np.inf)
+        for moving in self._shown(begins, model.coordinates):
             states = np.zeros_like(best)
-            states[:, :2] = moving
+            states[:, :count] = moving
             try:
                 misfits = self.misfits(model, states)
             except DivergenceError:
@@ -138,10 +151,10 @@ class ShootingSegments:
             least = np.minimum(misfits, least)
         return best
 
-    def _shown(self, begins: Sequence[int]) -> list[Floats]:
-        """Displacement and velocity at these samples, smoothed more and more widely; at last as they stand there."""
-        shown = [starting_states(self.record, self.response, begins, reach) for reach in REACHES]
-        names = MOTIONS[:2]
+    def _shown(self, begins: Sequence[int], coordinates: Sequence[str]) -> list[Floats]:
+        """Displacements and velocities at these samples, smoothed more and more widely; at last as they stand there."""
+        shown = [starting_states(self.record, self.outputs, begins, reach, coordinates) for reach in REACHES]
+        names = [str(Sensor(coordinate, motion)) for motion in MOTIONS[:2] for coordinate in coordinates]
         if set(names) <= set(self.record.channels):
             shown.append(np.stack([self.record[name][list(begins)] for name in names], axis=1))
         return shown

@@ -31,13 +31,13 @@ def states_along(fit: FreeRunFit, prepared: Prepared, span: tuple[int, int]) -> 
         If the free run leaves the range of finite numbers.
     """
     plain = _held(fit, prepared, span, "estimate")
-    measured = prepared.record[prepared.response][slice(*span)]
+    outputs = prepared.outputs
+    measured = outputs.stacked(outputs.measured(prepared.record, span))
     if prepared.response == FORCE or not own_begins(prepared.record, span) or not is_poor(plain, measured):
         return plain.initial
     segments = ShootingSegments(
-        prepared.record, prepared.response, span, even_restarts(prepared.record, prepared.response, span),
-        fit.steps_per_sample,
-    )  # fmt: skip
+        prepared.record, outputs, span, even_restarts(prepared.record, outputs, span), fit.steps_per_sample
+    )
     try:
         first = segments.first_states(fit.model)
         loose = fit_segments(fit.model, segments, first, tuple(fit.model.values), LOOSE)
@@ -59,8 +59,8 @@ def states_of_segments(
     DivergenceError
         If the free run leaves the range of finite numbers.
     """
-    record, response, steps, held = prepared.record, prepared.response, fit.steps_per_sample, tuple(fit.model.values)
-    short = ShootingSegments(record, response, span, even_restarts(record, response, span), steps)
+    record, outputs, steps, held = prepared.record, prepared.outputs, fit.steps_per_sample, tuple(fit.model.values)
+    short = ShootingSegments(record, outputs, span, even_restarts(record, outputs, span), steps)
     loose = fit_segments(fit.model, short, short.first_states(fit.model), held, LOOSE)
     begins = [span[0], *short.restarts]
     kept = needed_restarts(fit.model, record, np.atleast_2d(loose.initial), span, short.restarts, steps)
@@ -83,24 +83,25 @@ def with_which_stretches_begin(segments: ShootingSegments, states: Floats) -> Fl
 def is_poor(fit: FreeRunFit, measured: Floats) -> bool:
     """Whether a fit has not converged, or only to a local minimum: its residual is large and smooth, like a motion.
 
-    ``measured`` is the response that it was fitted to.
+    ``measured`` is the stacked motion that it was fitted to.
     """
     return not fit.converged or resembles_a_motion(fit, measured)
 
 
 def resembles_a_motion(fit: FreeRunFit, measured: Floats) -> bool:
     """Whether what a fit leaves is large and smooth."""
-    return fit.rms >= POOR * float(np.std(measured)) and is_smooth(fit.residual)
+    return fit.rms >= POOR * float(np.std(measured)) and is_smooth(fit.residual, len(fit.outputs))
 
 
-def is_smooth(residual: Floats) -> bool:
-    """Whether neighbouring samples of a residual are as much alike as those of a motion."""
-    return 1.0 - float(np.mean(np.diff(residual) ** 2)) / (2.0 * float(np.mean(residual**2))) > SMOOTH
+def is_smooth(residual: Floats, sensors: int = 1) -> bool:
+    """Whether neighbouring samples of a stacked residual are as much alike as those of a motion."""
+    change = residual[sensors:] - residual[:-sensors]
+    return 1.0 - float(np.mean(change**2)) / (2.0 * float(np.mean(residual**2))) > SMOOTH
 
 
 def _held(fit: FreeRunFit, prepared: Prepared, span: tuple[int, int], initial: str | Floats) -> FreeRunFit:
     """The model with all coefficients held: its states alone are fitted."""
     return fit_free_run(
-        fit.model, prepared.record, held=tuple(fit.model.values), response=prepared.response,
+        fit.model, prepared.record, held=tuple(fit.model.values), outputs=prepared.outputs,
         steps_per_sample=fit.steps_per_sample, span=span, lost=prepared.lost, initial=initial,
     )  # fmt: skip

@@ -13,7 +13,8 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import covariance_of, fit_part, linearise
 from study.identify.time_domain.settling import continued, settled
 from study.records.prepared import Prepared
-from study.support.autoregression import autoregression
+from study.support.arrays import Floats
+from study.support.autoregression import autoregression, whitened
 from study.support.errors import DivergenceError
 from study.support.thresholds import TOLERANCE, K
 
@@ -22,15 +23,15 @@ RUNS = 20  # free runs of the weighted fit, which begins at the plain one
 
 def finished(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit of a search as all that is shown rests on it: to the whole fitting part, settled, and weighted."""
-    if len(fit.noise) > 1 and fit.span == prepared.plan.fit:
+    if fit.noise and fit.span == prepared.plan.fit:
         return fit
     return weighted(settled(continued(fit, prepared), prepared), prepared)
 
 
 def weighted(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit weighted with the autoregressive noise that it leaves, or as it is where that is white or no noise."""
-    noise = autoregression(fit.residual)
-    if len(noise) == 1 or not fit.keys or fit.restarts:
+    noise = noise_left(fit)
+    if not noise or not fit.keys or fit.restarts:
         return fit
     try:
         again = fit_part(
@@ -41,6 +42,20 @@ def weighted(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
         return fit
     again = replace(again, elsewhere=fit.elsewhere)
     return again if again.converged and _agree(fit, again, prepared) else fit
+
+
+def noise_left(fit: FreeRunFit) -> tuple[Floats, ...]:
+    """The noise that a fit leaves, as coefficients which make it white; none of a single sensor whose noise is white.
+
+    The first coefficients weigh the sensors by their noise.
+    """
+    left = fit.residual.reshape(-1, len(fit.outputs))
+    noise = [autoregression(own) for own in left.T]
+    if len(noise) == 1:
+        return tuple(noise) if len(noise[0]) > 1 else ()
+    size = np.array([float(np.std(whitened(own, a))) for own, a in zip(left.T, noise, strict=True)])
+    size = np.maximum(size, np.finfo(float).eps * max(float(np.max(np.abs(left))), np.finfo(float).tiny))
+    return tuple(a * size[0] / own for a, own in zip(noise, size, strict=True))
 
 
 def _agree(plain: FreeRunFit, other: FreeRunFit, prepared: Prepared) -> bool:

@@ -1,0 +1,59 @@
+"""The measured motions that free runs are held against, side by side.
+
+Residuals of all sensors at one time stand next to each other in one long array, each in shares of its sensor's size, so
+that blocks of time hold all of them and one statistic serves any number of sensors. A single sensor's are as they are,
+in its own unit.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from study.records.record import ALONE, Record, Sensor
+from study.support.arrays import Floats
+from study.support.autoregression import whitened
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Sensors, and what a unit of each counts."""
+
+    sensors: tuple[Sensor, ...]
+    weights: tuple[float, ...]  # one for each sensor; 1 for a single one
+
+    def __len__(self) -> int:
+        """Number of sensors."""
+        return len(self.sensors)
+
+    def measured(self, record: Record, span: tuple[int, int]) -> Floats:
+        """What the sensors show along a span, shape (n, sensors)."""
+        return np.stack([record[str(sensor)][slice(*span)] for sensor in self.sensors], axis=1)
+
+    def stacked(self, values: Floats) -> Floats:
+        """Values (n, sensors, ...) weighted, those of one time side by side, shape (n sensors, ...)."""
+        if len(self.sensors) == 1:
+            return values[:, 0]
+        weights = np.array(self.weights).reshape(-1, *[1] * (values.ndim - 2))
+        return (values * weights).reshape(-1, *values.shape[2:])
+
+    def apart(self, stacked: Floats) -> Floats:
+        """The inverse of :meth:`stacked`: shape (n, sensors, ...), in the units of the sensors."""
+        values = stacked.reshape(-1, len(self.sensors), *stacked.shape[1:])
+        return values / np.array(self.weights).reshape(-1, *[1] * (values.ndim - 2))
+
+    def whitened(self, stacked: Floats, noise: "Sequence[Floats]") -> Floats:
+        """Stacked values filtered with the autoregressive coefficients of each sensor's noise, the same shape."""
+        if all(len(own) == 1 for own in noise):
+            return stacked
+        values = stacked.reshape(-1, len(self.sensors), *stacked.shape[1:])
+        parts = [whitened(values[:, i], own) for i, own in enumerate(noise)]
+        return np.stack(parts, axis=1).reshape(stacked.shape)
+
+
+def alone(motion: str) -> Outputs:
+    """One motion of a single mass, or the force on it where its motion is prescribed."""
+    return Outputs((Sensor(ALONE, motion),), (1.0,))
+
+
+DISPLACEMENT = alone("displacement")
