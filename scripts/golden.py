@@ -1,8 +1,8 @@
 """Golden results: the same commands by the code of another revision and by this one, number by number.
 
-``python scripts/golden.py REVISION [NAME ...]`` checks the revision out beside this tree, compiles it, writes records with
-it, runs every command (or those named) with both, and lists what differs by more than 1e-9 of itself. What the other
-revision gave is kept in the folder ``.golden`` and not made again.
+``python scripts/golden.py REVISION [NAME ...]`` checks the revision out beside this tree, compiles it, writes records
+with it, runs every command (or those named) with both, and lists what differs by more than 1e-9 of itself. What the
+other revision gave is kept in the folder ``.golden`` and not made again.
 """
 
 import json
@@ -86,9 +86,16 @@ def main() -> int:
         subprocess.run([sys.executable, "setup.py", "-q", "build_ext", "--inplace"], cwd=other, check=True)
     if not made.exists():
         _make(other, made)
+
+    def theirs_of(name: str) -> dict[str, Any]:
+        return _run(other, made, KEPT / f"run_{revision}" / name, name, True)
+
+    def ours_of(name: str) -> dict[str, Any]:
+        return _run(HERE, made, KEPT / "run_here" / name, name, False)
+
     with ThreadPoolExecutor(WORKERS) as pool:
-        theirs = dict(zip(names, pool.map(lambda n: _run(other, made, KEPT / f"run_{revision}" / n, n, True), names)))
-        ours = dict(zip(names, pool.map(lambda n: _run(HERE, made, KEPT / "run_here" / n, n, False), names)))
+        theirs = dict(zip(names, pool.map(theirs_of, names), strict=True))
+        ours = dict(zip(names, pool.map(ours_of, names), strict=True))
     different = 0
     for name in names:
         found = list(_differences(theirs[name], ours[name]))
@@ -189,10 +196,10 @@ def _differences(one: Any, other: Any, path: str = "") -> Iterator[str]:
             else:
                 yield from _differences(one[key], other[key], f"{path}/{key}")
     elif isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
-        for i, pair in enumerate(zip(one, other)):
+        for i, pair in enumerate(zip(one, other, strict=True)):
             yield from _differences(*pair, f"{path}[{i}]")
     elif isinstance(one, str) and isinstance(other, str) and "\n" in one and one.count("\n") == other.count("\n"):
-        for i, pair in enumerate(zip(one.splitlines(), other.splitlines())):
+        for i, pair in enumerate(zip(one.splitlines(), other.splitlines(), strict=True)):
             yield from _differences(*pair, f"{path}:{i + 1}")
     elif not _same(one, other):
         yield f"{path}: {_short(one)} -> {_short(other)}"
@@ -202,7 +209,7 @@ def _same(one: Any, other: Any) -> bool:
     if one == other:
         return True
     if isinstance(one, str) and isinstance(other, str) and "," in one and one.count(",") == other.count(","):
-        return all(_same(a, b) for a, b in zip(one.split(","), other.split(",")))
+        return all(_same(a, b) for a, b in zip(one.split(","), other.split(","), strict=True))
     try:
         a, b = float(one), float(other)
     except (TypeError, ValueError):
