@@ -165,7 +165,7 @@ def test_no_constant_name_stands_for_two_things():
             if not (name == "COMMAND" and path.parent.name == "commands"):  # each command's module has one
                 where.setdefault(name, set()).add(path.relative_to(STUDY).as_posix())
     twice = {name: sorted(homes) for name, homes in where.items() if len(homes) > 1}
-    assert {name: homes for name, homes in twice.items() if name not in TWICE.split()} == {}, "expected names of their own"
+    assert {name: homes for name, homes in twice.items() if name not in TWICE.split()} == {}, "a name of its own"
     assert [name for name in TWICE.split() if name not in twice] == [], "each is one thing by now: take it off the list"
 
 
