@@ -39,7 +39,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> None:
     from study.equations.model_file import read_model, text_with
-    from study.support.transaction import locked
+    from study.support.files import locked
 
     folder = out_folder(arguments)
     first = read_model(arguments.model)

@@ -37,7 +37,7 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.diagnose.dropping import check_can_go
     from study.equations.model_file import read_model, text_without
     from study.support.errors import at
-    from study.support.transaction import locked
+    from study.support.files import locked
 
     folder = out_folder(arguments)
     read_model(arguments.model)

@@ -39,8 +39,7 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.explore.desk import Desk
     from study.explore.live import AloneScene
     from study.explore.server import serve
-    from study.support.file_sets import keep
-    from study.support.files import read_text
+    from study.support.files import keep, read_text
 
     folder = out_folder(arguments)
     keep([arguments.model], [folder / arguments.model.name])

@@ -250,7 +250,7 @@ def _other(given: tuple[int, int] | None, record: "Record") -> tuple[int, int] |
 
 def out_folder(arguments: argparse.Namespace) -> Path:
     """Where results go, seen to be writable: ``--out``, or ``results/`` and the stem of the first record."""
-    from study.support.file_sets import check_folder
+    from study.support.files import check_folder
 
     first: Path = arguments.records[0]
     folder: Path = arguments.out if arguments.out is not None else RESULTS / (first.stem or "record")
@@ -272,8 +272,7 @@ def written_together(
 ) -> None:
     """Write the model's new text, its history and the comparison, all or none; the model must be locked."""
     from study.compare import history
-    from study.support.file_sets import keep, made
-    from study.support.transaction import replace_together
+    from study.support.files import keep, made, replace_together
 
     results = {folder / "comparison.json": comparison}
     keep(inputs_of(arguments), results)

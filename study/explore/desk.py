@@ -18,7 +18,7 @@ from study.explore.any_session import AnySession, undone
 from study.explore.saved_files import PAGE, files, of_stage
 from study.explore.session import Session
 from study.support.errors import StudyError
-from study.support.file_sets import write_files
+from study.support.files import write_files
 
 VALUES = "values"  # how to save a model: with what was fitted
 Drawn = Mapping[str, bytes]
