@@ -12,9 +12,9 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from study.support.arrays import Floats
+from study.support.least_squares import INDISTINCT
 
 BLOCK = 32  # samples whose products are summed together
-INDISTINCT = 1e-12  # eigenvalue of a scaled normal matrix below which variables cannot be told apart
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.support.arrays import Floats
-from study.support.block_normal import INDISTINCT, ContinuityGaps, Normal, normal_equations
+from study.support.block_normal import ContinuityGaps, Normal, normal_equations
+from study.support.least_squares import INDISTINCT
 
 OFFSET = 1e-4  # length of the next step, in standard errors, at which a search has converged (Bates and Watts, 1981)
 ROUNDING = 1e-11  # share of the response that a step changes at which a search has converged too

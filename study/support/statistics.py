@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from study.support.arrays import Floats
+from study.support.least_squares import length_or_one, normal_inverse
 from study.support.thresholds import BLOCKS
 
 SHORTEST = 16  # samples in a block
@@ -136,10 +137,9 @@ def clustered_covariance(jacobian: Floats, residual: Floats, others: int = 0) ->
     (Liang and Zeger, 1986), never below the formula for white noise. ``others`` is how many unknowns the columns of the
     Jacobian are beside.
     """
-    scale = np.linalg.norm(jacobian, axis=0)
-    scale = np.where(scale > 0.0, scale, 1.0)
+    scale = length_or_one(jacobian)
     j = jacobian / scale
-    inverse = np.linalg.pinv(j.T @ j, rcond=1e-12, hermitian=True)
+    inverse = normal_inverse(j.T @ j)
     count = max(2, min(BLOCKS, len(residual) // SHORTEST))
     size = len(residual) // count
     blocks = np.einsum(
