@@ -72,7 +72,7 @@ def _examined(session: Session, progress: Callable[[int], None]) -> sessions.Sta
     return sessions.examined(session, progress)[0]
 
 
-ALONE = Deeds(
+OF_ONE_MASS = Deeds(
     sessions.with_added, sessions.dropped, undone, sessions.with_held, sessions.tried, _examined,
     sessions.with_stage, _by_itself, _drawn, files,
 )  # fmt: skip
@@ -82,7 +82,13 @@ class Desk(Generic[S]):
     """One session and whoever looks at it."""
 
     def __init__(
-        self, session: S, model: Path, text: str, folder: Path, inputs: Sequence[Path] = (), deeds: Deeds[S] = ALONE
+        self,
+        session: S,
+        model: Path,
+        text: str,
+        folder: Path,
+        inputs: Sequence[Path] = (),
+        deeds: Deeds[S] = OF_ONE_MASS,
     ) -> None:
         self.session, self.deeds = session, deeds
         self.state = State()
