@@ -177,20 +177,14 @@ def layout_of(arguments: argparse.Namespace, record: "Record") -> "Layout":
     return Layout(tuple(arguments.use), fit, judge, alternate, arguments.response, arguments.cutoff)
 
 
-def accounted_for(
-    arguments: argparse.Namespace, model: "Model", record: "Record", path: Path, **options: Any
-) -> "Accounted":
-    """The comparison of a model with a record that is made ready and corrected for faults of the measurement.
-
-    ``options`` are those of :func:`study.faults.accounting.accounted`: estimator and progress.
-    """
-    return accounted_together(arguments, model, [record], path, **options)
-
-
 def accounted_together(
     arguments: argparse.Namespace, model: "Model", records: "Sequence[Record]", path: Path, **options: Any
 ) -> "Accounted":
-    """The same of several records of one structure, to all of which one model is fitted."""
+    """The comparison of a model with records that are made ready and corrected for faults of the measurement.
+
+    One model is fitted to all of them. ``options`` are those of :func:`study.faults.accounting.accounted`: estimator
+    and progress.
+    """
     from study.faults.instrument_settings import NOTHING_ASKED, settings_beside
     from study.faults.kinds_of_tests import accounted_test
 
