@@ -90,15 +90,11 @@ class Term:
     cause: str  # where it commonly comes from
     parameters: tuple[ShapeParameter, ...] = ()
     state: str | None = None  # dz/dt for a term with a memory z of its own
-    conditions: tuple[
-        PhysicalBound, ...
-    ] = ()  # when it is physical, beside positive parameters without a sign
+    conditions: tuple[PhysicalBound, ...] = ()  # when it is physical, beside positive parameters without a sign
     # What the report gives in place of the coefficients: amplitude and phase of a cosine and a sine, or the negative of
     # a single one.
     reported: tuple[str, ...] = ()
-    either_sign: bool = (
-        False  # as hardening and softening do: a trial then draws its sign
-    )
+    either_sign: bool = False  # as hardening and softening do: a trial then draws its sign
     placeless: bool = False  # whether it is the same wherever the system rests, but for another linear stiffness
 
     @property

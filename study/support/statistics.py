@@ -18,21 +18,12 @@ SHORTEST = 16  # samples in a block
 
 @dataclass(frozen=True)
 class Gain:
-    """How much of one fit's residual another explains.
+    """How much of one fit's residual another explains."""
 
-    Attributes
-    ----------
-    explained : float
-        Share of the mean square of the residual.
-    error : float
-        Its standard error, by leaving out one block at a time.
-    p_value : float
-        Probability of so steady an agreement between the residual and the change of the prediction if there
-        were none (one-sided, over blocks).
-    """
-
-    explained: float
-    error: float
+    explained: float  # share of the mean square of the residual
+    error: float  # its standard error, by leaving out one block at a time
+    # Probability of so steady an agreement between the residual and the change of the prediction if there were none
+    # (one-sided, over blocks).
     p_value: float
 
 
