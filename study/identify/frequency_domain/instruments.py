@@ -22,13 +22,13 @@ from study.records import spectra
 from study.records.record import Record
 from study.records.spectra import Segments, SpectralMatrix
 from study.support.arrays import Complexes, Floats
-from study.support.least_squares import INDISTINCT, normal_inverse
+from study.support.least_squares import INDISTINCT, floored, normal_inverse
 
 NODES = 15  # nodes of the Gauss-Hermite rule: exact for shapes up to the power 29, close for kinked ones
 NOISY = {"u": "displacement", "v": "velocity"}  # channels with noise, by their names in a formula
 TINY = float(np.finfo(np.float64).tiny)
 STRETCHES, FEWEST = 16, 8  # parts of the record, at most and at least, whose scatter gives the errors of coefficients
-FAINT = 1e-8  # noise below this share of a channel's mean square is the rounding of the free run
+RUN_ERROR = 1e-8  # of a channel's mean square: noise below is the error of the free run
 
 
 def channels(inputs: Sequence[Input], record: Record, clean: Record) -> list[Floats]:
@@ -100,7 +100,7 @@ def fit_with_instruments(
     keep = lines_in(matrix.frequency, band)
     density, count = matrix.density[keep], len(inputs)
     noise = residual_density(_without_instruments(matrix), known)[keep]
-    noise = np.maximum(noise, FAINT * np.max(noise))
+    noise = floored(noise)
     powers = np.concatenate([item.powers(matrix.frequency[keep]) for item in inputs], axis=1)
     owner = np.repeat(np.arange(count), [len(item.parts) for item in inputs])
     weighted = powers.conj() / noise[:, None]
@@ -153,7 +153,7 @@ def noise_spread(record: Record, clean: Record) -> dict[str, Floats]:
     """A root of the noise's covariance: for each noisy channel its part of every independent source."""
     names = [name for name in NOISY.values() if name in record]
     noise = np.stack([record[name] - clean[name] for name in names])
-    noise[np.mean(noise**2, axis=1) < FAINT * np.mean(np.stack([clean[name] for name in names]) ** 2, axis=1)] = 0.0
+    noise[np.mean(noise**2, axis=1) < RUN_ERROR * np.mean(np.stack([clean[name] for name in names]) ** 2, axis=1)] = 0.0
     values, vectors = np.linalg.eigh(noise @ noise.T / noise.shape[1])
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     return dict(zip(names, root, strict=True))
