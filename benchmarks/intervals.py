@@ -16,8 +16,8 @@ from scipy.stats import t as student
 from study.equations.model_file import read_model
 from study.equations.simulate import Integrator, simulate
 from study.identify import estimators
-from study.identify.estimators import output_error
 from study.identify.estimators.base import Settings
+from study.identify.estimators.in_free_run import free_run_fit
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.record import Record
 from study.records.spectra import Segments
@@ -44,7 +44,7 @@ def one(noise: float, seed: int) -> list[dict[str, object]]:
     rows: list[dict[str, object]] = []
     for name in NAMES:
         found = estimators.identify(name, MODEL, record, TOLD)
-        fit = output_error.free_run_fit(MODEL, record)
+        fit = free_run_fit(MODEL, record)
         known = np.sqrt(np.mean(added**2)) / fit.rms  # the bound takes the noise's own variance
         assert found.estimate is not None
         for key in found.estimate.symbols:

@@ -14,9 +14,9 @@ from study.equations.model_file import read_model
 from study.equations.simulate import METHODS, Integrator, simulate
 from study.identify.frequency_domain import coefficients, conditioned
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
-from study.identify.frequency_domain.local_polynomial_fit import fit_local_polynomial
-from study.identify.frequency_domain.local_polynomial_method import (
+from study.identify.frequency_domain.local_polynomial import (
     LocalPolynomial,
+    fit_local_polynomial,
     local_polynomial_responses,
     transform,
 )

@@ -4,7 +4,7 @@ from study.support.code_dependencies import rests_on
 
 # Touching study/identify/frequency_domain/conditioned.py re-runs identification and what follows, not simulation, though the two share
 # study/reproduction/make_record.py: what only identification uses is not followed from there.
-IDENTIFICATION_ONLY = ["study.identify.estimators", "study.identify.estimators.base", "study.records.spectra", "study.identify.frequency_domain.local_polynomial_method"]
+IDENTIFICATION_ONLY = ["study.identify.estimators", "study.identify.estimators.base", "study.records.spectra", "study.identify.frequency_domain.local_polynomial"]
 
 
 # Where results go to a store (profiles/kubernetes), jobs get the project's files with the job, as they were when the run

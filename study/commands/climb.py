@@ -17,8 +17,7 @@ from study.equations.model_file import WANTED, parse_model
 from study.explore import session as sessions
 from study.explore.saved_files import PAGE, files
 from study.explore.session import Session
-from study.support.file_sets import write_files
-from study.support.files import read_text
+from study.support.files import read_text, write_files
 
 
 def climb(

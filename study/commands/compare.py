@@ -43,7 +43,7 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.equations.model_file import read_model
     from study.faults.fault import fault_fields
     from study.support.extras import lacking
-    from study.support.file_sets import write_files
+    from study.support.files import write_files
 
     folder = out_folder(arguments)
     model = read_model(arguments.model)

@@ -41,7 +41,7 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.equations.model_file import read_model
     from study.faults.instrument_settings import settings_beside
     from study.support.errors import expect
-    from study.support.file_sets import write_files
+    from study.support.files import write_files
 
     expect(not (arguments.each and arguments.each_record), "--each and --each-record exclude each other; expected one")
     folder = out_folder(arguments)

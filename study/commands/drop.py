@@ -5,39 +5,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from study.commands import structures
-from study.commands.command import Command, progress
-from study.commands.record_arguments import (
-    accounted_for,
-    add_out_argument,
-    add_reading_arguments,
-    out_folder,
-    read_records,
-    sources,
-    written_together,
-)
+from study.commands.command import Command
+from study.commands.record_arguments import out_folder
+from study.commands.revision import add_revision_arguments, revise
 
 if TYPE_CHECKING:
-    from study.compare.comparison import Comparison
-    from study.diagnose.needless import Needless
     from study.equations.model import Model
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", type=Path, help="model file (YAML); the term is taken out of it")
     parser.add_argument("term", help="an effect of the model")
-    where = parser.add_mutually_exclusive_group()
-    where.add_argument("--between", nargs=2, metavar="PLACE", help="of a structure: where the term is")
-    where.add_argument("--at", metavar="COORDINATE", help="of a structure: the coordinate that it acts on")
-    parser.add_argument("--data", dest="records", type=Path, nargs="+", required=True, metavar="RECORD")
-    add_reading_arguments(parser)
-    add_out_argument(parser)
+    add_revision_arguments(parser, "where the term is")
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    from study.diagnose.dropping import check_can_go
+    from study.diagnose.dropping import check_can_go, compared_without
     from study.equations.model_file import read_model, text_without
     from study.support.errors import at
-    from study.support.transaction import locked
+    from study.support.files import locked
 
     folder = out_folder(arguments)
     read_model(arguments.model)
@@ -50,7 +36,8 @@ def _run(arguments: argparse.Namespace) -> None:
             return
         with at(arguments.model):
             check_can_go(model, name)
-        _dropped(arguments, model, text_without(arguments.model, name), folder)
+        text = text_without(arguments.model, name)
+        revise(arguments, model, text, folder, lambda before: compared_without(before, name), dropped=name)
 
 
 def _placed(arguments: argparse.Namespace, model: "Model") -> str:
@@ -62,33 +49,6 @@ def _placed(arguments: argparse.Namespace, model: "Model") -> str:
     where |= {"between": arguments.between} if arguments.between else {}
     place = layout.place_of_entry(where, arguments.term, model.coordinates) if where else None
     return term_at(model, arguments.term, place)
-
-
-def _dropped(arguments: argparse.Namespace, model: "Model", text: str, folder: Path) -> None:
-    """Fit with and without the term, write model and history, and say what was reached."""
-    from study.compare import history
-    from study.compare.comparison_report import as_json, comparison_document, comparison_summary, history_step
-    from study.diagnose.dropping import compared_without
-    from study.diagnose.needless import needless, of_records
-
-    steps, name = history.read_history(arguments.model), arguments.term
-    records = read_records(arguments)
-    pairs: list[tuple[Comparison, Comparison]] = []
-    unneeded: list[tuple[Needless, ...]] = []
-    with progress(" fits", 3 * len(records)) as step:
-        for record, path in zip(records, sources(arguments), strict=True):
-            before = accounted_for(arguments, model, record, path).comparison
-            step("")
-            pairs.append((before, compared_without(before, name)))
-            step("")
-            unneeded.append(needless(pairs[-1][1]))
-            step("")
-    said = of_records([record.name for record in records], unneeded)
-    for before, after in pairs:
-        steps = history.with_step(steps, history_step(before), history_step(after, dropped=name))
-    written_together(arguments, text, steps, as_json(comparison_document([after for _, after in pairs])), folder)
-    print(comparison_summary([after for _, after in pairs]))
-    print("\n" + history.history_table(steps) + (f"\n\n{said}" if said else ""))
 
 
 COMMAND = Command(

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 from study.commands import structures
 from study.commands.command import Command, progress, whole_number
 from study.commands.record_arguments import (
-    accounted_for,
     accounted_together,
     add_each_record_argument,
     add_record_arguments,
@@ -39,8 +38,7 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.explore.desk import Desk
     from study.explore.live import AloneScene
     from study.explore.server import serve
-    from study.support.file_sets import keep
-    from study.support.files import read_text
+    from study.support.files import keep, read_text
 
     folder = out_folder(arguments)
     keep([arguments.model], [folder / arguments.model.name])
@@ -74,7 +72,7 @@ def _begun(arguments: argparse.Namespace, model: "Model", steps: "list[Step]") -
         found = accounted_together(arguments, together, marked, arguments.records[0], progress=step)
         own: list[Accounted] = []
         for record, path in zip(records, sources(arguments), strict=True) if many else ():
-            own.append(accounted_for(arguments, model, record, path, progress=step))
+            own.append(accounted_together(arguments, model, [record], path, progress=step))
     comparisons = [a.comparison for a in own]
     several = Several(tuple(c.prepared for c in comparisons), tuple(records), separate)
     known = of_own(comparisons) if own else by_record(several, found.comparison) if separate else None

@@ -23,7 +23,7 @@ def _run(arguments: argparse.Namespace) -> None:
     print(history.history_table(steps))
     if arguments.out is not None:
         from study.compare.history_picture import history_files
-        from study.support.file_sets import check_folder, write_files
+        from study.support.files import check_folder, write_files
 
         check_folder(arguments.out)
         found = history_files(steps, arguments.model.stem) | {"history.json": history.as_bytes(steps)}

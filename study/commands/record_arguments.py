@@ -177,20 +177,14 @@ def layout_of(arguments: argparse.Namespace, record: "Record") -> "Layout":
     return Layout(tuple(arguments.use), fit, judge, alternate, arguments.response, arguments.cutoff)
 
 
-def accounted_for(
-    arguments: argparse.Namespace, model: "Model", record: "Record", path: Path, **options: Any
-) -> "Accounted":
-    """The comparison of a model with a record that is made ready and corrected for faults of the measurement.
-
-    ``options`` are those of :func:`study.faults.accounting.accounted`: estimator and progress.
-    """
-    return accounted_together(arguments, model, [record], path, **options)
-
-
 def accounted_together(
     arguments: argparse.Namespace, model: "Model", records: "Sequence[Record]", path: Path, **options: Any
 ) -> "Accounted":
-    """The same of several records of one structure, to all of which one model is fitted."""
+    """The comparison of a model with records that are made ready and corrected for faults of the measurement.
+
+    One model is fitted to all of them. ``options`` are those of :func:`study.faults.accounting.accounted`: estimator
+    and progress.
+    """
     from study.faults.instrument_settings import NOTHING_ASKED, settings_beside
     from study.faults.kinds_of_tests import accounted_test
 
@@ -250,7 +244,7 @@ def _other(given: tuple[int, int] | None, record: "Record") -> tuple[int, int] |
 
 def out_folder(arguments: argparse.Namespace) -> Path:
     """Where results go, seen to be writable: ``--out``, or ``results/`` and the stem of the first record."""
-    from study.support.file_sets import check_folder
+    from study.support.files import check_folder
 
     first: Path = arguments.records[0]
     folder: Path = arguments.out if arguments.out is not None else RESULTS / (first.stem or "record")
@@ -272,8 +266,7 @@ def written_together(
 ) -> None:
     """Write the model's new text, its history and the comparison, all or none; the model must be locked."""
     from study.compare import history
-    from study.support.file_sets import keep, made
-    from study.support.transaction import replace_together
+    from study.support.files import keep, made, replace_together
 
     results = {folder / "comparison.json": comparison}
     keep(inputs_of(arguments), results)

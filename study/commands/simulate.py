@@ -49,8 +49,7 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.records.excitation import Excitation, force
     from study.records.record import write_csv
     from study.support.errors import at, expect
-    from study.support.file_sets import keep
-    from study.support.files import replacing
+    from study.support.files import keep, replacing
 
     keep([arguments.model, path_of(arguments.model)], [arguments.out])
     model = read_model(arguments.model)

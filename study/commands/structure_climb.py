@@ -17,8 +17,7 @@ from study.explore.saved_files import PAGE
 from study.structure import structure_report
 from study.structure.structure_comparison import compare_structure
 from study.structure.structure_pictures import diagnosis_pictures
-from study.support.file_sets import write_files
-from study.support.files import read_text
+from study.support.files import read_text, write_files
 
 SAVED = "climb.html"  # the whole climb as one page
 

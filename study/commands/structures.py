@@ -52,7 +52,7 @@ def compare_command(arguments: argparse.Namespace, model: "Model") -> None:
     from study.structure.structure_comparison import compare_structure, structure_document, structure_summary
     from study.structure.structure_page import PAGE, structure_page
     from study.structure.structure_pictures import structure_pictures
-    from study.support.file_sets import write_files
+    from study.support.files import write_files
 
     folder = out_folder(arguments)
     ready = prepared_structures(arguments, model)
@@ -76,7 +76,7 @@ def _compare_measured(arguments: argparse.Namespace, model: "Model", ready: "lis
     """The same where the linear part is as measured."""
     from study.compare.comparison_report import as_json
     from study.structure.measured_comparison import compare_measured, measured_document, measured_summary
-    from study.support.file_sets import write_files
+    from study.support.files import write_files
 
     folder = out_folder(arguments)
     with progress("step", 3 * len(ready)) as step:
@@ -113,7 +113,7 @@ def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
         structure_fields,
     )
     from study.structure.structure_verdict import diagnose_structure
-    from study.support.file_sets import write_files
+    from study.support.files import write_files
 
     folder = out_folder(arguments)
     own = own_candidates(arguments.candidate, model)
@@ -158,7 +158,7 @@ def _diagnose_measured(
     from study.structure.measured_comparison import compare_measured
     from study.structure.measured_diagnosis import diagnose_measured
     from study.structure.measured_report import measured_fields, measured_in_words, measured_table
-    from study.support.file_sets import write_files
+    from study.support.files import write_files
 
     folder, files = out_folder(arguments), dict[str, bytes]()
     for prepared in ready:
@@ -193,7 +193,7 @@ def add(arguments: argparse.Namespace, model: "Model") -> None:
     from study.equations.model_file import text_with
     from study.structure.structure_verdict import added_term
     from study.support.errors import at
-    from study.support.transaction import locked
+    from study.support.files import locked
 
     term = terms.get(arguments.term) if arguments.force is None else terms.custom(arguments.term, arguments.force)
     with at(arguments.model):

@@ -14,7 +14,7 @@ from scipy.fft import fft, fftfreq, ifft
 from study.compare.comparison import Comparison
 from study.compare.release import at_the_release
 from study.equations.free_run import prepare
-from study.identify.frequency_domain.decay_start import frequency_and_rate
+from study.identify.frequency_domain.starting_values import frequency_and_rate
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.records.outputs import alone
 from study.records.prepared import Prepared

@@ -9,9 +9,8 @@ from types import NoneType
 from typing import Any, cast
 
 from study.support.errors import StudyError
-from study.support.files import read_text
+from study.support.files import read_text, recover
 from study.support.numbers import percent
-from study.support.transaction import recover
 from study.support.yaml_text import shown
 
 Step = dict[str, Any]

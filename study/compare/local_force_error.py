@@ -16,7 +16,7 @@ from study.compare.force_error import ForceError, from_noise, lines_to_judge
 from study.compare.prediction import Prediction
 from study.equations.model import Model
 from study.identify.frequency_domain.inputs import Input, histories, reverse_inputs
-from study.identify.frequency_domain.local_polynomial_method import (
+from study.identify.frequency_domain.local_polynomial import (
     SPARE,
     Lines,
     LocalPolynomial,

@@ -33,9 +33,21 @@ def _dimensions(tree: ast.expr, known: dict[str, Dimensions]) -> Dimensions | No
             base, n = _dimensions(left, known), _exponent(right)
             return None if base is None or n is None else (base[0] * n, base[1] * n)
         case ast.BinOp(left=left, op=op, right=right):
-            return _combine(op, _dimensions(left, known), _dimensions(right, known))
-        case ast.Call(func=ast.Name(id=name), args=arguments):
-            return _function(name, [_dimensions(a, known) for a in arguments])
+            a, b = _dimensions(left, known), _dimensions(right, known)
+            if a is None or b is None:
+                return None
+            if isinstance(op, ast.Mult | ast.Div):
+                sign = 1 if isinstance(op, ast.Mult) else -1
+                return (a[0] + sign * b[0], a[1] + sign * b[1])
+            return a if a == b else None
+        case ast.Call(func=ast.Name(id="abs" | "max" | "min"), args=arguments):
+            units = {_dimensions(a, known) for a in arguments} - {NONE}  # a bare number, as in max(u, 0), takes any
+            return NONE if not units else units.pop() if len(units) == 1 else None
+        case ast.Call(func=ast.Name(id="sqrt"), args=[argument]):
+            a = _dimensions(argument, known)
+            return None if a is None else (a[0] / 2, a[1] / 2)
+        case ast.Call(func=ast.Name()):
+            return NONE
         case _:
             return None
 
@@ -52,26 +64,6 @@ def _exponent(tree: ast.expr) -> Fraction | None:
             return None
 
 
-def _combine(op: ast.operator, a: Dimensions | None, b: Dimensions | None) -> Dimensions | None:
-    if a is None or b is None:
-        return None
-    if isinstance(op, ast.Mult):
-        return (a[0] + b[0], a[1] + b[1])
-    if isinstance(op, ast.Div):
-        return (a[0] - b[0], a[1] - b[1])
-    return a if a == b else None
-
-
-def _function(name: str, arguments: list[Dimensions | None]) -> Dimensions | None:
-    if name in ("abs", "max", "min"):
-        units = set(arguments) - {NONE}  # a bare number, as in max(u, 0), takes the other's unit
-        return NONE if not units else units.pop() if len(units) == 1 else None
-    if name == "sqrt":
-        a = arguments[0]
-        return None if a is None else (a[0] / 2, a[1] / 2)
-    return NONE
-
-
 def compose(force: str, length: str, powers: Dimensions | None) -> str:
     """The unit of a coefficient: force over the unit of its shape, as in ``N s^2/m^2``.
 
@@ -81,28 +73,14 @@ def compose(force: str, length: str, powers: Dimensions | None) -> str:
         return f"{force} per unit of the formula"
     if (force, length, powers) == ("N", "m", MASS):
         return "kg"
-    if force == f"{length}/s^2":  # a force per unit mass
-        return _of_an_acceleration(length, powers)
-    over = [_power(unit, p) for unit, p in ((length, powers[0]), ("s", powers[1])) if p > 0]
-    up = [_power(unit, -p) for unit, p in ((length, powers[0]), ("s", powers[1])) if p < 0]
-    label = " ".join([force, *up])
+    if force == f"{length}/s^2":  # a force per unit mass: no unit but the powers left, as 1/s^2 of a stiffness
+        force, powers = "", (powers[0] - 1, powers[1] + 2)
+    own = ((length, powers[0]), ("s", powers[1]))
+    over, up = ([unit if abs(p) == 1 else f"{unit}^{abs(p)}" for unit, p in own if p * sign > 0] for sign in (1, -1))
+    label = " ".join(filter(None, [force, *up]))
     if not over:
         return label
-    return f"{label}/{over[0]}" if len(over) == 1 else f"{label}/({' '.join(over)})"
-
-
-def _of_an_acceleration(length: str, powers: Dimensions) -> str:
-    """The unit of a coefficient per unit mass, as ``1/s^2`` of a stiffness; none of the mass itself."""
-    own = ((length, 1 - powers[0]), ("s", -2 - powers[1]))
-    up, over = ([_power(unit, abs(p)) for unit, p in own if p * sign > 0] for sign in (1, -1))
-    if not over:
-        return " ".join(up)
-    below = over[0] if len(over) == 1 else f"({' '.join(over)})"
-    return f"{' '.join(up) or '1'}/{below}"
-
-
-def _power(unit: str, power: Fraction) -> str:
-    return unit if power == 1 else f"{unit}^{power}"
+    return f"{label or '1'}/{over[0]}" if len(over) == 1 else f"{label or '1'}/({' '.join(over)})"
 
 
 def pretty(text: str) -> str:

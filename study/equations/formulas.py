@@ -11,24 +11,15 @@ from collections.abc import Mapping
 from study.equations.graph import Graph, Op
 from study.support.errors import StudyError
 
-LONGEST = 300
+LONGEST = 300  # characters
 DEEPEST = 40
 LARGEST_EXPONENT = 16.0
 
-FUNCTIONS = {
-    "abs": (Op.ABS, 1),
-    "sgn": (Op.SGN, 1),
-    "sign": (Op.SGN, 1),
-    "sin": (Op.SIN, 1),
-    "cos": (Op.COS, 1),
-    "tan": (Op.DIV, 1),  # of sine and cosine
-    "exp": (Op.EXP, 1),
-    "log": (Op.LOG, 1),
-    "sqrt": (Op.SQRT, 1),
-    "tanh": (Op.TANH, 1),
-    "max": (Op.MAX, 2),
-    "min": (Op.MIN, 2),
-}
+FUNCTIONS = {  # with their numbers of arguments; a tangent is made of two others
+    "abs": (Op.ABS, 1), "sgn": (Op.SGN, 1), "sign": (Op.SGN, 1), "sin": (Op.SIN, 1), "cos": (Op.COS, 1),
+    "tan": (Op.DIV, 1), "exp": (Op.EXP, 1), "log": (Op.LOG, 1), "sqrt": (Op.SQRT, 1), "tanh": (Op.TANH, 1),
+    "max": (Op.MAX, 2), "min": (Op.MIN, 2),
+}  # fmt: skip
 VARIABLES = ("u", "v", "t")  # in a formula these, and pi, are never columns of a record
 
 
@@ -46,17 +37,13 @@ def parse(text: str) -> ast.expr:
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, MemoryError, RecursionError):
         raise ExpressionError(f"the expression {text!r} is not a formula such as 'u*abs(u) + 0.1*v**3'") from None
-    if _depth(tree) > DEEPEST:
-        raise ExpressionError(f"the expression {text!r} is nested more than {DEEPEST} deep")
-    return tree
-
-
-def _depth(tree: ast.expr) -> int:
     deepest, level = 0, [tree]
     while level:
         deepest += 1
         level = [child for node in level for child in ast.iter_child_nodes(node) if isinstance(child, ast.expr)]
-    return deepest
+    if deepest > DEEPEST:
+        raise ExpressionError(f"the expression {text!r} is nested more than {DEEPEST} deep")
+    return tree
 
 
 def names(text: str) -> list[str]:
@@ -87,19 +74,30 @@ class _Builder:
         return node
 
     def translated(self, tree: ast.expr) -> int:
+        graph = self.graph
         match tree:
             case ast.Constant(value=value):
                 return self.number(value)
             case ast.Name(id=name):
-                return self.name(name)
+                if name not in self.known and name != "pi":
+                    raise self.refuse(f"uses the name {name!r}; it may use {', '.join(sorted(self.known))} and pi")
+                return self.known[name] if name in self.known else graph.const(math.pi)
             case ast.UnaryOp(op=ast.USub(), operand=operand):
-                return self.graph.neg(self.node(operand))
+                return graph.neg(self.node(operand))
             case ast.UnaryOp(op=ast.UAdd(), operand=operand):
                 return self.node(operand)
             case ast.BinOp(left=base, op=ast.Pow(), right=exponent):
                 return self.power(base, exponent)
-            case ast.BinOp(left=left, op=op, right=right):
-                return self.arithmetic(op, self.node(left), self.node(right))
+            case ast.BinOp(left=left, op=ast.Add(), right=right):
+                return graph.add(self.node(left), self.node(right))
+            case ast.BinOp(left=left, op=ast.Sub(), right=right):
+                return graph.sub(self.node(left), self.node(right))
+            case ast.BinOp(left=left, op=ast.Mult(), right=right):
+                return graph.mul(self.node(left), self.node(right))
+            case ast.BinOp(left=left, op=ast.Div(), right=right):
+                return self.ratio(self.node(left), self.node(right))
+            case ast.BinOp():
+                raise self.refuse("uses an operator other than + - * / **")
             case ast.Call():
                 return self.call(tree)
             case _:
@@ -112,13 +110,6 @@ class _Builder:
             raise self.refuse(f"holds the number {str(value)[:20]}, outside the range of +-1e300")
         return self.graph.const(float(value))
 
-    def name(self, name: str) -> int:
-        if name in self.known:
-            return self.known[name]
-        if name == "pi":
-            return self.graph.const(math.pi)
-        raise self.refuse(f"uses the name {name!r}; it may use {', '.join(sorted(self.known))} and pi")
-
     def power(self, base: ast.expr, exponent: ast.expr) -> int:
         value = self.graph.constant_value(self.node(exponent))
         if value is None or abs(value) > LARGEST_EXPONENT:
@@ -127,35 +118,18 @@ class _Builder:
             )
         node = self.node(base)
         number = self.graph.constant_value(node)
-        return self.graph.power(node, value) if number is None else self.constant_power(number, value)
-
-    def constant_power(self, base: float, exponent: float) -> int:
+        if number is None:
+            return self.graph.power(node, value)
         try:
-            value = base**exponent
+            return self.number(number**value)
         except (OverflowError, ZeroDivisionError):
-            value = math.nan
-        return self.number(value)
+            return self.number(math.nan)
 
-    def arithmetic(self, op: ast.operator, left: int, right: int) -> int:
-        match op:
-            case ast.Add():
-                return self.graph.add(left, right)
-            case ast.Sub():
-                return self.graph.sub(left, right)
-            case ast.Mult():
-                return self.graph.mul(left, right)
-            case ast.Div():
-                return self.divide(left, right)
-            case _:
-                raise self.refuse("uses an operator other than + - * / **")
-
-    def divide(self, left: int, right: int) -> int:
+    def ratio(self, left: int, right: int) -> int:
         x, y = self.graph.constant_value(left), self.graph.constant_value(right)
         if y == 0.0:
             raise self.refuse("divides by zero; expected a divisor that moves, or another number")
-        if x is not None and y is not None:
-            return self.graph.const(x / y)
-        return self.graph.div(left, right)
+        return self.graph.div(left, right) if x is None or y is None else self.graph.const(x / y)
 
     def call(self, tree: ast.Call) -> int:
         name = tree.func.id if isinstance(tree.func, ast.Name) else ast.unparse(tree.func)
@@ -167,6 +141,4 @@ class _Builder:
         arguments = [self.node(argument) for argument in tree.args]
         if name == "tan":
             return self.graph.div(self.graph.unary(Op.SIN, arguments[0]), self.graph.unary(Op.COS, arguments[0]))
-        if arity == 1:
-            return self.graph.unary(op, arguments[0])
-        return self.graph.binary(op, arguments[0], arguments[1])
+        return self.graph.unary(op, *arguments) if arity == 1 else self.graph.binary(op, *arguments)

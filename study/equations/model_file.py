@@ -31,8 +31,7 @@ from study.equations.redundancy import repeated_force
 from study.equations.terms import Term
 from study.support import yaml_text
 from study.support.errors import StudyError
-from study.support.files import read_text, replace_file
-from study.support.transaction import recover
+from study.support.files import read_text, recover, replace_file
 from study.support.yaml_text import as_list, as_mapping, scalar, shown
 
 MOST_TERMS = 200

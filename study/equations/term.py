@@ -11,24 +11,12 @@ from study.equations import dimensions, formulas
 
 @dataclass(frozen=True)
 class Component:
-    """One coefficient's shape.
+    """One coefficient's shape."""
 
-    Attributes
-    ----------
-    symbol : str
-        Name of the coefficient, such as ``k3``.
-    shape : str
-        Formula of the unit-coefficient shape g(u, v, t) or of the term's state z.
-    order : int
-        How often it is differentiated with respect to time: 0, 1 or (inertia alone) 2.
-    factor : float
-        A fixed number before it: Van der Pol's damping is c3/3 d/dt u^3.
-    """
-
-    symbol: str
-    shape: str
-    order: int = 0
-    factor: float = 1.0
+    symbol: str  # name of the coefficient, such as ``k3``
+    shape: str  # formula of the unit-coefficient shape g(u, v, t) or of the term's state z
+    order: int = 0  # how often it is differentiated with respect to time: 0, 1 or (inertia alone) 2
+    factor: float = 1.0  # a fixed number before it: Van der Pol's damping is c3/3 d/dt u^3
 
 
 Places = Literal[
@@ -41,48 +29,28 @@ Places = Literal[
 class Search:
     """Where a shape parameter is looked for along the motion of a model that lacks the term.
 
-    Attributes
-    ----------
-    kind : str
-        What ``places`` are: quantiles of a displacement; multiples of the time in which the motion turns by one
-        radian, of one over its rms displacement, or of the parameter before; or distances, in lines of the spectrum,
-        from where a stiffness that varies with time would explain most, or from the peaks of the residual.
-    places : tuple of float
-        The points to try.
-    blunt : bool
-        Whether a place predicts poorly where a fit from it ends: then fits start all over the range.
+    ``kind`` says what the places are: quantiles of a displacement; multiples of the time in which the motion turns by
+    one radian, of one over its rms displacement, or of the parameter before; or distances, in lines of the spectrum,
+    from where a stiffness that varies with time would explain most, or from the peaks of the residual.
     """
 
     kind: Places
-    places: tuple[float, ...]
-    blunt: bool = False
+    places: tuple[float, ...]  # the points to try
+    blunt: bool = False  # whether a place predicts poorly where a fit from it ends: then fits start all over the range
 
 
 @dataclass(frozen=True)
 class ShapeParameter:
-    """A shape parameter.
+    """A shape parameter, given or estimated."""
 
-    Attributes
-    ----------
-    name, meaning : str
-        What formulas and people call it.
-    quantity : str
-        Its unit: ``length``, ``frequency``, ``time`` or ``1/length``.
-    search : Search
-        Where a fit looks for it.
-    drawn : pair of float
-        Range from which a trial draws it, in the units that rms displacement and rms velocity make up; of the
-        parameter before where its search is in shares of that.
-    signed : bool
-        Whether it may be zero or negative; all others are above zero.
-    """
-
-    name: str
-    quantity: str
-    meaning: str
-    search: Search
+    name: str  # in formulas
+    quantity: str  # its unit: ``length``, ``frequency``, ``time`` or ``1/length``
+    meaning: str  # to people
+    search: Search  # where a fit looks for it
+    # Range from which a trial draws it, in the units that rms displacement and rms velocity make up; of the parameter
+    # before where its search is in shares of that.
     drawn: tuple[float, float]
-    signed: bool = False
+    signed: bool = False  # whether it may be zero or negative; all others are above zero
 
     @property
     def relative(self) -> bool:
@@ -92,27 +60,13 @@ class ShapeParameter:
 
 @dataclass(frozen=True)
 class PhysicalBound:
-    """What makes a term physical: a coefficient or shape parameter above a bound.
+    """What makes a term physical: a coefficient or shape parameter above a bound."""
 
-    Attributes
-    ----------
-    name : str
-        The coefficient or shape parameter.
-    reason : str
-        Why, as a clause.
-    over : str or None
-        Name of another one whose size is the bound; zero is, if left out.
-    reached : bool
-        Whether the bound itself will do.
-    enforced : bool
-        Whether no fit goes beyond it.
-    """
-
-    name: str
-    reason: str
-    over: str | None = None
-    reached: bool = False
-    enforced: bool = False
+    name: str  # of the coefficient or shape parameter
+    reason: str  # as a clause
+    over: str | None = None  # another one whose size is the bound; zero is, if left out
+    reached: bool = False  # whether the bound itself will do
+    enforced: bool = False  # whether no fit goes beyond it
 
     def broken(self, values: Mapping[str, float]) -> str:
         """A sentence on values by name that break it; empty if they do not, or are not all known."""
@@ -127,44 +81,21 @@ class PhysicalBound:
 
 @dataclass(frozen=True)
 class Term:
-    """A physical effect.
+    """A physical effect."""
 
-    Attributes
-    ----------
-    name : str
-        As models and tables name it.
-    components : tuple of Component
-        One for each coefficient (a periodic stiffness of any phase has two).
-    formula : str
-        For people: the force with a unit coefficient.
-    meaning, cause : str
-        The physics in a sentence, and where it commonly comes from.
-    parameters : tuple of Parameter
-        Shape parameters, given or estimated.
-    state : str or None
-        dz/dt for a term with a memory z of its own.
-    conditions : tuple of Condition
-        When it is physical, beside that parameters without a sign are above zero.
-    reported : tuple of str
-        What the report gives in place of the coefficients: amplitude and phase of a cosine and a sine, or the negative
-        of a single one.
-    either_sign : bool
-        Whether it occurs with either sign, as hardening and softening do: a trial then draws it.
-    placeless : bool
-        Whether it is the same wherever the system rests, but for another linear stiffness.
-    """
-
-    name: str
-    components: tuple[Component, ...]
-    formula: str
-    meaning: str
-    cause: str
+    name: str  # as models and tables name it
+    components: tuple[Component, ...]  # one for each coefficient (a periodic stiffness of any phase has two)
+    formula: str  # for people: the force with a unit coefficient
+    meaning: str  # the physics in a sentence
+    cause: str  # where it commonly comes from
     parameters: tuple[ShapeParameter, ...] = ()
-    state: str | None = None
-    conditions: tuple[PhysicalBound, ...] = ()
+    state: str | None = None  # dz/dt for a term with a memory z of its own
+    conditions: tuple[PhysicalBound, ...] = ()  # when it is physical, beside positive parameters without a sign
+    # What the report gives in place of the coefficients: amplitude and phase of a cosine and a sine, or the negative of
+    # a single one.
     reported: tuple[str, ...] = ()
-    either_sign: bool = False
-    placeless: bool = False
+    either_sign: bool = False  # as hardening and softening do: a trial then draws its sign
+    placeless: bool = False  # whether it is the same wherever the system rests, but for another linear stiffness
 
     @property
     def symbols(self) -> tuple[str, ...]:

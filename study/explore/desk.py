@@ -18,7 +18,7 @@ from study.explore.any_session import AnySession, undone
 from study.explore.saved_files import PAGE, files, of_stage
 from study.explore.session import Session
 from study.support.errors import StudyError
-from study.support.file_sets import write_files
+from study.support.files import write_files
 
 VALUES = "values"  # how to save a model: with what was fitted
 Drawn = Mapping[str, bytes]
@@ -72,7 +72,7 @@ def _examined(session: Session, progress: Callable[[int], None]) -> sessions.Sta
     return sessions.examined(session, progress)[0]
 
 
-ALONE = Deeds(
+OF_ONE_MASS = Deeds(
     sessions.with_added, sessions.dropped, undone, sessions.with_held, sessions.tried, _examined,
     sessions.with_stage, _by_itself, _drawn, files,
 )  # fmt: skip
@@ -82,7 +82,13 @@ class Desk(Generic[S]):
     """One session and whoever looks at it."""
 
     def __init__(
-        self, session: S, model: Path, text: str, folder: Path, inputs: Sequence[Path] = (), deeds: Deeds[S] = ALONE
+        self,
+        session: S,
+        model: Path,
+        text: str,
+        folder: Path,
+        inputs: Sequence[Path] = (),
+        deeds: Deeds[S] = OF_ONE_MASS,
     ) -> None:
         self.session, self.deeds = session, deeds
         self.state = State()

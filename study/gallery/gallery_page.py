@@ -7,10 +7,9 @@ from pathlib import Path
 from study.gallery import blocks
 from study.gallery.findings_of_record import Beside, RecordFindings, found_beside, read_findings
 from study.gallery.known import Literature, literature, published
-from study.support import document, picture_page
-from study.support.document import Block, Fold, Heading, Image
+from study.support import document
+from study.support.document import Block, Fold, Heading, Image, PageSection, Picture
 from study.support.numbers import percent
-from study.support.picture_page import PageSection, Picture
 
 TITLE = "Measured records"
 PICTURES: Mapping[str, str] = {  # of a climb's folder, and what they show
@@ -64,7 +63,7 @@ def entries(config: Path, results: Path, records: Mapping[str, Sequence[str]]) -
 def gallery_page(shown: Sequence[Entry]) -> bytes:
     """Everything on one page, with thumbnails that open."""
     first = PageSection("all", "All of them", document.fragment([climb_overview(shown)]))
-    return picture_page.picture_page(TITLE, [first, *(_section(entry) for entry in shown)])
+    return document.picture_page(TITLE, [first, *(_section(entry) for entry in shown)])
 
 
 def climb_overview(shown: Sequence[Entry]) -> Block:
@@ -89,7 +88,7 @@ def _section(entry: Entry) -> PageSection:
     told = blocks.told(entry.known, entry.found, entry.values)
     folds = [Fold(f"{f.record}: the first candidates", (blocks.candidates(f),)) for f in entry.found]
     shown = "".join(
-        (f"<h3>{f.record}</h3>" if len(entry.found) > 1 else "") + picture_page.thumbnails(climb_pictures(f))
+        (f"<h3>{f.record}</h3>" if len(entry.found) > 1 else "") + document.thumbnails(climb_pictures(f))
         for f in entry.found
     )
     return PageSection(entry.known.entry, entry.known.title, document.fragment([*told, *folds]) + shown)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from study.figures.curves import InputResponse
-    from study.identify.frequency_domain.responses import Responses
+    from study.identify.frequency_domain.coefficients import Responses
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -6,7 +6,7 @@ from study.equations.model import Model
 from study.equations.terms import get
 from study.identify import estimators
 from study.identify.estimators.base import Identified, Settings
-from study.identify.frequency_domain.local_polynomial_method import LocalPolynomial
+from study.identify.frequency_domain.local_polynomial import LocalPolynomial
 from study.records.record import Record
 from study.reproduction.settings import IdentificationSettings
 from study.support.errors import DivergenceError

@@ -13,8 +13,8 @@ import numpy as np
 import pandas as pd
 
 from study.equations.model import Model
-from study.identify.estimators import miso
 from study.identify.estimators.base import Settings, true_parameters
+from study.identify.estimators.in_reverse import miso
 from study.reproduction.ensemble import threaded
 from study.reproduction.make_record import make_record
 from study.reproduction.settings import IntegratorSettings, RecordSettings
@@ -73,7 +73,7 @@ def _runs(
             simulated = make_record(model, stepped, seed=seed)
         except DivergenceError as error:
             return IntegratorRun({}, error.time)
-        return IntegratorRun({p.name: p.value for p in miso.identify(model, simulated, estimation).parameters})
+        return IntegratorRun({p.name: p.value for p in miso(model, simulated, estimation).parameters})
 
     return threaded(run, list(seeds))
 

@@ -94,7 +94,7 @@ def check_reached(excitation: ExcitationSettings, settings: StudySettings) -> No
 
 def check_model(path: Path, also_assumed: str, settings: StudySettings) -> Model:
     """A case's model, which can be simulated, and whose inputs the record can tell apart with a term more."""
-    from study.identify.frequency_domain.local_polynomial_method import LocalPolynomial
+    from study.identify.frequency_domain.local_polynomial import LocalPolynomial
 
     model = assumed = read_model(path)
     with at(path):

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 
 from study.reproduction import structure_pages, summary
 from study.reproduction.claims.claim_pages import conditions
-from study.support import document, picture_page
-from study.support.document import Text
-from study.support.picture_page import PageSection, Picture, fragment_without_images
+from study.support import document
+from study.support.document import PageSection, Picture, Text, fragment_without_images
 
 TITLE = "The report, run again"
 
@@ -15,7 +14,7 @@ def study_page(tables: summary.Tables, pictures: Sequence[Picture]) -> bytes:
     """The page; ``pictures`` in the order in which they stand."""
     sections = [
         ("verdict", "Verdict", fragment_without_images([*summary.counts(tables), Text(summary.INTRODUCTION)])),
-        ("figures", "Figures", picture_page.groups(pictures)),
+        ("figures", "Figures", document.picture_groups(pictures)),
         ("failing", "Not reproduced, or only partly", fragment_without_images(summary.failing_claims(tables))),
         ("numbers", "The report's numbers beside ours", fragment_without_images(summary.numbers(tables))),
         ("claims", "Every claim", _claims(tables)),
@@ -29,7 +28,7 @@ def study_page(tables: summary.Tables, pictures: Sequence[Picture]) -> bytes:
         ("reading", 'What "unit variance" refers to', fragment_without_images(summary.reading(tables))),
         ("times", "Run times", fragment_without_images(summary.run_times(tables))),
     ]
-    return picture_page.picture_page(TITLE, [PageSection(*section) for section in sections])
+    return document.picture_page(TITLE, [PageSection(*section) for section in sections])
 
 
 def _claims(tables: summary.Tables) -> str:

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.compare.noise import segments_of
-from study.identify.estimators import siso
-from study.identify.frequency_domain import conditioned, joint_coefficients
+from study.identify.frequency_domain import coefficients, conditioned
 from study.identify.frequency_domain.inputs import Input
 from study.records import spectra
 from study.structure.missing_forces import MissingForces
@@ -83,12 +82,12 @@ def dynamic_stiffnesses(comparison: StructureComparison) -> dict[frozenset[str],
     for equation in equations:
         matrix = spectra.cross_spectra(equation.channels, prepared.dt, segments_of(len(equation.channels[0])))
         found = conditioned.analyse(matrix)
-        share = joint_coefficients.independent_share(found, matrix)
+        share = coefficients.independent_share(found, matrix)
         inside = (found.frequency > 0.0) & (found.frequency <= highest_frequency(comparison))
         for j, item in enumerate(equation.inputs if np.any(inside) else ()):  # segments may be too short for any line
             path = _path(item, paths)
             own = float(np.median(share[inside, j]))
-            if path is not None and siso.is_linear(item) and own > best.get(path, (0.0, None))[0]:
+            if path is not None and item.linear and own > best.get(path, (0.0, None))[0]:
                 best[path] = own, _read(equation, item, j, found, inside, model.numbers())
     return {path: read for path, (_, read) in best.items()}
 

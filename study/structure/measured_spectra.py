@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from study.equations.model import Model
 from study.equations.place import HERE, Place
 from study.identify.frequency_domain import instruments
+from study.identify.frequency_domain.coefficients import Responses
 from study.identify.frequency_domain.inputs import Input, input_history, reverse_inputs
-from study.identify.frequency_domain.responses import Responses
 from study.records import spectra
 from study.records.record import MOTIONS, Record
 from study.records.spectra import Segments

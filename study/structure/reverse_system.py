@@ -12,12 +12,11 @@ from itertools import pairwise
 import numpy as np
 
 from study.equations.model import Model
-from study.identify.estimators import siso
 from study.identify.estimators.base import Identified, Settings, named_parameters
-from study.identify.estimators.local_polynomial import identify_lines
-from study.identify.frequency_domain import conditioned, joint_coefficients, local_polynomial_fit
+from study.identify.estimators.in_reverse import identify_lines
+from study.identify.frequency_domain import coefficients, conditioned, local_polynomial
 from study.identify.frequency_domain.inputs import INERTIA, Input, histories, reverse_inputs
-from study.identify.frequency_domain.local_polynomial_method import Lines, transform
+from study.identify.frequency_domain.local_polynomial import Lines, transform
 from study.records import spectra
 from study.records.record import MOTIONS, Record
 from study.structure.prepared_structure import PreparedStructure
@@ -52,7 +51,7 @@ class EquationResult:
     """What an estimator finds in one equation: ``Identified`` as of a single mass.
 
     ``independent`` is the share of each input that the others do not determine, shape (lines, inputs): no A_j(f) can be
-    read where it is nothing, though the coefficients can be found over all lines (``joint_coefficients``).
+    read where it is nothing, though the coefficients can be found over all lines (``coefficients.fit_jointly``).
     """
 
     coordinate: str
@@ -162,15 +161,15 @@ def by_conditioned_spectra(equations: Sequence[Equation], dt: float, settings: S
     ends = np.cumsum([0, *(len(e.channels) for e in equations)])
     rows = [list(range(a, b)) for a, b in pairwise(ends)]
     matrix, band = spectra.cross_spectra(channels, dt, settings.segments), settings.band
-    results, fits = list[EquationResult](), list[joint_coefficients.JointFit]()
+    results, fits = list[EquationResult](), list[coefficients.JointFit]()
     for e, r in zip(equations, rows, strict=True):
         own = replace(matrix, density=matrix.density[:, r][:, :, r])
         analysis = conditioned.analyse(own)
-        fits.append(joint_coefficients.fit_jointly(matrix, r, analysis, e.inputs, band))
+        fits.append(coefficients.fit_jointly(matrix, r, analysis, e.inputs, band))
         found = Identified(e.inputs, analysis, named_parameters(fits[-1].estimate), fits[-1].estimate)
-        share = joint_coefficients.independent_share(analysis, own)
+        share = coefficients.independent_share(analysis, own)
         results.append(EquationResult(e.coordinate, e.mass, found, share))
-    blocks = [[joint_coefficients.covariance(matrix, a, b, band) for b in fits] for a in fits]
+    blocks = [[coefficients.covariance_between_outputs(matrix, a, b, band) for b in fits] for a in fits]
     return ReverseSystem(tuple(results), np.block(blocks))
 
 
@@ -180,7 +179,7 @@ def linear_alone(equations: Sequence[Equation], dt: float, settings: Settings) -
 
 
 def _linear(equation: Equation) -> Equation:
-    kept = [k for k, item in enumerate(equation.inputs) if siso.is_linear(item)]
+    kept = [k for k, item in enumerate(equation.inputs) if item.linear]
     channels = tuple(equation.channels[k] for k in (*kept, -1))
     return replace(equation, inputs=tuple(equation.inputs[k] for k in kept), channels=channels)
 
@@ -190,11 +189,11 @@ def by_local_polynomials(equations: Sequence[Equation], dt: float, settings: Set
     lines = [transform(equation.channels, dt) for equation in equations]
     results = [_result(e, identify_lines(e.inputs, x, settings)) for e, x in zip(equations, lines, strict=True)]
     shifts = np.concatenate([_shifts(e, x, settings) for e, x in zip(equations, lines, strict=True)], axis=1)
-    return ReverseSystem(tuple(results), local_polynomial_fit.covariance_between(shifts, shifts))
+    return ReverseSystem(tuple(results), local_polynomial.covariance_between(shifts, shifts))
 
 
 def _shifts(equation: Equation, lines: Lines, settings: Settings) -> Floats:
-    return local_polynomial_fit.fit_with_shifts(lines, equation.inputs, settings.band, settings.local_polynomial)[1]
+    return local_polynomial.fit_local_polynomial(lines, equation.inputs, settings.band, settings.local_polynomial)[1]
 
 
 def _result(equation: Equation, found: Identified) -> EquationResult:

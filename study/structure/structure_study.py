@@ -13,7 +13,7 @@ from study.equations.model import Model, ModelTerm, free
 from study.equations.model_file import read_model
 from study.equations.terms import get
 from study.identify.estimators.base import Settings
-from study.identify.frequency_domain.local_polynomial_method import LocalPolynomial
+from study.identify.frequency_domain.local_polynomial import LocalPolynomial
 from study.records.excitation import Excitation, force
 from study.records.record import MOTIONS
 from study.reproduction.case_names import rules

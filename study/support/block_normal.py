@@ -12,37 +12,21 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from study.support.arrays import Floats
+from study.support.least_squares import INDISTINCT
 
 BLOCK = 32  # samples whose products are summed together
-INDISTINCT = 1e-12  # eigenvalue of a scaled normal matrix below which variables cannot be told apart
 
 
 @dataclass(frozen=True)
 class Normal:
-    """``J^T J`` and ``J^T residual`` for columns of unit length; k shared variables, f own ones of each of N segments.
+    """``J^T J`` and ``J^T residual`` for columns of unit length; k shared variables, f own ones of N segments each."""
 
-    Attributes
-    ----------
-    shared : array, shape (k, k)
-        Products of the shared columns.
-    cross : array, shape (N, k, f)
-        Those of the shared with the own columns of each segment.
-    own : array, shape (N, f, f)
-        Those of the own columns.
-    links : array, shape (N - 1, f, f), or None
-        Those of the own columns of each segment but the first (rows) with those of the segment before.
-    right : array, shape (k,)
-        Products of the shared columns with the residual.
-    own_right : array, shape (N, f)
-        Those of the own columns.
-    """
-
-    shared: Floats
-    cross: Floats
-    own: Floats
-    links: Floats | None
-    right: Floats
-    own_right: Floats
+    shared: Floats  # products of the shared columns, shape (k, k)
+    cross: Floats  # of the shared with the own columns of each segment, shape (N, k, f)
+    own: Floats  # of the own columns, shape (N, f, f)
+    links: Floats | None  # of each segment's own columns, the first's left out, with those before it, (N - 1, f, f)
+    right: Floats  # of the shared columns with the residual, shape (k,)
+    own_right: Floats  # of the own columns with it, shape (N, f)
 
     def _own_solved(self, damping: float, right: Floats) -> Floats:
         """Solution of the equations of the own variables alone for right sides of shape (N, f, m)."""
@@ -89,21 +73,11 @@ class Normal:
 
 @dataclass(frozen=True)
 class ContinuityGaps:
-    """Penalised continuity constraints: each segment is to arrive in the state in which the next begins.
+    """Penalised continuity constraints: each segment is to arrive in the state in which the next begins."""
 
-    Attributes
-    ----------
-    gaps : array, shape (N - 1, f)
-        Differences of the two states, times the weight.
-    jacobian : array, shape (N - 1, f, k + f)
-        Derivatives of the gaps by the shared variables and by those of the segment before.
-    weight : array, shape (f,)
-        Derivative by the state after, with its sign turned.
-    """
-
-    gaps: Floats
-    jacobian: Floats
-    weight: Floats
+    gaps: Floats  # differences of the two states, times the weight, shape (N - 1, f)
+    jacobian: Floats  # of the gaps by the shared variables and by those of the segment before, shape (N - 1, f, k + f)
+    weight: Floats  # derivative by the state after, with its sign turned, shape (f,)
 
 
 def _tridiagonal(own: Floats, links: Floats, damping: float, right: Floats) -> Floats:

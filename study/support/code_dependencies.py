@@ -14,8 +14,8 @@ KERNELS = "kernels.py"  # the module whose loops are in C, in the folder beside 
 def rests_on(script: Path, *, also: Iterable[str] = (), without: Collection[str] = ()) -> list[str]:
     """Sorted paths of the files of the package that a script imports, directly or through one another.
 
-    ``also`` names modules that are imported while the script runs, such as ``estimators.miso``; those in ``without``
-    are not followed: what the script imports along with what it needs, and does not use.
+    ``also`` names modules that are imported while the script runs, such as estimators; those in ``without`` are not
+    followed: what the script imports along with what it needs, and does not use.
     """
     root = script.parent.parent
     reached: set[Path] = set()

@@ -1,9 +1,14 @@
-"""Pages made of headings, text and tables, as Markdown for a reader of files and as HTML for the report page."""
+"""Pages made of headings, text and tables, as Markdown for a reader of files and as HTML for a browser.
 
+An HTML page is one file that asks for nothing from anywhere: style, script and pictures are in it.
+"""
+
+import base64
 import html
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path, PurePosixPath
 
 from tabulate import tabulate
@@ -126,11 +131,10 @@ def put(path: Path, mark: str, blocks: Sequence[Block]) -> None:
 
 
 def document_page(title: str, blocks: Sequence[Block]) -> str:
-    """The page as one HTML file that asks for nothing from anywhere."""
-    body = fragment(blocks)
+    """The page as HTML."""
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f"<title>{html.escape(title)}</title>\n<style>\n{STYLE}\n</style>\n</head>\n<body>\n{body}\n</body>\n</html>\n"
+        f"<title>{html.escape(title)}</title>\n<style>\n{STYLE}\n</style>\n</head>\n<body>\n{fragment(blocks)}\n</body>\n</html>\n"
     )
 
 
@@ -164,3 +168,63 @@ def _inline(text: str) -> str:
     for pattern, replacement in ((BOLD, r"<strong>\1</strong>"), (CODE, r"<code>\1</code>"), (LINK, r"\1")):
         text = re.sub(pattern, replacement, text)
     return text
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture that a page shows."""
+
+    group: str  # under which it stands
+    name: str  # what it is called
+    shows: str  # in a few words
+    png: bytes
+
+
+@dataclass(frozen=True)
+class PageSection:
+    """A part of the page that the line at its top leads to."""
+
+    anchor: str
+    title: str
+    content: str  # HTML
+
+
+def picture_page(title: str, sections: Sequence[PageSection]) -> bytes:
+    """Sections, thumbnails that open large, tables that sort, in UTF-8."""
+    style, behaviour = (
+        files("study.support").joinpath(f"picture_page.{kind}").read_text(encoding="utf-8").strip()
+        for kind in ("css", "js")
+    )
+    links = "".join(f'<a href="#{s.anchor}">{html.escape(s.title)}</a>' for s in sections)
+    body = "".join(f'<section id="{s.anchor}"><h2>{html.escape(s.title)}</h2>{s.content}</section>' for s in sections)
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
+        f"<title>{html.escape(title)}</title>\n<style>\n{style}\n</style>\n</head>\n<body>\n"
+        f"<header><h1>{html.escape(title)}</h1><nav>{links}</nav></header>\n<main>{body}</main>\n"
+        '<dialog id="large"><button aria-label="close">×</button><figure><img alt=""><figcaption></figcaption></figure>'
+        f"</dialog>\n<script>\n{behaviour}\n</script>\n</body>\n</html>\n"
+    ).encode()
+
+
+def fragment_without_images(blocks: Sequence[Block]) -> str:
+    """Blocks without their images, which such a page has as thumbnails."""
+    return fragment([b for b in blocks if not isinstance(b, Image)])
+
+
+def picture_groups(pictures: Sequence[Picture]) -> str:
+    """Thumbnails under the names of their groups."""
+    names = dict.fromkeys(picture.group for picture in pictures)
+    return "".join(
+        f"<h3>{html.escape(name)}</h3>{thumbnails([p for p in pictures if p.group == name])}" for name in names
+    )
+
+
+def thumbnails(pictures: Sequence[Picture]) -> str:
+    """Thumbnails side by side; each opens large."""
+    shown: list[str] = []
+    for picture in pictures:
+        words, data = html.escape(f"{picture.name}: {picture.shows}"), base64.b64encode(picture.png).decode()
+        image = f'<img loading="lazy" decoding="async" alt="{words}" src="data:image/png;base64,{data}">'
+        shown.append(f'<button class="thumb">{image}<span>{words}</span></button>')
+    return f'<div class="grid">{"".join(shown)}</div>'

@@ -1,23 +1,75 @@
-"""Linear least squares with columns of any size."""
+"""Linear least squares with columns of any size.
+
+One number tells what is rounding: of columns of unit length, sums of thousands of products agree to about 1e-12 of the
+largest. What singular values or variances fall below that share of the largest is known of nothing.
+"""
 
 from typing import Any, cast
 
 import numpy as np
 
-from study.support.arrays import Floats
+from study.support.arrays import Complexes, Floats
 
-NOTHING = 1e-200  # of the largest column: what is so much smaller tells nothing, and its amount would overflow
+INDISTINCT = 1e-12  # share of the largest singular value, eigenvalue or variance below which there is rounding alone
+_lstsq, _pinv = cast(Any, np.linalg.lstsq), cast(Any, np.linalg.pinv)  # their annotations leave the element type open
 
 
-def least_squares(columns: Floats, target: Floats, cutoff: float = 1e-12) -> Floats:
+def least_squares(columns: Floats, target: Floats, cutoff: float = INDISTINCT) -> Floats:
     """Amounts of the columns that approximate the target best, shape (columns,).
 
     Columns are scaled to unit length first; singular values below ``cutoff`` of the largest then count as zero.
     """
     peak = np.max(np.abs(columns), axis=0, initial=0.0)
-    peak = np.where(peak > NOTHING * np.max(peak, initial=0.0), peak, np.inf)  # first, so that no square overflows
-    length = np.linalg.norm(columns / peak, axis=0)
-    scale = peak * np.where(length > 0.0, length, 1.0)
-    solve = cast(Any, np.linalg.lstsq)  # its annotation leaves the element type open
-    amounts: Floats = np.asarray(solve(columns / scale, target, rcond=cutoff)[0], dtype=np.float64)
+    least = np.sqrt(np.finfo(float).tiny) * np.max(peak, initial=0.0)  # the square of a larger amount may be no number
+    peak = np.where(peak > least, peak, np.inf)  # first, so that no square overflows
+    scale = peak * length_or_one(columns / peak)
+    amounts: Floats = np.asarray(_lstsq(columns / scale, target, rcond=cutoff)[0], dtype=np.float64)
     return amounts / scale
+
+
+def influence(design: Complexes, weight: Floats) -> Complexes:
+    """How the lines of a complex target move its real coefficients: these are ``Re(influence @ target)``.
+
+    Parameters
+    ----------
+    design : complex array, shape (lines, coefficients)
+        What a unit of each coefficient makes of the target.
+    weight : array, shape (lines,)
+        Inverse variances of the lines, to a common factor.
+
+    Returns
+    -------
+    complex array, shape (coefficients, lines)
+        Zero for a coefficient that no line tells.
+    """
+    root = np.sqrt(weight)
+    columns = np.concatenate([design.real, design.imag]) * np.concatenate([root, root])[:, None]
+    size = length_or_one(columns)
+    inverse: Floats = np.asarray(_pinv(columns / size, rcond=INDISTINCT), dtype=np.float64) / size[:, None]
+    lines = len(design)
+    return (inverse[:, :lines] - 1j * inverse[:, lines:]) * root
+
+
+def normal_inverse(normal: Floats, size: Floats | None = None) -> Floats:
+    """Inverse of a normal matrix ``J^T W J``, or ``Z^T W J`` with instruments Z, for p unknowns of any size.
+
+    Shapes (..., p, p). ``size`` has the lengths of the columns; the roots of the diagonal if left out. Of unknowns of
+    which the data tell a sum alone, the shortest amounts are taken.
+    """
+    if size is None:
+        size = np.sqrt(np.diagonal(normal, axis1=-2, axis2=-1))
+    size = np.where(size > 0.0, size, np.inf)
+    scale = size[..., :, None] * size[..., None, :]
+    return np.asarray(_pinv(normal / scale, rcond=INDISTINCT), dtype=np.float64) / scale
+
+
+def length_or_one(columns: Floats | Complexes) -> Floats:
+    """Length of each column, one where it is zero."""
+    length = np.linalg.norm(columns, axis=0)
+    return np.where(length > 0.0, length, 1.0)
+
+
+def floored(variance: Floats) -> Floats:
+    """Variances to divide by; ones where a model explains everything to the last digit."""
+    largest = float(np.max(variance, initial=0.0))
+    return np.maximum(variance, INDISTINCT * largest) if largest > 0.0 else np.ones_like(variance)

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.support.arrays import Floats
-from study.support.block_normal import INDISTINCT, ContinuityGaps, Normal, normal_equations
+from study.support.block_normal import ContinuityGaps, Normal, normal_equations
+from study.support.least_squares import INDISTINCT
 
 OFFSET = 1e-4  # length of the next step, in standard errors, at which a search has converged (Bates and Watts, 1981)
 ROUNDING = 1e-11  # share of the response that a step changes at which a search has converged too
@@ -22,27 +23,13 @@ MATTERS = 1e-3  # fall of the error that matters, as a share of what a step of o
 
 @dataclass(frozen=True)
 class Point:
-    """A point of the search; n samples, p variables: shared ones, then segment by segment its own.
+    """A point of the search; n samples, p variables: shared ones, then segment by segment its own."""
 
-    Attributes
-    ----------
-    x : array, shape (p,)
-        The variables.
-    residual : array, shape (n,)
-        Measured minus predicted.
-    cost : float
-        Sum of squares of the residual.
-    scale : array, shape (p,)
-        Length of each column of the Jacobian, one where it is zero.
-    normal : Normal
-        Normal equations of the Jacobian with columns of unit length.
-    """
-
-    x: Floats
-    residual: Floats
-    cost: float
-    scale: Floats
-    normal: Normal
+    x: Floats  # the variables, shape (p,)
+    residual: Floats  # measured minus predicted, shape (n,)
+    cost: float  # sum of squares of the residual
+    scale: Floats  # length of each column of the Jacobian, one where it is zero, shape (p,)
+    normal: Normal  # normal equations of the Jacobian with columns of unit length
 
     def covariance(self) -> Floats:
         """Of the k shared variables, s^2 from the residual; very large where the data do not decide, shape (k, k)."""
@@ -115,11 +102,16 @@ def minimise(
     for iteration in range(1, max_iterations + 1):
         unit = count * point.cost / freedom  # fall of the error in a step of one standard error
         fall = point.normal.decrement()
+        found = f"converged after {iteration} free runs"
         if fall <= offset**2 * unit or fall <= (ROUNDING * size) ** 2:
-            return End(point, True, iteration, f"converged after {iteration} free runs")
+            return End(point, True, iteration, found)
         costs.append(point.cost)
         if len(costs) > PATIENCE and costs[-1 - PATIENCE] - point.cost < MATTERS * unit:
-            return _stalled(point, iteration, float(np.sqrt(fall / unit)))
+            left = float(np.sqrt(fall / unit))  # in a kink of the sum of squares, as friction and stops cause
+            if left <= 1.0:  # the kink may be the minimum
+                return End(point, True, iteration, f"{found} to where no step lowers the error")
+            why = f"no step lowers the error, though one of {left:.2g} standard errors should"
+            return End(point, False, iteration, f"stuck after {iteration} free runs: {why}")
         step = point.normal.step(damping)
         trial = linearise(point.x + step / point.scale)
         expected = float(step @ (damping * step + point.normal.gradient()))
@@ -130,11 +122,3 @@ def minimise(
         else:
             damping, growth = damping * growth, 2.0 * growth
     return End(point, False, max_iterations, f"still falling after {max_iterations} free runs, the most allowed")
-
-
-def _stalled(point: Point, iteration: int, offset: float) -> End:
-    """The end of a search in a kink of the sum of squares, as friction and stops cause; it may be the minimum."""
-    if offset <= 1.0:
-        return End(point, True, iteration, f"converged after {iteration} free runs to where no step lowers the error")
-    why = f"no step lowers the error, though one of {offset:.2g} standard errors should"
-    return End(point, False, iteration, f"stuck after {iteration} free runs: {why}")

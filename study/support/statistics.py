@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from study.support.arrays import Floats
+from study.support.least_squares import length_or_one, normal_inverse
 from study.support.thresholds import BLOCKS
 
 SHORTEST = 16  # samples in a block
@@ -17,21 +18,12 @@ SHORTEST = 16  # samples in a block
 
 @dataclass(frozen=True)
 class Gain:
-    """How much of one fit's residual another explains.
+    """How much of one fit's residual another explains."""
 
-    Attributes
-    ----------
-    explained : float
-        Share of the mean square of the residual.
-    error : float
-        Its standard error, by leaving out one block at a time.
-    p_value : float
-        Probability of so steady an agreement between the residual and the change of the prediction if there
-        were none (one-sided, over blocks).
-    """
-
-    explained: float
-    error: float
+    explained: float  # share of the mean square of the residual
+    error: float  # its standard error, by leaving out one block at a time
+    # Probability of so steady an agreement between the residual and the change of the prediction if there were none
+    # (one-sided, over blocks).
     p_value: float
 
 
@@ -136,10 +128,9 @@ def clustered_covariance(jacobian: Floats, residual: Floats, others: int = 0) ->
     (Liang and Zeger, 1986), never below the formula for white noise. ``others`` is how many unknowns the columns of the
     Jacobian are beside.
     """
-    scale = np.linalg.norm(jacobian, axis=0)
-    scale = np.where(scale > 0.0, scale, 1.0)
+    scale = length_or_one(jacobian)
     j = jacobian / scale
-    inverse = np.linalg.pinv(j.T @ j, rcond=1e-12, hermitian=True)
+    inverse = normal_inverse(j.T @ j)
     count = max(2, min(BLOCKS, len(residual) // SHORTEST))
     size = len(residual) // count
     blocks = np.einsum(

@@ -16,7 +16,7 @@ from study.equations.terms import get
 from study.records.excitation import Excitation, force
 from study.records.record import Record, write_csv
 from study.support.errors import StudyError
-from study.support.file_sets import check_folder, write_files
+from study.support.files import check_folder, write_files
 
 DT = 0.02
 DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parents[3] / "shared" / "data"))

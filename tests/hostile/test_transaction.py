@@ -16,7 +16,7 @@ from study import cli
 from study.compare import history
 from study.equations.model_file import read_model
 from study.support.errors import StudyError
-from study.support.transaction import journal_of, locked, recover, replace_together
+from study.support.files import journal_of, locked, recover, replace_together
 
 OLD, NEW = b"terms: [inertia]\n", b"terms: [inertia, linear_damping]\n"
 STEPS, MORE = b'{"steps": []}\n', b'{"steps": [1]}\n'
@@ -24,7 +24,7 @@ STEPS, MORE = b'{"steps": []}\n', b'{"steps": [1]}\n'
 KILLED = """
 import os, sys
 from pathlib import Path
-from study.support.transaction import locked, replace_together
+from study.support.files import locked, replace_together
 
 count, last = 0, int(sys.argv[1])
 
@@ -61,6 +61,8 @@ def state() -> tuple[bytes, bytes | None]:
 @pytest.mark.parametrize("kept", [STEPS, None], ids=["with a history", "without"])
 def test_killed_between_any_two_writes(kept: bytes | None) -> None:
     """Every write in turn: whoever reads the model next sees all of it or nothing."""
+    if kept is not None:
+        Path("rig.history.json").write_bytes(kept)
     whole = subprocess.run([sys.executable, "-c", KILLED, "0"], capture_output=True, text=True, check=True)
     writes = int(whole.stdout)
     assert writes >= 10
@@ -134,7 +136,7 @@ def test_what_fails_on_the_way_is_put_back(monkeypatch: pytest.MonkeyPatch) -> N
 def test_one_after_the_other() -> None:
     """Twenty at once, each adds a line: none is lost."""
     code = (
-        "from pathlib import Path\nfrom study.support.transaction import *\np = Path('rig.yaml')\n"
+        "from pathlib import Path\nfrom study.support.files import *\np = Path('rig.yaml')\n"
         "with locked(p):\n    replace_together(p, {p: p.read_bytes() + b'x'})\n"
     )
     running = [subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL) for _ in range(20)]

@@ -8,7 +8,7 @@ import pytest
 
 from study.equations.simulate import Integrator, simulate
 from study.identify import estimators
-from study.identify.estimators import output_error
+from study.identify.estimators import in_free_run
 from study.identify.estimators.base import Settings
 from study.identify.frequency_domain.starting_values import linear_start
 from study.identify.time_domain.part_fit import fit_part
@@ -88,7 +88,7 @@ def test_the_rest_of_the_library(name, make_model, report_force):
 def test_a_chaotic_system_is_found_in_segments(seed, systems, records):
     """In one free run every width leaves the motion, and the best of them says little."""
     model, record = systems["dead_band"], noisy(records["dead_band"], 0.05, seed)
-    fit = output_error.free_run_fit(opened(model), record)
+    fit = in_free_run.free_run_fit(opened(model), record)
     assert fit.restarts
     for key, true in model.values.items():
         assert fit.model.values[key] == pytest.approx(true, rel=0.3)
@@ -96,11 +96,11 @@ def test_a_chaotic_system_is_found_in_segments(seed, systems, records):
 
 def test_given_shapes_are_kept(systems, records):
     model, record = systems["mathieu"], records["mathieu"]
-    fit = output_error.free_run_fit(model, record)
+    fit = in_free_run.free_run_fit(model, record)
     assert fit.model.values["periodic_stiffness.f_m"] == model.values["periodic_stiffness.f_m"]
     assert set(model.values) - set(fit.keys) == {"periodic_stiffness.f_m"}
     assert "f_m" not in by_name(estimators.identify("output_error", model, record, TOLD))
-    assert set(output_error.free_run_fit(opened(model), record).keys) == set(model.values)
+    assert set(in_free_run.free_run_fit(opened(model), record).keys) == set(model.values)
 
 
 def test_nothing_is_found_for_a_model_without_shapes(systems, records):
@@ -141,7 +141,7 @@ def test_a_search_that_does_not_arrive_says_so(systems, records, monkeypatch):
     def hasty(model, prepared):
         return fit_part(model, prepared, model.held_keys, linear_start(model, prepared), max_iterations=1)
 
-    monkeypatch.setattr("study.identify.estimators.output_error.fit_model", hasty)
+    monkeypatch.setattr("study.identify.estimators.in_free_run.fit_model", hasty)
     record = noisy(records["duffing"], 0.05, 1)
     found = estimators.identify("output_error", systems["duffing"], record, TOLD)
     assert found.note == "still falling after 1 free runs, the most allowed"
@@ -154,7 +154,7 @@ def test_one_free_run_is_enough_for_all_but_the_dead_band(systems, records):
     for name, model in systems.items():
         if name == "dead_band":
             continue
-        fit = output_error.free_run_fit(model, records[name].part(0, 2048))
+        fit = in_free_run.free_run_fit(model, records[name].part(0, 2048))
         assert fit.converged
         assert fit.restarts == (), name
 
@@ -162,4 +162,4 @@ def test_one_free_run_is_enough_for_all_but_the_dead_band(systems, records):
 def test_a_record_that_does_not_show_it_is_refused(systems, records):
     record = records["linear"].with_channels({"displacement": np.zeros(8192)})
     with pytest.raises(StudyError):
-        output_error.free_run_fit(opened(systems["mathieu"]), record)
+        in_free_run.free_run_fit(opened(systems["mathieu"]), record)

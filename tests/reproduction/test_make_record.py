@@ -75,7 +75,7 @@ def test_an_estimator_whose_model_diverges_leaves_the_others_alone(systems, reco
         raise DivergenceError("the free run diverges", 1.0)
 
     monkeypatch.setitem(ESTIMATORS, "output_error", __name__)
-    monkeypatch.setattr(sys.modules[__name__], "identify", diverges, raising=False)
+    monkeypatch.setattr(sys.modules[__name__], "output_error", diverges, raising=False)
     told = CONFIG.identification_settings("linear", ("miso", "output_error"))
     found = identify_case(systems["linear"], records["linear"], told)
     assert found["output_error"].note.startswith("output_error finds nothing in linear: the free run diverges")

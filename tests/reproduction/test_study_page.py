@@ -10,7 +10,7 @@ from study.reproduction import study_page, summary
 from study.reproduction.claims import claims_table
 from study.reproduction.claims.claim_pages import LONGEST, conditions, shortened
 from study.support import document
-from study.support.picture_page import Picture
+from study.support.document import Picture
 from tests.reproduction.test_summary import CLAIMS, ERRORS, PARAMETERS, READING, STRUCTURES, TIMES
 
 PNG = bytes.fromhex("89504e470d0a1a0a") + b"picture"

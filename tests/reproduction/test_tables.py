@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from study.identify.estimators.base import Identified, Parameter
-from study.identify.frequency_domain.responses import Responses
+from study.identify.frequency_domain.coefficients import Responses
 from study.reproduction import tables
 from study.reproduction.config import load_config
 from study.reproduction.identify_case import identify_case

@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 from study.equations.model_file import parse_model
 from study.identify import estimators
 from study.identify.estimators.base import Settings
-from study.identify.frequency_domain.local_polynomial_method import LocalPolynomial
+from study.identify.frequency_domain.local_polynomial import LocalPolynomial
 from study.records.excitation import Excitation, force
 from study.records.record import Record
 from study.records.spectra import Segments

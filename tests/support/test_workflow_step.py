@@ -102,12 +102,12 @@ def test_simulation_does_not_rest_on_identification():
         "study.identify.estimators",
         "study.identify.estimators.base",
         "study.records.spectra",
-        "study.identify.frequency_domain.local_polynomial_method",
+        "study.identify.frequency_domain.local_polynomial",
     ]
     found = rests_on(ROOT / script, without=cut)
     names = {Path(p).name for p in found}
     assert {"simulate.py", "kernels.py", "plain.c", "program.h", "excitation.py", "terms.py", "record.py"} <= names
-    assert not {"miso.py", "parameters.py", "spectra.py", "inputs.py", "local_polynomial.py"} & names
+    assert not {"in_reverse.py", "spectra.py", "inputs.py", "coefficients.py", "local_polynomial.py"} & names
 
 
 def test_steps_write_files_that_are_never_half_there():

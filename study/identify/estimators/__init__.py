@@ -1,4 +1,4 @@
-"""Ways to get coefficients from a record. Each is one file with one function, entered in ``ESTIMATORS``."""
+"""Ways to get coefficients from a record, each a function of its name: in reverse, or on a fit in free run."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, cast
@@ -10,15 +10,16 @@ if TYPE_CHECKING:  # a list of the estimators needs none of their modules
     from study.identify.estimators.base import Estimator, Identified, Settings
     from study.records.record import Record
 
+IN_REVERSE, IN_FREE_RUN = "study.identify.estimators.in_reverse", "study.identify.estimators.in_free_run"
 ESTIMATORS = {
-    "siso": "study.identify.estimators.siso",
-    "miso": "study.identify.estimators.miso",
-    "miso_hand_read": "study.identify.estimators.hand_read",
-    "local_polynomial": "study.identify.estimators.local_polynomial",
-    "output_error": "study.identify.estimators.output_error",
-    "instrumental": "study.identify.estimators.instrumental",
-    "miso_free_shape": "study.identify.estimators.free_shape",
-    "errors_in_variables": "study.identify.estimators.errors_in_variables",
+    "siso": IN_REVERSE,
+    "miso": IN_REVERSE,
+    "miso_hand_read": IN_REVERSE,
+    "local_polynomial": IN_REVERSE,
+    "output_error": IN_FREE_RUN,
+    "instrumental": IN_FREE_RUN,
+    "miso_free_shape": IN_FREE_RUN,
+    "errors_in_variables": IN_REVERSE,
 }
 
 
@@ -26,7 +27,7 @@ def get_estimator(name: str) -> "Estimator":
     """The estimator of this name, its module imported only now."""
     if name not in ESTIMATORS:
         raise StudyError(f"there is no estimator {name!r}; known are {', '.join(ESTIMATORS)}")
-    return cast("Estimator", import_module(ESTIMATORS[name]).identify)
+    return cast("Estimator", getattr(import_module(ESTIMATORS[name]), name))
 
 
 def identify(name: str, model: "Model", record: "Record", settings: "Settings") -> "Identified":

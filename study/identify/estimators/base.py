@@ -10,35 +10,22 @@ import numpy as np
 from study.equations.model import Model
 from study.equations.term import Term
 from study.equations.terms import LIBRARY
-from study.identify.frequency_domain.coefficients import Estimate
+from study.identify.frequency_domain.coefficients import Estimate, Responses
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.identify.frequency_domain.inputs import Input
-from study.identify.frequency_domain.local_polynomial_method import LocalPolynomial
-from study.identify.frequency_domain.responses import Responses
+from study.identify.frequency_domain.local_polynomial import LocalPolynomial
 from study.records.record import Record
 from study.records.spectra import Segments
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of the estimators.
+    """Settings of the estimators."""
 
-    Attributes
-    ----------
-    segments : Segments
-        Segments of Welch's method, for estimators that use it.
-    band : pair of float
-        Lines that the parameters are fitted to, in hertz.
-    local_polynomial : LocalPolynomial
-        Bands and degree, for the estimator of this name.
-    settle_periods : int
-        Periods at the beginning of a periodic record that ``errors_in_variables`` leaves out.
-    """
-
-    segments: Segments
-    band: tuple[float, float]
-    local_polynomial: LocalPolynomial = field(default_factory=LocalPolynomial)
-    settle_periods: int = 1
+    segments: Segments  # of Welch's method, for estimators that use it
+    band: tuple[float, float]  # lines that the parameters are fitted to, in hertz
+    local_polynomial: LocalPolynomial = field(default_factory=LocalPolynomial)  # for the estimator of this name
+    settle_periods: int = 1  # at the beginning of a periodic record, which ``errors_in_variables`` leaves out
 
 
 @dataclass(frozen=True)
@@ -52,34 +39,15 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Identified:
-    """Result of an estimator.
+    """Result of an estimator."""
 
-    Attributes
-    ----------
-    inputs : tuple of Input
-        Inputs of the reverse system.
-    responses : Responses or None
-        Frequency response functions, for estimators that have some of their own; a ``MisoResult`` has
-        coherences too.
-    parameters : tuple of Parameter
-        Named parameters.
-    estimate : Estimate or None
-        The coefficients themselves, as the model names them, for estimators that find them together.
-    note : str
-        A warning, such as that a search did not converge; mostly empty.
-    shapes : Estimate or None
-        Shape parameters, where they are not part of ``estimate``.
-    analysis : MisoResult or None
-        Coherences, for estimators whose ``responses`` have none of their own.
-    """
-
-    inputs: tuple[Input, ...]
-    responses: Responses | None
+    inputs: tuple[Input, ...]  # of the reverse system
+    responses: Responses | None  # for estimators that have some of their own; a ``MisoResult`` has coherences too
     parameters: tuple[Parameter, ...]
-    estimate: Estimate | None = None
-    note: str = ""
-    shapes: Estimate | None = None
-    analysis: MisoResult | None = None
+    estimate: Estimate | None = None  # coefficients as the model names them, for estimators that find them together
+    note: str = ""  # a warning, such as that a search did not converge; mostly empty
+    shapes: Estimate | None = None  # shape parameters, where they are not part of ``estimate``
+    analysis: MisoResult | None = None  # coherences, for estimators whose ``responses`` have none of their own
 
 
 class Estimator(Protocol):

@@ -9,45 +9,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from study.identify.frequency_domain.responses import Responses
+from study.identify.frequency_domain.coefficients import Responses
 from study.records.spectra import SpectralMatrix
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
-
-COLLINEAR = 1e-13  # an input of which less than this share is left after conditioning depends on the others
-SILENT = 1e-13  # a line below this share of an input's largest amplitude is the rounding of the others
+from study.support.least_squares import INDISTINCT
 
 
 @dataclass(frozen=True)
 class MisoResult(Responses):
-    """What each input contributes, at each frequency line; q inputs, arrays of shape (q, lines).
+    """What each input contributes, at each frequency line; q inputs, arrays of shape (q, lines)."""
 
-    Attributes
-    ----------
-    conditioned : complex array
-        ``L_j``, frequency response function from the conditioned input j.
-    ordinary : array
-        Ordinary coherence of each raw input with the output.
-    partial : array
-        Partial coherence of each conditioned input with what is left of the output, (4.30).
-    contribution : array
-        Ordinary coherence of each conditioned input with the total output: the linear coherence
-        and the nonlinear coherence functions q^2, (4.31).
-    cumulative : array
-        Running sums of ``contribution``; the last is the multiple coherence, (4.38).
-    output : array, shape (lines,)
-        G_yy; ``noise`` is G_nn of (4.44).
-    averages : float
-        Effective number of averages.
-    """
-
-    conditioned: Complexes
-    ordinary: Floats
-    partial: Floats
-    contribution: Floats
-    cumulative: Floats
-    output: Floats
-    averages: float
+    conditioned: Complexes  # L_j, frequency response function from the conditioned input j
+    ordinary: Floats  # ordinary coherence of each raw input with the output
+    partial: Floats  # of each conditioned input with what is left of the output, (4.30)
+    contribution: Floats  # of each conditioned input with the total output: the coherence functions q^2, (4.31)
+    cumulative: Floats  # running sums of ``contribution``; the last is the multiple coherence, (4.38)
+    output: Floats  # G_yy, shape (lines,); ``noise`` is G_nn of (4.44)
+    averages: float  # their effective number
 
     @property
     def multiple(self) -> Floats:
@@ -68,20 +47,22 @@ def analyse(matrix: SpectralMatrix) -> MisoResult:
         )
     scale = _scale(matrix.density)
     scaled = matrix.density / (scale[:, :, None] * scale[:, None, :])
-    lower, left, partial = _condition(scaled)
+    rows, left, partial = _condition(scaled)
     gain = scale[:, -1:] / scale[:, :-1]
-    response = _unconditioned(lower, left)
-    output = matrix.density[:, -1, -1].real
-    contribution = _contributions(lower, scaled)
+    power, conditioned = np.einsum("fii->fi", scaled).real, np.einsum("fjj->fj", rows[:, :, :-1]).real
+    contribution = np.abs(rows[:, :, -1]) ** 2 / _divisor(conditioned) / _divisor(power[:, -1:])
     cumulative = np.minimum(np.cumsum(contribution, axis=1), 1.0)
-    noise = np.clip(1.0 - cumulative[:, -1], 0.0, None)
-    covariance = _covariance(scaled, noise, matrix.averages) * (gain[:, :, None] * gain[:, None, :])
+    noise, output = np.clip(1.0 - cumulative[:, -1], 0.0, None), matrix.density[:, -1, -1].real
+    # The many-input form of Bendat and Piersol's normalised random error (1 - gamma^2) / (2 gamma^2 n_d) of a squared
+    # gain (Random Data, 1986, chapter 11), with the q degrees of freedom given back that the fit itself used up.
+    inverse = np.linalg.pinv(scaled[:, :-1, :-1], rcond=INDISTINCT, hermitian=True)
+    covariance = inverse * (noise / (matrix.averages - inputs))[:, None, None]
     return MisoResult(
         frequency=matrix.frequency,
         conditioned=(left * gain).T,
-        response=(response * gain).T,
-        covariance=covariance,
-        ordinary=_ordinary(scaled).T,
+        response=(_unconditioned(rows, left) * gain).T,
+        covariance=covariance * (gain[:, :, None] * gain[:, None, :]),
+        ordinary=(np.abs(scaled[:, :-1, -1]) ** 2 / _divisor(power[:, :-1] * power[:, -1:])).T,
         partial=partial.T,
         contribution=contribution.T,
         cumulative=cumulative.T,
@@ -91,6 +72,11 @@ def analyse(matrix: SpectralMatrix) -> MisoResult:
     )
 
 
+def _divisor(power: Floats) -> Floats:
+    """What to divide by, where nothing divided by nothing is nothing."""
+    return np.where(power > 0.0, power, 1.0)
+
+
 def _scale(density: Complexes) -> Floats:
     """Root of each autospectrum, shape (lines, channels); infinite where an input is silent, so that it scales to zero.
 
@@ -98,8 +84,8 @@ def _scale(density: Complexes) -> Floats:
     unit power, would pass for an input.
     """
     power = np.sqrt(np.clip(np.einsum("fii->fi", density).real, 0.0, None))
-    scale = np.where(power > SILENT * power.max(axis=0), power, np.inf)
-    scale[:, -1] = np.where(power[:, -1] > 0.0, power[:, -1], 1.0)
+    scale = np.where(power > INDISTINCT * power.max(axis=0), power, np.inf)
+    scale[:, -1] = _divisor(power[:, -1])
     return scale
 
 
@@ -116,14 +102,14 @@ def _condition(density: Complexes) -> tuple[Complexes, Complexes, Floats]:
     partial = np.zeros((lines, channels - 1))
     for r in range(channels - 1):
         power = left[:, r, r].real
-        useful = power > COLLINEAR
+        useful = power > INDISTINCT
         row = np.where(useful[:, None], left[:, r, :], 0.0)
         safe = np.where(useful, power, 1.0)
         rows[:, r] = row
         responses[:, r] = row[:, -1] / safe
         remaining = left[:, -1, -1].real
         explained = np.abs(row[:, -1]) ** 2 / safe
-        partial[:, r] = np.clip(explained / np.where(remaining > 0.0, remaining, 1.0), 0.0, 1.0)
+        partial[:, r] = np.clip(explained / _divisor(remaining), 0.0, 1.0)
         left = left - row.conj()[:, :, None] * row[:, None, :] / safe[:, None, None]
     return rows, responses, partial
 
@@ -132,33 +118,6 @@ def _unconditioned(rows: Complexes, conditioned: Complexes) -> Complexes:
     """A_j from L_j by back substitution, (4.26) to (4.28)."""
     response = conditioned.copy()
     for i in range(conditioned.shape[1] - 2, -1, -1):
-        power = rows[:, i, i].real
-        ratio = rows[:, i, i + 1 : -1] / np.where(power > 0.0, power, 1.0)[:, None]
+        ratio = rows[:, i, i + 1 : -1] / _divisor(rows[:, i, i].real)[:, None]
         response[:, i] -= np.einsum("fj,fj->f", ratio, response[:, i + 1 :])
     return response
-
-
-def _contributions(rows: Complexes, density: Complexes) -> Floats:
-    """Share of the output that passes through each conditioned input, (4.29), (4.31) and (4.35)."""
-    power = np.einsum("fjj->fj", rows[:, :, :-1]).real
-    share = np.abs(rows[:, :, -1]) ** 2 / np.where(power > 0.0, power, 1.0)
-    output = density[:, -1, -1].real
-    return share / np.where(output > 0.0, output, 1.0)[:, None]
-
-
-def _ordinary(density: Complexes) -> Floats:
-    power = np.einsum("fii->fi", density).real
-    product = power[:, :-1] * power[:, -1:]
-    return np.abs(density[:, :-1, -1]) ** 2 / np.where(product > 0.0, product, 1.0)
-
-
-def _covariance(density: Complexes, noise: Floats, averages: float) -> Complexes:
-    """Random-error covariance of A: G_nn / (n_d - q) times the inverse input matrix.
-
-    This is the many-input form of Bendat and Piersol's normalised random error
-    ``(1 - gamma^2) / (2 gamma^2 n_d)`` of a squared gain (Random Data, 1986, chapter 11),
-    with the q degrees of freedom given back that the fit itself used up.
-    """
-    inputs = density.shape[1] - 1
-    inverse = np.linalg.pinv(density[:, :-1, :-1], rcond=COLLINEAR, hermitian=True)
-    return inverse * (noise / (averages - inputs))[:, None, None]

@@ -29,7 +29,7 @@ AGREED = 0.01  # of a state's rms: what other steps may change
 
 @dataclass(frozen=True)
 class Part:
-    """A coefficient's place in an input's frequency response function."""
+    """A coefficient's place in an input's frequency response function: ``coefficient * factor * (j 2 pi f)^order``."""
 
     symbol: str
     order: int
@@ -38,30 +38,19 @@ class Part:
 
 @dataclass(frozen=True)
 class Input:
-    """One input of the reverse system.
+    """One input of the reverse system."""
 
-    Attributes
-    ----------
-    shape : str
-        Formula of its time history g(u, v, t).
-    parts : tuple of Part
-        ``A(f) = sum of coefficient * factor * (j 2 pi f)^order``.
-    terms : tuple of str
-        Names of the terms it carries.
-    parameters : tuple of (str, float)
-        Shape parameters in the formula.
-    state : str or None
-        dz/dt, where the shape is a state z with a memory.
-    direction : tuple of float
-        Weights of the coordinates in the motion u that the shape is of.
-    """
+    shape: str  # formula of its time history g(u, v, t)
+    parts: tuple[Part, ...]  # what its frequency response function A(f) is the sum of
+    terms: tuple[str, ...]  # names of the terms it carries
+    parameters: tuple[tuple[str, float], ...]  # shape parameters in the formula
+    state: str | None = None  # dz/dt, where the shape is a state z with a memory
+    direction: tuple[float, ...] = ()  # weights of the coordinates in the motion u of the shape
 
-    shape: str
-    parts: tuple[Part, ...]
-    terms: tuple[str, ...]
-    parameters: tuple[tuple[str, float], ...]
-    state: str | None = None
-    direction: tuple[float, ...] = ()
+    @property
+    def linear(self) -> bool:
+        """Whether it is the motion itself."""
+        return self.shape == "u"
 
     def powers(self, frequency: Floats) -> Complexes:
         """``factor (j 2 pi f)^order`` of each part, shape (lines, parts)."""
@@ -71,6 +60,11 @@ class Input:
     def response(self, frequency: Floats, values: dict[str, float]) -> Complexes:
         """The exact A(f) for coefficients of these values, shape (lines,)."""
         return self.powers(frequency) @ np.array([values.get(p.symbol, 0.0) for p in self.parts])
+
+
+def symbols_of(inputs: Sequence[Input]) -> tuple[str, ...]:
+    """Names of the coefficients of all inputs, in their order."""
+    return tuple(part.symbol for item in inputs for part in item.parts)
 
 
 def reverse_inputs(model: Model, coordinate: str = ALONE) -> tuple[Input, ...]:

@@ -12,27 +12,23 @@ A_j(f) still comes from the measured response and may differ from the form that 
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, cast
 
 import numpy as np
 
 from study.equations import formulas
-from study.identify.frequency_domain.coefficients import Estimate
-from study.identify.frequency_domain.conditioned import COLLINEAR
-from study.identify.frequency_domain.from_coefficients import residual_density
-from study.identify.frequency_domain.inputs import Input, input_history
-from study.identify.frequency_domain.responses import Responses
+from study.identify.frequency_domain.coefficients import Estimate, Responses, lines_in, residual_density
+from study.identify.frequency_domain.inputs import Input, input_history, symbols_of
 from study.records import spectra
 from study.records.record import Record
 from study.records.spectra import Segments, SpectralMatrix
 from study.support.arrays import Complexes, Floats
+from study.support.least_squares import INDISTINCT, floored, normal_inverse
 
 NODES = 15  # nodes of the Gauss-Hermite rule: exact for shapes up to the power 29, close for kinked ones
 NOISY = {"u": "displacement", "v": "velocity"}  # channels with noise, by their names in a formula
 TINY = float(np.finfo(np.float64).tiny)
-_pinv = cast(Any, np.linalg.pinv)  # its annotation leaves the element type open
 STRETCHES, FEWEST = 16, 8  # parts of the record, at most and at least, whose scatter gives the errors of coefficients
-FAINT = 1e-8  # noise below this share of a channel's mean square is the rounding of the free run
+RUN_ERROR = 1e-8  # of a channel's mean square: noise below is the error of the free run
 
 
 def channels(inputs: Sequence[Input], record: Record, clean: Record) -> list[Floats]:
@@ -61,7 +57,7 @@ def instrumental_responses(matrix: SpectralMatrix) -> Responses:
     density, count = matrix.density, matrix.density.shape[1] // 2
     scale = np.sqrt(np.maximum(np.einsum("fii->fi", density).real, TINY))
     scaled = density / (scale[:, :, None] * scale[:, None, :])
-    inverse: Complexes = np.asarray(_pinv(scaled[:, :count, count:-1], rcond=COLLINEAR), dtype=np.complex128)
+    inverse: Complexes = np.asarray(np.linalg.pinv(scaled[:, :count, count:-1], rcond=INDISTINCT), dtype=np.complex128)
     gain = scale[:, -1:] / scale[:, count:-1]
     response = (np.einsum("fij,fj->fi", inverse, scaled[:, :count, -1]) * gain).T
     noise = residual_density(_without_instruments(matrix), response)
@@ -101,10 +97,10 @@ def fit_with_instruments(
     parts : sequence of SpectralMatrix
         As :func:`stretches` gives them.
     """
-    keep = (matrix.frequency >= band[0]) & (matrix.frequency <= band[1])
+    keep = lines_in(matrix.frequency, band)
     density, count = matrix.density[keep], len(inputs)
     noise = residual_density(_without_instruments(matrix), known)[keep]
-    noise = np.maximum(noise, FAINT * np.max(noise))
+    noise = floored(noise)
     powers = np.concatenate([item.powers(matrix.frequency[keep]) for item in inputs], axis=1)
     owner = np.repeat(np.arange(count), [len(item.parts) for item in inputs])
     weighted = powers.conj() / noise[:, None]
@@ -113,31 +109,22 @@ def fit_with_instruments(
 
     def equations(lines: Complexes) -> tuple[Floats, Floats]:
         through = lines[:, owner][:, :, count + owner]
-        normal = np.einsum("fp,fpq,fq->pq", weighted, through, powers).real / np.outer(size, size)
-        return normal, np.einsum("fp,fp->p", weighted, lines[:, owner, -1]).real / size
+        normal = np.einsum("fp,fpq,fq->pq", weighted, through, powers).real
+        return normal, np.einsum("fp,fp->p", weighted, lines[:, owner, -1]).real
 
     normal, right = equations(density)
-    inverse: Floats = np.asarray(_pinv(normal), dtype=np.float64)
-    scaled = inverse @ right
-    if parts:
-        covariance = _jackknife([equations(p.density[keep]) for p in parts])
+    inverse = normal_inverse(normal, size)
+    if parts:  # leaving out the equations of one stretch after the other
+        left, rights = (np.stack(side) for side in zip(*(equations(p.density[keep]) for p in parts), strict=True))
+        inverses = normal_inverse(np.sum(left, axis=0) - left, size)
+        without = np.einsum("gpq,gq->gp", inverses, np.sum(rights, axis=0) - rights)
+        off = without - np.mean(without, axis=0)
+        covariance = (len(off) - 1.0) / len(off) * off.T @ off
         covariance *= sum(p.averages for p in parts) / matrix.averages  # the whole has segments across the joints
     else:
-        spread = np.einsum("fp,fpq,fq->pq", weighted, own, powers).real / np.outer(size, size)
-        spread *= matrix.segments.line_inflation() / (2.0 * matrix.averages)
-        covariance = inverse @ spread @ inverse.T
-    symbols = tuple(part.symbol for item in inputs for part in item.parts)
-    freedom = len(parts) - 1.0 if parts else math.inf
-    return Estimate(symbols, scaled / size, covariance / np.outer(size, size), freedom)
-
-
-def _jackknife(equations: Sequence[tuple[Floats, Floats]]) -> Floats:
-    """Covariance of the solution of all equations, by leaving out those of one stretch after the other."""
-    left, right = (np.stack(side) for side in zip(*equations, strict=True))
-    inverses = np.asarray(_pinv(np.sum(left, axis=0) - left), dtype=np.float64)
-    without = np.einsum("gpq,gq->gp", inverses, np.sum(right, axis=0) - right)
-    off = without - np.mean(without, axis=0)
-    return np.asarray((len(off) - 1.0) / len(off) * off.T @ off, dtype=np.float64)
+        spread = np.einsum("fp,fpq,fq->pq", weighted, own, powers).real
+        covariance = inverse @ spread @ inverse.T * matrix.segments.line_inflation() / (2.0 * matrix.averages)
+    return Estimate(symbols_of(inputs), inverse @ right, covariance, len(parts) - 1.0 if parts else math.inf)
 
 
 def _without_instruments(matrix: SpectralMatrix) -> SpectralMatrix:
@@ -166,7 +153,7 @@ def noise_spread(record: Record, clean: Record) -> dict[str, Floats]:
     """A root of the noise's covariance: for each noisy channel its part of every independent source."""
     names = [name for name in NOISY.values() if name in record]
     noise = np.stack([record[name] - clean[name] for name in names])
-    noise[np.mean(noise**2, axis=1) < FAINT * np.mean(np.stack([clean[name] for name in names]) ** 2, axis=1)] = 0.0
+    noise[np.mean(noise**2, axis=1) < RUN_ERROR * np.mean(np.stack([clean[name] for name in names]) ** 2, axis=1)] = 0.0
     values, vectors = np.linalg.eigh(noise @ noise.T / noise.shape[1])
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     return dict(zip(names, root, strict=True))

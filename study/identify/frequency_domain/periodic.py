@@ -23,16 +23,17 @@ import numpy as np
 from scipy.fft import rfft
 
 from study.equations import formulas
-from study.identify.frequency_domain.coefficients import Estimate, floored
-from study.identify.frequency_domain.inputs import Input, histories
+from study.identify.frequency_domain.coefficients import Estimate, lines_in
+from study.identify.frequency_domain.inputs import Input, histories, symbols_of
 from study.records.record import Record
 from study.support.arrays import Complexes, Floats, Ints
 from study.support.errors import StudyError
+from study.support.least_squares import floored, normal_inverse
 
 Chosen = tuple[int, ...]
 MOST = 12  # periods that are treated one by one; of more, neighbours are averaged first
 NEIGHBOURS = 10  # lines on either side that a variance is averaged over: its own line would correlate with the weight
-PASSES = 4  # iterations of weights and coefficients
+PASSES = 4  # weights from the coefficients before
 DIFFERENT = 0.5  # share of a force's power that may differ between periods
 
 
@@ -68,32 +69,28 @@ def fit_periodic(record: Record, inputs: Sequence[Input], band: tuple[float, flo
     The covariance has as many degrees of freedom as there are periods, less one.
     """
     periods = Periods.of(record, inputs, band)
-    count = len(periods.force)
+    force, count = periods.force, len(periods.force)
     _check(inputs, count, record.name)
     own = np.stack([periods.columns((p,)) for p in range(count)])
     size = np.linalg.norm(own, axis=(0, 1))
     driven = size > 0.0
-    scale = size[driven]
-    equations = [
-        _Equation(
-            periods.unbiased(a)[:, driven] / scale, periods.unbiased(b)[:, driven] / scale,
-            np.mean(periods.force[list(a)], axis=0),
-        )
+    own, size = own[:, :, driven], size[driven]
+    halves = [  # columns and output of one half of the periods, columns of the other half as instruments
+        (periods.unbiased(a)[:, driven], np.mean(force[list(a)], axis=0), periods.unbiased(b)[:, driven])
         for a, b in _halves(count)
-    ]  # fmt: skip
-    values, covariance = _solve(equations, own[:, :, driven] / scale, periods.force)
-    symbols = [p.symbol for item in inputs for p in item.parts]
-    known = tuple(s for s, d in zip(symbols, driven, strict=True) if d)
-    return Estimate(known, values / scale, covariance / np.outer(scale, scale), count - 1.0)
-
-
-@dataclass(frozen=True)
-class _Equation:
-    """Columns and output of one half of the periods, columns of the other half as instruments; rows are lines."""
-
-    columns: Complexes
-    instruments: Complexes
-    output: Complexes
+    ]
+    instruments, weight = np.mean([z for _, _, z in halves], axis=0), np.ones(force.shape[1])
+    values, shifts = np.zeros(len(size)), np.zeros((len(size), count))
+    for _ in range(PASSES + 1):  # alike at first, then by what the coefficients before leave
+        tested = [((z * weight[:, None]).conj().T, x, y) for x, y, z in halves]
+        inverse = normal_inverse(np.mean([(z @ x).real for z, x, _ in tested], axis=0), size)
+        values = np.asarray(inverse @ np.mean([(z @ y).real for z, _, y in tested], axis=0), dtype=np.float64)
+        left = force - own @ values
+        left = left - np.mean(left, axis=0)  # what a period leaves otherwise than the others do, for the scatter
+        shifts = inverse @ ((instruments * weight[:, None]).conj().T @ left.T).real
+        weight = _weights(np.sum(np.abs(left) ** 2, axis=0))
+    known = tuple(s for s, d in zip(symbols_of(inputs), driven, strict=True) if d)
+    return Estimate(known, values, shifts @ shifts.T / (count * (count - 1.0)), count - 1.0)
 
 
 @dataclass(frozen=True)
@@ -113,7 +110,7 @@ class Periods:
         channels = _grouped(record)
         samples = channels["force"].shape[1]
         frequency: Floats = np.arange(samples // 2 + 1, dtype=np.float64) / (samples * record.dt)
-        keep = np.flatnonzero((frequency >= band[0]) & (frequency <= band[1]))
+        keep = np.flatnonzero(lines_in(frequency, band))
         if len(keep) <= 2 * NEIGHBOURS:
             raise StudyError(
                 f"a period of {record.name} has {len(keep)} lines from {band[0]:g} to {band[1]:g} Hz; "
@@ -171,34 +168,6 @@ def _halves(count: int) -> list[tuple[Chosen, Chosen]]:
     turned = [tuple((shift + i) % count for i in range(count)) for shift in range(count)]
     cuts = [(order[:half], order[half:]) for order in turned]
     return cuts if count % 2 == 0 else cuts + [(b, a) for a, b in cuts]
-
-
-def _solve(equations: Sequence[_Equation], own: Complexes, force: Complexes) -> tuple[Floats, Floats]:
-    """Coefficients and their covariance; ``own`` and ``force`` are of each period by itself, for the scatter."""
-    count = len(force)
-    instruments = np.mean([e.instruments for e in equations], axis=0)
-    weight = np.ones(force.shape[1])
-    values, covariance = _weighted(equations, instruments, weight, own, force)
-    for _ in range(PASSES):
-        left = force - own @ values
-        weight = _weights(np.sum(np.abs(left - np.mean(left, axis=0)) ** 2, axis=0))
-        values, covariance = _weighted(equations, instruments, weight, own, force)
-    return values, covariance / (count * (count - 1.0))
-
-
-def _weighted(
-    equations: Sequence[_Equation], instruments: Complexes, weight: Floats, own: Complexes, force: Complexes
-) -> tuple[Floats, Floats]:  # fmt: skip
-    """Coefficients by instruments, and the sum of squares of what each period would shift them by."""
-    tested = [(e.instruments * weight[:, None]).conj().T for e in equations]
-    normal = np.mean([(z @ e.columns).real for z, e in zip(tested, equations, strict=True)], axis=0)
-    right: Floats = np.mean([(z @ e.output).real for z, e in zip(tested, equations, strict=True)], axis=0)
-    inverse: Floats = np.asarray(np.linalg.pinv(normal), dtype=np.float64)
-    values: Floats = inverse @ right
-    left = force - own @ values
-    left = left - np.mean(left, axis=0)
-    shifts: Floats = inverse @ ((instruments * weight[:, None]).conj().T @ left.T).real
-    return values, shifts @ shifts.T
 
 
 def _weights(scatter: Floats) -> Floats:

@@ -15,24 +15,12 @@ from study.support.arrays import Complexes, Floats
 
 @dataclass(frozen=True, eq=False)
 class Observability:
-    """What the lines say of a system's order: a subspace and its weights.
+    """What the lines say of a system's order: a subspace and its weights."""
 
-    Attributes
-    ----------
-    basis : array, shape (blocks outputs, blocks outputs)
-        Left singular vectors.
-    singular : array, shape (blocks outputs,)
-        Singular values: how much of the outputs each direction holds.
-    outputs : int
-        How many.
-    period : float
-        T of the bilinear transformation ``s = 2/T (z - 1)/(z + 1)``, in seconds.
-    """
-
-    basis: Floats
-    singular: Floats
-    outputs: int
-    period: float
+    basis: Floats  # left singular vectors, shape (blocks outputs, blocks outputs)
+    singular: Floats  # how much of the outputs each direction holds, shape (blocks outputs,)
+    outputs: int  # how many
+    period: float  # T of the bilinear transformation ``s = 2/T (z - 1)/(z + 1)``, in seconds
 
     def poles(self, order: int) -> Complexes:
         """Eigenvalues in rad/s of the system of this order, reflected to the left where they are unstable."""

@@ -153,14 +153,10 @@ def _layout(path: Path, lines: Sequence[str]) -> TextLayout:
     odd = next((k for k in best.others if heading < k < first and (words or best.is_numbers(k))), None)
     if odd is not None:  # a sample with a cell too many or too few must not be taken for a heading
         raise StudyError(f"{path}: line {odd + 1} has {len(best.others[odd])} cells; expected {best.width}")
-    return TextLayout(best.delimiter, best.decimal, first, *_headings(header, units, best.width))
-
-
-def _headings(header: Sequence[str], units: Sequence[str], width: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Name and unit of each column; a unit in the name comes before one in a row of its own."""
-    named = [split_unit(cell) for cell in header] or [(f"column {k + 1}", "") for k in range(width)]
-    below = [cell.strip("[]() ") for cell in units] or [""] * width
-    return tuple(n for n, _ in named), tuple(own or row for (_, own), row in zip(named, below, strict=True))
+    named = [split_unit(cell) for cell in header] or [(f"column {k + 1}", "") for k in range(best.width)]
+    below = [cell.strip("[]() ") for cell in units] or [""] * best.width
+    known = tuple(own or row for (_, own), row in zip(named, below, strict=True))  # a unit in the name comes first
+    return TextLayout(best.delimiter, best.decimal, first, tuple(name for name, _ in named), known)
 
 
 def _is_units_row(cells: Sequence[str]) -> bool:
@@ -182,30 +178,26 @@ def _commented(lines: Sequence[str], best: _Reading) -> list[str]:
 
 
 def _table(path: Path, body: bytes, layout: TextLayout) -> Table:
+    """Cells as numbers at once, or where one holds text, cell by cell: a column with text is refused if asked for."""
     place, width = partial(_line, body, layout.first), len(layout.names)
+    in_words = WORDS.search(body) is not None
     try:
-        frame, read = _frame(body, layout)
+        try:
+            frame = _parse(body, layout, "str" if in_words else "float64")
+        except pd.errors.ParserError:  # cells too many, which the slow road would not mend
+            raise
+        except (ValueError, OverflowError):
+            in_words, frame = True, _parse(body, layout, "str")
     except ValueError as error:
         raise StudyError(f"{path}: {_ragged(str(error), layout, place(0))}") from None
     hidden = f"{path}: line {layout.first + 1} has {frame.shape[1]} cells of numbers; expected {width}"
     expect(frame.shape[1] == width, hidden)  # a comment behind the first sample can hide some of its cells
-    headings = zip(layout.names, layout.units, strict=True)
-    columns = [read(name, unit, frame[k], layout.decimal, place) for k, (name, unit) in enumerate(headings)]
-    if read is _numbers:  # a delimiter at the end of each line leaves an unnamed column without a number
-        columns = [c for c in columns if c.name or not bool(np.isnan(c.values).all())]
-    return Table(tuple(columns), place=place)
-
-
-def _frame(body: bytes, layout: TextLayout) -> tuple[pd.DataFrame, Callable[..., Column]]:
-    """The cells, and how to make a column of them: as numbers at once, or where a cell holds text, cell by cell."""
-    try:
-        if not WORDS.search(body):
-            return _parse(body, layout, "float64"), _numbers
-    except pd.errors.ParserError:  # cells too many, which the slow road would not mend
-        raise
-    except (ValueError, OverflowError):
-        pass
-    return _parse(body, layout, "str"), _checked
+    headings = enumerate(zip(layout.names, layout.units, strict=True))
+    if in_words:
+        return Table(tuple(_checked(n, u, frame[k], layout.decimal, place) for k, (n, u) in headings), place=place)
+    columns = (Column(n, frame[k].to_numpy(dtype=np.float64), u) for k, (n, u) in headings)
+    # A delimiter at the end of each line leaves an unnamed column without a number.
+    return Table(tuple(c for c in columns if c.name or not bool(np.isnan(c.values).all())), place=place)
 
 
 def _parse(body: bytes, layout: TextLayout, dtype: str) -> pd.DataFrame:
@@ -214,10 +206,6 @@ def _parse(body: bytes, layout: TextLayout, dtype: str) -> pd.DataFrame:
         comment="%" if b"\n%" in body else "#", skipinitialspace=True, engine="c",
         keep_default_na=False, na_values=[""],
     )  # fmt: skip
-
-
-def _numbers(name: str, unit: str, cells: "pd.Series[Any]", _decimal: str, _place: Place) -> Column:
-    return Column(name, cells.to_numpy(dtype=np.float64), unit)
 
 
 def _checked(name: str, unit: str, cells: "pd.Series[Any]", decimal: str, place: Place) -> Column:

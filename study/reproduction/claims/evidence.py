@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from study.equations.model import Model
 from study.equations.terms import get
-from study.identify.estimators import miso, siso
 from study.identify.estimators.base import Identified, Settings
-from study.identify.estimators.hand_read import read_curve
+from study.identify.estimators.in_reverse import miso, read_curve, siso
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.records.record import Record
 from study.records.spectra import autospectrum
@@ -200,7 +199,7 @@ class Evidence:
         for name in assumed.plus:
             model = model.with_term(get(name))
         settings = self.estimator_settings(assumed)
-        single, multiple = (estimator.identify(model, record, settings) for estimator in (siso, miso))
+        single, multiple = (estimator(model, record, settings) for estimator in (siso, miso))
         return Outcome(_analysis(single, settings), _analysis(multiple, settings))
 
 

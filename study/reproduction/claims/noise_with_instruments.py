@@ -1,6 +1,6 @@
 """Section 5.4 with another estimator: what its statements would be with instruments from a free run."""
 
-from study.identify.estimators import instrumental
+from study.identify.estimators.in_free_run import instrumental
 from study.reproduction.claims.common import COMBINED, noises
 from study.reproduction.claims.evidence import Drive, Evidence
 from study.reproduction.claims.judgement import Condition, claims, together
@@ -35,7 +35,7 @@ def relative_errors(evidence: Evidence, reported: Reported, noise: float) -> dic
     """Relative error of each parameter against its exact value."""
     drive, settings = Drive(COMBINED, noise=noise), evidence.estimator_settings()
     model, truth = evidence.model(drive), {n: reported.table_1(COMBINED, n) for n in (*PARTS, "f_n")}
-    identified = threaded(lambda r: instrumental.identify(model, r, settings), evidence.records(drive))
+    identified = threaded(lambda r: instrumental(model, r, settings), evidence.records(drive))
     estimates = [{p.name: p.value for p in i.parameters} for i in identified]
     return {n: Sample.own_first(e[n] / true - 1.0 for e in estimates) for n, true in truth.items()}
 

@@ -9,10 +9,9 @@ import pytest
 from study.equations.simulate import Integrator, simulate
 from study.identify import estimators
 from study.identify.estimators.base import Settings
-from study.identify.frequency_domain import local_polynomial_method
+from study.identify.frequency_domain import local_polynomial
 from study.identify.frequency_domain.inputs import Input, Part, histories, reverse_inputs
-from study.identify.frequency_domain.local_polynomial_fit import fit_local_polynomial
-from study.identify.frequency_domain.local_polynomial_method import Lines, LocalPolynomial, transform
+from study.identify.frequency_domain.local_polynomial import Lines, LocalPolynomial, fit_local_polynomial, transform
 from study.records.excitation import Excitation, force
 from study.records.spectra import Segments
 from study.support.errors import StudyError
@@ -43,7 +42,7 @@ def made_lines(count=400, noise=0.0, seed=3):
 
 def test_polynomials_are_found_exactly_whatever_leaks():
     lines, exact = made_lines()
-    found = local_polynomial_method.local_polynomial_responses(lines, LocalPolynomial(2, 12))
+    found = local_polynomial.local_polynomial_responses(lines, LocalPolynomial(2, 12))
     index = np.searchsorted(lines.frequency, found.frequency - 1e-9)
     np.testing.assert_allclose(found.response, exact[:, index], rtol=1e-9)
     assert np.all(found.noise < 1e-18 * np.mean(np.abs(lines.output) ** 2))
@@ -54,7 +53,7 @@ def test_polynomials_are_found_exactly_whatever_leaks():
 def test_a_band_is_solved_as_a_dense_solver_does():
     lines, _ = made_lines(noise=50.0)
     how = LocalPolynomial(1, 10)
-    found = local_polynomial_method.local_polynomial_responses(lines, how)
+    found = local_polynomial.local_polynomial_responses(lines, how)
     b, first = 3, 3 * 5
     x = np.arange(-10, 11) / 10.0
     part = slice(first, first + 21)
@@ -70,16 +69,16 @@ def test_a_band_is_solved_as_a_dense_solver_does():
 
 def test_bands_solved_in_chunks_are_the_same(monkeypatch):
     lines, _ = made_lines(noise=1.0)
-    whole = local_polynomial_method.local_polynomial_responses(lines, LocalPolynomial(2, 12))
-    monkeypatch.setattr(local_polynomial_method, "CHUNK", 7)
-    parts = local_polynomial_method.local_polynomial_responses(lines, LocalPolynomial(2, 12))
+    whole = local_polynomial.local_polynomial_responses(lines, LocalPolynomial(2, 12))
+    monkeypatch.setattr(local_polynomial, "AT_A_TIME", 7)
+    parts = local_polynomial.local_polynomial_responses(lines, LocalPolynomial(2, 12))
     np.testing.assert_array_equal(whole.response, parts.response)
     np.testing.assert_array_equal(whole.covariance, parts.covariance)
 
 
 def test_covariance_and_noise_are_those_of_many_seeds():
     found = [
-        local_polynomial_method.local_polynomial_responses(made_lines(120, 50.0, s)[0], LocalPolynomial(2, 15))
+        local_polynomial.local_polynomial_responses(made_lines(120, 50.0, s)[0], LocalPolynomial(2, 15))
         for s in range(60)
     ]
     exact = made_lines(120)[1][:, np.searchsorted(made_lines(120)[0].frequency, found[0].frequency - 1e-9)]
@@ -121,7 +120,7 @@ def test_coefficients_are_those_of_one_dense_solve():
     solution = np.linalg.lstsq(
         np.concatenate([design.real, design.imag]), np.concatenate([target.real, target.imag]), rcond=None
     )[0]
-    estimate = fit_local_polynomial(lines, INPUTS, band, how)
+    estimate = fit_local_polynomial(lines, INPUTS, band, how)[0]
     np.testing.assert_allclose(estimate.values, solution[:4] * [1.0, 1.0, 1.0, 1e8], rtol=1e-8)
 
 
@@ -194,7 +193,7 @@ def test_memory_does_not_grow_with_bands_times_inputs():
     import tracemalloc
 
     tracemalloc.start()
-    local_polynomial_method.local_polynomial_responses(lines, LocalPolynomial())
+    local_polynomial.local_polynomial_responses(lines, LocalPolynomial())
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     bands = len(lines.frequency) // 20
@@ -213,7 +212,7 @@ def test_records_that_are_too_short(systems, records):
     with pytest.raises(StudyError, match=re.escape(says)):
         fit_local_polynomial(lines, inputs, BAND, LocalPolynomial())
     with pytest.raises(StudyError, match="the record of 256 samples has 127 lines, fewer than the 161 of a band"):
-        local_polynomial_method.local_polynomial_responses(lines, LocalPolynomial(2, 80))
+        local_polynomial.local_polynomial_responses(lines, LocalPolynomial(2, 80))
 
 
 def test_bands_that_are_too_narrow():
