@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 from study.equations.model import Model
 from study.equations.model_file import read_model
 from study.figures import page
+from study.records.record import Record, write_csv
 from study.reproduction import tables
 from study.structure import measured_tables, reverse_figures, reverse_tables
 from study.structure.measured_comparison import compare_measured
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_claims import measured_claims, structure_claims
-from study.structure.structure_record import StructureRecord, write_structure_csv
 from study.structure.structure_study import (
     StructureCase,
     StructureSettings,
@@ -39,7 +39,7 @@ def main(
     for name, table in made.items():
         tables.write_table(table, outputs[name])
     with replacing(outputs["record"]) as beside:
-        write_structure_csv(record, beside)
+        write_csv(record, beside)
     with styles.context(style):
         drawn = {kind: draw() for kind, draw in figures.items()}
         for kind, path in pictures.items():
@@ -47,7 +47,7 @@ def main(
 
 
 def in_reverse(
-    structure: Model, record: StructureRecord, case: StructureCase, settings: StructureSettings
+    structure: Model, record: Record, case: StructureCase, settings: StructureSettings
 ) -> Made:  # fmt: skip
     """Tables and figures of the equations of motion."""
     result = identify_structure(structure, record, case, settings)
@@ -66,7 +66,7 @@ def in_reverse(
 
 
 def as_measured(
-    structure: Model, record: StructureRecord, case: StructureCase, settings: StructureSettings
+    structure: Model, record: Record, case: StructureCase, settings: StructureSettings
 ) -> Made:  # fmt: skip
     """Tables and figures of a structure by its own modes."""
     model = measured_model(structure, case.sensors)

@@ -40,7 +40,7 @@ def climb(
     shutil.rmtree(work, ignore_errors=True)
     if first.named:
         return structure_climb(arguments, first, steps, folder)
-    together = accounted_together(arguments, first, read_records(arguments), records[0])
+    together = accounted_together(arguments, first, read_records(arguments, first), records[0])
     session = sessions.begin_with(together.comparison)
     for number in range(steps + 1):
         session, diagnosis = _diagnosed(session, work / f"step_{number}")

@@ -50,7 +50,7 @@ def _run(arguments: argparse.Namespace) -> None:
     if model.named:
         structures.compare_command(arguments, model)
         return
-    records = read_records(arguments)
+    records = read_records(arguments, model)
     model, marked, separate = separated_records(arguments, model, records)
     tests = [marked] if separate else [[record] for record in records]
     many, unpaged = len(tests) > 1, lacking("bokeh", PAGE, "explore")

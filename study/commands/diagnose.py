@@ -53,7 +53,7 @@ def _run(arguments: argparse.Namespace) -> None:
     for name in arguments.without:
         terms.get(name)
     files: dict[str, bytes] = {}
-    records = read_records(arguments)
+    records = read_records(arguments, model)
     for path in arguments.records:
         settings_beside(path)  # what is wrong there is said before the work begins
     if not arguments.each:  # one verdict on one structure

@@ -65,7 +65,7 @@ def _begun(arguments: argparse.Namespace, model: "Model", steps: "list[Step]") -
     from study.explore.by_record import Several, by_record, of_own
     from study.faults.accounting import Accounted
 
-    records = read_records(arguments)
+    records = read_records(arguments, model)
     together, marked, separate = separated_records(arguments, model, records)
     many = len(records) > 1 and not separate
     with progress("step", STEPS * (1 + len(records) * many)) as step:

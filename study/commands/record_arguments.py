@@ -151,7 +151,7 @@ def given_options(arguments: argparse.Namespace, group: str | None = None) -> "R
     )
 
 
-def read_records(arguments: argparse.Namespace) -> list["Record"]:
+def read_records(arguments: argparse.Namespace, model: "Model") -> list["Record"]:
     """The records, each with a name of its own: one for each file, or for each group of each."""
     from study.compare.comparison import distinct
     from study.records.readers import read_record
@@ -159,7 +159,8 @@ def read_records(arguments: argparse.Namespace) -> list["Record"]:
     groups: list[str | None] = list(arguments.group) or [None]
     for group in (g for g in groups if groups.count(g) > 1):
         raise StudyError(f"--group {group} is given twice; expected each group once")
-    return list(distinct([read_record(p, given_options(arguments, g)) for p in arguments.records for g in groups]))
+    chosen = [(path, given_options(arguments, group)) for path in arguments.records for group in groups]
+    return list(distinct([read_record(path, options, model.roles) for path, options in chosen]))
 
 
 def sources(arguments: argparse.Namespace) -> list[Path]:

@@ -43,7 +43,7 @@ def revise(
     from study.compare.comparison_report import as_json, comparison_document, comparison_summary, history_step
     from study.diagnose.needless import needless, of_records
 
-    steps, records = history.read_history(arguments.model), read_records(arguments)
+    steps, records = history.read_history(arguments.model), read_records(arguments, model)
     before: list[Comparison] = []
     after: list[Comparison] = []
     unneeded: list[tuple[Needless, ...]] = []

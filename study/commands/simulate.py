@@ -73,8 +73,8 @@ def _run(arguments: argparse.Namespace) -> None:
 def _structure(model: "Model", arguments: argparse.Namespace) -> None:
     """The same of a structure: each of its forces is random on its own."""
     from study.records.excitation import Excitation, force
+    from study.records.record import write_csv
     from study.structure.modes import modes_of, modes_table
-    from study.structure.structure_record import write_structure_csv
     from study.structure.structure_simulation import simulate_structure
     from study.support.errors import expect
     from study.support.files import replacing
@@ -90,7 +90,7 @@ def _structure(model: "Model", arguments: argparse.Namespace) -> None:
     steps = arguments.steps or _enough(2.0 * math.pi * modes.frequency.max(), arguments.dt)
     record = simulate_structure(model, forces, arguments.dt, steps_per_sample=steps)
     with replacing(arguments.out) as beside:
-        write_structure_csv(record, beside)
+        write_csv(record, beside)
     driven = ", ".join(f"{name} at {where} of rms {forces[name].std():.4g} N" for name, where in model.forces)
     print(f"{arguments.out}: {len(record)} samples, {arguments.samples * arguments.dt:g} s of {model.name}, {driven}")
     print(modes_table(modes, model.coordinates))

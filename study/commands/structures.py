@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 from study.commands.command import progress
 from study.commands.record_arguments import (
     ALTERNATE,
-    given_options,
     inputs_of,
     out_folder,
-    refuse_groups,
+    read_records,
+    sources,
     written_together,
 )
 
@@ -27,13 +27,11 @@ if TYPE_CHECKING:
 def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[PreparedStructure]":
     """The records that were named, made ready."""
     from study.structure.structure_layout import Parts, lay_out
-    from study.structure.structure_reader import read_structure
     from study.support.errors import at
 
-    refuse_groups(arguments)
     made: list[PreparedStructure] = []
-    for path in arguments.records:
-        record = read_structure(path, model, given_options(arguments))
+    records = read_records(arguments, model)
+    for path, record in zip(sources(arguments), records, strict=True):
         turns = arguments.judge == ALTERNATE
         fit, judge = (_within(span, len(record)) for span in (arguments.fit, None if turns else arguments.judge))
         with at(path):

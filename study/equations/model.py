@@ -6,6 +6,7 @@ None where it is to be estimated. Models are immutable; ``with_term`` and ``with
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from study.equations import formulas
 from study.equations.graph import Graph, Program
@@ -13,6 +14,9 @@ from study.equations.place import ALONE, HERE, Place
 from study.equations.term import Component, Term
 from study.support.arrays import Floats
 from study.support.errors import StudyError
+
+if TYPE_CHECKING:
+    from study.records.readers.roles import Roles
 
 FIXED_INPUTS = (*formulas.VARIABLES, "force")  # the registers that every forward program begins with
 
@@ -128,6 +132,13 @@ class Model:
     def values(self) -> dict[str, float | None]:
         """Every coefficient and shape parameter by key."""
         return {key: value for t in self.terms for key, value in t.values.items()}
+
+    @property
+    def roles(self) -> "Roles":
+        """What the columns of a record may be for it: its forces, and motions of its coordinates."""
+        from study.records.readers.roles import Roles
+
+        return Roles(self.coordinates, tuple(name for name, _ in self.forces))
 
     @property
     def held_keys(self) -> tuple[str, ...]:

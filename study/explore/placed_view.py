@@ -19,7 +19,6 @@ from study.explore.page_units import Scale, in_text, length, power, rate
 from study.explore.placed_session import PlacedStage
 from study.explore.placed_words import placed_words
 from study.figures.labels import power_of_ten
-from study.records.record import SI_UNITS
 from study.records.spectra import autospectrum
 from study.structure.connection_spectra import dynamic_stiffnesses, highest_frequency, missing_force_spectra
 from study.structure.sketch import Sketch
@@ -79,7 +78,8 @@ def _scales(comparison: StructureComparison) -> tuple[Scale, Scale]:
     curves = [c for c in comparison.forces.curves.values() if len(c.at)]
     far = max((float(np.max(np.abs(c.at))) for c in curves), default=1.0)
     most = max((float(np.max(np.abs(c.mean))) for c in curves), default=1.0)
-    return _length(comparison, far), power("N or N m" if _turns(comparison) else "N", most)
+    (force, unit), turns = comparison.prepared.record.force_and_length, _turns(comparison)
+    return _length(comparison, far), power(f"{force} or {force} {unit}" if turns else force, most)
 
 
 def _turns(comparison: StructureComparison) -> bool:
@@ -89,7 +89,8 @@ def _turns(comparison: StructureComparison) -> bool:
 
 def _length(comparison: StructureComparison, largest: float) -> Scale:
     """Metres become mm where that is easier to read; beside angles they stay."""
-    return power("m or rad", largest) if _turns(comparison) else length("m", largest)
+    unit = comparison.prepared.record.force_and_length[1]
+    return power(f"{unit} or rad", largest) if _turns(comparison) else length(unit, largest)
 
 
 def _sensors(comparison: StructureComparison) -> Columns:
@@ -116,11 +117,11 @@ def _joined(parts: Iterator[tuple[str, Mapping[str, Floats]]], names: Sequence[s
 def _motion_scale(comparison: StructureComparison, i: int) -> Scale:
     """Unit in which the motion of a sensor is easy to read."""
     sensor = comparison.prediction.prepared.sensors[i]
-    unit = SI_UNITS[sensor.motion]
+    unit = comparison.prepared.record.unit(sensor)
     most = float(np.max(np.abs(comparison.prediction.measured[:, i]), initial=0.0))
     if sensor.coordinate in comparison.prepared.record.rotations:
-        return power(unit.replace("m", "rad", 1), most)
-    return length(unit, most) if unit == "m" else rate(unit, most)
+        return power(unit, most)
+    return rate(unit, most) if "/" in unit else length(unit, most)
 
 
 def _motions(comparison: StructureComparison, close: bool = False) -> Columns:
@@ -206,7 +207,8 @@ def _force(comparison: StructureComparison, labels: Mapping[frozenset[str], str]
 def _stiffness(comparison: StructureComparison, labels: Mapping[frozenset[str], str]) -> tuple[Columns, str]:
     """Dynamic stiffness of each connection with 95 % intervals and that of the model, and their unit."""
     found = dynamic_stiffnesses(comparison)
-    scale = power("N/m", max((float(np.max(np.abs(s.model), initial=0.0)) for s in found.values()), default=1.0))
+    unit = "/".join(comparison.prepared.record.force_and_length)
+    scale = power(unit, max((float(np.max(np.abs(s.model), initial=0.0)) for s in found.values()), default=1.0))
 
     def parts() -> Iterator[tuple[str, Mapping[str, Floats]]]:
         for path, read in found.items():

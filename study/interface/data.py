@@ -214,7 +214,7 @@ def record(
 
 
 def _from_arrays(arrays: Mapping[str, Any], name: str, options: "ReadOptions") -> records.Record:
-    from study.records.readers import suspect_swapped
+    from study.records.readers import Roles, suspect_swapped
     from study.records.readers.assemble import record_from
     from study.records.readers.table import Column, Table, split_unit
 
@@ -227,7 +227,7 @@ def _from_arrays(arrays: Mapping[str, Any], name: str, options: "ReadOptions") -
             )
         title, unit = split_unit(heading)
         columns.append(Column(title, array.astype(np.float64), unit))
-    made = record_from(Path(name), Table(tuple(columns)), options)
+    made = record_from(Path(name), Table(tuple(columns)), options, Roles())
     suspicion = None if options.accept_swapped else suspect_swapped(made)
     if suspicion is not None:
         raise StudyError(f"{name}: {suspicion}")

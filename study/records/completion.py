@@ -7,12 +7,13 @@ the record. Integration is limited to frequencies above a cut-off: drift and off
 by (2 pi f)^2, would otherwise dominate. The remaining band is reported, and judgements are limited to it.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
-from study.records.record import MOTIONS, SI_UNITS, Record
+from study.records.record import ALONE, MOTIONS, Record, Sensor
 from study.records.spectra import Segments, autospectrum
 from study.support.arrays import Floats
 from study.support.autoregression import burg, continued_by
@@ -35,9 +36,9 @@ class CompletedRecord:
     Attributes
     ----------
     record : Record
-        Force, the three motions and any extra channels.
+        Forces, the three motions of every measured coordinate and any extra channels.
     band : (float, float)
-        Lowest and highest frequency in hertz at which all three motions are valid.
+        Lowest and highest frequency in hertz at which all motions are valid.
     edge : int
         Samples at each end that derivatives and integrals leave uncertain; 0 if nothing was computed.
     notes : tuple of str
@@ -51,58 +52,80 @@ class CompletedRecord:
 
 
 def complete(record: Record, cutoff: float | None = None) -> CompletedRecord:
-    """Fill in the motions that were not measured.
+    """Fill in the motions that were not measured, of every coordinate of which one was.
 
     Parameters
     ----------
     record : Record
-        Force and at least one motion.
+        Forces and at least one motion.
     cutoff : float, optional
         Lowest frequency in hertz that integration keeps (above it the gain is exactly one, below half of it
-        zero). Default: :func:`suggest_cutoff`. If displacement and acceleration are both measured, the velocity is
-        the derivative of the one below the cut-off and the integral of the other above it; without a cut-off it is
-        the derivative of the displacement.
+        zero). Default: :func:`suggest_cutoff` for each coordinate. If displacement and acceleration of one are both
+        measured, the velocity is the derivative of the one below the cut-off and the integral of the other above it;
+        without a cut-off it is the derivative of the displacement.
 
     Raises
     ------
     StudyError
         If no motion was measured, units cannot be converted, or the cut-off is outside of (0, 1/(2 dt)).
     """
-    measured = [m for m in MOTIONS if m in record]
-    if not measured:
+    if not record.sensors:
         raise StudyError(f"{record.name}: no displacement, velocity or acceleration is there; at least one is needed")
     nyquist = 0.5 / record.dt
     if cutoff is not None and not 0.0 < cutoff < nyquist:
         raise StudyError(f"{record.name}: the cut-off is {cutoff:g} Hz; expected it above 0 and below {nyquist:g} Hz")
     record, notes = consistent(record)
-    if len(measured) == len(MOTIONS):
-        return CompletedRecord(record, (0.0, nyquist), 0, notes)
-    if measured == ["displacement", "acceleration"] and cutoff is not None:
-        return _blended(record, cutoff, notes)
-    return _derived(record, measured, cutoff, notes)
+    low, edge, said = 0.0, 0, dict[str, list[str]]()
+    for coordinate in record.coordinates:
+        measured = [m for m in MOTIONS if Sensor(coordinate, m) in record]
+        if not measured or len(measured) == len(MOTIONS):
+            continue
+        if measured == ["displacement", "acceleration"] and cutoff is not None:
+            found = _blended(record, coordinate, cutoff)
+        else:
+            found = _derived(record, coordinate, measured, cutoff)
+        record = record.with_channels({str(Sensor(coordinate, m)): values for m, values in found.motions.items()})
+        low, edge = max(low, found.low), max(edge, found.edge)
+        for sentence in found.notes:
+            said.setdefault(sentence, []).append(coordinate)
+    return CompletedRecord(record, (low, nyquist), edge, (*notes, *(_where(s, at) for s, at in said.items())))
+
+
+@dataclass(frozen=True)
+class _Filled:
+    """Motions of a coordinate that were not measured."""
+
+    motions: dict[str, Floats]
+    low: float  # hertz below which they are not valid
+    edge: int
+    notes: tuple[str, ...]
+
+
+def _where(sentence: str, coordinates: Sequence[str]) -> str:
+    """A sentence on some coordinates, which it names unless it is the only one, without a name."""
+    named = [coordinate for coordinate in coordinates if coordinate]
+    return f"{', '.join(named)}: {sentence}" if named else sentence
 
 
 _OPERATION = {1: "derivative", 2: "second derivative", -1: "integral", -2: "double integral"}
 
 
-def _derived(record: Record, measured: list[str], cutoff: float | None, notes: tuple[str, ...]) -> CompletedRecord:
+def _derived(record: Record, coordinate: str, measured: list[str], cutoff: float | None) -> _Filled:
     """Each missing motion from the nearest measured one, by derivatives if there is a choice."""
     integrates = MOTIONS.index(measured[0]) > 0
-    low = (suggest_cutoff(record) if cutoff is None else cutoff) if integrates else 0.0
-    channels: dict[str, Floats] = {}
-    sentences = list(notes)
+    low = (suggest_cutoff(record, coordinate) if cutoff is None else cutoff) if integrates else 0.0
+    motions, sentences = dict[str, Floats](), list[str]()
     for level, name in enumerate(MOTIONS):
         if name in measured:
             continue
         below = [m for m in measured if MOTIONS.index(m) < level]
         source = below[-1] if below else measured[0]
         order = level - MOTIONS.index(source)
-        channels[name] = derivative(record[source], record.dt, order, low)
+        motions[name] = derivative(record[Sensor(coordinate, source)], record.dt, order, low)
         sentences.append(
             f"{name} is the {_OPERATION[order]} of the {source}{f' above {low:.4g} Hz' if order < 0 else ''}"
         )
-    edge = _edge(record, low) if integrates else NEAR_END
-    return CompletedRecord(record.with_channels(channels), (low, 0.5 / record.dt), edge, tuple(sentences))
+    return _Filled(motions, low, _edge(record, low) if integrates else NEAR_END, tuple(sentences))
 
 
 def _edge(record: Record, cutoff: float) -> int:
@@ -110,17 +133,17 @@ def _edge(record: Record, cutoff: float) -> int:
     return min(int(np.ceil(SETTLED / (cutoff * record.dt))), len(record) // 4)
 
 
-def _blended(record: Record, cutoff: float, notes: tuple[str, ...]) -> CompletedRecord:
+def _blended(record: Record, coordinate: str, cutoff: float) -> _Filled:
     """Velocity from both: the integral above the cut-off, the derivative below it."""
-    slow = derivative(record["displacement"], record.dt, 1)
-    fast = derivative(record["acceleration"], record.dt, -1, cutoff)
-    below = slow - derivative(record["displacement"], record.dt, 1, cutoff)
-    blended = record.with_channels({"velocity": fast + below})
+    displacement, acceleration = (record[Sensor(coordinate, m)] for m in ("displacement", "acceleration"))
+    slow = derivative(displacement, record.dt, 1)
+    fast = derivative(acceleration, record.dt, -1, cutoff)
+    below = slow - derivative(displacement, record.dt, 1, cutoff)
     note = (
         f"velocity is the derivative of the displacement below {cutoff:.4g} Hz "
         "and the integral of the acceleration above"
     )
-    return CompletedRecord(blended, (0.0, 0.5 / record.dt), _edge(record, cutoff), (*notes, note))
+    return _Filled({"velocity": fast + below}, 0.0, _edge(record, cutoff), (note,))
 
 
 def derivative(values: Floats, dt: float, order: int, cutoff: float = 0.0) -> Floats:
@@ -178,18 +201,18 @@ def _predicted(values: Floats, reach: int) -> Floats:
     return np.zeros(reach)
 
 
-def suggest_cutoff(record: Record) -> float:
+def suggest_cutoff(record: Record, coordinate: str = ALONE) -> float:
     """Frequency in hertz above which a measured acceleration or velocity can be integrated.
 
     The autospectrum of the displacement is that of the acceleration over (2 pi f)^4. Towards low frequencies that
     of a response levels off, that of noise and drift rises as f^-4. From below, the cut-off is where it first stops
     falling for an octave; at most where the measured motion is strongest.
     """
-    name = next(m for m in reversed(MOTIONS) if m in record)
+    sensor = next(s for m in reversed(MOTIONS) if (s := Sensor(coordinate, m)) in record)
     length = min(len(record), max(32, min(4096, 2 * len(record) // AVERAGES)))
-    frequency, power = autospectrum(record[name], record.dt, Segments(length))
+    frequency, power = autospectrum(record[sensor], record.dt, Segments(length))
     frequency, power = frequency[2:], power[2:]
-    displacement = _smooth(power) / frequency ** (2 * MOTIONS.index(name))
+    displacement = _smooth(power) / frequency ** (2 * MOTIONS.index(sensor.motion))
     strongest = int(np.argmax(power))
     for k in range(strongest):
         octave = (frequency > frequency[k]) & (frequency <= 2.0 * frequency[k])
@@ -208,31 +231,45 @@ def _smooth(power: Floats) -> Floats:
 
 
 def consistent(record: Record) -> tuple[Record, tuple[str, ...]]:
-    """The record with velocity per second of displacement and acceleration per second of velocity.
+    """The record with one length for all that translates, radians for all that turns, and seconds.
 
-    Returned beside a sentence on each conversion. The unit of length is that of the first of displacement, velocity
-    and acceleration that was measured (metres for an acceleration in g).
+    Velocity is per second of displacement, acceleration per second of velocity. The length is that of the first of the
+    motions that were measured (metres for an acceleration in g). The forces on named coordinates share the unit of the
+    first, and a moment is in that times the length. Returned beside a sentence on each conversion.
     """
-    measured = [m for m in MOTIONS if m in record]
-    units = {m: role_unit(m, record.units.get(m) or SI_UNITS[m]) for m in measured}
+    sensors = sorted(record.sensors, key=lambda s: (record.coordinates.index(s.coordinate), MOTIONS.index(s.motion)))
+    units = {str(s): role_unit(s.motion, record.unit(s)) for s in sensors}
     if len({u.powers[3] for u in units.values()}) > 1:
-        mixed = ", ".join(f"{m} in {u.text}" for m, u in units.items())
+        mixed = ", ".join(f"{channel} in {u.text}" for channel, u in units.items())
         raise StudyError(f"{record.name}: {mixed} cannot be compared; expected all calibrated, or all in volts")
-    length = _length(units[measured[0]])
-    wanted: dict[str, str] = dict(zip(MOTIONS, (length, f"{length}/s", f"{length}/s^2"), strict=True))
+    turning = record.rotations
+    straight = [units[str(s)] for s in sensors if s.coordinate not in turning]
+    length = _length(straight[0]) if straight else "m"
+    wanted: dict[str, str] = {}
+    for sensor in (Sensor(c, m) for c in record.coordinates for m in MOTIONS):
+        own = "rad" if sensor.coordinate in turning else length
+        wanted[str(sensor)] = (own, f"{own}/s", f"{own}/s^2")[MOTIONS.index(sensor.motion)]
+    if record.coordinates != (ALONE,):
+        forces = {name: role_unit("force", record.unit(name)) for name in record.forces}
+        units |= forces
+        wanted |= _of_forces(forces, length)
     channels: dict[str, Floats] = {}
     notes: list[str] = []
-    for motion, unit in units.items():
-        factor = unit.factor / parse_unit(wanted[motion]).factor
+    for channel, unit in units.items():
+        factor = unit.factor / parse_unit(wanted[channel]).factor
         if unit.powers[3] == 0 and factor != 1.0:
-            channels[motion] = record[motion] * factor
-            notes.append(f"{motion} is converted from {unit.text} to {wanted[motion]}")
+            channels[channel] = record[channel] * factor
+            notes.append(f"{channel} is converted from {unit.text} to {wanted[channel]}")
     return replace(record.with_channels(channels), units={**record.units, **wanted}), tuple(notes)
+
+
+def _of_forces(forces: Mapping[str, Unit], length: str) -> dict[str, str]:
+    """One unit for all forces, and that times the length for all moments."""
+    first = next((u.text for u in forces.values() if u.powers == ROLES["force"][0]), "N")
+    return {n: u.text if u.powers[3] else f"{first} {length}" if u.powers[1] else first for n, u in forces.items()}
 
 
 def _length(unit: Unit) -> str:
     """The unit of length in a unit of motion: ``mm`` in ``mm/s^2``, ``m`` in ``g``."""
     first = unit.text.replace("/", " ").split()[0]
-    if first == "deg" or first.endswith("rad"):  # a sine in a formula takes radians
-        return "rad"
     return first if parse_unit(first).powers in (ROLES["displacement"][0], VOLTAGE) else "m"

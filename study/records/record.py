@@ -3,12 +3,13 @@
 from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from pathlib import Path
 
 import numpy as np
 
 from study.support.arrays import Floats
+from study.support.units import is_angle
 
 ALONE = ""  # the only coordinate of a single mass has no name, so that its channels are called as their motions are
 MOTIONS = ("displacement", "velocity", "acceleration")
@@ -52,51 +53,69 @@ class Stretch:
 
 @dataclass(frozen=True, eq=False)  # arrays have no single truth value: a record equals itself alone
 class Record:
-    """Evenly sampled channels.
+    """Evenly sampled forces and motions of one or more coordinates; n samples."""
 
-    Attributes
-    ----------
-    dt : float
-        Sampling interval in seconds.
-    channels : dict of float64 arrays, shape (n,)
-        ``force`` and at least one of ``displacement, velocity, acceleration``; any further ones.
-    units : dict of str
-        Unit of each channel; SI by default.
-    name : str
-        What it is called in tables and file names.
-    start : float
-        Time of the first sample in seconds.
-    period : int, optional
-        Samples in one period, where the excitation is periodic.
-    stretches : tuple of Stretch
-        What it is strung together of; empty for a record of its own.
-    changed : set of str
-        Channels that are no longer those of its stretches.
-    between : str
-        What the force does between its samples: one of ``interpolation.READINGS``.
-    """
-
-    dt: float
-    channels: Mapping[str, Floats]
-    units: Mapping[str, str] = field(default_factory=lambda: dict(SI_UNITS))
-    name: str = "record"
-    start: float = 0.0
-    period: int | None = None
-    stretches: tuple[Stretch, ...] = ()
-    changed: frozenset[str] = frozenset()
-    between: str = "band_limited"
+    dt: float  # seconds between samples
+    channels: Mapping[str, Floats]  # (n,) each: forces, motions by sensor ("floor1 acceleration"), further ones
+    units: Mapping[str, str] = field(default_factory=lambda: dict(SI_UNITS))  # of each channel
+    name: str = "record"  # in tables and names of files
+    start: float = 0.0  # time of the first sample in seconds
+    period: int | None = None  # samples in one period, where the excitation is periodic
+    stretches: tuple[Stretch, ...] = ()  # what it is strung together of; empty for a record of its own
+    changed: frozenset[str] = frozenset()  # channels that are no longer those of its stretches
+    between: str = "band_limited"  # what a force does between its samples: one of ``interpolation.READINGS``
+    coordinates: tuple[str, ...] = (ALONE,)  # whose motions its channels may be
+    forces: tuple[str, ...] = ("force",)  # which channels are forces
 
     def __len__(self) -> int:
         """Number of samples."""
-        return len(self.channels["force"])
+        return len(next(iter(self.channels.values())))
 
-    def __getitem__(self, channel: str) -> Floats:
+    def __getitem__(self, channel: str | Sensor) -> Floats:
         """One channel."""
-        return self.channels[channel]
+        return self.channels[str(channel)]
 
-    def __contains__(self, channel: str) -> bool:
+    def __contains__(self, channel: str | Sensor) -> bool:
         """Whether the record has this channel."""
-        return channel in self.channels
+        return str(channel) in self.channels
+
+    @property
+    def sensors(self) -> tuple[Sensor, ...]:
+        """The motions that it holds, in the order of its channels."""
+        known = {str(s := Sensor(c, m)): s for c in self.coordinates for m in MOTIONS}
+        return tuple(known[name] for name in self.channels if name in known)
+
+    @property
+    def motions(self) -> dict[Sensor, Floats]:
+        """These motions by sensor, shape (n,) each."""
+        return {sensor: self[sensor] for sensor in self.sensors}
+
+    def motion(self, coordinate: str) -> Floats:
+        """Displacement, velocity and acceleration of a coordinate of a completed record, shape (3, n)."""
+        return np.stack([self[Sensor(coordinate, motion)] for motion in MOTIONS])
+
+    @property
+    def rotations(self) -> frozenset[str]:
+        """The coordinates that turn: those whose motion is in an angle."""
+        return frozenset(s.coordinate for s in self.sensors if is_angle(self.unit(s)))
+
+    def unit(self, channel: str | Sensor) -> str:
+        """Unit of a channel: the SI one where nobody says, none of a further channel then."""
+        return self.units.get(str(channel)) or self.usual_unit(channel)
+
+    def usual_unit(self, channel: str | Sensor) -> str:
+        """The SI unit of a force or a motion; empty for a further channel."""
+        role = (
+            "force" if channel in self.forces else next((s.motion for s in self.sensors if str(s) == str(channel)), "")
+        )
+        return SI_UNITS.get(role, "")
+
+    @property
+    def force_and_length(self) -> tuple[str, str]:
+        """Units of force and length in the equations of motion of coordinates that do not turn."""
+        forces = (self.unit(f) for f in self.forces if " " not in self.unit(f))  # else a moment
+        lengths = (self.units.get(str(Sensor(c, MOTIONS[0])), "") for c in self.coordinates if c not in self.rotations)
+        return next(forces, SI_UNITS["force"]), next(filter(None, lengths), SI_UNITS["displacement"])
 
     @property
     def time(self) -> Floats:
@@ -122,10 +141,16 @@ class Record:
         place = bisect_right(bounds, sample, hi=len(bounds) - 1)
         return bounds[place - 1], bounds[place]
 
+    def runs(self, span: tuple[int, int]) -> tuple[tuple[int, int], ...]:
+        """The parts of a span that lie in one stretch each: first sample, and last + 1."""
+        bounds = (span[0], *(joint for joint in self.joints if span[0] < joint < span[1]), span[1])
+        return tuple(pairwise(bounds))
+
     @property
     def extra(self) -> tuple[str, ...]:
-        """Names of channels beside force and motion."""
-        return tuple(c for c in self.channels if c != "force" and c not in MOTIONS)
+        """Names of channels beside forces and motions."""
+        known = {*self.forces, *map(str, self.sensors)}
+        return tuple(c for c in self.channels if c not in known)
 
     def part(self, first: int, last: int) -> "Record":
         """Samples ``first`` to ``last`` (exclusive), with the time they were taken at."""
@@ -143,24 +168,48 @@ class Record:
                 kept.append(Stretch(stretch.source, stretch.first + low, stretch.first + high, going_on))
         return tuple(kept)
 
+    def with_motions(self, motions: Mapping[Sensor, Floats]) -> "Record":
+        """The same with these motions in place of its own."""
+        own = {str(sensor) for sensor in self.sensors}
+        kept = {name: values for name, values in self.channels.items() if name not in own}
+        return replace(self, channels=kept | {str(sensor): values for sensor, values in motions.items()})
+
+    def relative(self, motion: Floats, span: tuple[int, int] | None = None) -> "Record":
+        """A motion along the record, rows displacement and so on of shape (n,), as the record of a single mass.
+
+        With the channels that formulas may name. ``motion`` may be that of a ``span`` alone.
+        """
+        first, last = span or (0, len(self))
+        further = {name: self[name][first:last] for name in self.extra}
+        channels = {"force": np.zeros(last - first), **dict(zip(MOTIONS, motion, strict=False)), **further}
+        return Record(self.dt, channels, name=self.name, start=self.start + first * self.dt)
+
     def with_channels(self, channels: Mapping[str, Floats]) -> "Record":
         """The same record with channels replaced or added."""
         changed = self.changed.union(channels) if self.stretches else self.changed
         return replace(self, channels={**self.channels, **channels}, changed=changed)
 
 
+def record_of(
+    dt: float, forces: Mapping[str, Floats], motions: Mapping[Sensor, Floats],
+    extra: Mapping[str, Floats] | None = None, name: str = "record", start: float = 0.0,
+) -> Record:  # fmt: skip
+    """A record in SI units of forces by name and motions by sensor."""
+    channels = {**forces, **{str(sensor): values for sensor, values in motions.items()}, **(extra or {})}
+    units = dict.fromkeys(forces, SI_UNITS["force"]) | {str(s): SI_UNITS[s.motion] for s in motions}
+    coordinates = tuple(dict.fromkeys(sensor.coordinate for sensor in motions))
+    return Record(dt, channels, units, name, start, coordinates=coordinates, forces=tuple(forces))
+
+
 def write_csv(record: Record, path: Path) -> None:
     """Write time and channels with all digits of a double; units other than SI follow the names."""
     import pandas as pd  # half a second, which records in memory are spared
 
-    named = {heading(name, record.units.get(name, "")): values for name, values in record.channels.items()}
-    columns: dict[str, Floats] = {"time": record.time, **named}
+    columns: dict[str, Floats] = {"time": record.time}
+    for channel, values in record.channels.items():
+        unit = record.units.get(channel, "")
+        columns[channel if unit in ("", record.usual_unit(channel)) else f"{channel} [{unit}]"] = values
     pd.DataFrame(columns).to_csv(path, index=False, float_format="%.17g", lineterminator="\n")
-
-
-def heading(channel: str, unit: str) -> str:
-    """A column's heading: the channel's name, and its unit if that is not the SI one."""
-    return channel if unit in ("", SI_UNITS.get(channel, "")) else f"{channel} [{unit}]"
 
 
 def read_csv(path: Path) -> Record:

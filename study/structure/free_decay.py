@@ -48,9 +48,9 @@ def free_decay_start(model: Model, prepared: PreparedStructure, held: Mapping[st
 
 def _free_of_noise(prepared: PreparedStructure, model: Model) -> Floats:
     """Motions along the fitting part in the band where any of them stands above noise, shape (3, n, samples)."""
-    record = prepared.record.whole or prepared.record
+    record = prepared.whole
     whole = replace(prepared, record=record)
-    bands = [band_above_noise(record.motions[s], prepared.dt, prepared.low) for s in prepared.sensors]
+    bands = [band_above_noise(record[s], prepared.dt, prepared.low) for s in prepared.sensors]
     known = [band for band in bands if band is not None]
     edge, motion = whole.edge, np.stack([whole.complete[c] for c in model.coordinates], axis=1)
     if known:
@@ -66,7 +66,7 @@ def _fitted_samples(prepared: PreparedStructure, edge: int) -> Ints:
     samples = np.arange(len(prepared.record))
     if prepared.record.stretches:
         samples = np.concatenate([np.arange(s.first, s.last) for s in prepared.record.stretches])
-    last = len(prepared.record.whole or prepared.record) - edge
+    last = len(prepared.whole) - edge
     fitted = samples[slice(*prepared.fit)]
     kept = fitted[(fitted >= edge) & (fitted < last)]
     return kept if len(kept) > FEWEST else fitted

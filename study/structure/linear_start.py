@@ -60,7 +60,7 @@ def frequency_responses(prepared: PreparedStructure, model: Model) -> SensorResp
     names = [name for name, _ in model.forces]
     expect(names, f"nothing drives {model.name!r}; expected 'forces' in the model, or values for its linear terms")
     part = slice(*prepared.fit)
-    channels = [prepared.record.forces[n][part] for n in names] + list(prepared.measured[part].T)
+    channels = [prepared.record[n][part] for n in names] + list(prepared.measured[part].T)
     length = min(LONGEST, 2 ** int(np.log2(max(len(channels[0]) // SHARE, 16))))
     matrix = cross_spectra([x - np.mean(x) for x in channels], prepared.dt, Segments(length=length))
     n, g = len(names), matrix.density[1:-1]

@@ -12,12 +12,11 @@ import numpy as np
 
 from study.equations.model import Model, ModelTerm, with_registers
 from study.records.interpolation import between_samples
-from study.records.record import MOTIONS
+from study.records.record import MOTIONS, Sensor
 from study.structure.measured_start import modal_starts
 from study.structure.modal_program import ModalKeys, modal_program
 from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_fit import MOST_STEPS, ROUGH, SHIFT
-from study.structure.structure_record import Sensor
 from study.structure.structure_run import StretchDrive, StructureRun
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError, StudyError
@@ -85,7 +84,7 @@ def modal_run(
     What is not in ``keys`` keeps its value.
     """
     record, (first, last) = prepared.record, span
-    columns = [record.forces[name] for name, _ in model.forces] + [record.extra[name] for name in model.channels]
+    columns = [record[name] for name in (*(name for name, _ in model.forces), *model.channels)]
     part = slice(2 * steps * first, 2 * steps * (last - 1) + 1)
     drive = np.stack([between_samples(x, 2 * steps)[part] for x in columns], axis=1)
     made = modal_program(model, modal, keys, tuple(record.extra))

@@ -36,7 +36,7 @@ def _shown(number: int, row: MeasuredRanked) -> list[str]:
 
 
 def _unit(row: MeasuredRanked) -> str:
-    return row.term.unit(row.term.symbols[0], "N", "m")
+    return row.term.unit(row.term.symbols[0], *row.prediction.prepared.record.force_and_length)
 
 
 def _named(row: MeasuredRanked) -> str:

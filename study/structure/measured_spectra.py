@@ -19,11 +19,10 @@ from study.identify.frequency_domain import instruments
 from study.identify.frequency_domain.coefficients import Responses
 from study.identify.frequency_domain.inputs import Input, input_history, reverse_inputs
 from study.records import spectra
-from study.records.record import MOTIONS, Record
+from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments
 from study.structure.measured_fit import MeasuredFit, modal_run
 from study.structure.prepared_structure import PreparedStructure
-from study.structure.structure_record import Sensor
 from study.support.arrays import Complexes, Floats
 
 Bools = NDArray[np.bool_]
@@ -90,7 +89,7 @@ def coefficient_spectra(fit: MeasuredFit, prepared: PreparedStructure) -> tuple[
     measured = {c: x[:, first:last] for c, x in prepared.complete.items()}
     clean = _free_motion(fit, prepared)
     groups = _inputs(model)
-    forces = [prepared.record.forces[name][first:last] for name, _ in model.forces]
+    forces = [prepared.record[name][first:last] for name, _ in model.forces]
     instrument, corrected = list(forces), list(forces)
     for place, inputs in groups:
         e = place.direction(model.coordinates)
@@ -133,11 +132,8 @@ def _inputs(model: Model) -> list[tuple[Place, tuple[Input, ...]]]:
 def _relative(
     prepared: PreparedStructure, model: Model, direction: Sequence[float], motion: dict[str, Floats]
 ) -> Record:  # fmt: skip
-    first, last = prepared.fit
     total = np.sum([w * motion[c][:2] for c, w in zip(model.coordinates, direction, strict=True) if w], axis=0)
-    extra = {name: x[first:last] for name, x in prepared.record.extra.items()}
-    channels = {"force": np.zeros(last - first), **dict(zip(MOTIONS[:2], total, strict=True)), **extra}
-    return Record(prepared.dt, channels, start=prepared.record.start + first * prepared.dt)
+    return prepared.record.relative(total, prepared.fit)
 
 
 def _responses(sensor: Sensor, channels: Sequence[Floats], dt: float, cut: Segments) -> Responses:

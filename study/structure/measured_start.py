@@ -14,7 +14,7 @@ from scipy.fft import rfft
 from study.equations.model import Model
 from study.identify.frequency_domain.inputs import input_history
 from study.identify.frequency_domain.subspace import observability
-from study.records.record import MOTIONS, Record
+from study.records.record import MOTIONS
 from study.structure.missing_forces import placed_inputs
 from study.structure.modal_program import ModalKeys
 from study.structure.prepared_structure import PreparedStructure
@@ -73,7 +73,7 @@ def lines_of(model: Model, prepared: PreparedStructure) -> DrivenLines:
         part = values[first:last]
         return np.asarray(rfft((part - np.mean(part)) * taper)[1:lines], dtype=np.complex128)
 
-    forces = np.stack([spectrum(prepared.record.forces[n]) for n in names], axis=1)
+    forces = np.stack([spectrum(prepared.record[n]) for n in names], axis=1)
     power = np.sum(np.abs(forces) ** 2, axis=1)
     smooth = np.convolve(power, np.ones(9) / 9.0, "same")
     driven = np.flatnonzero(smooth > FAINT * float(np.max(smooth)))
@@ -102,9 +102,7 @@ def unit_histories(model: Model, prepared: PreparedStructure) -> list[Floats]:
         expect(not blind, sentence)
         e = entry.place.direction(model.coordinates)
         motion = np.sum([w * prepared.complete[c] for c, w in zip(model.coordinates, e, strict=True) if w], axis=0)
-        record = prepared.record
-        channels = {"force": np.zeros(len(record)), **dict(zip(MOTIONS, motion, strict=True)), **record.extra}
-        relative = Record(record.dt, channels, name=record.name, start=record.start)
+        record, relative = prepared.record, prepared.record.relative(motion)
         by_symbol: dict[str, Floats] = {}
         for item in placed_inputs(entry):
             values = input_history(item, relative)

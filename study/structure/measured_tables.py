@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from study.equations.model import Model
 from study.figures import frequency_response, page
 from study.figures.curves import InputResponse, ResponseCurve
-from study.records.record import MOTIONS
+from study.records.record import MOTIONS, Sensor
 from study.records.spectra import cross_spectra
 from study.reproduction.tables import PARAMETER_COLUMNS, stacked
 from study.structure.mass_matrix import matrices
@@ -20,7 +20,6 @@ from study.structure.measured_comparison import MeasuredComparison
 from study.structure.measured_fit import MeasuredFit
 from study.structure.modes import modes_of
 from study.structure.places import transfer
-from study.structure.structure_record import Sensor
 from study.structure.structure_study import StructureCase, StructureSettings
 from study.support.arrays import Complexes, Floats
 
@@ -81,7 +80,7 @@ def measured_responses(
     prepared, cut = comparison.prepared, settings.segments.segments()
     (name, where), *_ = truth.forces
     sensors = tuple(Sensor(s.coordinate, MOTIONS[0]) for s in prepared.sensors)
-    matrix = cross_spectra([prepared.record.forces[name], *prepared.measured.T], prepared.dt, cut)
+    matrix = cross_spectra([prepared.record[name], *prepared.measured.T], prepared.dt, cut)
     f = matrix.frequency
     inside = (f > 0.0) & (f < case.cutoff - LEAKED * f[1])
     linear = transfer(matrices(truth, truth.numbers()), sensors, truth.coordinates, prepared.dt, cut.length)

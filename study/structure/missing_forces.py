@@ -19,7 +19,7 @@ from study.equations.place import HERE, Place
 from study.identify.frequency_domain.inputs import Input, input_history, reverse_inputs
 from study.records import noise_floor
 from study.records.completion import derivative
-from study.records.record import MOTIONS, Record
+from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments, autospectrum
 from study.structure.equations_of_motion import motion_program
 from study.structure.mass_matrix import checked_mass_matrix, matrices
@@ -27,7 +27,6 @@ from study.structure.placed_units import units_at
 from study.structure.places import alignment, connections, transfer
 from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_prediction import StructurePrediction
-from study.structure.structure_record import Sensor
 from study.support.arrays import Floats
 
 CLEAR = 3.0  # standard errors by which the difference must stand above the noise, for a line to be used
@@ -48,7 +47,7 @@ class MissingForces:
     displacement, velocity : array, shape (samples, all coordinates)
         The motion, free of noise.
     residual : array, shape (samples, coordinates)
-        Force that is left, in newtons, or newton metres on a rotation.
+        Force that is left, or moment on a rotation.
     size : array, shape (coordinates,)
         Rms force of inertia, to compare it with.
     matrix : array, shape (coordinates, coordinates)
@@ -59,8 +58,8 @@ class MissingForces:
         connections, neighbours and the ground. Unlike the matrix it needs no derivatives of noisy motions.
     curves : dict of str
         Force over relative displacement of each of these places by label: a restoring-force map.
-    rotations : frozenset of str
-        Coordinates that were measured as angles: their forces are moments.
+    record : Record
+        Which it is of, for its units.
     """
 
     coordinates: tuple[str, ...]
@@ -72,12 +71,12 @@ class MissingForces:
     matrix: Floats
     aligned: tuple[tuple[Place, float], ...]
     curves: dict[str, ForceCurve]
-    rotations: frozenset[str]
+    record: Record
 
     def units(self, label: str) -> dict[str, str]:
         """Units of force and displacement of the map of a place, or of the equation of a coordinate."""
         place = next((p for p, _ in self.aligned if p.label == label), None) or Place("at", (label,))
-        return dict(zip(("force", "displacement"), units_at(place, self.rotations), strict=True))
+        return dict(zip(("force", "displacement"), units_at(place, self.record), strict=True))
 
     @property
     def rms(self) -> Floats:
@@ -106,7 +105,7 @@ def missing_forces(prediction: StructurePrediction) -> MissingForces:
     return MissingForces(
         tuple(measured), tuple(c for c in model.coordinates if c not in measured), motion[0][inner], motion[1][inner],
         left, size, matrix, aligned, _maps(known, measured, motion[0][inner][:, rows], left),
-        prediction.prepared.record.rotations,
+        prediction.prepared.record,
     )  # fmt: skip
 
 
@@ -184,7 +183,7 @@ def unbalanced_forces(model: Model, motion: Floats, prediction: StructurePredict
     record = prepared.record
     program = motion_program(model, tuple(record.extra))
     states = [_state(entry, model, motion, prepared.dt) for entry in model.states]
-    drive = [record.forces[name][part] for name, _ in model.forces] + [record.extra[n][part] for n in model.channels]
+    drive = [record[n][part] for n in (*(name for name, _ in model.forces), *model.channels)]
     data = np.column_stack([motion[0], motion[1], record.time[part], *drive, *states])
     columns = np.arange(data.shape[1], dtype=np.int64)
     registers, code = program.program.registers.copy(), program.program

@@ -12,6 +12,7 @@ from study.diagnose.constancy import CoefficientCurve, along_amplitude, along_fr
 from study.diagnose.ranking import in_order
 from study.equations.model import ModelTerm
 from study.equations.term import Term
+from study.records.record import Record
 from study.structure.placed_candidates import PlacedCandidate, physical
 from study.structure.placed_units import coefficient_unit
 from study.structure.structure_fit import (
@@ -62,14 +63,14 @@ class PlacedRanked:
         return self.entry.term
 
     @property
-    def rotations(self) -> frozenset[str]:
+    def record(self) -> Record:
         """Coordinates that were measured as angles."""
-        return self.prediction.prepared.record.rotations
+        return self.prediction.prepared.record
 
     @property
     def unit(self) -> str:
         """Unit of the coefficient."""
-        return coefficient_unit(self.entry, self.term.symbols[0], self.rotations)
+        return coefficient_unit(self.entry, self.term.symbols[0], self.record)
 
     @property
     def response_error(self) -> float:

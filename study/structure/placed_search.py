@@ -19,7 +19,7 @@ from study.equations.place import Place
 from study.equations.term import Term
 from study.identify.frequency_domain.inputs import input_history
 from study.identify.time_domain.shape_search import MODULATION, values_to_try
-from study.records.record import MOTIONS, Record
+from study.records.record import MOTIONS, Record, Sensor
 from study.structure.mass_matrix import LINEAR, linear_keys, matrices, patterns
 from study.structure.missing_forces import corrected_motion, placed_inputs, relative_record
 from study.structure.placed_lines import placed_modulation_lines, placed_residual_lines
@@ -27,7 +27,6 @@ from study.structure.places import transfer
 from study.structure.prepared_structure import PreparedStructure
 from study.structure.stretch_transforms import StretchTransforms, stretch_transforms
 from study.structure.structure_fit import StructureFit, fit_structure, flat, linearise_structure
-from study.structure.structure_record import Sensor
 from study.structure.structure_run import prepare_run
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError

@@ -7,8 +7,7 @@ from scipy.fft import rfftfreq
 
 from study.equations.model import Model
 from study.equations.place import GROUND, Place
-from study.records.record import MOTIONS
-from study.structure.structure_record import Sensor
+from study.records.record import MOTIONS, Sensor
 from study.support.arrays import Complexes, Floats
 
 

@@ -7,11 +7,10 @@ from functools import cached_property
 import numpy as np
 
 from study.equations.model import Model
-from study.records.completion import CompletedRecord, complete
+from study.records.completion import CompletedRecord, complete, consistent
 from study.records.plan import FEWEST
-from study.records.record import MOTIONS, Record
+from study.records.record import MOTIONS, Record, Sensor
 from study.structure.mass_matrix import check_held_masses
-from study.structure.structure_record import Sensor, StructureRecord
 from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 
@@ -22,7 +21,7 @@ class PreparedStructure:
 
     Attributes
     ----------
-    record : StructureRecord
+    record : Record
         In N, m and s.
     sensors : tuple of Sensor
         One motion of each measured coordinate: what free runs are compared with.
@@ -32,7 +31,7 @@ class PreparedStructure:
         What was left out, a sentence each.
     """
 
-    record: StructureRecord
+    record: Record
     sensors: tuple[Sensor, ...]
     fit: tuple[int, int]
     judge: tuple[int, int]
@@ -47,7 +46,7 @@ class PreparedStructure:
     @cached_property
     def measured(self) -> Floats:
         """The sensors that are compared, shape (samples, sensors)."""
-        return np.stack([self.record.motions[s] for s in self.sensors], axis=1)
+        return np.stack([self.record[s] for s in self.sensors], axis=1)
 
     @cached_property
     def scale(self) -> Floats:
@@ -67,21 +66,24 @@ class PreparedStructure:
     @cached_property
     def low(self) -> float:
         """Lowest frequency in hertz at which all completed motions are valid."""
-        return max(self._completed(s.coordinate).band[0] for s in self.sensors)
+        return self._completed.band[0]
 
     @cached_property
     def edge(self) -> int:
         """Samples at each end that derivatives and integrals leave uncertain; stretches leave these out."""
-        if self.record.stretches:
-            return 0
-        return max(self._completed(s.coordinate).edge for s in self.sensors)
+        return 0 if self.record.stretches else self._completed.edge
 
-    def _completed(self, coordinate: str) -> CompletedRecord:
-        return completed_coordinate(self.record.whole or self.record, coordinate, self.cutoff)
+    @property
+    def whole(self) -> Record:
+        """The record that its stretches are of."""
+        return self.record.stretches[0].source if self.record.stretches else self.record
+
+    @cached_property
+    def _completed(self) -> CompletedRecord:
+        return complete(self.whole, self.cutoff)
 
     def _motion(self, coordinate: str) -> Floats:
-        record = self._completed(coordinate).record
-        motion = np.stack([record[motion] for motion in MOTIONS])
+        motion = self._completed.record.motion(coordinate)
         cuts = [motion[:, s.first : s.last] for s in self.record.stretches]
         return np.concatenate(cuts, axis=1) if cuts else motion
 
@@ -96,15 +98,8 @@ class PreparedStructure:
         return replace(self, fit=(last - samples, last) if self.judge[0] == last else (first, first + samples))
 
 
-def completed_coordinate(record: StructureRecord, coordinate: str, cutoff: float | None = None) -> CompletedRecord:
-    """The motion of one coordinate, completed."""
-    channels = {s.motion: x for s, x in record.motions.items() if s.coordinate == coordinate}
-    still = np.zeros(len(record))
-    return complete(Record(record.dt, {"force": still, **channels}, name=record.name), cutoff)
-
-
 def prepare_structure(
-    record: StructureRecord,
+    record: Record,
     model: Model,
     fit: tuple[int, int] | None = None,
     judge: tuple[int, int] | None = None,
@@ -120,6 +115,7 @@ def prepare_structure(
     """
     if not model.measured:  # whose masses nobody lumps
         check_held_masses(model)
+    record, converted = consistent(record)
     half = len(record) // 2
     fit, judge = fit or (0, half), judge or (half, len(record))
     for name, (first, last) in (("fit", fit), ("judge", judge)):
@@ -133,7 +129,7 @@ def prepare_structure(
     blind = [c for c in model.coordinates if c not in first_of]
     _check_tied(model, blind)
     lacks = f"no sensor is at {' and '.join(blind)}: the free run has its motion, the reverse system lacks it"
-    return PreparedStructure(record, sensors, fit, judge, (lacks,) if blind else (), cutoff)
+    return PreparedStructure(record, sensors, fit, judge, (*converted, *([lacks] if blind else [])), cutoff)
 
 
 def _check_tied(model: Model, blind: Sequence[str]) -> None:

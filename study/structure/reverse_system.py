@@ -116,7 +116,7 @@ def _equation(
     cache: dict[tuple[float, ...], Record],
 ) -> Equation:  # fmt: skip
     record, mass = prepared.record, None
-    drives = [record.forces[name] for name, where in model.forces if where == coordinate]
+    drives = [record[name] for name, where in model.forces if where == coordinate]
     output = np.sum(drives, axis=0) if drives else -prepared.complete[coordinate][INERTIA]
     if not drives:
         mass = next(
@@ -150,9 +150,7 @@ def _relative(model: Model, prepared: PreparedStructure, direction: Sequence[flo
     for coordinate, weight in zip(model.coordinates, direction, strict=True):
         if weight != 0.0:
             total += weight * prepared.complete[coordinate]
-    record = prepared.record
-    channels = {"force": np.zeros(len(record)), **dict(zip(MOTIONS, total, strict=True)), **record.extra}
-    return Record(record.dt, channels, name=record.name, start=record.start)
+    return prepared.record.relative(total)
 
 
 def by_conditioned_spectra(equations: Sequence[Equation], dt: float, settings: Settings) -> ReverseSystem:

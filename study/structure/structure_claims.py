@@ -6,14 +6,13 @@ import numpy as np
 import pandas as pd
 
 from study.equations.model import Model
-from study.records.record import MOTIONS
+from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import cross_spectra
 from study.reproduction.claims.judgement import SEPARATOR, Condition
 from study.structure.mass_matrix import matrices
 from study.structure.measured_comparison import MeasuredComparison
 from study.structure.places import transfer
 from study.structure.reverse_tables import structure_parameters
-from study.structure.structure_record import Sensor, StructureRecord
 from study.structure.structure_study import CaseResult, StructureCase, StructureFindings, StructureSettings
 from study.support.numbers import percent
 
@@ -26,7 +25,7 @@ STATEMENTS = {
 
 
 def structure_claims(
-    case: StructureCase, record: StructureRecord, result: CaseResult, settings: StructureSettings
+    case: StructureCase, record: Record, result: CaseResult, settings: StructureSettings
 ) -> pd.DataFrame:
     """Every claim on a case, a row each: what must hold, what was measured, the verdict."""
     conditions = {
@@ -75,12 +74,12 @@ def _verdict(met: Sequence[bool]) -> str:
     return "holds" if all(met) else "partly" if any(met) else "does not hold"
 
 
-def _transfer_functions(model: Model, record: StructureRecord, settings: StructureSettings) -> Iterable[Condition]:
+def _transfer_functions(model: Model, record: Record, settings: StructureSettings) -> Iterable[Condition]:
     """The best linear approximation of every motion by the force against that of the structure's linear part."""
     cut, limit = settings.segments.segments(), settings.claims.changed
     (name, where), *_ = model.forces
     sensors = tuple(Sensor(c, MOTIONS[0]) for c in model.coordinates)
-    matrix = cross_spectra([record.forces[name], *(record.motions[s] for s in sensors)], record.dt, cut)
+    matrix = cross_spectra([record[name], *(record[s] for s in sensors)], record.dt, cut)
     linear = transfer(matrices(model, model.numbers()), sensors, model.coordinates, record.dt, cut.length)
     exact = linear[:, :, model.coordinates.index(where)]
     inside = (matrix.frequency >= settings.fit_band[0]) & (matrix.frequency <= settings.fit_band[1])

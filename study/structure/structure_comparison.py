@@ -10,6 +10,7 @@ import numpy as np
 from study.equations import model_file
 from study.equations.model import Model, ModelTerm
 from study.equations.place import HERE, Place, place_in_words
+from study.records.record import Record
 from study.structure.missing_forces import MissingForces, missing_forces
 from study.structure.modes import Modes, modes_of, modes_table
 from study.structure.placed_units import coefficient_unit, parameter_units
@@ -93,24 +94,24 @@ def compare_structure(
     if fit.undecided:
         notes.append(f"this record cannot tell apart, or does not show, {', '.join(fit.undecided)}")
     return StructureComparison(
-        model, prepared, fit, covariance, _coefficients(fit, covariance, prepared.record.rotations), prediction, modes,
+        model, prepared, fit, covariance, _coefficients(fit, covariance, prepared.record), prediction, modes,
         missing_forces(prediction), tuple(notes),
     )  # fmt: skip
 
 
-def _coefficients(fit: StructureFit, covariance: Floats, rotations: frozenset[str]) -> tuple[PlacedCoefficient, ...]:
+def _coefficients(fit: StructureFit, covariance: Floats, record: Record) -> tuple[PlacedCoefficient, ...]:
     errors = dict(zip(fit.keys, np.sqrt(np.diag(covariance)).tolist(), strict=True))
     return tuple(
         PlacedCoefficient(key, entry.term.name, entry.place, float(value), errors.get(key), unit)
         for entry in fit.model.terms
-        for (key, value), unit in zip(entry.values.items(), _units(entry, rotations), strict=True)
+        for (key, value), unit in zip(entry.values.items(), _units(entry, record), strict=True)
         if value is not None
     )
 
 
-def _units(entry: ModelTerm, rotations: frozenset[str]) -> list[str]:
-    own = [coefficient_unit(entry, symbol, rotations) for symbol in entry.term.symbols]
-    return [*own, *parameter_units(entry, rotations).values()]
+def _units(entry: ModelTerm, record: Record) -> list[str]:
+    own = [coefficient_unit(entry, symbol, record) for symbol in entry.term.symbols]
+    return [*own, *parameter_units(entry, record).values()]
 
 
 def structure_in_words(comparison: StructureComparison) -> str:

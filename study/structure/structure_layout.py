@@ -16,7 +16,6 @@ from study.records.record import Record, Stretch
 from study.records.states import period
 from study.records.stretches import BLOCKS, cut
 from study.structure.prepared_structure import PreparedStructure, prepare_structure
-from study.structure.structure_record import StructureRecord
 from study.support.errors import expect
 from study.support.thresholds import TOLERANCE
 
@@ -48,7 +47,7 @@ class Parts:
     cutoff: float | None = None
 
 
-def lay_out(record: StructureRecord, model: Model, parts: Parts) -> PreparedStructure:
+def lay_out(record: Record, model: Model, parts: Parts) -> PreparedStructure:
     """A record of a structure made ready, in stretches that begin anew where it is a free decay or the user says so.
 
     Raises
@@ -70,7 +69,7 @@ def lay_out(record: StructureRecord, model: Model, parts: Parts) -> PreparedStru
     if not (asked or free):
         return prepare_structure(record, model, parts.fit, parts.judge, parts.cutoff)
     plain = prepare_structure(record, model, parts.fit, parts.judge, parts.cutoff)
-    source = _stand_in(plain)
+    source = plain.record
     if explicit:
         fit, judge = ([_sure(source, span, plain.edge)] for span in (plain.fit, plain.judge))
         return _strung(plain, fit, judge, ())
@@ -87,13 +86,7 @@ def lay_out(record: StructureRecord, model: Model, parts: Parts) -> PreparedStru
     return _strung(plain, fit, judge, (said,))
 
 
-def _stand_in(plain: PreparedStructure) -> Record:
-    """The record that stretches name as their source: it has their times."""
-    still = np.zeros(len(plain.record))
-    return Record(plain.dt, {"force": still}, name=plain.record.name, start=plain.record.start)
-
-
-def _samples(record: StructureRecord, use: Use) -> list[Span]:
+def _samples(record: Record, use: Use) -> list[Span]:
     """The stretches to use, in samples, in the order of time."""
     if not use:
         return [(0, len(record))]
@@ -150,9 +143,6 @@ def _strung(
     record, stretches = plain.record, (*fit, *judge)
     rows = np.concatenate([np.arange(s.first, s.last) for s in stretches])
     split = sum(map(len, fit))
-    strung = replace(
-        record, forces={name: x[rows] for name, x in record.forces.items()},
-        motions={sensor: x[rows] for sensor, x in record.motions.items()},
-        extra={name: x[rows] for name, x in record.extra.items()}, stretches=stretches, whole=record,
-    )  # fmt: skip
+    channels = {name: values[rows] for name, values in record.channels.items()}
+    strung = replace(record, channels=channels, stretches=stretches)
     return replace(plain, record=strung, fit=(0, split), judge=(split, len(rows)), notes=(*plain.notes, *notes))

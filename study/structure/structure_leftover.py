@@ -12,13 +12,12 @@ from scipy.fft import next_fast_len
 
 from study.diagnose.dependence import DEGREE, TAUS, hysteretic, relaxed
 from study.equations.place import Place
-from study.records.record import MOTIONS
+from study.records.record import MOTIONS, Sensor
 from study.structure.mass_matrix import matrices
 from study.structure.placed_lines import placed_modulation_lines, placed_residual_lines
 from study.structure.places import connections, transfer
 from study.structure.stretch_transforms import stretch_transforms
 from study.structure.structure_prediction import StructurePrediction
-from study.structure.structure_record import Sensor
 from study.structure.structure_run import prepare_run
 from study.support import statistics
 from study.support.arrays import Complexes, Floats

@@ -14,7 +14,6 @@ from study.diagnose.verdict import MISSING
 from study.equations.place import place_in_words
 from study.figures import page
 from study.figures.sheet import in_style
-from study.records.record import SI_UNITS
 from study.structure import structure_panels
 from study.structure.modes import Modes
 from study.structure.sketch import Sketch, sketch
@@ -127,7 +126,7 @@ def responses_figure(comparison: StructureComparison) -> Figure:
         sensor, near = prediction.prepared.sensors[int(i)], close_by(prediction, int(i))
         panels.response_panel(
             panel, time[near], prediction.measured[near, int(i)], prediction.predicted[near, int(i)],
-            SI_UNITS[sensor.motion],
+            prediction.prepared.record.unit(sensor),
         )  # fmt: skip
         panel.set_ylabel(panel.get_ylabel().replace("response", sensor.motion))
         names.append(f"{sensor}: error {percent(float(prediction.errors[int(i)]))}")

@@ -7,9 +7,9 @@ import numpy as np
 
 from study.compare.noise import SIGNIFICANT
 from study.records import noise_floor
+from study.records.record import Sensor
 from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_fit import StructureFit, fit_structure
-from study.structure.structure_record import Sensor
 from study.structure.structure_run import prepare_run
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError

@@ -10,12 +10,12 @@ from study.diagnose.needless import needless_fields
 from study.diagnose.verdict import MISSING, NOTHING
 from study.equations.place import place_in_words as placed
 from study.figures.labels import term_names
+from study.records.record import Sensor
 from study.structure.modes import modes_table
 from study.structure.placed_needless import PlacedNeedless
 from study.structure.placed_ranking import PlacedRanked
 from study.structure.placed_units import parameter_units
 from study.structure.structure_comparison import mode_rows, structure_document
-from study.structure.structure_record import Sensor
 from study.structure.structure_verdict import StructureDiagnosis
 from study.support.numbers import percent
 
@@ -83,7 +83,7 @@ def _missing(diagnosis: StructureDiagnosis) -> list[str]:
 
 
 def _shape(row: PlacedRanked) -> str:
-    known = parameter_units(row.entry, row.rotations) | {"phase": "rad"}
+    known = parameter_units(row.entry, row.record) | {"phase": "rad"}
     parts = [f"{n} = {x:.4g} +- {1.96 * row.parameter_errors[n]:.2g} {known[n]}" for n, x in row.parameters.items()]
     return f", with {', '.join(parts)}" if parts else ""
 

@@ -13,9 +13,8 @@ from study.equations import kernels
 from study.equations.graph import Program
 from study.equations.model import Model, with_registers
 from study.records.interpolation import between_samples
-from study.records.record import MOTIONS
+from study.records.record import MOTIONS, Record, Sensor
 from study.structure.equations_of_motion import MotionProgram, motion_program
-from study.structure.structure_record import Sensor, StructureRecord
 from study.support.arrays import Floats, Ints
 from study.support.errors import DivergenceError, expect
 
@@ -134,7 +133,7 @@ class StructureRun:
 
 def prepare_run(
     model: Model,
-    record: StructureRecord,
+    record: Record,
     keys: Sequence[str] = (),
     *,
     sensors: Sequence[Sensor] | None = None,
@@ -147,7 +146,7 @@ def prepare_run(
     ----------
     model : Model
         A structure, every value known but those of ``keys``.
-    record : StructureRecord
+    record : Record
         Gives the forces, and the channels which the user's own terms name.
     keys : sequence of str
         The coefficients and shape parameters to differentiate by.
@@ -170,7 +169,7 @@ def prepare_run(
     lacking = ", ".join(name for name in names if name not in record.forces)
     expect(not lacking, f"record {record.name!r} has no force {lacking}; expected {', '.join(names)}")
     program = motion_program(model, tuple(record.extra), keys)
-    columns = [record.forces[name] for name in names] + [record.extra[name] for name in model.channels]
+    columns = [record[name] for name in (*names, *model.channels)]
     return StructureRun(
         program, tuple(keys), _drives(record, (first, last), columns, 2 * steps_per_sample), record.dt,
         steps_per_sample,
@@ -178,14 +177,12 @@ def prepare_run(
     )  # fmt: skip
 
 
-def _drives(
-    record: StructureRecord, span: tuple[int, int], columns: Sequence[Floats], factor: int
-) -> tuple[StretchDrive, ...]:
+def _drives(record: Record, span: tuple[int, int], columns: Sequence[Floats], factor: int) -> tuple[StretchDrive, ...]:
     """What acts along each stretch of a span, ``factor`` half steps in a sampling interval."""
     found: list[StretchDrive] = []
     time = record.time
     for begin, end in record.runs(span):
-        first, last = record.run_of(begin)
+        first, last = record.stretch_of(begin)
         values = np.zeros((factor * (end - begin - 1) + 1, len(columns)))
         part = slice(factor * (begin - first), factor * (end - 1 - first) + 1)
         for i, channel in enumerate(columns):

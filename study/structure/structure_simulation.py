@@ -5,9 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from study.equations.model import Model
-from study.records.record import MOTIONS
+from study.records.record import MOTIONS, Record, Sensor, record_of
 from study.structure.mass_matrix import checked_mass_matrix
-from study.structure.structure_record import Sensor, StructureRecord
 from study.structure.structure_run import prepare_run
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError, StudyError, expect
@@ -23,7 +22,7 @@ def simulate_structure(
     initial: Sequence[float] = (),
     sensors: Sequence[Sensor] | None = None,
     extra: Mapping[str, Floats] | None = None,
-) -> StructureRecord:
+) -> Record:
     """Motion of a structure under forces.
 
     Parameters
@@ -61,9 +60,9 @@ def simulate_structure(
     count = samples or min((len(values) for values in forces.values()), default=0)
     expect(count > 1, f"{model.name!r} has no force; expected a number of samples for its free decay")
     wanted = tuple(sensors or (Sensor(c, m) for m in MOTIONS for c in model.coordinates))
-    still = StructureRecord(dt, forces, {s: np.zeros(count) for s in wanted}, extra or {}, name=model.name)
+    still = record_of(dt, forces, {s: np.zeros(count) for s in wanted}, extra, model.name)
     try:
-        run = prepare_run(model, still, steps_per_sample=steps_per_sample)
+        run = prepare_run(model, still, sensors=wanted, steps_per_sample=steps_per_sample)
         response, _ = run.respond({}, np.array(initial, dtype=np.float64))
     except DivergenceError as error:
         raise DivergenceError(

@@ -15,7 +15,7 @@ from study.equations.terms import get
 from study.identify.estimators.base import Settings
 from study.identify.frequency_domain.local_polynomial import LocalPolynomial
 from study.records.excitation import Excitation, force
-from study.records.record import MOTIONS
+from study.records.record import MOTIONS, Record, Sensor
 from study.reproduction.case_names import rules
 from study.reproduction.config import Name
 from study.reproduction.settings import (
@@ -32,7 +32,6 @@ from study.structure.action_reaction import JointEstimate, joint_estimate
 from study.structure.places import connections
 from study.structure.prepared_structure import prepare_structure
 from study.structure.reverse_system import ESTIMATORS, Equation, ReverseSystem, equations_of, reverse_system
-from study.structure.structure_record import Sensor, StructureRecord
 from study.structure.structure_simulation import simulate_structure
 from study.support.config_files import Section, TableRow, Text, read_rows, read_yaml
 from study.support.errors import StudyError, at, expect
@@ -162,7 +161,7 @@ def _check(case: StructureCase, models: Path) -> None:
         expect(not blind, f"sensors lack {', '.join(blind)}, where the force or a nonlinear term acts; expected one")
 
 
-def make_structure_record(model: Model, case: StructureCase, settings: StructureSettings) -> StructureRecord:
+def make_structure_record(model: Model, case: StructureCase, settings: StructureSettings) -> Record:
     """Simulate a case: all motions without noise, or the displacements at its sensors with noise."""
     samples, dt = settings.sampling.samples, settings.sampling.dt
     drive = force(Excitation(level=case.level, reading="filtered", cutoff=case.cutoff), samples, dt, settings.seed)
@@ -171,7 +170,7 @@ def make_structure_record(model: Model, case: StructureCase, settings: Structure
     wanted = case.sensors or model.coordinates
     kinds = MOTIONS[:1] if case.noise > 0.0 else MOTIONS
     rng = np.random.default_rng(settings.noise_seed)
-    kept = {s: full.motions[s] for kind in kinds for s in (Sensor(c, kind) for c in wanted)}
+    kept = {s: full[s] for kind in kinds for s in (Sensor(c, kind) for c in wanted)}
     if case.noise > 0.0:
         kept = {s: x + np.sqrt(case.noise) * np.std(x) * rng.standard_normal(samples) for s, x in kept.items()}
     return replace(full.with_motions(kept), name=case.case)
@@ -206,9 +205,7 @@ class CaseResult:
     found: Mapping[str, StructureFindings]
 
 
-def identify_structure(
-    model: Model, record: StructureRecord, case: StructureCase, settings: StructureSettings
-) -> CaseResult:
+def identify_structure(model: Model, record: Record, case: StructureCase, settings: StructureSettings) -> CaseResult:
     """Every equation of a case by every estimator of the settings."""
     assumed = assumed_structure(model, case.also_assumed)
     equations, _ = equations_of(assumed, prepare_structure(record, assumed), (0, len(record)))

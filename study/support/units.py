@@ -35,6 +35,7 @@ PREFIXES = {"M": 1e6, "k": 1e3, "d": 1e-1, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n":
 PREFIXED = ("N", "m", "s", "V", "g", "gn", "rad")
 PLAIN = str.maketrans({
     "²": "^2", "³": "^3", "⁻": "^-", "¹": "1", "·": " ", "⋅": " ", "*": " ", "µ": "u", "μ": "u", "−": "-",
+    "°": "deg",
 })  # fmt: skip
 FACTOR = re.compile(r"([A-Za-z_]+)(?:\^?(-?[0-9]))?")
 ROLES: dict[str, tuple[Powers, str]] = {
@@ -112,6 +113,12 @@ def role_unit(role: str, text: str) -> Unit:
     uncalibrated = role != "time" and unit.powers[3] == 1
     expect(unit.powers == powers or moment or uncalibrated, f"{text!r} is no unit of {role}; expected {expected}")
     return unit
+
+
+def is_angle(text: str) -> bool:
+    """Whether a unit is that of an angle, of its rate or of its acceleration: ``rad``, ``mrad/s``, ``deg``."""
+    first = next(iter(text.replace("/", " ").split()), "")
+    return first == "deg" or first.endswith("rad")
 
 
 def is_unit(text: str) -> bool:

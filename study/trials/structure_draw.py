@@ -11,12 +11,11 @@ from study.equations.term import Term
 from study.equations.terms import LIBRARY, get
 from study.identify.frequency_domain.inputs import input_history
 from study.records.excitation import Excitation, force
-from study.records.record import MOTIONS
+from study.records.record import MOTIONS, Record, Sensor
 from study.structure.missing_forces import placed_inputs, relative_record
 from study.structure.modes import modes_of
 from study.structure.placed_candidates import external
 from study.structure.places import connections
-from study.structure.structure_record import Sensor, StructureRecord
 from study.structure.structure_simulation import simulate_structure
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError, StudyError, expect
@@ -37,7 +36,7 @@ CHAOTIC = 1e-3  # share of the motion that a small push at the start may still m
 class StructureTrial:
     """A record, what its owner believes, and the truth."""
 
-    record: StructureRecord
+    record: Record
     believed: Model
     truth: Model
     hidden: ModelTerm | None  # None where nothing is missing
@@ -164,11 +163,11 @@ def _hidden(
     return None
 
 
-def _motion(record: StructureRecord, model: Model) -> Floats:
-    return np.stack([[record.motions[Sensor(c, m)] for c in model.coordinates] for m in MOTIONS]).transpose(0, 2, 1)
+def _motion(record: Record, model: Model) -> Floats:
+    return np.stack([[record[Sensor(c, m)] for c in model.coordinates] for m in MOTIONS]).transpose(0, 2, 1)
 
 
-def _strength(unit: ModelTerm, base: Model, record: StructureRecord, dt: float) -> tuple[float, float]:
+def _strength(unit: ModelTerm, base: Model, record: Record, dt: float) -> tuple[float, float]:
     """Rms of a unit effect beyond any linear force at its place, and of the structure's own force there."""
     motion = _motion(record, base)
     along = relative_record(unit.place, base, motion, dt)
@@ -215,7 +214,8 @@ def _forgets(model: Model, drive: dict[str, Floats], dt: float) -> bool:
     wanted = tuple(Sensor(c, "displacement") for c in model.coordinates)
     try:
         one, other = (
-            simulate_structure(model, f, dt, sensors=wanted, steps_per_sample=2).measured for f in (drive, pushed)
+            np.stack([*simulate_structure(model, f, dt, sensors=wanted, steps_per_sample=2).motions.values()])
+            for f in (drive, pushed)
         )
     except StudyError:
         return False

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from study.equations.model_file import format_model
-from study.structure.structure_record import write_structure_csv
+from study.records.record import write_csv
 from study.trials.sealed import write_trial_files
 from study.trials.structure_draw import StructureTrial
 
@@ -16,6 +16,4 @@ def write_structure_trial(trial: StructureTrial, folder: Path) -> tuple[Path, Pa
         "truth": format_model(trial.truth),
     }  # fmt: skip
     record = trial.record
-    return write_trial_files(
-        record.name, lambda path: write_structure_csv(record, path), trial.believed, content, folder
-    )
+    return write_trial_files(record.name, lambda path: write_csv(record, path), trial.believed, content, folder)

@@ -16,7 +16,7 @@ from playwright.sync_api import Page, sync_playwright
 from scripts.page_picture import MISSING, QUIET, browser
 from study.equations.model_file import format_model, read_model
 from study.records.excitation import Excitation, force
-from study.structure.structure_record import write_structure_csv
+from study.records.record import write_csv
 from study.structure.structure_simulation import simulate_structure
 
 FRAME = Path(__file__).parents[2] / "models" / "structures" / "frame.yaml"
@@ -30,7 +30,7 @@ def hall(tmp_path_factory):
     record, rng = simulate_structure(frame, {"shaker": drive}, 0.02), np.random.default_rng(5)
     kept = {s: x for s, x in record.motions.items() if s.motion == "displacement"}
     noisy = {s: x + 0.05 * np.std(x) * rng.standard_normal(len(x)) for s, x in kept.items()}
-    write_structure_csv(record.with_motions(noisy), folder / "frame.csv")
+    write_csv(record.with_motions(noisy), folder / "frame.csv")
     believed = frame.without_term("cubic_stiffness[floor2-floor3]")
     model = replace(believed, name="frame").with_values(dict.fromkeys(believed.values, None))
     (folder / "frame.yaml").write_text(f"# hall 3\n{format_model(model)}")

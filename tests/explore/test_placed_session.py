@@ -15,9 +15,9 @@ from study.explore.desk import Desk
 from study.explore.placed_page import PLACED, structure_files
 from study.explore.placed_view import placed_view
 from study.explore.saved_files import PAGE
+from study.records.readers import read_record
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure
-from study.structure.structure_reader import read_structure
 from study.support.errors import StudyError
 
 CUBIC = "cubic_stiffness[floor2-floor3]"
@@ -26,7 +26,7 @@ CUBIC = "cubic_stiffness[floor2-floor3]"
 @pytest.fixture(scope="module")
 def begun(hall):
     model = model_file.read_model(hall / "frame.yaml")
-    prepared = prepare_structure(read_structure(hall / "frame.csv", model), model)
+    prepared = prepare_structure(read_record(hall / "frame.csv", roles=model.roles), model)
     return sessions.begin_placed(compare_structure(model, prepared))
 
 

@@ -10,11 +10,11 @@ from study.compare import history
 from study.equations.model_file import format_model, parse_model, read_model
 from study.identify.frequency_domain.subspace import observability
 from study.records.excitation import Excitation, force
+from study.records.record import Record, Sensor, record_of, write_csv
 from study.structure.measured_comparison import compare_measured, measured_document, measured_says
 from study.structure.measured_fit import modal_run
 from study.structure.modes import modes_of
 from study.structure.prepared_structure import prepare_structure
-from study.structure.structure_record import Sensor, StructureRecord, write_structure_csv
 from study.structure.structure_simulation import simulate_structure
 from study.support.errors import StudyError
 
@@ -40,15 +40,13 @@ def beam():
     return model, simulate_structure(model, {"shaker": drive}, DT, steps_per_sample=4)
 
 
-def at_sensors(
-    beam, motion="displacement", noise=0.01, places=("p4", "p7", "p10"), seed=4, samples=SAMPLES
-) -> StructureRecord:
+def at_sensors(beam, motion="displacement", noise=0.01, places=("p4", "p7", "p10"), seed=4, samples=SAMPLES) -> Record:
     rng, motions = np.random.default_rng(seed), {}
     for place in places:
         x = beam[1].motions[Sensor(place, motion)]
         motions[Sensor(place, motion)] = x + np.sqrt(noise) * np.std(x) * rng.standard_normal(len(x))
-    forces = {name: x[:samples] for name, x in beam[1].forces.items()}
-    return StructureRecord(DT, forces, {s: x[:samples] for s, x in motions.items()})
+    forces = {name: beam[1][name][:samples] for name in beam[1].forces}
+    return record_of(DT, forces, {s: x[:samples] for s, x in motions.items()})
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +117,7 @@ def test_the_reports_duffing_system_is_a_structure_of_one_mode(motion, noise, re
     u = record.motions[Sensor("x", motion)]
     noisy = u + np.sqrt(noise) * np.std(u) * np.random.default_rng(3).standard_normal(len(u))
     model = measured("coordinates: [x]\nforces: {shaker: x}\nlinear: measured\nterms: [{term: cubic_stiffness, at: x}]")
-    own = StructureRecord(record.dt, record.forces, {Sensor("x", motion): noisy})
+    own = record.with_motions({Sensor("x", motion): noisy})
     fit = compare_measured(model, prepare_structure(own, model)).fit
     assert fit.modal.modes == 1
     mass = fit.values["phi[x,1]"] ** -2
@@ -175,7 +173,7 @@ def test_what_the_sensors_do_not_show_is_said(beam):
 
 
 def test_compare_on_the_command_line(tmp_path, beam, comparison, capsys):
-    write_structure_csv(at_sensors(beam), tmp_path / "beam.csv")
+    write_csv(at_sensors(beam), tmp_path / "beam.csv")
     (tmp_path / "beam.yaml").write_text(MEASURED)
     words = [str(tmp_path / "beam.csv"), "--model", str(tmp_path / "beam.yaml"), "--out", str(tmp_path / "out")]
     assert main(["compare", *words]) == 0
@@ -187,7 +185,7 @@ def test_compare_on_the_command_line(tmp_path, beam, comparison, capsys):
 
 @pytest.mark.long
 def test_a_term_is_dropped_beside_a_measured_linear_part(tmp_path, beam, capsys):
-    write_structure_csv(at_sensors(beam, samples=4000), tmp_path / "beam.csv")
+    write_csv(at_sensors(beam, samples=4000), tmp_path / "beam.csv")
     model = tmp_path / "beam.yaml"
     model.write_text(MEASURED)
     words = ["--data", str(tmp_path / "beam.csv"), "--out", str(tmp_path / "out")]

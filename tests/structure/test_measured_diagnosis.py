@@ -1,6 +1,7 @@
 """What is missing between sensors where the linear part is as measured: effect and place, on the beam."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,12 @@ from study.cli import main
 from study.equations.model_file import parse_model, read_model
 from study.equations.terms import LIBRARY
 from study.records.excitation import Excitation, force
+from study.records.record import Sensor, write_csv
 from study.structure.measured_comparison import compare_measured
 from study.structure.measured_diagnosis import diagnose_measured
 from study.structure.measured_report import measured_in_words
 from study.structure.measured_screening import between_sensors, measured_entries
 from study.structure.prepared_structure import prepare_structure
-from study.structure.structure_record import Sensor, StructureRecord, write_structure_csv
 from study.structure.structure_simulation import simulate_structure
 
 ROOT = Path(__file__).parents[2]
@@ -32,13 +33,13 @@ def record():
     exact, rng = simulate_structure(model, {"shaker": drive}, DT, steps_per_sample=4), np.random.default_rng(4)
     shown = {s: x for s, x in exact.motions.items() if s in {Sensor(p, "displacement") for p in ("p4", "p10")}}
     noisy = {s: x + 0.1 * np.std(x) * rng.standard_normal(len(x)) for s, x in shown.items()}
-    return StructureRecord(DT, exact.forces, noisy, name="beam")
+    return replace(exact.with_motions(noisy), name="beam")
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory, record):
     place = tmp_path_factory.mktemp("beam")
-    write_structure_csv(record, place / "beam.csv")
+    write_csv(record, place / "beam.csv")
     (place / "bare.yaml").write_text(BARE)
     return place
 
@@ -97,9 +98,7 @@ def test_an_open_shape_parameter_is_searched_for():
     whole = parse_model(text.replace("terms:", f"{place}terms:"), Path("whole.yaml"))
     drive = force(Excitation(level=1.0, cutoff=12.5), 2048, 0.02, 1990)
     record = simulate_structure(whole, {"shaker": drive}, 0.02, steps_per_sample=16)
-    shown = StructureRecord(
-        0.02, record.forces, {s: x for s, x in record.motions.items() if s.motion == "displacement"}
-    )
+    shown = record.with_motions({s: x for s, x in record.motions.items() if s.motion == "displacement"})
     model = parse_model(f"{place}linear: measured\nterms: [{{term: dead_band, at: x}}]", Path("dead.yaml"))
     comparison = compare_measured(model, prepare_structure(shown, model))
     true, found = whole.numbers(), comparison.fit.values

@@ -11,12 +11,11 @@ from study.identify import estimators
 from study.identify.estimators.base import Settings
 from study.identify.frequency_domain.local_polynomial import LocalPolynomial
 from study.records.excitation import Excitation, force
-from study.records.record import Record
+from study.records.record import Record, record_of
 from study.records.spectra import Segments
 from study.structure.action_reaction import joint_estimate
 from study.structure.prepared_structure import prepare_structure
 from study.structure.reverse_system import equations_of, exact_responses, reverse_system
-from study.structure.structure_record import StructureRecord
 from study.structure.structure_simulation import simulate_structure
 from study.support.errors import StudyError
 
@@ -52,10 +51,10 @@ def record():
 def one_force(record):
     """The same structure driven at its first mass alone."""
     driven = model(TWO.replace(", second: b", ""))
-    return driven, simulate_structure(driven, {"first": record.forces["first"]}, DT)
+    return driven, simulate_structure(driven, {"first": record["first"]}, DT)
 
 
-def equations(structure, record: StructureRecord):
+def equations(structure, record: Record):
     return equations_of(structure, prepare_structure(record, structure), (0, len(record)))[0]
 
 
@@ -159,8 +158,8 @@ def noisy(record, sign, seed):
     rng = np.random.default_rng(seed)
     first, second = 0.1 * rng.standard_normal((2, SAMPLES))
     noise = {"first": first, "second": second if sign == 0 else sign * first}
-    forces = {name: x + noise[name] for name, x in record.forces.items()}
-    return StructureRecord(DT, forces, record.motions)
+    forces = {name: record[name] + noise[name] for name in record.forces}
+    return record_of(DT, forces, record.motions)
 
 
 @pytest.mark.parametrize("estimator", ["miso", "local_polynomial"])
@@ -180,7 +179,7 @@ def test_the_error_of_the_difference_is_its_scatter(record, estimator, sign):
 
 def test_a_term_at_the_wrong_place_breaks_action_and_reaction(record):
     structure, own = model(), model(TWO.replace("cubic_stiffness, between: [a, b]", "cubic_stiffness, at: b"))
-    grounded = simulate_structure(own, record.forces, DT)
+    grounded = simulate_structure(own, {name: record[name] for name in record.forces}, DT)
     for motions, holds in ((record, True), (grounded, False)):
         system = reverse_system("miso", equations(structure, noisy(motions, 0, 5)), DT, SETTINGS)
         assert (joint_estimate(system).least_p > 1e-6) == holds
@@ -189,7 +188,7 @@ def test_a_term_at_the_wrong_place_breaks_action_and_reaction(record):
 def test_what_no_equation_tells_is_said(one_force):
     structure, motions = one_force
     still = model(TWO.replace("forces: {first: a, second: b}\n", ""))
-    free = StructureRecord(DT, {}, motions.motions)
+    free = record_of(DT, {}, motions.motions)
     system = reverse_system("local_polynomial", equations(still, free), DT, SETTINGS)
     with pytest.raises(StudyError, match="a mass held"):
         joint_estimate(system)
@@ -206,11 +205,9 @@ def test_the_joint_estimate_is_the_nearest_one(one_force):
     """Minimum distance by a general solver, whose derivatives are differences."""
     structure, motions = one_force
     rng = np.random.default_rng(2)
-    noisy_force = motions.forces["first"] + 0.3 * rng.standard_normal(SAMPLES)
+    noisy_force = motions["first"] + 0.3 * rng.standard_normal(SAMPLES)
     shaken = {s: x * (1.0 + 1e-3 * rng.standard_normal(SAMPLES)) for s, x in motions.motions.items()}
-    system = reverse_system(
-        "miso", equations(structure, StructureRecord(DT, {"first": noisy_force}, shaken)), DT, SETTINGS
-    )
+    system = reverse_system("miso", equations(structure, record_of(DT, {"first": noisy_force}, shaken)), DT, SETTINGS)
     joint = joint_estimate(system).estimate
     own = [(r.mass, r.found.estimate) for r in system.results]
     size = np.array([structure.values[key] for key in joint.symbols])

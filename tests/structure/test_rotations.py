@@ -1,17 +1,23 @@
 """Coordinates that were measured as angles: forces on them are moments, and every unit says so."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from study.equations.model import free
 from study.equations.place import Place
 from study.equations.terms import get
+from study.records.readers import read_record
+from study.records.record import Sensor, record_of, write_csv
 from study.structure.placed_units import coefficient_unit, parameter_units, units_at
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure, structure_summary
-from study.structure.structure_reader import read_structure
-from study.structure.structure_record import write_structure_csv
 
-TURNS = frozenset({"pitch"})
+TURNS = record_of(
+    0.01, {"shaker": np.zeros(9)}, {Sensor(c, "displacement"): np.zeros(9) for c in ("heave", "pitch")}
+)  # fmt: skip
+TURNS = replace(TURNS, units={**TURNS.units, "pitch displacement": "rad"})
 PITCH = Place("between", ("ground", "pitch"))
 
 
@@ -44,13 +50,13 @@ def test_a_record_tells_which_coordinates_turn(tmp_path, frame, quiet_frame, uni
     path = tmp_path / "rig.csv"
     kept = {s: x for s, x in quiet_frame.motions.items() if s.motion == "displacement"}
     turned = {s: x * (factor if s.coordinate == "floor3" else 1.0) for s, x in kept.items()}
-    write_structure_csv(quiet_frame.with_motions(turned), path)
+    write_csv(quiet_frame.with_motions(turned), path)
     head, rest = path.read_text().split("\n", 1)
     path.write_text(
         head.replace("floor1 displacement", "floor1 (m)").replace("floor2 displacement", "floor2 (m)")
         .replace("floor3 displacement", f"floor3 ({unit})") + "\n" + rest
     )  # fmt: skip
-    record = read_structure(path, frame)
+    record = read_record(path, roles=frame.roles)
     assert record.rotations == {"floor3"}
     comparison = compare_structure(frame, prepare_structure(record, frame))
     said = structure_summary(comparison)

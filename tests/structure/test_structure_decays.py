@@ -8,11 +8,11 @@ import pytest
 
 from study.diagnose.verdict import MISSING, NOTHING
 from study.equations.model_file import parse_model
+from study.records.record import Sensor, record_of
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure
 from study.structure.structure_fit import linearise_structure
 from study.structure.structure_layout import Parts, lay_out
-from study.structure.structure_record import Sensor, StructureRecord
 from study.structure.structure_run import prepare_run
 from study.structure.structure_verdict import diagnose_structure
 from study.support.errors import StudyError
@@ -44,11 +44,11 @@ def model(*, known=False, more=""):
 
 def decay(more="", noise=0.003, seed=1, begin=BEGIN, samples=SAMPLES):
     """The pair let go; noise as a share of each motion's size."""
-    still = StructureRecord(DT, {}, {s: np.zeros(samples) for s in SENSORS})
+    still = record_of(DT, {}, {s: np.zeros(samples) for s in SENSORS})
     run = prepare_run(model(known=True, more=more), still, sensors=SENSORS, steps_per_sample=4)
     motion, rng = run.respond({}, begin)[0], np.random.default_rng(seed)
     noisy = motion + noise * np.std(motion, axis=1, keepdims=True) * rng.standard_normal(motion.shape)
-    return StructureRecord(DT, {}, dict(zip(SENSORS, noisy, strict=True)), name="decay", start=3.0)
+    return record_of(DT, {}, dict(zip(SENSORS, noisy, strict=True)), name="decay", start=3.0)
 
 
 def test_a_decay_is_fitted_and_judged_in_turn_and_its_motion_begins_anew():

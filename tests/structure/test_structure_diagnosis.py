@@ -9,17 +9,17 @@ import pytest
 from study.cli import main
 from study.equations.model_file import format_model, read_model
 from study.equations.terms import get
+from study.records.record import write_csv
 from study.structure.placed_candidates import candidate_entries, external, one_sided, screened
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure
-from study.structure.structure_record import write_structure_csv
 from study.structure.structure_verdict import placed_search_base
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory, record_of, believed):
     place = tmp_path_factory.mktemp("frame")
-    write_structure_csv(record_of(), place / "frame.csv")
+    write_csv(record_of(), place / "frame.csv")
     (place / "frame.yaml").write_text(format_model(believed))
     return place
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,8 @@ import pytest
 
 from study.cli import main
 from study.equations.model_file import format_model, parse_model, read_model
+from study.records.record import write_csv
 from study.structure.sketch import GROUND_AT, sketch
-from study.structure.structure_record import write_structure_csv
 
 TREE = """
 name: tree
@@ -31,9 +32,8 @@ def given(tmp_path_factory, record_of, believed, frame):
     """A short record, and models without and with the hardening joint."""
     folder = tmp_path_factory.mktemp("pictures")
     record = record_of()
-    cut = {s: x[:2400] for s, x in record.motions.items()}
-    short = type(record)(record.dt, {n: x[:2400] for n, x in record.forces.items()}, cut, name="short")
-    write_structure_csv(short, folder / "short.csv")
+    short = replace(record.part(0, 2400), name="short")
+    write_csv(short, folder / "short.csv")
     (folder / "frame.yaml").write_text(format_model(believed))
     full = frame.with_values(dict.fromkeys(frame.values, None))
     (folder / "full.yaml").write_text(format_model(full))

@@ -11,14 +11,14 @@ from study.equations.model import free
 from study.equations.model_file import parse_model
 from study.equations.place import Place
 from study.equations.terms import LIBRARY, get
+from study.records.completion import consistent
 from study.records.excitation import Excitation, force
-from study.records.readers import ReadOptions
+from study.records.readers import ReadOptions, read_record
+from study.records.record import Sensor, write_csv
 from study.structure.mass_matrix import check_held_masses, loose_motions
 from study.structure.placed_candidates import PROMISING, elsewhere
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure
-from study.structure.structure_reader import read_structure
-from study.structure.structure_record import Sensor, write_structure_csv
 from study.structure.structure_report import structure_diagnosis_in_words
 from study.structure.structure_simulation import simulate_structure
 from study.structure.structure_verdict import diagnose_structure
@@ -127,21 +127,24 @@ def test_a_mechanism_is_named_where_no_fit_begins():
     ("heads", "units", "said"),
     [
         (("trunk [mm]", "right displacement"), {}, "trunk displacement in mm, right displacement in no unit; expected"),
-        (("trunk [V]", "right [m]"), {}, "sensors in volts and in metres cannot be compared"),
+        (("trunk [V]", "right [m]"), {}, "trunk displacement in V, right displacement in m cannot be compared"),
         (("trunk [mm]", "right displacement"), {"right.displacement": "mm"}, None),
         (("trunk displacement", "right displacement"), {"displacement": "mm"}, None),
     ],
 )  # fmt: skip
 def test_sensors_in_different_units(tmp_path, heads, units, said):
     record = twin_record(("trunk", "right"))
-    write_structure_csv(record, tmp_path / "twin.csv")
+    write_csv(record, tmp_path / "twin.csv")
     lines = (tmp_path / "twin.csv").read_text().splitlines(keepends=True)
     lines[0] = ",".join(["time", "shaker", *heads]) + "\n"
     (tmp_path / "twin.csv").write_text("".join(lines))
     model = parse_model(HEAD + MASSES + FOOT + BRANCHES, HERE)
     if said is None:
-        read = read_structure(tmp_path / "twin.csv", model, ReadOptions(units=units))
-        np.testing.assert_allclose(read.measured, 1e-3 * record.measured)
+        read, _ = consistent(read_record(tmp_path / "twin.csv", ReadOptions(units=units), model.roles))
+        for sensor in record.sensors:
+            np.testing.assert_allclose(read[sensor], record[sensor])
+            assert read.unit(sensor) == "mm"
+        assert read.force_and_length == ("N", "mm")
         return
     with pytest.raises(StudyError, match=said):
-        read_structure(tmp_path / "twin.csv", model, ReadOptions(units=units))
+        consistent(read_record(tmp_path / "twin.csv", ReadOptions(units=units), model.roles))

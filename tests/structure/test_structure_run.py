@@ -12,8 +12,8 @@ from study.equations.model_file import read_model
 from study.equations.place import HERE, Place
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
+from study.records.record import Sensor
 from study.structure.modes import modes_of
-from study.structure.structure_record import Sensor
 from study.structure.structure_run import prepare_run
 from study.structure.structure_simulation import simulate_structure
 

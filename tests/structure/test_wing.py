@@ -11,11 +11,11 @@ from study.equations.model import free
 from study.equations.model_file import parse_model
 from study.equations.place import Place
 from study.equations.terms import LIBRARY, get
+from study.records.readers import read_record
 from study.structure.placed_candidates import candidate_entries, screened
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure
 from study.structure.structure_layout import Parts, lay_out
-from study.structure.structure_reader import read_structure
 from study.structure.structure_verdict import diagnose_structure, placed_search_base
 from study.support.errors import StudyError
 
@@ -49,7 +49,7 @@ def wing(name):
 @pytest.mark.parametrize("name", list(AUTHORS))
 def test_stiffness_is_found_and_what_is_missing_is_in_pitch(name):
     model = wing(name)
-    record = read_structure(DATA / "wing" / f"{name}.csv", model)
+    record = read_record(DATA / "wing" / f"{name}.csv", roles=model.roles)
     prepared = prepare_structure(record, model, (0, 2500), (2500, 4000))
     comparison = compare_structure(model, prepared)
     _, _, heave, pitch = AUTHORS[name]
@@ -82,7 +82,7 @@ def test_heave_of_the_second_wing_has_dry_friction():
         ("coulomb_friction", "pitch"),
     ):  # fmt: skip
         model = model.with_term(free(get(effect), Place("between", ("ground", where))))
-    record = read_structure(DATA / "wing" / "model_2.csv", model)
+    record = read_record(DATA / "wing" / "model_2.csv", roles=model.roles)
     comparison = compare_structure(model, prepare_structure(record, model, (0, 2400), (2400, 4000)))
     found = {c.key: c for c in comparison.coefficients}
     friction = found["fc[ground-heave]"]
@@ -99,7 +99,7 @@ def test_heave_of_the_second_wing_has_dry_friction():
 def test_a_prediction_worse_than_none_is_never_said_to_lack_nothing():
     """Pitch is at rest in the judged part, and linear terms alone let it swing on."""
     model = wing("model_2")
-    record = read_structure(DATA / "wing" / "model_2.csv", model)
+    record = read_record(DATA / "wing" / "model_2.csv", roles=model.roles)
     comparison = compare_structure(model, prepare_structure(record, model, (0, 2500), (2500, 4000)))
     assert comparison.prediction.error > 1.0
     others = [name for name in LIBRARY if name != "constant_force"]
@@ -109,7 +109,7 @@ def test_a_prediction_worse_than_none_is_never_said_to_lack_nothing():
 def test_without_a_force_masses_must_be_given():
     model = wing("model_1")
     free = model.with_values({"m[heave]": None})
-    record = read_structure(DATA / "wing" / "model_1.csv", free)
+    record = read_record(DATA / "wing" / "model_1.csv", roles=free.roles)
     with pytest.raises(StudyError, match=r"says nothing of m\[heave\]; expected a value"):
         compare_structure(free, prepare_structure(record, free, (0, 2500), (2500, 4000)))
 
@@ -122,7 +122,7 @@ SEARCHED = ("quadratic_stiffness", "cubic_stiffness", "bilinear_stiffness", "cou
 def test_as_a_user_runs_it_the_missing_stiffness_is_in_pitch(name):
     """Without parts named: every other stretch of one and a half periods is judged, from a state of its own."""
     model = wing(name)
-    record = read_structure(DATA / "wing" / f"{name}.csv", model)
+    record = read_record(DATA / "wing" / f"{name}.csv", roles=model.roles)
     comparison = compare_structure(model, lay_out(record, model, Parts()))
     _, _, heave, pitch = AUTHORS[name]
     values = comparison.fit.model.values
@@ -140,7 +140,7 @@ def test_as_a_user_runs_it_the_missing_stiffness_is_in_pitch(name):
 def test_no_division_of_a_decay_lacks_nothing(fit, judge):
     """As long as its free run leaves a hundred times the noise; a free run of seconds has lost the motion there."""
     model = wing("model_1")
-    record = read_structure(DATA / "wing" / "model_1.csv", model)
+    record = read_record(DATA / "wing" / "model_1.csv", roles=model.roles)
     others = [effect for effect in LIBRARY if effect != "constant_force"]
     for prepared in (lay_out(record, model, Parts(fit, judge)), prepare_structure(record, model, fit, judge)):
         comparison = compare_structure(model, prepared)

@@ -11,6 +11,7 @@ import numpy as np
 from study.records.readers import hdf5, matlab, parquet, uff
 from study.records.readers.assemble import record_from
 from study.records.readers.options import ReadOptions, assignments, options_beside, read_options
+from study.records.readers.roles import Roles
 from study.records.readers.source import EXPECTED, readable
 from study.records.readers.swapped import suspect_swapped
 from study.records.readers.table import Table
@@ -18,8 +19,9 @@ from study.records.record import Record
 from study.support.errors import StudyError, expect
 from study.support.files import reason
 
-__all__ = ["ReadOptions", "assignments", "read_options", "read_record", "read_table", "suspect_swapped"]
+__all__ = ["ReadOptions", "Roles", "assignments", "read_options", "read_record", "read_table", "suspect_swapped"]
 
+SINGLE_MASS = Roles()
 MAGIC = 1024  # bytes; MATLAB 7.3 begins its HDF5 part behind 512 of its own
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 BINARY = {"hdf5": hdf5.read, "matlab": matlab.read, "parquet": parquet.read, "uff": uff.read}
@@ -34,7 +36,7 @@ OTHERS = {
 }  # fmt: skip
 
 
-def read_record(path: Path, mapping: ReadOptions | None = None) -> Record:
+def read_record(path: Path, mapping: ReadOptions | None = None, roles: Roles = SINGLE_MASS) -> Record:
     """Read a measured record: CSV and other text tables, MATLAB to 7.3, HDF5, UFF (dataset 58), or Parquet.
 
     Parameters
@@ -44,11 +46,13 @@ def read_record(path: Path, mapping: ReadOptions | None = None) -> Record:
     mapping : ReadOptions, optional
         What the user says about it. Comes before ``<stem>.record.yaml`` beside the file, and that
         before what the file says itself.
+    roles : Roles
+        Coordinates and forces of the model; those of a single mass if left out.
 
     Returns
     -------
     Record
-        Force and at least one motion, as measured; ``completion.complete`` gives the others.
+        Forces and at least one motion, as measured; ``completion.complete`` gives the others.
 
     Raises
     ------
@@ -57,8 +61,9 @@ def read_record(path: Path, mapping: ReadOptions | None = None) -> Record:
     """
     path = Path(path)
     table, options = read_table(path, mapping)
-    record = record_from(path, table, options)
-    unforced = not np.any(record["force"])
+    record = record_from(path, table, options, roles)
+    one = len(roles.coordinates) == len(roles.forces) == 1  # of several nobody can say which should move as a mass does
+    unforced = not one or not np.any(record[roles.forces[0]])
     suspicion = None if options.accept_swapped or unforced else suspect_swapped(record)
     if suspicion is not None:
         raise StudyError(f"{path}: {suspicion}")

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from study.records.readers import checks
 from study.records.readers.options import ReadOptions
-from study.records.readers.roles import assign, own_unit
+from study.records.readers.roles import Roles, assign, own_unit
 from study.records.readers.sampling import even_interval
 from study.records.readers.table import Column, Table
 from study.records.record import MOTIONS, SI_UNITS, Record
 from study.support.errors import StudyError, at, expect
 from study.support.terminal import harmless
-from study.support.units import ROLES, is_unit, parse_unit, role_unit
+from study.support.units import is_unit, parse_unit, role_unit
 
 Floats = NDArray[np.float64]
 LONGEST_NAME = 120  # characters of a record's name: names of files have 255 bytes, and more is put to it
@@ -24,26 +24,31 @@ AGREE = 0.01  # share by which a given interval may differ from that of the time
 AGAIN = 0.7  # of its rms: a force that changes by more after a period does not repeat (a random one changes by 1.4)
 
 
-def record_from(path: Path, table: Table, options: ReadOptions) -> Record:
+def record_from(path: Path, table: Table, options: ReadOptions, roles: Roles) -> Record:
     """The record that a table holds; its columns, units, times and values have to make one."""
     grouped = not options.group or any("/" in column.name for column in table.columns)
     expect(grouped, f"{path}: a group {options.group!r} is asked for and this file has none; leave it out")
-    roles = assign(path, table, options)
-    for column in roles.values():
+    columns = assign(path, table, options, roles)
+    for column in columns.values():
         expect(not column.fault, f"{path}: {column.fault}")
-    _check_lengths(path, roles, options)
-    _check_apart(path, roles)
-    units = _units(path, roles, options)
-    first, last = _range(path, len(next(iter(roles.values())).values), options)
+    _check_lengths(path, columns)
+    given = _given_units(path, columns, options, roles)
+    _check_apart(path, columns, roles)
+    units = _units(path, columns, given, roles)
+    first, last = _range(path, len(next(iter(columns.values())).values), options)
     cut = table.from_sample(first)
-    kept = _usable(path, {r: replace(c, values=c.values[first:last]) for r, c in roles.items()}, cut, options)
+    kept = {channel: replace(c, values=c.values[first:last]) for channel, c in columns.items()}
+    kept = _usable(path, kept, cut, options, roles)
     dt, start = _sampling(path, kept, units, cut, options, first)
-    channels = {role: c.values for role, c in kept.items() if role != "time"}
-    named = {role: unit for role, unit in units.items() if role in channels}
-    if "force" not in channels:  # a free decay
-        channels["force"] = np.zeros(last - first)
-    period = _period(path, roles, channels["force"], options)
-    return Record(dt, channels, {**SI_UNITS, **named}, _name(path, options), start, period)
+    channels = {channel: c.values for channel, c in kept.items() if channel != "time"}
+    still = {force: np.zeros(last - first) for force in roles.forces if force not in channels}  # a free decay
+    usual = {"time": "s"} | {channel: SI_UNITS[kind] for channel, kind in roles.kinds.items()}
+    named = {channel: unit for channel, unit in units.items() if channel in channels}
+    period = _period(path, columns, channels, options, roles)
+    return Record(
+        dt, channels | still, usual | named, _name(path, options), start, period,
+        coordinates=roles.coordinates, forces=roles.forces,
+    )  # fmt: skip
 
 
 def _name(path: Path, options: ReadOptions) -> str:
@@ -53,43 +58,64 @@ def _name(path: Path, options: ReadOptions) -> str:
     return harmless(name)[:LONGEST_NAME]  # files are named after it, and pictures show it
 
 
-def _check_apart(path: Path, roles: Mapping[str, Column]) -> None:
+def _check_apart(path: Path, columns: Mapping[str, Column], roles: Roles) -> None:
     """Refuse one column in two places."""
     taken: dict[int, str] = {}
-    for role, column in roles.items():
-        other = taken.setdefault(id(column), role)
-        expect(other == role, f"{path}: column {column.name!r} is given as {other} and as {role}; expected one of each")
-    for motion in (m for m in MOTIONS if m in roles and "force" in roles):
-        same = np.array_equal(roles["force"].values, roles[motion].values)
-        expect(not same, f"{path}: force and {motion} hold the same numbers; expected two measured channels")
+    for channel, column in columns.items():
+        other = taken.setdefault(id(column), channel)
+        expect(
+            other == channel,
+            f"{path}: column {column.name!r} is given as {other} and as {channel}; expected one of each",
+        )
+    for force in (f for f in roles.forces if f in columns):
+        for motion in (c for c in columns if roles.kinds.get(c) in MOTIONS):
+            same = np.array_equal(columns[force].values, columns[motion].values)
+            expect(not same, f"{path}: {force} and {motion} hold the same numbers; expected two measured channels")
 
 
-def _check_lengths(path: Path, roles: Mapping[str, Column], options: ReadOptions) -> None:
-    lengths = {len(column.values) for column in roles.values()}
-    each = ", ".join(f"{role} ({column.name!r}) has {len(column.values)}" for role, column in roles.items())
+def _check_lengths(path: Path, columns: Mapping[str, Column]) -> None:
+    lengths = {len(column.values) for column in columns.values()}
+    each = ", ".join(f"{channel} ({column.name!r}) has {len(column.values)}" for channel, column in columns.items())
     expect(len(lengths) == 1, f"{path}: channels differ in length: {each} samples; expected the same number for all")
-    for role in options.units:
-        known = role in (*roles, "time")
-        expect(known, f"{path}: a unit is given for {role!r}; {', '.join(roles)} are the channels")
 
 
-def _units(path: Path, roles: Mapping[str, Column], options: ReadOptions) -> dict[str, str]:
+def _given_units(path: Path, columns: Mapping[str, Column], options: ReadOptions, roles: Roles) -> dict[str, str]:
+    """The units that the user gives, by channel; one of ``force`` or of a motion is that of all such channels."""
+    given: dict[str, str] = {}
+    for role, unit in options.units.items():
+        channel = roles.said(role) or role
+        meant = [channel] if channel in (*columns, "time") else [c for c in columns if roles.kinds.get(c) == role]
+        expect(meant, f"{path}: a unit is given for {role!r}; {', '.join(columns)} are the channels")
+        given = dict.fromkeys(meant, unit) | given if len(meant) > 1 else given | {meant[0]: unit}
+    return given
+
+
+def _units(
+    path: Path, columns: Mapping[str, Column], given: Mapping[str, str], roles: Roles
+) -> dict[str, str]:  # fmt: skip
     """Unit of each channel, as records write it; an extra channel's may be anything."""
     units: dict[str, str] = {}
-    for role, column in roles.items():
-        text = options.units.get(role) or own_unit(column, role)
-        _refuse_contradiction(path, column, role, options)
-        if text and role in ROLES:
+    for channel, column in columns.items():
+        kind = roles.kinds.get(channel, "")
+        own = own_unit(column, kind)
+        text = given.get(channel) or own
+        _refuse_contradiction(path, column, given.get(channel, ""), own)
+        if text and kind:
             with at(f"{path}: column {column.name!r}"):
-                units[role] = role_unit(role, text).text
+                units[channel] = role_unit(kind, text).text
         elif text:
-            units[role] = parse_unit(text).text if is_unit(text) else text
+            units[channel] = parse_unit(text).text if is_unit(text) else text
+    motions = [channel for channel in columns if roles.kinds.get(channel) in MOTIONS]
+    bare = next((channel for channel in motions if channel not in units), None)
+    if bare is not None and not roles.alone and any(channel in units for channel in motions):
+        names = ", ".join(f"{channel} in {units.get(channel, 'no unit')}" for channel in motions)
+        like = f"--unit {bare.replace(' ', '.')}=UNIT"
+        raise StudyError(f"{path}: {names}; expected a unit of every sensor, such as {like}, or of none, for SI units")
     return units
 
 
-def _refuse_contradiction(path: Path, column: Column, role: str, options: ReadOptions) -> None:
+def _refuse_contradiction(path: Path, column: Column, given: str, own: str) -> None:
     """Refuse a unit that is given where the file says another: one is a factor wrong, and nobody knows which."""
-    given, own = options.units.get(role, ""), own_unit(column, role)
     if not (is_unit(given) and is_unit(own)):
         return
     one, other = parse_unit(given), parse_unit(own)
@@ -115,27 +141,30 @@ def _range(path: Path, length: int, options: ReadOptions) -> tuple[int, int]:
     return first, end
 
 
-def _usable(path: Path, roles: Mapping[str, Column], table: Table, options: ReadOptions) -> dict[str, Column]:
+def _usable(
+    path: Path, columns: Mapping[str, Column], table: Table, options: ReadOptions, roles: Roles
+) -> dict[str, Column]:
     """The channels, each checked; an extra channel with gaps that nobody asked for is left out."""
     usable: dict[str, Column] = {}
-    for role, column in roles.items():
+    for channel, column in columns.items():
+        kind = roles.kinds.get(channel, "")
         fault = checks.not_finite(column.values, table.place) or checks.beyond(column.values, table.place)
-        if fault is not None and role not in (*ROLES, *options.columns):
+        if fault is not None and not kind and channel not in options.columns:
             continue
-        resting = role == "force" and not np.any(column.values)  # no force acts: a free decay
-        if fault is None and role in ("force", *MOTIONS) and not resting:
+        resting = kind == "force" and not np.any(column.values)  # no force acts: a free decay
+        if fault is None and kind in ("force", *MOTIONS) and not resting:
             fault = checks.constant(column.values)
             if fault is None and not options.accept_saturated:
                 fault = checks.saturated(column.values)
         if fault is not None:
-            meaning = "" if column.name == role else f" ({role})"
+            meaning = "" if column.name == channel else f" ({channel})"
             raise StudyError(f"{path}: column {column.name!r}{meaning} {fault}")
-        usable[role] = column
+        usable[channel] = column
     return usable
 
 
 def _sampling(
-    path: Path, roles: Mapping[str, Column], units: Mapping[str, str], table: Table, options: ReadOptions, first: int
+    path: Path, columns: Mapping[str, Column], units: Mapping[str, str], table: Table, options: ReadOptions, first: int
 ) -> tuple[float, float]:
     """Interval and first time: what the user says, what the times say, what the file states."""
     stated = options.interval
@@ -143,8 +172,8 @@ def _sampling(
     usual = given is None or checks.SHORTEST <= given <= checks.LONGEST
     limits = f"{checks.SHORTEST:g} to {checks.LONGEST:g} s"
     expect(usual, f"{path}: the sampling interval is {given or 0.0:g} s; expected one of {limits}")
-    if "time" in roles:
-        time = roles["time"].values * parse_unit(units.get("time", "s")).factor
+    if "time" in columns:
+        time = columns["time"].values * parse_unit(units.get("time", "s")).factor
         if stated is None:
             return even_interval(path, time, table.place)
         step = float(np.median(np.diff(time)))
@@ -163,13 +192,17 @@ def _sampling(
     return dt, table.start + dt * first
 
 
-def _period(path: Path, roles: Mapping[str, Column], force: Floats, options: ReadOptions) -> int | None:
-    length, period = len(next(iter(roles.values())).values), options.period
+def _period(
+    path: Path, columns: Mapping[str, Column], channels: Mapping[str, Floats], options: ReadOptions, roles: Roles
+) -> int | None:  # fmt: skip
+    length, period = len(next(iter(columns.values())).values), options.period
+    forces = [force for force in roles.forces if force in columns]
     if period is None:
-        return roles["force"].period if "force" in roles else None
+        return columns[forces[0]].period if forces else None
     given = f"{path}: a period of {period} samples is given"
     expect(period <= length, f"{given}, and the record has {length}; expected one that it holds")
-    change = checks.change_after(force, period)
-    differs = f"the force {period} samples later differs by {100.0 * change:.0f} % of its rms"
-    expect(change <= AGAIN, f"{given}, and {differs}; expected the number of samples after which it repeats")
+    for force in forces:
+        change, called = checks.change_after(channels[force], period), "force" if roles.alone else f"force {force!r}"
+        differs = f"the {called} {period} samples later differs by {100.0 * change:.0f} % of its rms"
+        expect(change <= AGAIN, f"{given}, and {differs}; expected the number of samples after which it repeats")
     return period

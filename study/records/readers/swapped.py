@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.records.record import MOTIONS, Record
+from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments, cross_spectra
 
 Floats = NDArray[np.float64]
@@ -38,32 +38,34 @@ def suspect_swapped(record: Record) -> str | None:
     The measured motion nearest to displacement is used. A record that is too short, or whose band holds no resonance
     and no mass, cannot tell.
     """
-    motion = next(m for m in MOTIONS if m in record)
+    (force,), sensor = record.forces, next(s for m in MOTIONS if (s := Sensor(record.coordinates[0], m)) in record)
     length = min(LONGEST, 2 * len(record) // AVERAGES)
     if length < 4 * FEWEST_LINES:
         return None
-    matrix = cross_spectra([record["force"], record[motion]], record.dt, Segments(length))
+    matrix = cross_spectra([record[force], record[sensor]], record.dt, Segments(length))
     g, frequency = matrix.density, matrix.frequency
-    force, response, cross = g[:, 0, 0].real, g[:, 1, 1].real, g[:, 1, 0]
-    weight = np.abs(cross) ** 2 / np.maximum(force * response, np.finfo(float).tiny)
-    keep = (weight > COHERENT) & (force > CONTENT * force.max()) & (response > CONTENT * response.max())
+    drive, response, cross = g[:, 0, 0].real, g[:, 1, 1].real, g[:, 1, 0]
+    weight = np.abs(cross) ** 2 / np.maximum(drive * response, np.finfo(float).tiny)
+    keep = (weight > COHERENT) & (drive > CONTENT * drive.max()) & (response > CONTENT * response.max())
     keep[:2] = False  # offset and drift
     if np.count_nonzero(keep) < FEWEST_LINES:
         return None
     omega, weight = 2.0 * np.pi * frequency[keep], weight[keep]
-    turn = (1j * omega) ** MOTIONS.index(motion)  # from this motion to what it is the derivative of
-    ratio = np.sqrt(force[keep] / response[keep]) * cross[keep] / np.abs(cross[keep])  # the same for both readings
+    turn = (1j * omega) ** MOTIONS.index(sensor.motion)  # from this motion to what it is the derivative of
+    ratio = np.sqrt(drive[keep] / response[keep]) * cross[keep] / np.abs(cross[keep])  # the same for both readings
     given = _fit(omega, ratio * turn, weight)
     swapped = _fit(omega, turn / ratio, weight)
     if _is_mechanical(given) or not _is_mechanical(swapped) or swapped.error > BETTER * given.error:
         return None
     if swapped.mass * omega.max() ** 2 < abs(swapped.stiffness):  # a spring alone fits too much
         return None
+    named = str(sensor).replace(" ", ".")
     return (
-        f"force and {motion} seem to be swapped: read the other way round, their ratio is that of a mass on a spring "
+        f"{force} and {sensor} seem to be swapped: read the other way round, their ratio is that of a mass on a spring "
         f"to within {100.0 * swapped.error:.0f} %, as given it misses by {100.0 * given.error:.0f} % (mass "
-        f"{given.mass:.3g}, damping {given.damping:.3g}); expected --column force=... --column {motion}=... with "
-        "the names exchanged (or --accept-swapped, 'accept_swapped: true' beside the file, if the record is like that)"
+        f"{given.mass:.3g}, damping {given.damping:.3g}); expected --column {force}=... --column {named}=... "
+        "with the names exchanged (or --accept-swapped, 'accept_swapped: true' beside the file, if the record is like "
+        "that)"
     )
 
 
