@@ -1,13 +1,13 @@
 """What the commands do with a model of several coordinates."""
 
 import argparse
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from study.commands.command import progress
 from study.commands.record_arguments import (
-    ALTERNATE,
     inputs_of,
+    layout_of,
     out_folder,
     read_records,
     sources,
@@ -25,23 +25,28 @@ if TYPE_CHECKING:
 
 
 def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[PreparedStructure]":
-    """The records that were named, made ready."""
-    from study.structure.structure_layout import Parts, lay_out
-    from study.support.errors import at
+    """The records that were named, made ready; options that nothing does with several coordinates are refused."""
+    from study.faults.instrument_settings import settings_beside
+    from study.structure.prepared_structure import structure_ready
+    from study.support.errors import at, expect
 
+    for option in ("absolute", "each_record"):
+        given = f"--{option.replace('_', '-')} is for a single mass; expected it left out beside 'coordinates'"
+        expect(not getattr(arguments, option, None), given)
+    expect(
+        getattr(arguments, "estimator", "output_error") == "output_error",
+        f"--estimator {getattr(arguments, 'estimator', '')} is for a single mass; expected output_error of a structure",
+    )
     made: list[PreparedStructure] = []
-    records = read_records(arguments, model)
-    for path, record in zip(sources(arguments), records, strict=True):
-        turns = arguments.judge == ALTERNATE
-        fit, judge = (_within(span, len(record)) for span in (arguments.fit, None if turns else arguments.judge))
+    for path, record in zip(sources(arguments), read_records(arguments, model), strict=True):
         with at(path):
-            parts = Parts(fit, judge, tuple(arguments.use), turns, arguments.cutoff)
-            made.append(lay_out(record, model, parts))
+            beside = settings_beside(path)
+            held = f"measurement holds {', '.join(beside.held)}, which is looked for in records of a single mass alone"
+            expect(arguments.no_measurement or not beside.held, f"{held}; expected 'measurement: off'")
+            layout = layout_of(arguments, record)
+            layout = replace(layout, as_sampled=arguments.as_sampled or beside.as_sampled)
+            made.append(structure_ready(record, model, layout))
     return made
-
-
-def _within(span: "tuple[int, int | None] | None", samples: int) -> tuple[int, int] | None:
-    return None if span is None else (span[0], samples if span[1] is None else span[1])
 
 
 def compare_command(arguments: argparse.Namespace, model: "Model") -> None:

@@ -26,7 +26,7 @@ from study.identify.time_domain.weighted_fit import weighted
 from study.records.plan import Plan
 from study.records.prepared import Prepared
 from study.records.record import Record
-from study.records.stretches import records_judged
+from study.records.record_layout import records_judged
 from study.support.errors import StudyError
 
 STEPS = 5  # reports of progress a record

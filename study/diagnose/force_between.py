@@ -17,8 +17,8 @@ from study.equations.terms import Term
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.rivals import larger
 from study.records.interpolation import READINGS
-from study.records.oversampling import without_spare_samples
 from study.records.prepared import Prepared
+from study.records.sampling_rate import without_spare_samples
 from study.support.errors import StudyError
 from study.support.numbers import percent
 

@@ -27,9 +27,9 @@ from study.equations.model import Model
 from study.equations.terms import LIBRARY, Term, custom
 from study.explore.any_session import chosen, held, holding
 from study.explore.by_record import ByRecord, Several, by_record
-from study.records.oversampling import without_spare_samples
 from study.records.prepared import Prepared
-from study.records.stretches import records_judged
+from study.records.record_layout import records_judged
+from study.records.sampling_rate import without_spare_samples
 from study.support.errors import StudyError, expect
 
 Step = dict[str, Any]

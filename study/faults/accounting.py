@@ -22,9 +22,8 @@ from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.motion_start import has_lost_the_motion
 from study.identify.time_domain.settling import settled
-from study.records.coarse_sampling import too_coarse
-from study.records.oversampling import without_spare_samples
 from study.records.prepared import FORCE, Prepared
+from study.records.sampling_rate import too_coarse, without_spare_samples
 from study.support.errors import StudyError
 from study.support.statistics import gain
 from study.support.thresholds import TOLERANCE
@@ -54,7 +53,7 @@ def accounted(
     """Compare a model with a record, the faults of the measurement accounted for.
 
     Faults are looked for in the record as it was sampled, and the corrected record is then compared without the samples
-    that its motion does not ask for (:mod:`study.records.oversampling`).
+    that its motion does not ask for (:mod:`study.records.sampling_rate`).
 
     Parameters
     ----------

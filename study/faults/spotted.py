@@ -14,7 +14,7 @@ from scipy.special import fdtrc
 
 from study.faults.fault import CLIPPING, CONVERTER_STEPS, DROP_OUTS, Fault
 from study.faults.leftover import FittedResidual
-from study.records.moving import moving
+from study.records.plan import moving
 from study.records.prepared import Prepared
 from study.support.arrays import Floats, Ints
 from study.support.thresholds import ALPHA, TOLERANCE

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from study.records.completion import complete
 from study.records.outputs import Outputs
 from study.records.plan import FEWEST, Plan, make_plan
-from study.records.record import ALONE, MOTIONS, Record, Sensor
+from study.records.record import ALONE, Record, Sensor
 from study.support.arrays import Floats
 
 FORCE = "force"  # what is predicted where the motion is prescribed
@@ -37,16 +37,17 @@ class Prepared:
     low : float
         Frequency in hertz below which the user wants nothing judged: the cut-off that was given, or 0.
     measured : tuple of str
-        The motions that were measured; the others are derivatives and integrals of them.
+        The channels of motions that were measured; the others are derivatives and integrals of them.
     lost : bool array, shape (n,), optional
         Samples of the response that say nothing, such as clipped ones: they are neither fitted nor judged.
     every : int
         How many samples of the record, as it was sampled, there are to one of this
-        (:mod:`study.records.oversampling`).
+        (:mod:`study.records.sampling_rate`).
     as_sampled : Prepared, optional
         The record with all of its samples, where this has fewer.
     running_on : Prepared, optional
-        The record with motions that run on for longer, where here they begin anew (``study.records.stretches.apart``).
+        The record with motions that run on for longer, where here they begin anew
+        (:func:`study.records.record_layout.apart`).
     sensors : tuple of Sensor
         The motions that free runs are held against; that of the plan's response if left out.
     """
@@ -123,7 +124,7 @@ class Prepared:
     @cached_property
     def free(self) -> bool:
         """Whether no force acts at all: the record is of free decays."""
-        return self.response != FORCE and not np.any(self.record[FORCE])
+        return self.response != FORCE and self.record.unforced
 
     def shortened(self, samples: int) -> "Prepared":
         """The same with no more than so many samples to fit: those that the judging part follows, if it does."""
@@ -177,7 +178,7 @@ def prepare_record(record: Record, plan: Plan | None = None, cutoff: float | Non
     """
     completed = complete(record, cutoff)
     plan, low = plan or make_plan(record), cutoff or 0.0
-    measured = tuple(motion for motion in MOTIONS if motion in record)
+    measured = tuple(map(str, record.sensors))
     return Prepared(completed.record, plan, completed.band, completed.edge, completed.notes, low, measured)
 
 

@@ -99,6 +99,11 @@ class Record:
         """The coordinates that turn: those whose motion is in an angle."""
         return frozenset(s.coordinate for s in self.sensors if is_angle(self.unit(s)))
 
+    @property
+    def unforced(self) -> bool:
+        """Whether no force acts along it: it is of free decays."""
+        return not any(np.any(self[force]) for force in self.forces)
+
     def unit(self, channel: str | Sensor) -> str:
         """Unit of a channel: the SI one where nobody says, none of a further channel then."""
         return self.units.get(str(channel)) or self.usual_unit(channel)

@@ -1,55 +1,57 @@
-"""What kind of test a record is, and which parts of it are fitted and judged: the one place where that is decided."""
+"""What kind of test a record is, and which parts of it are fitted and judged: the one place where that is decided.
+
+Decays between blows, decays from several heights, parts of a long record that are fitted and judged in turn, pieces of
+the motion of a mass without a spring, several records of one structure: all are stretches, strung together to one
+prepared record whose first part is fitted and whose second is judged.
+"""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from study.records.completion import CompletedRecord, complete
-from study.records.oversampling import completed_without_spare
-from study.records.plan import Plan, make_plan
+from study.records.driven_by_motion import with_prescribed_motion
+from study.records.plan import FEWEST, Plan, Span, compared, driven_apart, make_plan, shared
 from study.records.prepared import FORCE, Prepared, prepare_record
-from study.records.prescribed import with_prescribed_motion
-from study.records.record import MOTIONS, Record, Stretch
-from study.records.shared_frequencies import differ, shared
-from study.records.stretches import alternating, strung_together, sure, within_the_horizon
+from study.records.record import MOTIONS, Record, Sensor, Stretch
+from study.records.sampling_rate import completed_without_spare
+from study.records.states import period
 from study.support.errors import StudyError, at, expect
 from study.support.numbers import percent
+from study.support.thresholds import TOLERANCE
 
-Span = tuple[int, int]
+PERIODS = 5.0  # of the motion in a block, at least: its noise is then hardly that of its neighbours (docs/tool.md)
+BLOCKS = 24  # of a stretch, at most
+HORIZON = 4.0  # periods of its motion over which a mass without a spring is judged ...
+PIECES = 4  # ... and in how many pieces each part is cut at least
 
 
 @dataclass(frozen=True)
 class Layout:
-    """What the user says of the parts of a record.
+    """What the user says of the parts of a record."""
 
-    Attributes
-    ----------
-    use : tuple of (float, float or None)
-        Stretches to use, in seconds of the record's own time; all of it if empty.
-    fit, judge : pair of int, optional
-        Samples to fit and to judge.
-    alternate : bool
-        Whether every other block is judged.
-    response : str, optional
-        The measured motion that free runs are held against.
-    cutoff : float, optional
-        Frequency in hertz above which a measured acceleration is integrated.
-    as_sampled : bool
-        Whether all samples are used, though the motion asks for fewer.
-    """
-
-    use: tuple[tuple[float, float | None], ...] = ()
-    fit: Span | None = None
-    judge: Span | None = None
-    alternate: bool = False
-    response: str | None = None
-    cutoff: float | None = None
-    as_sampled: bool = False
+    use: tuple[tuple[float, float | None], ...] = ()  # stretches to use, in seconds of the record's time; empty: all
+    fit: Span | None = None  # samples to fit ...
+    judge: Span | None = None  # ... and to judge
+    alternate: bool = False  # whether every other block is judged
+    response: str | None = None  # the measured motion that free runs are held against
+    cutoff: float | None = None  # hertz above which a measured acceleration is integrated
+    as_sampled: bool = False  # whether all samples are used, though the motion asks for fewer
 
 
-def laid_out(records: Sequence[Record], layout: Layout, *, prescribed: bool = False, drifts: bool = False) -> Prepared:
+@dataclass(frozen=True)
+class Kind:
+    """What a model makes of a record."""
+
+    prescribed: bool = False  # it has no inertia: the motion is prescribed, and the force is predicted
+    drifts: bool = False  # nothing brings its mass back: the motion is judged over a horizon
+    unbroken: bool = False  # it wants one long stretch to fit and one to judge
+    anew: float = 0.0  # periods after which a decay begins anew; 0 where it runs on through the blocks of both parts
+
+
+def laid_out(records: Sequence[Record], layout: Layout, kind: Kind | None = None) -> Prepared:
     """Records made ready: motions completed, and the parts to fit and to judge settled.
 
     A single stretch under a force is fitted in its first half and judged in its second. Every other block is judged of
@@ -62,68 +64,75 @@ def laid_out(records: Sequence[Record], layout: Layout, *, prescribed: bool = Fa
         Of one structure, judged together.
     layout : Layout
         What the user says.
-    prescribed : bool
-        Whether the motion is prescribed and the force is what a model predicts: it has no inertia.
-    drifts : bool
-        Whether nothing in the model brings the mass back: its motion is judged over a horizon.
+    kind : Kind, optional
+        What the model makes of them.
 
     Raises
     ------
     StudyError
         If ranges overlap or leave the record, the response asked for was not measured, or it cannot be completed.
     """
-    response = _response(records[0], layout.response, prescribed)
+    kind = kind or Kind()
+    wanted = layout.response
+    if kind.prescribed:
+        with at(records[0].name):
+            expect(wanted in (None, FORCE), f"the model has no inertia, so the force is predicted, not the {wanted}")
+        wanted = FORCE
+    sensors = compared(records[0], wanted)
     explicit = layout.fit is not None or layout.judge is not None
     contradiction = (
         "--use and --fit or --judge A:B exclude each other; expected '--judge every-other-block' beside --use"
     )
     expect(not (explicit and (layout.use or layout.alternate)), contradiction)
-    if prescribed:
+    notes, every = list[str](), 1
+    if kind.prescribed:
         _refuse_unforced(records)
-    readied = [with_prescribed_motion(r) if prescribed else (r, ()) for r in records]
-    records = [r for r, _ in readied]
-    free = not prescribed and all(_unforced(r, layout) for r in records)
+        readied = [with_prescribed_motion(record) for record in records]
+        records, notes = [r for r, _ in readied], [note for _, said in readied for note in said]
+    free = not kind.prescribed and all(_unforced(r, layout) for r in records)
     several = len(records) > 1 or len(layout.use) > 1
-    turns = several or layout.alternate or ((free or prescribed) and not explicit)
-    notes, every = [n for _, said in readied for n in said], 1
-    if not (turns or layout.use or drifts):
-        plan = _plan(records[0], layout, response)
-        if explicit or not differ(records[0], plan.fit, plan.judge):
-            return _plain(records[0], plan, layout, notes)
+    turns = several or layout.alternate or ((free or kind.prescribed) and not (explicit or kind.unbroken))
+    if kind.unbroken:
+        sentence = "the linear part of the model is as measured: frequency response functions want one long stretch"
+        asked = several or layout.alternate or layout.use
+        expect(not asked, f"{sentence}; expected --fit A:B and --judge A:B instead of stretches")
+    if not (turns or layout.use or kind.drifts or (free and kind.anew)):
+        with at(records[0].name):
+            plan = make_plan(records[0], layout.fit, layout.judge, wanted)
+        if explicit or kind.unbroken or not driven_apart(records[0], plan.fit, plan.judge):
+            prepared = prepare_record(records[0], plan, layout.cutoff)
+            return replace(prepared, notes=(*notes, *prepared.notes))
         turns = True
         notes.append(_why(records[0], plan))
     completed = [complete(record, layout.cutoff) for record in records]
-    if turns and not (layout.use or layout.as_sampled or free or prescribed or drifts):
+    if turns and not (layout.use or layout.as_sampled or free or kind.prescribed or kind.drifts):
         shortest = sum(len(record) for record in records) // 2
         completed, every = completed_without_spare(completed, _measured(records), shortest)
     if explicit:
-        plan = make_plan(records[0], layout.fit, layout.judge, response)
+        plan = make_plan(records[0], layout.fit, layout.judge, wanted)
         fit, judge = [sure(completed[0], *plan.fit)], [sure(completed[0], *plan.judge)]
     else:
-        stretches = _stretches(completed, layout)
+        stretches = [sure(c, *span) for c in completed for span in _samples(c.record, layout)]
         if turns:
-            fit, judge = alternating(stretches, _seen(response))
-            notes.append(_said(fit, judge, len(stretches)))
+            anew = kind.anew if free else 0.0
+            fit, judge = alternating([_until_rest(s, sensors) for s in stretches] if anew else stretches, sensors, anew)
+            notes.append(_said(fit, judge, len(stretches), anew=bool(anew)))
         else:
-            fit, judge = _halves(stretches[0])
-    if drifts:
-        fit, judge, horizon = _over_a_horizon(fit, judge, _seen(response))
+            middle = (stretches[0].first + stretches[0].last) // 2
+            fit, judge = [replace(stretches[0], last=middle)], [replace(stretches[0], first=middle)]
+    if kind.drifts:
+        (fit, first), (judge, second) = (within_the_horizon(part, sensors) for part in (fit, judge))
         notes.append(
             f"nothing in the model brings the mass back, so its motion drifts: it is fitted and judged over a horizon "
-            f"of {horizon:.3g} s, from {len(fit)} and {len(judge)} states of its own"
+            f"of {0.5 * (first + second):.3g} s, from {len(fit)} and {len(judge)} states of its own"
         )
-    prepared = strung_together(fit, judge, response, completed, notes)
+    prepared = strung_together(fit, judge, sensors, completed, notes)
     return replace(prepared, low=layout.cutoff or 0.0, measured=_measured(records), every=every)
 
 
 def _measured(records: Sequence[Record]) -> tuple[str, ...]:
-    return tuple(m for m in MOTIONS if all(m in record for record in records))
-
-
-def _plan(record: Record, layout: Layout, response: str) -> Plan:
-    """Of a single stretch: halves, or the samples that are named."""
-    with at(record.name):
-        return make_plan(record, layout.fit, layout.judge, response)
+    """The channels of the motions that every record shows."""
+    return tuple(str(s) for s in records[0].sensors if all(s in record for record in records))
 
 
 def _why(record: Record, plan: Plan) -> str:
@@ -134,40 +143,18 @@ def _why(record: Record, plan: Plan) -> str:
     )
 
 
-def _plain(record: Record, plan: Plan, layout: Layout, notes: list[str]) -> Prepared:
-    """A single stretch in two parts."""
-    prepared = prepare_record(record, plan, layout.cutoff)
-    return replace(prepared, notes=(*notes, *prepared.notes)) if notes else prepared
-
-
-def _response(record: Record, wanted: str | None, prescribed: bool) -> str:
-    with at(record.name):
-        measured = [m for m in MOTIONS if m in record]
-        if prescribed:
-            expect(wanted in (None, FORCE), f"the model has no inertia, so the force is predicted, not the {wanted}")
-            return FORCE
-        usable = wanted is None or wanted in measured
-        expect(usable, f"no {wanted} was measured; expected --response {', '.join(measured)}")
-        return wanted or measured[0]
-
-
 def _refuse_unforced(records: Sequence[Record]) -> None:
     for record in records:
         expect(
-            np.any(record[FORCE]),
+            not record.unforced,
             f"{record.name}: no force was measured, which a model without inertia predicts; expected a column of the "
             "force, or a model with inertia",
         )
 
 
-def _seen(response: str) -> str:
-    """What shows the period of a motion."""
-    return "displacement" if response == FORCE else response
-
-
 def _unforced(record: Record, layout: Layout) -> bool:
     """Whether no force acts along the stretches that are used."""
-    return all(not np.any(record[FORCE][a:b]) for a, b in _samples(record, layout))
+    return all(not np.any(record[f][a:b]) for a, b in _samples(record, layout) for f in record.forces)
 
 
 def _samples(record: Record, layout: Layout) -> list[Span]:
@@ -189,26 +176,168 @@ def _samples(record: Record, layout: Layout) -> list[Span]:
     return ordered or [(0, len(record))]
 
 
-def _stretches(completed: Sequence[CompletedRecord], layout: Layout) -> list[Stretch]:
-    return [sure(c, *span) for c in completed for span in _samples(c.record, layout)]
+def sure(completed: CompletedRecord, first: int, last: int) -> Stretch:
+    """A stretch of a completed record without the samples at its ends that derivatives leave uncertain."""
+    edge = completed.edge
+    low, high = max(first, edge), min(last, len(completed.record) - edge)
+    expect(
+        high - low >= FEWEST,
+        f"{completed.record.name}: samples {first} to {last} leave {max(high - low, 0)} that are sure; expected "
+        f"{FEWEST} or more",
+    )
+    return Stretch(completed.record, low, high)
 
 
-def _halves(stretch: Stretch) -> tuple[list[Stretch], list[Stretch]]:
-    middle = (stretch.first + stretch.last) // 2
-    return [replace(stretch, last=middle)], [replace(stretch, first=middle)]
+def _until_rest(stretch: Stretch, sensors: Sequence[Sensor]) -> Stretch:
+    """A stretch up to where the motion has died away to practically nothing: rest tells nothing of a structure."""
+    values = np.stack([stretch.source[s][stretch.first : stretch.last] for s in sensors], axis=1)
+    away = np.abs(values - np.mean(values[-FEWEST // 2 :], axis=0))
+    loud = np.flatnonzero(np.any(away > TOLERANCE * np.max(away, axis=0), axis=1))
+    last = int(loud[-1]) + 1 if len(loud) else 0
+    return replace(stretch, last=stretch.first + min(max(last, 2 * FEWEST), len(stretch)))
 
 
-def _over_a_horizon(
-    fit: list[Stretch], judge: list[Stretch], response: str
-) -> tuple[list[Stretch], list[Stretch], float]:  # fmt: skip
-    (fit, first), (judge, second) = (within_the_horizon(part, response) for part in (fit, judge))
-    return fit, judge, 0.5 * (first + second)
+def alternating(
+    stretches: Sequence[Stretch], sensors: Sequence[Sensor], anew: float = 0.0
+) -> tuple[list[Stretch], list[Stretch]]:
+    """Every other block of the stretches to be fitted, and those between them to be judged.
+
+    Each part has one motion in every stretch, that runs on through the blocks of the other; or it begins ``anew`` in
+    each block, of so many periods. Where a stretch before began with a block that is fitted, the next begins with one
+    that is judged, so that neither has all the loud ones.
+    """
+    fit, judge = list[Stretch](), list[Stretch]()
+    for number, stretch in enumerate(stretches):
+        most = int(len(stretch) / max((anew or PERIODS) * period_of(stretch, sensors), FEWEST))
+        for place, block in enumerate(cut(stretch, int(np.clip(most, 2, BLOCKS)))):
+            block = replace(block, continues=place > 1 and not anew)  # the motion runs on through the blocks between
+            (fit if (number + place) % 2 == 0 else judge).append(block)
+    return fit, judge
 
 
-def _said(fit: Sequence[Stretch], judge: Sequence[Stretch], stretches: int) -> str:
+def _said(fit: Sequence[Stretch], judge: Sequence[Stretch], stretches: int, *, anew: bool) -> str:
     length = float(np.mean([len(s) for s in (*fit, *judge)])) * fit[0].source.dt
     of = f" of {stretches} stretches" if stretches > 1 else ""
+    goes_on = "the free run of either part runs on through the other's"
+    begins = "the motion begins anew in each, from a state of its own"
     return (
         f"every other block{of} is judged: {len(fit)} are fitted and {len(judge)} judged, of {length:.3g} s each on "
-        "average, and the free run of either part runs on through the other's"
+        f"average, and {begins if anew else goes_on}"
     )
+
+
+def period_of(stretch: Stretch, sensors: Sequence[Sensor]) -> float:
+    """Samples in a period of the slowest motion; of the displacement where that is prescribed."""
+    seen = [MOTIONS[0] if s.motion == FORCE else s for s in sensors]
+    return max(period(stretch.source[s][stretch.first : stretch.last]) for s in seen)
+
+
+def cut(stretch: Stretch, count: int) -> list[Stretch]:
+    """A stretch in so many parts of about equal length."""
+    bounds = np.linspace(stretch.first, stretch.last, count + 1).round().astype(int).tolist()
+    return [replace(stretch, first=a, last=b) for a, b in itertools.pairwise(bounds)]
+
+
+def within_the_horizon(stretches: Sequence[Stretch], sensors: Sequence[Sensor]) -> tuple[list[Stretch], float]:
+    """Stretches in pieces of some periods of the motion, and their mean length in seconds."""
+    pieces = list[Stretch]()
+    for stretch in stretches:
+        wanted = len(stretch) / (HORIZON * period_of(stretch, sensors))
+        count = min(max(round(wanted), -(-PIECES // len(stretches))), max(len(stretch) // FEWEST, 1))
+        pieces += cut(stretch, count)
+    return pieces, float(np.mean([len(p) for p in pieces])) * stretches[0].source.dt
+
+
+def strung_together(
+    fit: Sequence[Stretch], judge: Sequence[Stretch], sensors: Sequence[Sensor], completed: Sequence[CompletedRecord],
+    notes: Sequence[str] = (),
+) -> Prepared:  # fmt: skip
+    """One prepared record of the stretches to fit and those to judge; ``completed`` are the records they come from.
+
+    Raises
+    ------
+    StudyError
+        If the records differ in sampling, channels' units or what was measured, or a part is too short.
+    """
+    first = completed[0].record
+    for other in completed[1:]:
+        _refuse_different(first, other.record)
+    stretches = (*fit, *judge)
+    common = [c for c in first.channels if all(c in s.source for s in stretches)]
+    channels = {c: np.concatenate([s.source[c][s.first : s.last] for s in stretches]) for c in common}
+    split, total = sum(map(len, fit)), sum(map(len, stretches))
+    for part, samples in (("fit", split), ("judge", total - split)):
+        expect(samples >= FEWEST, f"{first.name}: {samples} samples are left to {part}; expected {FEWEST} or more")
+    record = Record(
+        first.dt, channels, first.units, first.name, first.start, stretches=stretches, coordinates=first.coordinates,
+        forces=first.forces,
+    )  # fmt: skip
+    band = max(c.band[0] for c in completed), min(c.band[1] for c in completed)
+    said = tuple(dict.fromkeys((*(n for c in completed for n in c.notes), *notes)))
+    plan = Plan(sensors[0].motion, (0, split), (split, total))
+    return Prepared(record, plan, band, 0, said, sensors=tuple(sensors))
+
+
+def _refuse_different(first: Record, other: Record) -> None:
+    if abs(other.dt / first.dt - 1.0) > 1e-6:
+        raise StudyError(
+            f"{first.name} is sampled at {1.0 / first.dt:g} Hz and {other.name} at {1.0 / other.dt:g} Hz; expected the "
+            "same for records that are judged together"
+        )
+    for channel in (*first.forces, *map(str, first.sensors)):
+        one, two = first.units.get(channel, ""), other.units.get(channel, "")
+        expect(
+            one == two,
+            f"{channel} is in {one} in {first.name} and in {two} in {other.name}; expected the same unit in records "
+            "that are judged together",
+        )
+
+
+def records_judged(prepared: Prepared) -> tuple[Prepared, ...]:
+    """A prepared record of several records, each time with the samples of one of them to judge; none of one record.
+
+    What is fitted stays the same. Each is called as the record whose samples are judged.
+    """
+    record, (begin, end) = prepared.record, prepared.plan.judge
+    bounds = (0, *record.joints, len(record))
+    judged = [(s.source, a, b) for s, (a, b) in zip(record.stretches, itertools.pairwise(bounds), strict=False)
+              if begin <= a and b <= end]  # fmt: skip
+    runs = [list(stretches) for _, stretches in itertools.groupby(judged, key=lambda stretch: id(stretch[0]))]
+    if len(runs) < 2:
+        return ()
+    return tuple(
+        replace(
+            prepared, record=replace(record, name=run[0][0].name),
+            plan=replace(prepared.plan, judge=(run[0][1], run[-1][2])),
+        )
+        for run in runs
+    )  # fmt: skip
+
+
+def runs_on(prepared: Prepared) -> bool:
+    """Whether a motion runs on between stretches of the record."""
+    return any(s.continues for s in prepared.record.stretches)
+
+
+def apart(prepared: Prepared) -> Iterator[Prepared]:
+    """The same record with motions that begin anew, from a state of its own each: for a model that loses the motion.
+
+    First in every stretch, then every few periods.
+    """
+    stretches = [replace(s, continues=False) for s in prepared.record.stretches]
+    whole = _begun_anew(prepared, stretches)
+    yield whole
+    joined = Stretch(prepared.record, 0, len(prepared.record))
+    samples = PERIODS * period_of(joined, prepared.sensors)
+    pieces = [p for s in stretches for p in cut(s, max(round(len(s) / max(samples, FEWEST)), 1))]
+    if len(pieces) > len(stretches):
+        yield replace(_begun_anew(prepared, pieces), running_on=whole)
+
+
+def _begun_anew(prepared: Prepared, pieces: Sequence[Stretch]) -> Prepared:
+    said = (
+        f"the free run of this model loses the motion on its way, so it begins anew every "
+        f"{len(prepared.record) / len(pieces) * prepared.dt:.3g} s, from a state of its own"
+    )
+    record = replace(prepared.record, stretches=tuple(pieces))
+    return replace(prepared, record=record, notes=(*prepared.notes, said), running_on=prepared)

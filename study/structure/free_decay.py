@@ -6,7 +6,6 @@ stand above their noise, which two derivatives would make larger than any force.
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -48,25 +47,24 @@ def free_decay_start(model: Model, prepared: PreparedStructure, held: Mapping[st
 
 def _free_of_noise(prepared: PreparedStructure, model: Model) -> Floats:
     """Motions along the fitting part in the band where any of them stands above noise, shape (3, n, samples)."""
-    record = prepared.whole
-    whole = replace(prepared, record=record)
+    record = prepared.record.stretches[0].source if prepared.record.stretches else prepared.record
     bands = [band_above_noise(record[s], prepared.dt, prepared.low) for s in prepared.sensors]
     known = [band for band in bands if band is not None]
-    edge, motion = whole.edge, np.stack([whole.complete[c] for c in model.coordinates], axis=1)
+    edge, motion = prepared.edge, np.stack([record.motion(c) for c in model.coordinates], axis=1)
     if known:
         frequency, gate = known[0][0], np.max([band[1] for band in known], axis=0)
         motion = np.apply_along_axis(in_band, 2, motion, prepared.dt, frequency, gate)
         width = float(np.sum(gate)) * float(frequency[1] - frequency[0])
         edge += round(1.0 / (width * prepared.dt)) if width > 0.0 else 0
-    return motion[:, :, _fitted_samples(prepared, edge)]
+    return motion[:, :, _fitted_samples(prepared, len(record), edge)]
 
 
-def _fitted_samples(prepared: PreparedStructure, edge: int) -> Ints:
+def _fitted_samples(prepared: PreparedStructure, whole: int, edge: int) -> Ints:
     """Samples of the whole record that are fitted, without those at its ends."""
     samples = np.arange(len(prepared.record))
     if prepared.record.stretches:
         samples = np.concatenate([np.arange(s.first, s.last) for s in prepared.record.stretches])
-    last = len(prepared.whole) - edge
+    last = whole - edge
     fitted = samples[slice(*prepared.fit)]
     kept = fitted[(fitted >= edge) & (fitted < last)]
     return kept if len(kept) > FEWEST else fitted

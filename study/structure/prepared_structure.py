@@ -7,12 +7,16 @@ from functools import cached_property
 import numpy as np
 
 from study.equations.model import Model
-from study.records.completion import CompletedRecord, complete, consistent
-from study.records.plan import FEWEST
-from study.records.record import MOTIONS, Record, Sensor
+from study.records.plan import Span, compared, make_plan
+from study.records.prepared import Prepared, prepare_record
+from study.records.record import Record, Sensor
+from study.records.record_layout import Kind, Layout, laid_out
+from study.records.sampling_rate import EDGE, without_spare_samples
 from study.structure.mass_matrix import check_held_masses
 from study.support.arrays import Floats
-from study.support.errors import StudyError, expect
+from study.support.errors import StudyError
+
+PERIODS = 1.5  # of a decay in a block: over more a wrong stiffness takes it out of step (docs/structures.md)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +40,8 @@ class PreparedStructure:
     fit: tuple[int, int]
     judge: tuple[int, int]
     notes: tuple[str, ...] = ()
-    cutoff: float | None = None  # hertz: accelerations are integrated above it
+    low: float = 0.0  # lowest frequency in hertz at which all completed motions are valid
+    edge: int = 0  # samples at each end that derivatives and integrals leave uncertain; stretches leave these out
 
     @property
     def dt(self) -> float:
@@ -61,31 +66,7 @@ class PreparedStructure:
     @cached_property
     def complete(self) -> dict[str, Floats]:
         """Displacement, velocity and acceleration of each measured coordinate, shape (3, samples)."""
-        return {s.coordinate: self._motion(s.coordinate) for s in self.sensors}
-
-    @cached_property
-    def low(self) -> float:
-        """Lowest frequency in hertz at which all completed motions are valid."""
-        return self._completed.band[0]
-
-    @cached_property
-    def edge(self) -> int:
-        """Samples at each end that derivatives and integrals leave uncertain; stretches leave these out."""
-        return 0 if self.record.stretches else self._completed.edge
-
-    @property
-    def whole(self) -> Record:
-        """The record that its stretches are of."""
-        return self.record.stretches[0].source if self.record.stretches else self.record
-
-    @cached_property
-    def _completed(self) -> CompletedRecord:
-        return complete(self.whole, self.cutoff)
-
-    def _motion(self, coordinate: str) -> Floats:
-        motion = self._completed.record.motion(coordinate)
-        cuts = [motion[:, s.first : s.last] for s in self.record.stretches]
-        return np.concatenate(cuts, axis=1) if cuts else motion
+        return {s.coordinate: self.record.motion(s.coordinate) for s in self.sensors}
 
     def shortened(self, samples: int) -> "PreparedStructure":
         """The same with no more than so many samples to fit: those that the judging part follows, if it does."""
@@ -99,37 +80,42 @@ class PreparedStructure:
 
 
 def prepare_structure(
-    record: Record,
-    model: Model,
-    fit: tuple[int, int] | None = None,
-    judge: tuple[int, int] | None = None,
-    cutoff: float | None = None,
-) -> PreparedStructure:
-    """Choose sensors and parts: the first half is fitted and the second judged by default.
+    record: Record, model: Model, fit: Span | None = None, judge: Span | None = None, cutoff: float | None = None
+) -> PreparedStructure:  # fmt: skip
+    """The parts of a record that are named, or its halves, whatever kind of test it is.
+
+    Raises as :func:`structure_ready`.
+    """
+    return _made(prepare_record(record, make_plan(record, fit, judge), cutoff), record, model)
+
+
+def structure_ready(record: Record, model: Model, layout: Layout) -> PreparedStructure:
+    """A record laid out for a structure: a decay in stretches that begin anew, a thinned one where it is oversampled.
 
     Raises
     ------
     StudyError
-        If the parts overlap or are too short, nothing measures a coordinate and nothing ties it to another, or the
-        masses that are given leave no positive definite mass matrix.
+        As :func:`study.records.record_layout.laid_out`, or if nothing measures a coordinate and nothing ties it to
+        another, or the masses that are given leave no positive definite mass matrix.
     """
+    prepared = laid_out([record], layout, Kind(unbroken=model.measured, anew=PERIODS))
+    return _made(prepared if layout.as_sampled else without_spare_samples(prepared), record, model)
+
+
+def _made(prepared: Prepared, record: Record, model: Model) -> PreparedStructure:
     if not model.measured:  # whose masses nobody lumps
         check_held_masses(model)
-    record, converted = consistent(record)
-    half = len(record) // 2
-    fit, judge = fit or (0, half), judge or (half, len(record))
-    for name, (first, last) in (("fit", fit), ("judge", judge)):
-        good = 0 <= first < last <= len(record) and last - first >= FEWEST
-        expect(good, f"the part to {name}, {first}:{last}, must hold {FEWEST} samples or more of {len(record)}")
-    apart = fit[1] <= judge[0] or judge[1] <= fit[0]
-    expect(apart, f"the parts to fit {fit[0]}:{fit[1]} and to judge {judge[0]}:{judge[1]} overlap; expected two parts")
-    ordered = sorted(record.sensors, key=lambda s: MOTIONS.index(s.motion), reverse=True)
-    first_of = {s.coordinate: s for s in ordered}
-    sensors = tuple(first_of[c] for c in model.coordinates if c in first_of)
-    blind = [c for c in model.coordinates if c not in first_of]
+    sensors = prepared.sensors or compared(record)
+    seen = {sensor.coordinate for sensor in sensors}
+    blind = [coordinate for coordinate in model.coordinates if coordinate not in seen]
     _check_tied(model, blind)
     lacks = f"no sensor is at {' and '.join(blind)}: the free run has its motion, the reverse system lacks it"
-    return PreparedStructure(record, sensors, fit, judge, (*converted, *([lacks] if blind else [])), cutoff)
+    ends = EDGE if prepared.every > 1 and not prepared.record.stretches else 0  # which a filter leaves unsure
+    (first, split), (other, last) = prepared.plan.fit, prepared.plan.judge
+    inner = len(prepared.record) - ends
+    fit, judge = (max(first, ends), min(split, inner)), (max(other, ends), min(last, inner))
+    notes = (*prepared.notes, *([lacks] if blind else []))
+    return PreparedStructure(prepared.record, sensors, fit, judge, notes, prepared.band[0], prepared.edge)
 
 
 def _check_tied(model: Model, blind: Sequence[str]) -> None:

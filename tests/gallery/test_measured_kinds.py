@@ -20,8 +20,7 @@ from study.gallery.findings_of_record import found_beside, read_findings
 from study.gallery.known import Published
 from study.identify.time_domain.fit_model import fit_model
 from study.records.readers import ReadOptions, read_record
-from study.records.record_layout import Layout
-from study.records.stretches import apart
+from study.records.record_layout import Layout, apart
 
 ROOT = Path(__file__).parents[2]
 DATA = Path(os.environ.get("STUDY_DATA", ROOT.parent / "shared" / "data"))

@@ -8,10 +8,10 @@ from study.equations.model import Model, free
 from study.equations.terms import get
 from study.faults.accounting import accounted
 from study.faults.fault import NAMES
-from study.records.coarse_sampling import too_coarse
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.prepared import prepare_record
 from study.records.record import SI_UNITS, Record
+from study.records.sampling_rate import too_coarse
 
 FINE = 20  # samples of the simulation to one of the record
 LINEAR = Model("rig", tuple(free(get(n)) for n in ("inertia", "linear_damping", "linear_stiffness")))

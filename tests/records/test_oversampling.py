@@ -11,9 +11,9 @@ from study.equations.terms import get
 from study.faults.accounting import accounted
 from study.faults.fault import NAMES
 from study.records.excitation import Excitation, displacement_noise, force
-from study.records.oversampling import content, decimated, without_spare_samples
 from study.records.prepared import prepare_record
 from study.records.record import SI_UNITS, Record
+from study.records.sampling_rate import content, decimated, without_spare_samples
 
 A_PERIOD, SAMPLES, DT = 180, 11520, 1.0 / 180  # of a system of 1 Hz
 VALUES = {"m": 1.0, "c": 0.377, "k": 39.5}

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from study.records.excitation import Excitation, force
+from study.records.plan import driven_apart, shared
 from study.records.record import SI_UNITS, Record
 from study.records.record_layout import Layout, laid_out
-from study.records.shared_frequencies import differ, shared
 
 STATIONARY = [
     Excitation("gaussian_lowpass", cutoff=6.0), Excitation("pierson_moskowitz", cutoff=6.0, peak_frequency=1.0),
@@ -28,7 +28,7 @@ def record(excitation, seed=1):
 @pytest.mark.parametrize("seed", range(5))
 def test_stationary_forces_keep_halves(excitation, seed):
     made = record(excitation, seed)
-    assert not differ(made, (0, 2048), (2048, 4096))
+    assert not driven_apart(made, (0, 2048), (2048, 4096))
     assert laid_out([made], Layout()).plan.fit == (0, 2048)
 
 
@@ -47,7 +47,7 @@ def test_dwells_are_like_a_sweep():
     time = 0.05 * np.arange(4096)
     made = record(STATIONARY[0])
     steps = np.sin(2.0 * np.pi * np.repeat(np.linspace(0.5, 4.0, 16), 256) * time)
-    assert differ(made.with_channels({"force": steps}), (0, 2048), (2048, 4096))
+    assert driven_apart(made.with_channels({"force": steps}), (0, 2048), (2048, 4096))
 
 
 def test_named_parts_are_not_overruled():

@@ -9,10 +9,10 @@ import pytest
 from study.diagnose.verdict import MISSING, NOTHING
 from study.equations.model_file import parse_model
 from study.records.record import Sensor, record_of
-from study.structure.prepared_structure import prepare_structure
+from study.records.record_layout import Layout
+from study.structure.prepared_structure import prepare_structure, structure_ready
 from study.structure.structure_comparison import compare_structure
 from study.structure.structure_fit import linearise_structure
-from study.structure.structure_layout import Parts, lay_out
 from study.structure.structure_run import prepare_run
 from study.structure.structure_verdict import diagnose_structure
 from study.support.errors import StudyError
@@ -52,7 +52,7 @@ def decay(more="", noise=0.003, seed=1, begin=BEGIN, samples=SAMPLES):
 
 
 def test_a_decay_is_fitted_and_judged_in_turn_and_its_motion_begins_anew():
-    prepared = lay_out(decay(), model(), Parts())
+    prepared = structure_ready(decay(), model(), Layout())
     record = prepared.record
     runs = record.runs((0, len(record)))
     assert len(record.stretches) == len(runs) >= 6
@@ -70,7 +70,7 @@ def test_a_decay_is_fitted_and_judged_in_turn_and_its_motion_begins_anew():
 
 
 def test_derivatives_by_the_states_of_each_stretch_are_those_of_the_motion():
-    prepared = lay_out(decay(HARD), model(more=HARD), Parts())
+    prepared = structure_ready(decay(HARD), model(more=HARD), Layout())
     fit = compare_structure(model(more=HARD), prepared).fit
     jacobian = linearise_structure(fit, prepared)
     states = len(fit.initial) // 4
@@ -92,14 +92,14 @@ def test_derivatives_by_the_states_of_each_stretch_are_those_of_the_motion():
 def test_a_fit_begins_where_noise_does_not_lead_it_astray(noise, seed):
     """Of displacements every 0.01 s: two derivatives of their noise are larger than the acceleration itself."""
     record = decay(noise=noise, seed=seed)
-    comparison = compare_structure(model(), lay_out(record, model(), Parts((0, 1000), (1000, 1600))))
+    comparison = compare_structure(model(), structure_ready(record, model(), Layout((), (0, 1000), (1000, 1600))))
     found = comparison.fit.model.values
     assert found["k[ground-a]"] == pytest.approx(40.0, rel=0.02)
     assert found["k[a-b]"] == pytest.approx(25.0, rel=0.02)
 
 
 def test_a_hardening_spring_is_found_where_it_is():
-    comparison = compare_structure(model(), lay_out(decay(HARD), model(), Parts()))
+    comparison = compare_structure(model(), structure_ready(decay(HARD), model(), Layout()))
     diagnosis = diagnose_structure(comparison, without=FEW)
     assert diagnosis.verdict == MISSING
     first = diagnosis.candidates[0]
@@ -111,7 +111,7 @@ def test_a_hardening_spring_is_found_where_it_is():
 
 @pytest.mark.parametrize("noise", [0.003, 0.05])
 def test_where_nothing_is_missing_nothing_is_said_to_be(noise):
-    comparison = compare_structure(model(), lay_out(decay(noise=noise), model(), Parts()))
+    comparison = compare_structure(model(), structure_ready(decay(noise=noise), model(), Layout()))
     assert diagnose_structure(comparison, without=FEW).verdict == NOTHING
 
 
@@ -127,23 +127,23 @@ def test_a_free_run_that_lost_the_motion_is_no_noise():
 
 
 def test_stretches_that_are_named_are_used_alone():
-    prepared = lay_out(decay(), model(), Parts(use=((3.5, 9.0), (12.0, None))))
+    prepared = structure_ready(decay(), model(), Layout(use=((3.5, 9.0), (12.0, None))))
     times = prepared.record.time
     assert np.all((times >= 3.5) & (times < 9.0) | (times >= 12.0))
     assert min(times) == pytest.approx(3.5)
-    explicit = lay_out(decay(), model(), Parts((0, 900), (900, 1800)))
+    explicit = structure_ready(decay(), model(), Layout((), (0, 900), (900, 1800)))
     assert len(explicit.record.stretches) == 2
 
 
 @pytest.mark.parametrize(
     ("parts", "said"),
     [
-        (Parts(use=((0.0, 5.0),)), "0:5 s does not lie in it; expected times from 3 s to 23 s"),
-        (Parts(use=((4.0, 9.0), (8.0, 12.0))), "overlap at 8 s"),
-        (Parts(fit=(0, 500), alternate=True), "exclude each other; expected '--judge every-other-block'"),
-        (Parts(use=((4.0, 4.3),)), "leave 30 that are sure; expected 64"),
+        (Layout(use=((0.0, 5.0),)), "--use 0:5 leaves the record; its times run from 3 to 22.99 s"),
+        (Layout(use=((4.0, 9.0), (8.0, 12.0))), "two of the stretches to use overlap"),
+        (Layout(fit=(0, 500), alternate=True), "exclude each other; expected '--judge every-other-block'"),
+        (Layout(use=((4.0, 4.3),)), "leave 30 that are sure; expected 64"),
     ],
 )
 def test_parts_that_cannot_be_are_refused(parts, said):
     with pytest.raises(StudyError, match=said):
-        lay_out(decay(), model(), parts)
+        structure_ready(decay(), model(), parts)

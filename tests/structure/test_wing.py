@@ -12,10 +12,10 @@ from study.equations.model_file import parse_model
 from study.equations.place import Place
 from study.equations.terms import LIBRARY, get
 from study.records.readers import read_record
+from study.records.record_layout import Layout
 from study.structure.placed_candidates import candidate_entries, screened
-from study.structure.prepared_structure import prepare_structure
+from study.structure.prepared_structure import prepare_structure, structure_ready
 from study.structure.structure_comparison import compare_structure
-from study.structure.structure_layout import Parts, lay_out
 from study.structure.structure_verdict import diagnose_structure, placed_search_base
 from study.support.errors import StudyError
 
@@ -123,7 +123,7 @@ def test_as_a_user_runs_it_the_missing_stiffness_is_in_pitch(name):
     """Without parts named: every other stretch of one and a half periods is judged, from a state of its own."""
     model = wing(name)
     record = read_record(DATA / "wing" / f"{name}.csv", roles=model.roles)
-    comparison = compare_structure(model, lay_out(record, model, Parts()))
+    comparison = compare_structure(model, structure_ready(record, model, Layout()))
     _, _, heave, pitch = AUTHORS[name]
     values = comparison.fit.model.values
     assert values["k[ground-heave]"] == pytest.approx(heave, rel=0.15)
@@ -142,7 +142,10 @@ def test_no_division_of_a_decay_lacks_nothing(fit, judge):
     model = wing("model_1")
     record = read_record(DATA / "wing" / "model_1.csv", roles=model.roles)
     others = [effect for effect in LIBRARY if effect != "constant_force"]
-    for prepared in (lay_out(record, model, Parts(fit, judge)), prepare_structure(record, model, fit, judge)):
+    for prepared in (
+        structure_ready(record, model, Layout((), fit, judge)),
+        prepare_structure(record, model, fit, judge),
+    ):
         comparison = compare_structure(model, prepared)
         assert comparison.prediction.error > 30.0 * comparison.prediction.floor
         assert diagnose_structure(comparison, without=others).verdict == UNKNOWN

@@ -7,8 +7,8 @@ from scipy.special import fdtrc
 from study.equations.model import Model
 from study.identify.frequency_domain.starting_values import coherent_lines, solved
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.records.coarse_sampling import too_coarse
 from study.records.prepared import FORCE, Prepared
+from study.records.sampling_rate import too_coarse
 from study.support.errors import StudyError
 from study.support.thresholds import ALPHA
 

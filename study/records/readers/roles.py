@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from study.records.moving_base import BASE
+from study.records.driven_by_motion import BASE
 from study.records.readers.options import BESIDE, ReadOptions
 from study.records.readers.table import Column, Table
 from study.records.record import ALONE, MOTIONS, Sensor

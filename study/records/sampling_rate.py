@@ -1,4 +1,6 @@
-"""Records sampled more finely than their motion asks for: some of the samples, behind a low-pass filter.
+"""Records sampled more finely than their motion asks for, or too coarsely.
+
+Of the first some of the samples are used, behind a low-pass filter.
 
 What lies above the highest frequency at which the measured motion stands above its noise is noise. A filter whose power
 and that of its image add up to one leaves white noise white, so that the samples that are kept hold as much of every
@@ -30,6 +32,7 @@ LEAST = 512  # samples in either part: what a segment of the spectra takes
 LINES = 8192  # samples in a segment of the spectrum, at most
 PARTS = 4  # segments that a record holds side by side, at least
 EDGE = 8  # samples at each end that the filter takes from what the record is continued by
+COARSE = 2.0 / 3.0  # of the power above half the Nyquist frequency: of white noise half of it is there
 PASSED = 2.0 / 3.0  # of the new Nyquist frequency, and its mirror image 4/3: where the filter falls
 
 
@@ -86,7 +89,7 @@ def spare_factor(records: Sequence[Record], measured: Sequence[str], shortest: i
     records : sequence of Record
         With completed motions.
     measured : sequence of str
-        Those that were measured: the others are louder at high frequencies, not more telling.
+        The channels that were measured: other motions are louder at high frequencies, not more telling.
     shortest : int
         Samples in the shorter of both parts.
     """
@@ -96,7 +99,7 @@ def spare_factor(records: Sequence[Record], measured: Sequence[str], shortest: i
     needed = max(content(record[name], record.dt).enough for record in records for name in measured)
     most = min(most, int(0.5 / records[0].dt / needed))
     whole = [record.period for record in records if record.period]
-    whole += [len(record) for record in records if _goes_round(record[FORCE])]
+    whole += [len(record) for record in records if any(_goes_round(record[force]) for force in record.forces)]
     return next((k for k in range(most, 1, -1) if not any(n % k for n in whole)), 1)
 
 
@@ -190,7 +193,7 @@ def decimated(record: Record, factor: int) -> Record:
     A force that is straight or held between its samples is filtered as such.
     """
     channels = {
-        name: _filtered(values, factor, record.between if name == FORCE else BAND_LIMITED)
+        name: _filtered(values, factor, record.between if name in record.forces else BAND_LIMITED)
         for name, values in record.channels.items()
     }
     period = None if record.period is None else record.period // factor
@@ -233,9 +236,9 @@ def _band(band: tuple[float, float], record: Record) -> tuple[float, float]:
 
 def _said(record: Record, factor: int, span: tuple[int, int]) -> str:
     """A sentence on what was done, by the period of the strongest line of the motion."""
-    values = record[MOTIONS[0]][slice(*span)]
-    power = np.abs(np.asarray(rfft(values - np.mean(values))))
-    a_period = len(values) / max(int(np.argmax(power)), 1)
+    motions = [record[s][slice(*span)] for s in record.sensors if s.motion == MOTIONS[0]]
+    power = np.sum([np.abs(np.asarray(rfft(x - np.mean(x)))) ** 2 / max(float(np.var(x)), 1e-300) for x in motions], 0)
+    a_period = (span[1] - span[0]) / max(int(np.argmax(power)), 1)
     return (
         f"the record {record.name} is sampled {a_period:.0f} times a period of its strongest motion, more finely than "
         f"anything but noise in it asks for: every {_ordinal(factor)} sample is used after a low-pass filter, which "
@@ -245,3 +248,29 @@ def _said(record: Record, factor: int, span: tuple[int, int]) -> str:
 
 def _ordinal(number: int) -> str:
     return {2: "second", 3: "third"}.get(number, f"{number}th")
+
+
+def too_coarse(prepared: Prepared) -> str:
+    """A sentence on a motion most of whose power lies above half the Nyquist frequency; empty where it does not.
+
+    There are fewer than four samples in a period then: the third harmonic of such a motion, which any odd nonlinearity
+    makes, folds to frequencies within it, and a motion from above the Nyquist frequency looks no different. The power
+    is that of the displacement, which falls above the resonance, whatever motion was measured.
+    """
+    if prepared.response == FORCE or prepared.free:
+        return ""
+    values = prepared.fitted - np.mean(prepared.fitted)
+    frequency = np.asarray(rfftfreq(len(values), prepared.dt))
+    inside = frequency >= max(prepared.band[0], frequency[1])
+    power = np.abs(np.asarray(rfft(values * np.hanning(len(values)))))[inside] ** 2
+    power /= frequency[inside] ** (2 * MOTIONS.index(prepared.response))
+    total, nyquist = np.cumsum(power), 0.5 / prepared.dt
+    above = 1.0 - np.interp(0.5 * nyquist, frequency[inside], total) / total[-1]
+    if above <= COARSE:
+        return ""
+    middle = float(frequency[inside][np.searchsorted(total, 0.5 * total[-1])])
+    return (
+        f"the record {prepared.record.name} is sampled too coarsely: {1.0 / (middle * prepared.dt):.1f} times a period "
+        f"of its motion at {middle:.3g} Hz, or that comes from above {nyquist:.3g} Hz and only looks so; a fit means "
+        "little, as third harmonics fold onto the motion itself; expected four samples a period or more"
+    )
