@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from study.equations.model import Model
     from study.equations.term import Term
     from study.explore.placed_session import PlacedSession
-    from study.structure.prepared_structure import PreparedStructure
+    from study.records.prepared import Prepared
     from study.structure.structure_comparison import StructureComparison
 
 
-def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[PreparedStructure]":
+def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[Prepared]":
     """The records that were named, made ready; options that nothing does with several coordinates are refused."""
     from study.faults.instrument_settings import settings_beside
     from study.structure.prepared_structure import structure_ready
@@ -37,7 +37,7 @@ def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[
         getattr(arguments, "estimator", "output_error") == "output_error",
         f"--estimator {getattr(arguments, 'estimator', '')} is for a single mass; expected output_error of a structure",
     )
-    made: list[PreparedStructure] = []
+    made: list[Prepared] = []
     for path, record in zip(sources(arguments), read_records(arguments, model), strict=True):
         with at(path):
             beside = settings_beside(path)
@@ -75,7 +75,7 @@ def compare_command(arguments: argparse.Namespace, model: "Model") -> None:
     print(f"\n{folder}: {_listed(files)}")
 
 
-def _compare_measured(arguments: argparse.Namespace, model: "Model", ready: "list[PreparedStructure]") -> None:
+def _compare_measured(arguments: argparse.Namespace, model: "Model", ready: "list[Prepared]") -> None:
     """The same where the linear part is as measured."""
     from study.compare.comparison_report import as_json
     from study.structure.measured_comparison import compare_measured, measured_document, measured_summary
@@ -154,7 +154,7 @@ def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
 
 
 def _diagnose_measured(
-    arguments: argparse.Namespace, model: "Model", ready: "list[PreparedStructure]", own: "list[Term]"
+    arguments: argparse.Namespace, model: "Model", ready: "list[Prepared]", own: "list[Term]"
 ) -> None:
     """The same where the linear part is as measured."""
     from study.compare.comparison_report import as_json

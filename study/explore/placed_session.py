@@ -8,9 +8,9 @@ from study.equations.model import Model, free
 from study.equations.terms import Term
 from study.explore.any_session import chosen, held, holding
 from study.explore.session import Step, joined, own_term
+from study.records.prepared import Prepared
 from study.structure.placed_dropping import dropped_term, term_at
 from study.structure.placed_needless import PlacedNeedless, placed_needless
-from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_comparison import StructureComparison, compare_structure, structure_history_step
 from study.structure.structure_report import structure_diagnosis_in_words
 from study.structure.structure_verdict import StructureDiagnosis, added_term, diagnose_structure
@@ -39,7 +39,7 @@ class PlacedStage:
 class PlacedSession:
     """A record of a structure, and the models tried on it."""
 
-    prepared: PreparedStructure
+    prepared: Prepared
     stages: tuple[PlacedStage, ...]  # from the model as given to the present one
     own: tuple[Term, ...] = ()  # the user's own candidates, each at all places
     earlier: tuple[Step, ...] = ()  # of the history that was kept beside the model file

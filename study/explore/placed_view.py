@@ -130,7 +130,7 @@ def _motions(comparison: StructureComparison, close: bool = False) -> Columns:
     Or ``close`` up where that is largest.
     """
     prediction = comparison.prediction
-    time = prediction.prepared.record.time[slice(*prediction.prepared.judge)]
+    time = prediction.prepared.record.time[slice(*prediction.prepared.plan.judge)]
 
     def parts() -> Iterator[tuple[str, Mapping[str, Floats]]]:
         for i, sensor in enumerate(prediction.prepared.sensors):

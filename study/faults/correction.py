@@ -74,7 +74,7 @@ def bridged(values: Floats, lost: NDArray[np.bool_]) -> Floats:
 def _with_response(prepared: Prepared, values: Floats) -> Prepared:
     """The record with another measured response, and the motions that follow from it."""
     record = prepared.record
-    computed = [m for m in MOTIONS if m not in prepared.measured]
+    computed = [m for m in MOTIONS if m in prepared.record.computed]
     channels = {name: c for name, c in record.channels.items() if name not in computed}
     raw = Record(
         record.dt, {**channels, prepared.response: values}, record.units, record.name, record.start, record.period

@@ -15,7 +15,7 @@ from study.faults.accounting import Accounted, accounted
 from study.records.driven_by_motion import on_a_moving_base, relative_to_base
 from study.records.prepared import Prepared
 from study.records.record import Record
-from study.records.record_layout import Kind, Layout, apart, laid_out, runs_on
+from study.records.record_layout import KindOfTest, Layout, apart, laid_out, runs_on
 
 
 def made_ready(
@@ -46,7 +46,7 @@ def made_ready(
     moved = [relative_to_base(r, mass, absolute) if b else (r, ()) for r, b in zip(records, based, strict=True)]
     prescribed = "inertia" not in model
     drifts = not prescribed and not has_spring(model)
-    prepared = laid_out([record for record, _ in moved], layout, Kind(prescribed, drifts))
+    prepared = laid_out([record for record, _ in moved], layout, KindOfTest(prescribed, drifts))
     prepared = replace(prepared, notes=(*(note for _, said in moved for note in said), *prepared.notes))
     return per_unit_mass(model, prepared) if prepared.free else (model, prepared)
 

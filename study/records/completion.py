@@ -84,7 +84,8 @@ def complete(record: Record, cutoff: float | None = None) -> CompletedRecord:
             found = _blended(record, coordinate, cutoff)
         else:
             found = _derived(record, coordinate, measured, cutoff)
-        record = record.with_channels({str(Sensor(coordinate, m)): values for m, values in found.motions.items()})
+        motions = {str(Sensor(coordinate, m)): values for m, values in found.motions.items()}
+        record = replace(record.with_channels(motions), computed=record.computed.union(motions))
         low, edge = max(low, found.low), max(edge, found.edge)
         for sentence in found.notes:
             said.setdefault(sentence, []).append(coordinate)

@@ -36,8 +36,6 @@ class Prepared:
         What was converted or computed, a sentence each.
     low : float
         Frequency in hertz below which the user wants nothing judged: the cut-off that was given, or 0.
-    measured : tuple of str
-        The channels of motions that were measured; the others are derivatives and integrals of them.
     lost : bool array, shape (n,), optional
         Samples of the response that say nothing, such as clipped ones: they are neither fitted nor judged.
     every : int
@@ -58,7 +56,6 @@ class Prepared:
     edge: int
     notes: tuple[str, ...] = ()
     low: float = 0.0
-    measured: tuple[str, ...] = ()
     lost: NDArray[np.bool_] | None = None
     every: int = 1
     as_sampled: "Prepared | None" = None
@@ -73,6 +70,21 @@ class Prepared:
             return Outputs(sensors, (1.0,))
         sizes = np.std(Outputs(sensors, (1.0,) * len(sensors)).measured(self.record, self.plan.fit), axis=0)
         return Outputs(sensors, tuple((1.0 / np.where(sizes > 0.0, sizes, 1.0)).tolist()))
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Those that have a sensor which is compared."""
+        return tuple(sensor.coordinate for sensor in self.outputs.sensors)
+
+    @cached_property
+    def measured(self) -> Floats:
+        """What the sensors that are compared show, shape (n, sensors)."""
+        return self.outputs.measured(self.record, (0, len(self.record)))
+
+    @cached_property
+    def scale(self) -> Floats:
+        """Size of each sensor: the standard deviation of its motion in the fitting part, shape (sensors,)."""
+        return np.std(self.measured[slice(*self.plan.fit)], axis=0)
 
     @property
     def response(self) -> str:
@@ -178,8 +190,7 @@ def prepare_record(record: Record, plan: Plan | None = None, cutoff: float | Non
     """
     completed = complete(record, cutoff)
     plan, low = plan or make_plan(record), cutoff or 0.0
-    measured = tuple(map(str, record.sensors))
-    return Prepared(completed.record, plan, completed.band, completed.edge, completed.notes, low, measured)
+    return Prepared(completed.record, plan, completed.band, completed.edge, completed.notes, low)
 
 
 def whole(record: Record, response: str = "displacement") -> Prepared:

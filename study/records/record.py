@@ -66,6 +66,7 @@ class Record:
     between: str = "band_limited"  # what a force does between its samples: one of ``interpolation.READINGS``
     coordinates: tuple[str, ...] = (ALONE,)  # whose motions its channels may be
     forces: tuple[str, ...] = ("force",)  # which channels are forces
+    computed: frozenset[str] = frozenset()  # motions that were not measured but computed from those that were
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -81,13 +82,13 @@ class Record:
 
     @property
     def sensors(self) -> tuple[Sensor, ...]:
-        """The motions that it holds, in the order of its channels."""
+        """The motions that were measured, in the order of its channels."""
         known = {str(s := Sensor(c, m)): s for c in self.coordinates for m in MOTIONS}
-        return tuple(known[name] for name in self.channels if name in known)
+        return tuple(known[name] for name in self.channels if name in known and name not in self.computed)
 
     @property
     def motions(self) -> dict[Sensor, Floats]:
-        """These motions by sensor, shape (n,) each."""
+        """The motions that were measured, by sensor; shape (n,) each."""
         return {sensor: self[sensor] for sensor in self.sensors}
 
     def motion(self, coordinate: str) -> Floats:
@@ -110,10 +111,10 @@ class Record:
 
     def usual_unit(self, channel: str | Sensor) -> str:
         """The SI unit of a force or a motion; empty for a further channel."""
-        role = (
-            "force" if channel in self.forces else next((s.motion for s in self.sensors if str(s) == str(channel)), "")
-        )
-        return SI_UNITS.get(role, "")
+        if channel in self.forces:
+            return SI_UNITS["force"]
+        found = (m for c in self.coordinates for m in MOTIONS if str(Sensor(c, m)) == str(channel))
+        return next((SI_UNITS[motion] for motion in found), "")
 
     @property
     def force_and_length(self) -> tuple[str, str]:
@@ -154,7 +155,7 @@ class Record:
     @property
     def extra(self) -> tuple[str, ...]:
         """Names of channels beside forces and motions."""
-        known = {*self.forces, *map(str, self.sensors)}
+        known = {*self.forces, *self.computed, *map(str, self.sensors)}
         return tuple(c for c in self.channels if c not in known)
 
     def part(self, first: int, last: int) -> "Record":
@@ -175,9 +176,9 @@ class Record:
 
     def with_motions(self, motions: Mapping[Sensor, Floats]) -> "Record":
         """The same with these motions in place of its own."""
-        own = {str(sensor) for sensor in self.sensors}
+        own = {*self.computed, *map(str, self.sensors)}
         kept = {name: values for name, values in self.channels.items() if name not in own}
-        return replace(self, channels=kept | {str(sensor): values for sensor, values in motions.items()})
+        return replace(self, channels=kept | {str(s): values for s, values in motions.items()}, computed=frozenset())
 
     def relative(self, motion: Floats, span: tuple[int, int] | None = None) -> "Record":
         """A motion along the record, rows displacement and so on of shape (n,), as the record of a single mass.

@@ -42,7 +42,7 @@ class Layout:
 
 
 @dataclass(frozen=True)
-class Kind:
+class KindOfTest:
     """What a model makes of a record."""
 
     prescribed: bool = False  # it has no inertia: the motion is prescribed, and the force is predicted
@@ -51,7 +51,7 @@ class Kind:
     anew: float = 0.0  # periods after which a decay begins anew; 0 where it runs on through the blocks of both parts
 
 
-def laid_out(records: Sequence[Record], layout: Layout, kind: Kind | None = None) -> Prepared:
+def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None = None) -> Prepared:
     """Records made ready: motions completed, and the parts to fit and to judge settled.
 
     A single stretch under a force is fitted in its first half and judged in its second. Every other block is judged of
@@ -64,7 +64,7 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: Kind | None = None
         Of one structure, judged together.
     layout : Layout
         What the user says.
-    kind : Kind, optional
+    kind : KindOfTest, optional
         What the model makes of them.
 
     Raises
@@ -72,7 +72,7 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: Kind | None = None
     StudyError
         If ranges overlap or leave the record, the response asked for was not measured, or it cannot be completed.
     """
-    kind = kind or Kind()
+    kind = kind or KindOfTest()
     wanted = layout.response
     if kind.prescribed:
         with at(records[0].name):
@@ -101,13 +101,13 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: Kind | None = None
             plan = make_plan(records[0], layout.fit, layout.judge, wanted)
         if explicit or kind.unbroken or not driven_apart(records[0], plan.fit, plan.judge):
             prepared = prepare_record(records[0], plan, layout.cutoff)
-            return replace(prepared, notes=(*notes, *prepared.notes))
+            return replace(prepared, sensors=sensors, notes=(*notes, *prepared.notes))
         turns = True
         notes.append(_why(records[0], plan))
     completed = [complete(record, layout.cutoff) for record in records]
     if turns and not (layout.use or layout.as_sampled or free or kind.prescribed or kind.drifts):
         shortest = sum(len(record) for record in records) // 2
-        completed, every = completed_without_spare(completed, _measured(records), shortest)
+        completed, every = completed_without_spare(completed, shortest)
     if explicit:
         plan = make_plan(records[0], layout.fit, layout.judge, wanted)
         fit, judge = [sure(completed[0], *plan.fit)], [sure(completed[0], *plan.judge)]
@@ -127,12 +127,7 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: Kind | None = None
             f"of {0.5 * (first + second):.3g} s, from {len(fit)} and {len(judge)} states of its own"
         )
     prepared = strung_together(fit, judge, sensors, completed, notes)
-    return replace(prepared, low=layout.cutoff or 0.0, measured=_measured(records), every=every)
-
-
-def _measured(records: Sequence[Record]) -> tuple[str, ...]:
-    """The channels of the motions that every record shows."""
-    return tuple(str(s) for s in records[0].sensors if all(s in record for record in records))
+    return replace(prepared, low=layout.cutoff or 0.0, every=every)
 
 
 def _why(record: Record, plan: Plan) -> str:
@@ -270,7 +265,7 @@ def strung_together(
         expect(samples >= FEWEST, f"{first.name}: {samples} samples are left to {part}; expected {FEWEST} or more")
     record = Record(
         first.dt, channels, first.units, first.name, first.start, stretches=stretches, coordinates=first.coordinates,
-        forces=first.forces,
+        forces=first.forces, computed=first.computed.union(*(c.record.computed for c in completed)),
     )  # fmt: skip
     band = max(c.band[0] for c in completed), min(c.band[1] for c in completed)
     said = tuple(dict.fromkeys((*(n for c in completed for n in c.notes), *notes)))

@@ -20,7 +20,7 @@ from study.records.completion import CompletedRecord, with_continuations
 from study.records.interpolation import BAND_LIMITED, closes
 from study.records.plan import Plan
 from study.records.prepared import FORCE, Prepared
-from study.records.record import MOTIONS, Record
+from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments, autospectrum
 from study.support.arrays import Floats
 from study.support.thresholds import ALPHA
@@ -46,7 +46,7 @@ def without_spare_samples(prepared: Prepared) -> Prepared:
     if prepared.record.stretches or prepared.lost is not None or prepared.response == FORCE or prepared.free:
         return prepared
     parts = prepared.plan.fit, prepared.plan.judge
-    factor = spare_factor([prepared.record], prepared.measured, min(b - a for a, b in parts))
+    factor = spare_factor([prepared.record], min(b - a for a, b in parts))
     if factor == 1:
         return prepared
     record = decimated(prepared.record, factor)
@@ -61,13 +61,13 @@ def without_spare_samples(prepared: Prepared) -> Prepared:
 
 
 def completed_without_spare(
-    completed: Sequence[CompletedRecord], measured: Sequence[str], shortest: int
+    completed: Sequence[CompletedRecord], shortest: int
 ) -> tuple[list[CompletedRecord], int]:  # fmt: skip
     """The same of driven records that are to be cut into stretches, and how many of their samples there are to one.
 
-    ``measured`` and ``shortest`` as for :func:`spare_factor`.
+    ``shortest`` as for :func:`spare_factor`.
     """
-    factor = spare_factor([c.record for c in completed], measured, shortest)
+    factor = spare_factor([c.record for c in completed], shortest)
     return [_fewer(c, factor) if factor > 1 else c for c in completed], factor
 
 
@@ -78,25 +78,24 @@ def _fewer(completed: CompletedRecord, factor: int) -> CompletedRecord:
     return replace(completed, record=record, band=_band(completed.band, record), edge=edge, notes=notes)
 
 
-def spare_factor(records: Sequence[Record], measured: Sequence[str], shortest: int) -> int:
+def spare_factor(records: Sequence[Record], shortest: int) -> int:
     """The largest whole number by which the sampling may be divided without loss; 1 if none.
 
-    Each measured motion allows a new Nyquist frequency (:meth:`Content.enough`). A force that closes on itself, and the
+    Each measured motion allows a new Nyquist frequency (:meth:`Content.enough`): what was computed is louder at high
+    frequencies, not more telling. A force that closes on itself, and the
     period of the excitation, still hold whole numbers of samples, and either part is long enough for spectra.
 
     Parameters
     ----------
     records : sequence of Record
         With completed motions.
-    measured : sequence of str
-        The channels that were measured: other motions are louder at high frequencies, not more telling.
     shortest : int
         Samples in the shorter of both parts.
     """
     most = shortest // LEAST
     if most < 2:
         return 1
-    needed = max(content(record[name], record.dt).enough for record in records for name in measured)
+    needed = max(content(record[s], record.dt).enough for record in records for s in record.sensors)
     most = min(most, int(0.5 / records[0].dt / needed))
     whole = [record.period for record in records if record.period]
     whole += [len(record) for record in records if any(_goes_round(record[force]) for force in record.forces)]
@@ -236,7 +235,8 @@ def _band(band: tuple[float, float], record: Record) -> tuple[float, float]:
 
 def _said(record: Record, factor: int, span: tuple[int, int]) -> str:
     """A sentence on what was done, by the period of the strongest line of the motion."""
-    motions = [record[s][slice(*span)] for s in record.sensors if s.motion == MOTIONS[0]]
+    moved = [s for c in record.coordinates if (s := Sensor(c, MOTIONS[0])) in record]
+    motions = [record[s][slice(*span)] for s in moved]
     power = np.sum([np.abs(np.asarray(rfft(x - np.mean(x)))) ** 2 / max(float(np.var(x)), 1e-300) for x in motions], 0)
     a_period = (span[1] - span[0]) / max(int(np.argmax(power)), 1)
     return (

@@ -11,15 +11,15 @@ import numpy as np
 
 from study.equations.model import Model
 from study.records.plan import FEWEST
+from study.records.prepared import Prepared
 from study.structure.mass_matrix import linear_keys, patterns
 from study.structure.missing_forces import band_above_noise, in_band
-from study.structure.prepared_structure import PreparedStructure
 from study.support.arrays import Floats, Ints
 from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares
 
 
-def free_decay_start(model: Model, prepared: PreparedStructure, held: Mapping[str, float]) -> dict[str, float]:
+def free_decay_start(model: Model, prepared: Prepared, held: Mapping[str, float]) -> dict[str, float]:
     """Linear coefficients that are not held, by least squares along the fitting part.
 
     Raises
@@ -32,7 +32,7 @@ def free_decay_start(model: Model, prepared: PreparedStructure, held: Mapping[st
     open_masses = ", ".join(key for key in free if orders[key] == 2)
     sentence = f"nothing drives {model.name!r}: its motion says nothing of {open_masses}; expected a value for each"
     expect(not open_masses, sentence)
-    lacking = ", ".join(c for c in model.coordinates if c not in prepared.complete)
+    lacking = ", ".join(c for c in model.coordinates if c not in prepared.coordinates)
     if lacking:
         raise StudyError(
             f"nothing drives {model.name!r} and no sensor is at {lacking}; expected one at each coordinate"
@@ -45,10 +45,10 @@ def free_decay_start(model: Model, prepared: PreparedStructure, held: Mapping[st
     return dict(zip(free, amounts.tolist(), strict=True))
 
 
-def _free_of_noise(prepared: PreparedStructure, model: Model) -> Floats:
+def _free_of_noise(prepared: Prepared, model: Model) -> Floats:
     """Motions along the fitting part in the band where any of them stands above noise, shape (3, n, samples)."""
     record = prepared.record.stretches[0].source if prepared.record.stretches else prepared.record
-    bands = [band_above_noise(record[s], prepared.dt, prepared.low) for s in prepared.sensors]
+    bands = [band_above_noise(record[s], prepared.dt, prepared.band[0]) for s in prepared.sensors]
     known = [band for band in bands if band is not None]
     edge, motion = prepared.edge, np.stack([record.motion(c) for c in model.coordinates], axis=1)
     if known:
@@ -59,12 +59,12 @@ def _free_of_noise(prepared: PreparedStructure, model: Model) -> Floats:
     return motion[:, :, _fitted_samples(prepared, len(record), edge)]
 
 
-def _fitted_samples(prepared: PreparedStructure, whole: int, edge: int) -> Ints:
+def _fitted_samples(prepared: Prepared, whole: int, edge: int) -> Ints:
     """Samples of the whole record that are fitted, without those at its ends."""
     samples = np.arange(len(prepared.record))
     if prepared.record.stretches:
         samples = np.concatenate([np.arange(s.first, s.last) for s in prepared.record.stretches])
     last = whole - edge
-    fitted = samples[slice(*prepared.fit)]
+    fitted = samples[slice(*prepared.plan.fit)]
     kept = fitted[(fitted >= edge) & (fitted < last)]
     return kept if len(kept) > FEWEST else fitted

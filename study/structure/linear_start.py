@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from study.equations.model import Model
+from study.records.prepared import Prepared
 from study.records.record import MOTIONS
 from study.records.spectra import Segments, cross_spectra
 from study.structure.mass_matrix import linear_keys, loose_motions, matrices, patterns
-from study.structure.prepared_structure import PreparedStructure
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares
@@ -49,7 +49,7 @@ class SensorResponses:
     error: Floats
 
 
-def frequency_responses(prepared: PreparedStructure, model: Model) -> SensorResponses:
+def frequency_responses(prepared: Prepared, model: Model) -> SensorResponses:
     """The best linear approximation of the sensors by the forces on the fitting part.
 
     Raises
@@ -59,7 +59,7 @@ def frequency_responses(prepared: PreparedStructure, model: Model) -> SensorResp
     """
     names = [name for name, _ in model.forces]
     expect(names, f"nothing drives {model.name!r}; expected 'forces' in the model, or values for its linear terms")
-    part = slice(*prepared.fit)
+    part = slice(*prepared.plan.fit)
     channels = [prepared.record[n][part] for n in names] + list(prepared.measured[part].T)
     length = min(LONGEST, 2 ** int(np.log2(max(len(channels[0]) // SHARE, 16))))
     matrix = cross_spectra([x - np.mean(x) for x in channels], prepared.dt, Segments(length=length))
@@ -149,7 +149,7 @@ def _real(values: Complexes) -> Floats:
     return np.concatenate([values.real, values.imag], axis=axis)
 
 
-def _problem(model: Model, prepared: PreparedStructure, held: Mapping[str, float]) -> tuple[_Linear, list[str]]:
+def _problem(model: Model, prepared: Prepared, held: Mapping[str, float]) -> tuple[_Linear, list[str]]:
     responses = frequency_responses(prepared, model)
     orders, own = linear_keys(model), patterns(model)
     s = 1j * responses.omega
@@ -170,7 +170,7 @@ def _problem(model: Model, prepared: PreparedStructure, held: Mapping[str, float
     ), free  # fmt: skip
 
 
-def structure_linear_start(model: Model, prepared: PreparedStructure, held: Mapping[str, float]) -> dict[str, float]:
+def structure_linear_start(model: Model, prepared: Prepared, held: Mapping[str, float]) -> dict[str, float]:
     """Linear coefficients that are not held, from the frequency response functions of the fitting part.
 
     Raises

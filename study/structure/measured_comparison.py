@@ -10,11 +10,11 @@ import numpy as np
 from study.equations import model_file
 from study.equations.model import Model, ModelTerm
 from study.equations.place import place_in_words
+from study.records.prepared import Prepared
 from study.structure.measured_fit import MeasuredFit, fit_measured, fit_with_term
 from study.structure.measured_prediction import MeasuredPrediction, predict_measured
 from study.structure.measured_screening import screened_by_lines
 from study.structure.measured_spectra import CoefficientSpectrum, coefficient_spectra
-from study.structure.prepared_structure import PreparedStructure
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError, expect
 from study.support.numbers import percent
@@ -48,7 +48,7 @@ class MeasuredComparison:
     """A model with ``linear: measured`` held against one record."""
 
     model: Model  # as it was given
-    prepared: PreparedStructure
+    prepared: Prepared
     fit: MeasuredFit
     modes: MeasuredModes
     prediction: MeasuredPrediction
@@ -57,7 +57,7 @@ class MeasuredComparison:
 
 
 def compare_measured(
-    model: Model, prepared: PreparedStructure, progress: Callable[[str], None] | None = None
+    model: Model, prepared: Prepared, progress: Callable[[str], None] | None = None
 ) -> MeasuredComparison:
     """Fit modes and what the terms leave open to one part of a record and judge the free run on the other.
 
@@ -82,7 +82,7 @@ def compare_measured(
     )
 
 
-def _first_fit(model: Model, prepared: PreparedStructure) -> MeasuredFit:
+def _first_fit(model: Model, prepared: Prepared) -> MeasuredFit:
     """The fit of a model; of terms with an open shape parameter one after the other, beside those before."""
     unknown = [t for t in model.terms if None in t.parameters]
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
@@ -95,7 +95,7 @@ def _first_fit(model: Model, prepared: PreparedStructure) -> MeasuredFit:
     return fit
 
 
-def _beside_minima(known: Model, entry: ModelTerm, prepared: PreparedStructure) -> MeasuredFit:
+def _beside_minima(known: Model, entry: ModelTerm, prepared: Prepared) -> MeasuredFit:
     """The best of fits from the shape that the screening found and from shapes a little aside.
 
     Along a gap or a dead band the misfit has kinks, and a local minimum between any two.
@@ -156,7 +156,7 @@ def measured_document(comparison: MeasuredComparison) -> dict[str, Any]:
         ],
         "by_frequency": [_plain(s) for s in comparison.spectra],
         "fit": {
-            "samples": list(prepared.fit), "judged": list(prepared.judge), "converged": fit.converged,
+            "samples": list(prepared.plan.fit), "judged": list(prepared.plan.judge), "converged": fit.converged,
             "message": fit.message,
         },
         "notes": list(comparison.notes), "says": measured_says(comparison),
@@ -214,7 +214,7 @@ def measured_summary(comparison: MeasuredComparison) -> str:
         )
     ]
     heads = ["mode", "error", "damping", "error", *(f"at {p}" for p in fit.modal.points)]
-    first, last = comparison.prepared.fit, comparison.prepared.judge
+    first, last = comparison.prepared.plan.fit, comparison.prepared.plan.judge
     parts = [
         f"model {comparison.model.name}, its linear part as measured: fitted to samples {first[0]} to {first[1]}, "
         f"judged on {last[0]} to {last[1]}",

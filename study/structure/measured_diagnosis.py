@@ -192,10 +192,10 @@ def _ranked(rows: list[MeasuredRanked], comparison: MeasuredComparison, asked: i
 def _derivatives(comparison: MeasuredComparison) -> Floats:
     """Of the motions on the judging part by the keys of the fit and its initial state."""
     fit, prepared = comparison.fit, comparison.prepared
-    begin = prepared.fit[0] if prepared.judge[0] == prepared.fit[1] else prepared.judge[0]
-    span = (begin, prepared.judge[1])
+    begin = prepared.plan.fit[0] if prepared.plan.judge[0] == prepared.plan.fit[1] else prepared.plan.judge[0]
+    span = (begin, prepared.plan.judge[1])
     run = modal_run(fit.model, fit.modal, prepared, prepared.sensors, fit.steps, span, fit.values, fit.keys)
-    return run.respond(fit.values, fit.initial)[1][prepared.judge[0] - begin :]
+    return run.respond(fit.values, fit.initial)[1][prepared.plan.judge[0] - begin :]
 
 
 def _decide(rows: list[MeasuredRanked], comparison: MeasuredComparison, asked: int) -> MeasuredDiagnosis:

@@ -12,10 +12,10 @@ import numpy as np
 
 from study.equations.model import Model, ModelTerm, with_registers
 from study.records.interpolation import between_samples
+from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Sensor
 from study.structure.measured_start import modal_starts
 from study.structure.modal_program import ModalKeys, modal_program
-from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_fit import MOST_STEPS, ROUGH, SHIFT
 from study.structure.structure_run import StretchDrive, StructureRun
 from study.support.arrays import Floats
@@ -76,7 +76,7 @@ class ModalRun:
 
 
 def modal_run(
-    model: Model, modal: ModalKeys, prepared: PreparedStructure, sensors: tuple[Sensor, ...], steps: int,
+    model: Model, modal: ModalKeys, prepared: Prepared, sensors: tuple[Sensor, ...], steps: int,
     span: tuple[int, int], values: Mapping[str, float], keys: tuple[str, ...] = (),
 ) -> ModalRun:  # fmt: skip
     """A structure by modes ready to run along a stretch of its record, ``steps`` Runge-Kutta steps a sample.
@@ -144,7 +144,7 @@ class MeasuredFit:
         return float(np.sqrt(max(self.covariance[i, i], 0.0)))
 
 
-def fit_measured(model: Model, prepared: PreparedStructure) -> MeasuredFit:
+def fit_measured(model: Model, prepared: Prepared) -> MeasuredFit:
     """Modes and coefficients from the fitting part; values that the model gives are held.
 
     There are as many modes as the Bayesian information criterion of the free run asks for, from one on; damping couples
@@ -182,7 +182,7 @@ def fit_measured(model: Model, prepared: PreparedStructure) -> MeasuredFit:
     return coupled if _criterion(coupled, prepared) < _criterion(best, prepared) else best
 
 
-def fit_with_term(model: Model, entry: ModelTerm, prepared: PreparedStructure) -> MeasuredFit:
+def fit_with_term(model: Model, entry: ModelTerm, prepared: Prepared) -> MeasuredFit:
     """A model with a term more, whose shape parameters have values: fitted with these, then with them free.
 
     Raises as :func:`fit_measured`.
@@ -195,7 +195,7 @@ def fit_with_term(model: Model, entry: ModelTerm, prepared: PreparedStructure) -
     )
 
 
-def refined_fit(fit: MeasuredFit, prepared: PreparedStructure, held: Collection[str]) -> MeasuredFit:
+def refined_fit(fit: MeasuredFit, prepared: Prepared, held: Collection[str]) -> MeasuredFit:
     """A fit gone on with from where it ended, with what it held beside ``held`` free; its modes stay as many.
 
     Raises
@@ -209,9 +209,7 @@ def refined_fit(fit: MeasuredFit, prepared: PreparedStructure, held: Collection[
     return _settled(again, model, prepared, names, TRIALS)
 
 
-def _settled(
-    fit: MeasuredFit, model: Model, prepared: PreparedStructure, held: tuple[str, ...], trials: int
-) -> MeasuredFit:
+def _settled(fit: MeasuredFit, model: Model, prepared: Prepared, held: tuple[str, ...], trials: int) -> MeasuredFit:
     """The fit at its minimum, or so many trials nearer, with enough steps.
 
     Halving them then moves no coefficient by what its error notices: what too coarse an integration leaves would else
@@ -232,12 +230,12 @@ def _settled(
             return fit
 
 
-def _fine(fit: MeasuredFit, prepared: PreparedStructure) -> bool:
+def _fine(fit: MeasuredFit, prepared: Prepared) -> bool:
     """Whether halving the steps changes the motions by too little to move any estimate by what its error notices."""
     coarse, fine = (
-        modal_run(fit.model, fit.modal, prepared, prepared.sensors, k * fit.steps, prepared.fit, fit.values).respond(
-            fit.values, fit.initial
-        )[0]
+        modal_run(
+            fit.model, fit.modal, prepared, prepared.sensors, k * fit.steps, prepared.plan.fit, fit.values
+        ).respond(fit.values, fit.initial)[0]
         for k in (1, 2)
     )
     moved, left = ((x / prepared.scale).ravel() for x in (fine - coarse, fit.residual))
@@ -249,7 +247,7 @@ def _steps(modal: ModalKeys, values: Mapping[str, float], dt: float) -> int:
     return int(np.clip(np.ceil(fastest * dt / ROUGH), 1, MOST_STEPS))
 
 
-def _criterion(fit: MeasuredFit, prepared: PreparedStructure) -> float:
+def _criterion(fit: MeasuredFit, prepared: Prepared) -> float:
     """The Bayesian information criterion for white noise in proportion to each sensor (Schwarz, 1978)."""
     weighted = fit.residual / prepared.scale
     count = weighted.size
@@ -257,13 +255,13 @@ def _criterion(fit: MeasuredFit, prepared: PreparedStructure) -> float:
 
 
 def _fitted(
-    model: Model, modal: ModalKeys, prepared: PreparedStructure, start: Mapping[str, float], held: Collection[str],
+    model: Model, modal: ModalKeys, prepared: Prepared, start: Mapping[str, float], held: Collection[str],
     steps: int, trials: int, initial: Floats | None = None,
 ) -> MeasuredFit:  # fmt: skip
     known = dict(start)
     keys = tuple(key for key in (*model.values, *modal.all) if key not in held)
-    runs = modal_run(model, modal, prepared, prepared.sensors, steps, prepared.fit, known, keys)
-    measured, scale = prepared.measured[slice(*prepared.fit)], prepared.scale
+    runs = modal_run(model, modal, prepared, prepared.sensors, steps, prepared.plan.fit, known, keys)
+    measured, scale = prepared.measured[slice(*prepared.plan.fit)], prepared.scale
     begin = np.zeros(runs.run.program.states) if initial is None else initial
 
     def point(x: Floats) -> Point | None:

@@ -6,8 +6,8 @@ from functools import cached_property
 import numpy as np
 
 from study.records import noise_floor
+from study.records.prepared import Prepared
 from study.structure.measured_fit import MeasuredFit, modal_run
-from study.structure.prepared_structure import PreparedStructure
 from study.support.arrays import Floats
 
 
@@ -16,18 +16,18 @@ class MeasuredPrediction:
     """The free run of such a structure along the judging part; n samples, s sensors."""
 
     fit: MeasuredFit
-    prepared: PreparedStructure
+    prepared: Prepared
     predicted: Floats  # shape (n, s)
 
     @cached_property
     def residual(self) -> Floats:
         """Measured minus predicted, shape (n, s)."""
-        return self.prepared.measured[slice(*self.prepared.judge)] - self.predicted
+        return self.prepared.measured[slice(*self.prepared.plan.judge)] - self.predicted
 
     @cached_property
     def size(self) -> Floats:
         """Rms of each measured motion about its mean, shape (s,)."""
-        return np.std(self.prepared.measured[slice(*self.prepared.judge)], axis=0)
+        return np.std(self.prepared.measured[slice(*self.prepared.plan.judge)], axis=0)
 
     @cached_property
     def errors(self) -> Floats:
@@ -50,11 +50,11 @@ class MeasuredPrediction:
         return float(np.sqrt(np.mean(self.floors**2)))
 
 
-def predict_measured(fit: MeasuredFit, prepared: PreparedStructure) -> MeasuredPrediction:
+def predict_measured(fit: MeasuredFit, prepared: Prepared) -> MeasuredPrediction:
     """Run a fitted structure along the judging part, on from the fitting part or from rest where that is elsewhere."""
-    follows = prepared.judge[0] == prepared.fit[1]
-    begin = prepared.fit[0] if follows else prepared.judge[0]
-    span = (begin, prepared.judge[1])
+    follows = prepared.plan.judge[0] == prepared.plan.fit[1]
+    begin = prepared.plan.fit[0] if follows else prepared.plan.judge[0]
+    span = (begin, prepared.plan.judge[1])
     runs = modal_run(fit.model, fit.modal, prepared, prepared.sensors, fit.steps, span, fit.values)
     motion, _ = runs.respond(fit.values, fit.initial if follows else np.zeros_like(fit.initial))
-    return MeasuredPrediction(fit, prepared, motion[prepared.judge[0] - begin :])
+    return MeasuredPrediction(fit, prepared, motion[prepared.plan.judge[0] - begin :])

@@ -19,11 +19,11 @@ from study.equations.term import Term
 from study.equations.terms import LIBRARY
 from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.identify.time_domain.shape_search import values_to_try
+from study.records.prepared import Prepared
 from study.records.record import Record
 from study.structure.measured_start import line_fits
 from study.structure.placed_candidates import external, one_sided
 from study.structure.placed_lines import placed_residual_lines
-from study.structure.prepared_structure import PreparedStructure
 from study.support.arrays import Floats
 from study.support.cores import cores
 from study.support.errors import StudyError
@@ -37,7 +37,7 @@ class Screened:
     share: float
 
 
-def between_sensors(model: Model, prepared: PreparedStructure) -> tuple[Place, ...]:
+def between_sensors(model: Model, prepared: Prepared) -> tuple[Place, ...]:
     """Every place that the sensors show: each to the ground, and each two of them."""
     seen = [s.coordinate for s in prepared.sensors]
     pairs = [*((GROUND, c) for c in seen), *combinations(seen, 2)]
@@ -46,7 +46,7 @@ def between_sensors(model: Model, prepared: PreparedStructure) -> tuple[Place, .
 
 
 def measured_entries(
-    model: Model, prepared: PreparedStructure, extra: Sequence[Term] = (), without: Sequence[str] = ()
+    model: Model, prepared: Prepared, extra: Sequence[Term] = (), without: Sequence[str] = ()
 ) -> list[ModelTerm]:
     """Every nonlinear effect at every place that the sensors show and where the model does not have it.
 
@@ -87,7 +87,7 @@ def _fits_in(model: Model, entry: ModelTerm) -> bool:
 
 
 def screened_by_lines(
-    model: Model, prepared: PreparedStructure, entries: Sequence[ModelTerm], residual: Floats, modes: int
+    model: Model, prepared: Prepared, entries: Sequence[ModelTerm], residual: Floats, modes: int
 ) -> list[Screened]:
     """Candidates with the shape parameters that explain most, the most promising first.
 
@@ -111,7 +111,7 @@ def _with(model: Model, entry: ModelTerm, point: tuple[float, ...]) -> Model:
     return model.with_term(replace(entry, parameters=point))
 
 
-def _left(model: Model, prepared: PreparedStructure, modes: int) -> float:
+def _left(model: Model, prepared: Prepared, modes: int) -> float:
     """Share of the lines' power that a model leaves with as many modes as Bayes' criterion asks for."""
     try:
         fits = list(line_fits(model, prepared, modes))
@@ -121,11 +121,11 @@ def _left(model: Model, prepared: PreparedStructure, modes: int) -> float:
 
 
 def _points(
-    entry: ModelTerm, model: Model, prepared: PreparedStructure, lines: Floats
+    entry: ModelTerm, model: Model, prepared: Prepared, lines: Floats
 ) -> list[tuple[float, ...]]:  # fmt: skip
     e = entry.place.direction(model.coordinates)
-    u = np.sum([w * prepared.complete[c][0] for c, w in zip(model.coordinates, e, strict=True) if w], axis=0)
-    u = u[slice(*prepared.fit)]
+    u = np.sum([w * prepared.record.motion(c)[0] for c, w in zip(model.coordinates, e, strict=True) if w], axis=0)
+    u = u[slice(*prepared.plan.fit)]
 
     def near(_: str, shifts: Floats) -> Floats:
         return np.add.outer(lines, shifts / (len(u) * prepared.dt)).ravel()

@@ -19,10 +19,10 @@ from study.identify.frequency_domain import instruments
 from study.identify.frequency_domain.coefficients import Responses
 from study.identify.frequency_domain.inputs import Input, input_history, reverse_inputs
 from study.records import spectra
+from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments
 from study.structure.measured_fit import MeasuredFit, modal_run
-from study.structure.prepared_structure import PreparedStructure
 from study.support.arrays import Complexes, Floats
 
 Bools = NDArray[np.bool_]
@@ -83,10 +83,10 @@ class CoefficientSpectrum:
         return float(np.sum(weight * values)) / total, float(np.sqrt(0.5 * self.inflation / total))
 
 
-def coefficient_spectra(fit: MeasuredFit, prepared: PreparedStructure) -> tuple[CoefficientSpectrum, ...]:
+def coefficient_spectra(fit: MeasuredFit, prepared: Prepared) -> tuple[CoefficientSpectrum, ...]:
     """Every coefficient of a fitted structure's terms, line by line, from its fitting part."""
-    model, (first, last) = fit.model, prepared.fit
-    measured = {c: x[:, first:last] for c, x in prepared.complete.items()}
+    model, (first, last) = fit.model, prepared.plan.fit
+    measured = {c: prepared.record.motion(c)[:, first:last] for c in prepared.coordinates}
     clean = _free_motion(fit, prepared)
     groups = _inputs(model)
     forces = [prepared.record[name][first:last] for name, _ in model.forces]
@@ -112,12 +112,12 @@ def coefficient_spectra(fit: MeasuredFit, prepared: PreparedStructure) -> tuple[
     return tuple(found)
 
 
-def _free_motion(fit: MeasuredFit, prepared: PreparedStructure) -> dict[str, Floats]:
+def _free_motion(fit: MeasuredFit, prepared: Prepared) -> dict[str, Floats]:
     """Displacement and velocity of each measured coordinate in the free run, shape (2, samples)."""
-    wanted = tuple(Sensor(c, m) for c in prepared.complete for m in MOTIONS[:2])
-    run = modal_run(fit.model, fit.modal, prepared, wanted, fit.steps, prepared.fit, fit.values)
+    wanted = tuple(Sensor(c, m) for c in prepared.coordinates for m in MOTIONS[:2])
+    run = modal_run(fit.model, fit.modal, prepared, wanted, fit.steps, prepared.plan.fit, fit.values)
     motion, _ = run.respond(fit.values, fit.initial)
-    return {c: motion[:, 2 * i : 2 * i + 2].T for i, c in enumerate(prepared.complete)}
+    return {c: motion[:, 2 * i : 2 * i + 2].T for i, c in enumerate(prepared.coordinates)}
 
 
 def _inputs(model: Model) -> list[tuple[Place, tuple[Input, ...]]]:
@@ -130,10 +130,10 @@ def _inputs(model: Model) -> list[tuple[Place, tuple[Input, ...]]]:
 
 
 def _relative(
-    prepared: PreparedStructure, model: Model, direction: Sequence[float], motion: dict[str, Floats]
+    prepared: Prepared, model: Model, direction: Sequence[float], motion: dict[str, Floats]
 ) -> Record:  # fmt: skip
     total = np.sum([w * motion[c][:2] for c, w in zip(model.coordinates, direction, strict=True) if w], axis=0)
-    return prepared.record.relative(total, prepared.fit)
+    return prepared.record.relative(total, prepared.plan.fit)
 
 
 def _responses(sensor: Sensor, channels: Sequence[Floats], dt: float, cut: Segments) -> Responses:

@@ -14,10 +14,10 @@ from scipy.fft import rfft
 from study.equations.model import Model
 from study.identify.frequency_domain.inputs import input_history
 from study.identify.frequency_domain.subspace import observability
+from study.records.prepared import Prepared
 from study.records.record import MOTIONS
 from study.structure.missing_forces import placed_inputs
 from study.structure.modal_program import ModalKeys
-from study.structure.prepared_structure import PreparedStructure
 from study.support.arrays import Complexes, Floats
 from study.support.errors import expect
 from study.support.least_squares import least_squares
@@ -55,7 +55,7 @@ class DrivenLines:
     order: Complexes
 
 
-def lines_of(model: Model, prepared: PreparedStructure) -> DrivenLines:
+def lines_of(model: Model, prepared: Prepared) -> DrivenLines:
     """Lines of the fitting part, through a Hann window.
 
     Raises
@@ -63,7 +63,7 @@ def lines_of(model: Model, prepared: PreparedStructure) -> DrivenLines:
     StudyError
         If no force drives the structure, or a term's place has no sensor.
     """
-    first, last = prepared.fit
+    first, last = prepared.plan.fit
     taper = np.hanning(last - first + 1)[:-1]
     names = [name for name, _ in model.forces]
     lines = (last - first) // 2
@@ -87,7 +87,7 @@ def lines_of(model: Model, prepared: PreparedStructure) -> DrivenLines:
     return DrivenLines(s, forces[keep], columns, outputs.astype(np.complex128), order.astype(np.complex128))
 
 
-def unit_histories(model: Model, prepared: PreparedStructure) -> list[Floats]:
+def unit_histories(model: Model, prepared: Prepared) -> list[Floats]:
     """Force of each coefficient with value one along the measured motion, in the order of the model's symbols.
 
     Raises
@@ -97,11 +97,11 @@ def unit_histories(model: Model, prepared: PreparedStructure) -> list[Floats]:
     """
     found: list[Floats] = []
     for entry in model.terms:
-        blind = [c for c in entry.place.moving if c not in prepared.complete]
+        blind = [c for c in entry.place.moving if c not in prepared.coordinates]
         sentence = f"{entry.name} lies at {', '.join(blind)}, where no sensor is; expected terms between sensors"
         expect(not blind, sentence)
         e = entry.place.direction(model.coordinates)
-        motion = np.sum([w * prepared.complete[c] for c, w in zip(model.coordinates, e, strict=True) if w], axis=0)
+        motion = np.sum([w * prepared.record.motion(c) for c, w in zip(model.coordinates, e, strict=True) if w], axis=0)
         record, relative = prepared.record, prepared.record.relative(motion)
         by_symbol: dict[str, Floats] = {}
         for item in placed_inputs(entry):
@@ -182,7 +182,7 @@ def _real(values: Complexes) -> Floats:
     return np.concatenate([values.real, values.imag])
 
 
-def modal_starts(model: Model, prepared: PreparedStructure) -> Iterator[tuple[ModalKeys, dict[str, float]]]:
+def modal_starts(model: Model, prepared: Prepared) -> Iterator[tuple[ModalKeys, dict[str, float]]]:
     """For one mode, two and so on, values of their keys and of the model's coefficients (:func:`line_fits`)."""
     return ((fit.modal, fit.values) for fit in line_fits(model, prepared))
 
@@ -197,7 +197,7 @@ class LineFit:
     criterion: float  # of Bayes, for white noise in proportion to each sensor (Schwarz, 1978)
 
 
-def line_fits(model: Model, prepared: PreparedStructure, most: int = MOST) -> Iterator[LineFit]:
+def line_fits(model: Model, prepared: Prepared, most: int = MOST) -> Iterator[LineFit]:
     """For one mode, two and so on up to ``most``, modes and coefficients with the smallest error of the lines.
 
     Raises

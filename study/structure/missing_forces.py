@@ -19,13 +19,13 @@ from study.equations.place import HERE, Place
 from study.identify.frequency_domain.inputs import Input, input_history, reverse_inputs
 from study.records import noise_floor
 from study.records.completion import derivative
+from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments, autospectrum
 from study.structure.equations_of_motion import motion_program
 from study.structure.mass_matrix import checked_mass_matrix, matrices
 from study.structure.placed_units import units_at
 from study.structure.places import alignment, connections, transfer
-from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_prediction import StructurePrediction
 from study.support.arrays import Floats
 
@@ -118,11 +118,11 @@ def gated_motion(prediction: StructurePrediction) -> Floats:
     wanted = tuple(Sensor(c, m) for m in MOTIONS for c in coordinates)
     samples = len(prediction.measured)
     free = np.zeros((samples, len(wanted))) if prediction.diverged else prediction.motion(wanted)
-    return corrected_motion(free, prediction.residual, prediction.prepared, coordinates, prediction.prepared.judge)
+    return corrected_motion(free, prediction.residual, prediction.prepared, coordinates, prediction.prepared.plan.judge)
 
 
 def corrected_motion(
-    free: Floats, difference: Floats, prepared: PreparedStructure, coordinates: Sequence[str], span: tuple[int, int]
+    free: Floats, difference: Floats, prepared: Prepared, coordinates: Sequence[str], span: tuple[int, int]
 ) -> Floats:
     """A free run's motions along a span, shape (samples, 3 coordinates), with what of the difference is no noise.
 
@@ -131,15 +131,15 @@ def corrected_motion(
     runs = [slice(begin - span[0], end - span[0]) for begin, end in prepared.record.runs(span)]
     motion = free.reshape(len(free), len(MOTIONS), -1).transpose(1, 0, 2).copy()
     for sensor, values in zip(prepared.sensors, difference.T, strict=True):
-        band, level = band_above_noise(values, prepared.dt, prepared.low), MOTIONS.index(sensor.motion)
+        band, level = band_above_noise(values, prepared.dt, prepared.band[0]), MOTIONS.index(sensor.motion)
         if band is None:
             continue
         for part in runs:
-            seen = values[part] if prepared.anew else in_band(values[part], prepared.dt, *band)
+            seen = values[part] if prepared.record.stretches else in_band(values[part], prepared.dt, *band)
             for order in range(len(MOTIONS)):
                 steps = order - level
-                change = derivative(seen, prepared.dt, steps, prepared.low if steps < 0 else 0.0)
-                if prepared.anew:  # a short stretch begins and ends with a step, which no filter may meet before
+                change = derivative(seen, prepared.dt, steps, prepared.band[0] if steps < 0 else 0.0)
+                if prepared.record.stretches:  # each begins and ends with a step, which no filter may meet before
                     change = in_band(change, prepared.dt, *band)
                 motion[order, part, coordinates.index(sensor.coordinate)] += change
     return motion
@@ -179,7 +179,7 @@ def in_band(values: Floats, dt: float, frequency: Floats, gate: Floats) -> Float
 def unbalanced_forces(model: Model, motion: Floats, prediction: StructurePrediction) -> tuple[Floats, Floats]:
     """What the equations leave along a motion, and the forces of inertia, each of shape (samples, coordinates)."""
     prepared = prediction.prepared
-    part = slice(*prepared.judge)
+    part = slice(*prepared.plan.judge)
     record = prepared.record
     program = motion_program(model, tuple(record.extra))
     states = [_state(entry, model, motion, prepared.dt) for entry in model.states]
@@ -230,7 +230,7 @@ def _shares(residual: Floats) -> Floats:
 
 def _aligned(model: Model, prediction: StructurePrediction) -> tuple[tuple[Place, float], ...]:
     prepared = prediction.prepared
-    seen = np.stack([_above_noise(x, prepared.dt, prepared.low) for x in prediction.residual.T], axis=1)
+    seen = np.stack([_above_noise(x, prepared.dt, prepared.band[0]) for x in prediction.residual.T], axis=1)
     if not np.any(seen):
         return ()
     size = next_fast_len(2 * len(seen), real=True)

@@ -12,9 +12,9 @@ from study.equations.model import Model, ModelTerm, free, with_registers
 from study.equations.place import Place
 from study.equations.term import Term
 from study.equations.terms import LIBRARY
+from study.records.prepared import Prepared
 from study.structure.placed_search import PlacedBaseline, PlacedStart, placed_starts, with_placed_term
 from study.structure.places import connections
-from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_fit import StructureFit, settled_structure
 from study.structure.structure_prediction import StructurePrediction, predict_structure
 from study.support.cores import cores
@@ -182,7 +182,7 @@ def one_side(candidates: Sequence[PlacedCandidate]) -> list[PlacedCandidate]:
     return list(best.values())
 
 
-def with_best_placed_settled(tried: Sequence[PlacedCandidate], prepared: PreparedStructure) -> list[PlacedCandidate]:
+def with_best_placed_settled(tried: Sequence[PlacedCandidate], prepared: Prepared) -> list[PlacedCandidate]:
     """The best candidates fitted as they would be if they were added, then the others."""
     ordered = sorted(tried, key=lambda c: (bool(c.unphysical), c.left))
 

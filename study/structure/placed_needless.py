@@ -15,8 +15,8 @@ from study.equations.layout import check
 from study.equations.model import Model, ModelTerm
 from study.equations.place import place_in_words
 from study.figures.labels import term_names
+from study.records.prepared import Prepared
 from study.structure.placed_ranking import held_out_parts, held_out_test
-from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_comparison import StructureComparison
 from study.structure.structure_fit import (
     StructureFit,
@@ -79,13 +79,13 @@ def placed_needless(comparison: StructureComparison) -> tuple[PlacedNeedless, ..
 
 
 def _each_alone(
-    terms: Sequence[ModelTerm], fit: StructureFit, prediction: StructurePrediction, prepared: PreparedStructure,
+    terms: Sequence[ModelTerm], fit: StructureFit, prediction: StructurePrediction, prepared: Prepared,
     asked: int,
 ) -> list[PlacedNeedless]:  # fmt: skip
     """Those of the terms that this model does not need, each for itself, of so many that were asked for."""
     jacobian = linearise_structure(fit, prepared)
     covariance = structure_covariance(fit, prepared, jacobian)
-    parts = held_out_parts(fit, prediction, jacobian, prepared.fit)
+    parts = held_out_parts(fit, prediction, jacobian, prepared.plan.fit)
 
     def answer(entry: ModelTerm) -> PlacedNeedless | None:
         start, lost = _removal(fit, entry, jacobian)
@@ -121,9 +121,7 @@ def _removal(fit: StructureFit, entry: ModelTerm, jacobian: Floats) -> tuple[dic
     return moved, response - others @ taken
 
 
-def _without(
-    fit: StructureFit, entry: ModelTerm, start: dict[str, float], prepared: PreparedStructure
-) -> StructureFit | None:
+def _without(fit: StructureFit, entry: ModelTerm, start: dict[str, float], prepared: Prepared) -> StructureFit | None:
     """The structure without a term, fitted from the better of two starts; None where it is none, or runs from none."""
     model = fit.model.without_term(entry.name)
     try:

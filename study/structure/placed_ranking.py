@@ -168,14 +168,14 @@ class HeldOutTest:
 def held_out_test(fit: StructureFit, before: StructurePrediction, noise: SensorNoise) -> HeldOutTest:
     """The test of whatever a fitted structure lacks, in noise as the best candidate leaves it."""
     jacobian = linearise_structure(fit, before.prepared)
-    parts = held_out_parts(fit, before, jacobian, before.prepared.fit)
+    parts = held_out_parts(fit, before, jacobian, before.prepared.plan.fit)
     try:
         columns = [before.derivatives(fit), jacobian] if not before.diverged else []
     except DivergenceError:
         columns = []
     bases = [orthonormal(noise.weighted(x)) for x in columns] or [np.zeros((part.size, 0)) for part in parts]
     white = [noise.weighted(part).ravel() if len(part) else np.zeros(0) for part in parts]
-    return HeldOutTest(noise, (white[0], white[1]), (bases[0], bases[1]), before.prepared.anew)
+    return HeldOutTest(noise, (white[0], white[1]), (bases[0], bases[1]), bool(before.prepared.record.stretches))
 
 
 def orthonormal(columns: Floats) -> Floats:
@@ -221,7 +221,7 @@ def _examined(candidate: PlacedCandidate, before: StructurePrediction) -> Placed
         candidate.entry, fit, candidate.prediction,
         statistics.gain((before.residual / size).ravel(), (candidate.prediction.residual / size).ravel()),
         coefficient, error, parameters, errors, flatness, steadiness,
-        held_out_parts(fit, candidate.prediction, jacobian, before.prepared.fit),
+        held_out_parts(fit, candidate.prediction, jacobian, before.prepared.plan.fit),
     )  # fmt: skip
 
 

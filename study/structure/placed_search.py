@@ -19,12 +19,12 @@ from study.equations.place import Place
 from study.equations.term import Term
 from study.identify.frequency_domain.inputs import input_history
 from study.identify.time_domain.shape_search import MODULATION, values_to_try
+from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record, Sensor
 from study.structure.mass_matrix import LINEAR, linear_keys, matrices, patterns
 from study.structure.missing_forces import corrected_motion, placed_inputs, relative_record
 from study.structure.placed_lines import placed_modulation_lines, placed_residual_lines
 from study.structure.places import transfer
-from study.structure.prepared_structure import PreparedStructure
 from study.structure.stretch_transforms import StretchTransforms, stretch_transforms
 from study.structure.structure_fit import StructureFit, fit_structure, flat, linearise_structure
 from study.structure.structure_run import prepare_run
@@ -46,7 +46,7 @@ class PlacedBaseline:
     ----------
     fit : StructureFit
         The fit.
-    prepared : PreparedStructure
+    prepared : Prepared
         The record, with as much to fit as a search uses.
     motion : array, shape (3, n, c)
         Displacement, velocity and acceleration of all coordinates.
@@ -66,7 +66,7 @@ class PlacedBaseline:
     """
 
     fit: StructureFit
-    prepared: PreparedStructure
+    prepared: Prepared
     motion: Floats
     paths: Complexes
     transforms: StretchTransforms
@@ -123,7 +123,7 @@ class PlacedStart:
     share: float
 
 
-def placed_baseline(fit: StructureFit, prepared: PreparedStructure) -> PlacedBaseline:
+def placed_baseline(fit: StructureFit, prepared: Prepared) -> PlacedBaseline:
     """Prepare a fitted structure for the search."""
     model = fit.model
     wanted = tuple(Sensor(c, m) for m in MOTIONS for c in model.coordinates)
@@ -238,7 +238,7 @@ def _grid(
 
 
 def with_placed_term(
-    fit: StructureFit, entry: ModelTerm, prepared: PreparedStructure, base: PlacedBaseline | None = None,
+    fit: StructureFit, entry: ModelTerm, prepared: Prepared, base: PlacedBaseline | None = None,
     points: Sequence[PlacedStart] | None = None,
 ) -> StructureFit:  # fmt: skip
     """The fitted structure with one term more at its place, the best of fits from several starts.
@@ -281,9 +281,7 @@ def _moved(base: PlacedBaseline, entry: ModelTerm, point: PlacedStart) -> dict[s
     return dict(zip(base.fit.keys, (base.fit.values + step[: len(base.fit.keys)]).tolist(), strict=True))
 
 
-def _tried(
-    model: Model, prepared: PreparedStructure, held: Sequence[str], near: StructureFit, runs: int
-) -> StructureFit | None:
+def _tried(model: Model, prepared: Prepared, held: Sequence[str], near: StructureFit, runs: int) -> StructureFit | None:
     try:
         return fit_structure(
             model, prepared, held, steps=near.steps, initial=near.initial, max_iterations=runs, offset=NEAR,

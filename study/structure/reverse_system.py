@@ -18,8 +18,8 @@ from study.identify.frequency_domain import coefficients, conditioned, local_pol
 from study.identify.frequency_domain.inputs import INERTIA, Input, histories, reverse_inputs
 from study.identify.frequency_domain.local_polynomial import Lines, transform
 from study.records import spectra
+from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record
-from study.structure.prepared_structure import PreparedStructure
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
@@ -77,7 +77,7 @@ class ReverseSystem:
 
 
 def equations_of(
-    model: Model, prepared: PreparedStructure, span: tuple[int, int] | None = None
+    model: Model, prepared: Prepared, span: tuple[int, int] | None = None
 ) -> tuple[tuple[Equation, ...], dict[str, str]]:
     """The equations whose motions are all measured, and why each of the others is none.
 
@@ -90,13 +90,13 @@ def equations_of(
     """
     if span is None:
         edge = prepared.edge
-        span = max(prepared.fit[0], edge), min(prepared.fit[1], len(prepared.record) - edge)
+        span = max(prepared.plan.fit[0], edge), min(prepared.plan.fit[1], len(prepared.record) - edge)
     own, lacking = list[Equation](), dict[str, str]()
     cache: dict[tuple[float, ...], Record] = {}
     for coordinate in model.coordinates:
         inputs = reverse_inputs(model, coordinate)
         needed = [c for c, *weights in _columns(model, inputs) if any(weights) or c == coordinate]
-        blind = [c for c in needed if c not in prepared.complete]
+        blind = [c for c in needed if c not in prepared.coordinates]
         if blind:
             lacking[coordinate] = f"no sensor is at {', '.join(blind)}"
         else:
@@ -112,12 +112,12 @@ def _columns(model: Model, inputs: Sequence[Input]) -> list[tuple[str, *tuple[fl
 
 
 def _equation(
-    model: Model, prepared: PreparedStructure, coordinate: str, inputs: tuple[Input, ...], span: tuple[int, int],
+    model: Model, prepared: Prepared, coordinate: str, inputs: tuple[Input, ...], span: tuple[int, int],
     cache: dict[tuple[float, ...], Record],
 ) -> Equation:  # fmt: skip
     record, mass = prepared.record, None
     drives = [record[name] for name, where in model.forces if where == coordinate]
-    output = np.sum(drives, axis=0) if drives else -prepared.complete[coordinate][INERTIA]
+    output = np.sum(drives, axis=0) if drives else -prepared.record.motion(coordinate)[INERTIA]
     if not drives:
         mass = next(
             t.symbols[0] for t in model.terms
@@ -144,12 +144,12 @@ def _without(inputs: tuple[Input, ...], key: str) -> tuple[Input, ...]:
     return tuple(i for i in rest if i.parts)
 
 
-def _relative(model: Model, prepared: PreparedStructure, direction: Sequence[float]) -> Record:
+def _relative(model: Model, prepared: Prepared, direction: Sequence[float]) -> Record:
     """A relative motion as the record of a single mass, with the channels that formulas may name."""
     total = np.zeros((len(MOTIONS), len(prepared.record)))
     for coordinate, weight in zip(model.coordinates, direction, strict=True):
         if weight != 0.0:
-            total += weight * prepared.complete[coordinate]
+            total += weight * prepared.record.motion(coordinate)
     return prepared.record.relative(total)
 
 

@@ -3,12 +3,12 @@
 import numpy as np
 
 from study.equations.model import Model
-from study.structure.prepared_structure import PreparedStructure
+from study.records.prepared import Prepared
 from study.structure.structure_run import StructureRun
 from study.support.arrays import Floats
 
 
-def beginnings(initial: Floats | None, run: StructureRun, prepared: PreparedStructure, model: Model) -> list[Floats]:
+def beginnings(initial: Floats | None, run: StructureRun, prepared: Prepared, model: Model) -> list[Floats]:
     """States from which a search may begin, the better first, each of shape (states,): those given, or rest.
 
     Where motions begin anew, as they were measured: rest tells nothing of a stiffness that hardens or of dry friction.
@@ -19,9 +19,9 @@ def beginnings(initial: Floats | None, run: StructureRun, prepared: PreparedStru
     if initial is not None:
         given = initial.reshape(len(run.drives), -1)
         state[:, : given.shape[1]] = given
-    elif prepared.anew:
-        begins = [begin for begin, _ in prepared.record.runs(prepared.fit)]
+    elif prepared.record.stretches:
+        begins = [begin for begin, _ in prepared.record.runs(prepared.plan.fit)]
         for i, coordinate in enumerate(model.coordinates):
-            if coordinate in prepared.complete:
-                state[:, [i, i + len(model.coordinates)]] = prepared.complete[coordinate][:2, begins].T
-    return [state.ravel(), rest] if initial is None and prepared.anew else [state.ravel()]
+            if coordinate in prepared.coordinates:
+                state[:, [i, i + len(model.coordinates)]] = prepared.record.motion(coordinate)[:2, begins].T
+    return [state.ravel(), rest] if initial is None and prepared.record.stretches else [state.ravel()]

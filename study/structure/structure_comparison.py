@@ -10,11 +10,11 @@ import numpy as np
 from study.equations import model_file
 from study.equations.model import Model, ModelTerm
 from study.equations.place import HERE, Place, place_in_words
+from study.records.prepared import Prepared
 from study.records.record import Record
 from study.structure.missing_forces import MissingForces, missing_forces
 from study.structure.modes import Modes, modes_of, modes_table
 from study.structure.placed_units import coefficient_unit, parameter_units
-from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_fit import StructureFit, linearise_structure, settled_structure, structure_covariance
 from study.structure.structure_leftover import FamilyGain, explained_by_place, family_gains
 from study.structure.structure_prediction import StructurePrediction, predict_structure
@@ -46,7 +46,7 @@ class StructureComparison:
     """A structure held against one record."""
 
     model: Model  # as it was given
-    prepared: PreparedStructure
+    prepared: Prepared
     fit: StructureFit
     covariance: Floats  # of the estimates; shape (keys, keys)
     coefficients: tuple[PlacedCoefficient, ...]
@@ -63,7 +63,7 @@ class StructureComparison:
 
 def compare_structure(
     model: Model,
-    prepared: PreparedStructure,
+    prepared: Prepared,
     fit: StructureFit | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> StructureComparison:
@@ -158,7 +158,7 @@ def structure_document(comparison: StructureComparison) -> dict[str, Any]:
         "coefficients": [placed_coefficient_row(c) for c in comparison.coefficients],
         "modes": mode_rows(comparison.modes),
         "fit": {
-            "samples": list(prediction.prepared.fit), "judged": list(prediction.prepared.judge),
+            "samples": list(prediction.prepared.plan.fit), "judged": list(prediction.prepared.plan.judge),
             "converged": fit.converged, "message": fit.message,
         },
         "where": {
@@ -217,7 +217,7 @@ def structure_summary(comparison: StructureComparison) -> str:
         ]
         for s, e, f in zip(prediction.prepared.sensors, prediction.errors, prediction.floors, strict=True)
     ]
-    first, last = prediction.prepared.fit, prediction.prepared.judge
+    first, last = prediction.prepared.plan.fit, prediction.prepared.plan.judge
     heads = ["sensor", "error", "noise floor", "force left there"]
     values = [[c.key, f"{c.value:.5g}", _interval(c), c.unit] for c in comparison.coefficients]
     parts = [

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from study.equations.model import Model, ModelTerm
+from study.records.prepared import Prepared
 from study.structure.mass_matrix import matrices
-from study.structure.prepared_structure import PreparedStructure
 from study.structure.stretch_beginnings import beginnings
 from study.structure.structure_run import StructureRun, prepare_run
 from study.support.arrays import Floats
@@ -173,7 +173,7 @@ def structure_steps(model: Model, dt: float) -> int:
 
 def fit_structure(
     model: Model,
-    prepared: PreparedStructure,
+    prepared: Prepared,
     held: Collection[str],
     start: Mapping[str, float] | None = None,
     *,
@@ -196,9 +196,11 @@ def fit_structure(
     keys = tuple(key for key in model.values if key not in held)
     values = begun.numbers()
     steps = steps or structure_steps(begun, prepared.dt)
-    run = prepare_run(begun, prepared.record, keys, sensors=prepared.sensors, steps_per_sample=steps, span=prepared.fit)
+    run = prepare_run(
+        begun, prepared.record, keys, sensors=prepared.sensors, steps_per_sample=steps, span=prepared.plan.fit
+    )
     positive = tuple(key for entry in model.terms for key in positive_keys(entry) if key in keys)
-    measured = prepared.measured[slice(*prepared.fit)]
+    measured = prepared.measured[slice(*prepared.plan.fit)]
     problem = _Problem(begun, run, measured, noise or sized(prepared.scale), positive)
     own, begins = [values[key] for key in keys], beginnings(initial, run, prepared, model)
     point = next((p for s in begins if (p := problem.linearise(np.array([*own, *s]))) is not None), None)
@@ -212,23 +214,24 @@ def fit_structure(
     undecided = tuple(key for key, unclear in zip(keys, end.point.undecided(), strict=False) if unclear)
     return StructureFit(
         begun.with_values(found), keys, x[len(keys) :], measured - response.T, end.converged, end.message,
-        prepared.fit[0], steps, problem.noise, undecided,
+        prepared.plan.fit[0], steps, problem.noise, undecided,
     )  # fmt: skip
 
 
-def same_states(fit: StructureFit, prepared: PreparedStructure) -> Floats | None:
+def same_states(fit: StructureFit, prepared: Prepared) -> Floats | None:
     """The states of a fit, where the fitting part begins as it did; with stretches, where it is the same."""
-    return fit.initial if (fit.span == prepared.fit if prepared.anew else fit.first == prepared.fit[0]) else None
+    first, last = prepared.plan.fit
+    return fit.initial if fit.first == first and (fit.span[1] == last or not prepared.record.stretches) else None
 
 
-def fitted_run(fit: StructureFit, prepared: PreparedStructure, keys: tuple[str, ...], finer: int = 1) -> StructureRun:
+def fitted_run(fit: StructureFit, prepared: Prepared, keys: tuple[str, ...], finer: int = 1) -> StructureRun:
     """The free run of a fit along the samples that it was fitted to."""
     return prepare_run(
         fit.model, prepared.record, keys, sensors=prepared.sensors, steps_per_sample=finer * fit.steps, span=fit.span
     )
 
 
-def linearise_structure(fit: StructureFit, prepared: PreparedStructure) -> Floats:
+def linearise_structure(fit: StructureFit, prepared: Prepared) -> Floats:
     """Derivatives of the motions on the samples that were fitted, shape (n, sensors, keys + states)."""
     run = fitted_run(fit, prepared, fit.keys)
     values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
@@ -241,13 +244,13 @@ def flat(fit: StructureFit, values: Floats) -> Floats:
     return weighted.reshape(-1, *weighted.shape[2:])
 
 
-def structure_shift(fit: StructureFit, prepared: PreparedStructure, jacobian: Floats) -> Floats:
+def structure_shift(fit: StructureFit, prepared: Prepared, jacobian: Floats) -> Floats:
     """By how much halving the steps would move estimates and initial state, by one step of Gauss and Newton."""
     coarse, fine = (fitted_run(fit, prepared, (), n).respond({}, fit.initial)[0].T for n in (1, 2))
     return least_squares(flat(fit, jacobian), flat(fit, coarse - fine))
 
 
-def structure_covariance(fit: StructureFit, prepared: PreparedStructure, jacobian: Floats) -> Floats:
+def structure_covariance(fit: StructureFit, prepared: Prepared, jacobian: Floats) -> Floats:
     """Covariance of estimates and initial state: of whatever is left, in blocks of time, and of the integration.
 
     Variances are those of blocks of time, or of white noise where that has larger ones; correlations are those of white
@@ -263,13 +266,13 @@ def structure_covariance(fit: StructureFit, prepared: PreparedStructure, jacobia
         return white / np.outer(size, size) * np.outer(deviation, deviation) + np.outer(moved, moved)
 
 
-def settled_structure(fit: StructureFit, prepared: PreparedStructure) -> StructureFit:
+def settled_structure(fit: StructureFit, prepared: Prepared) -> StructureFit:
     """The fit on the whole fitting part, with enough steps, and weighted with the noise that it leaves.
 
     Weighting stands where it costs nothing of the response and moves no coefficient by more than its error explains, as
     for a single coordinate (``weighted_fit``).
     """
-    if fit.span != prepared.fit or not fit.converged:
+    if fit.span != prepared.plan.fit or not fit.converged:
         fit = fit_structure(fit.model, prepared, fit.held, steps=fit.steps, initial=same_states(fit, prepared))
     while fit.steps < MOST_STEPS:
         whole = replace(fit, keys=tuple(fit.model.values))  # what the integration does to a held one is left as well
@@ -282,7 +285,7 @@ def settled_structure(fit: StructureFit, prepared: PreparedStructure) -> Structu
     return _weighted(fit, prepared)
 
 
-def _weighted(fit: StructureFit, prepared: PreparedStructure) -> StructureFit:
+def _weighted(fit: StructureFit, prepared: Prepared) -> StructureFit:
     if not fit.keys:
         return fit
     noise = noise_left(fit.residual)

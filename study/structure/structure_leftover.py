@@ -52,9 +52,9 @@ def family_gains(prediction: StructurePrediction) -> list[FamilyGain]:
     fit, prepared = prediction.fit, prediction.prepared
     model = fit.model
     prediction = _from_the_fit(prediction)
-    begin = max(prediction.first, prepared.judge[0] - LONGEST)
-    end = min(prepared.judge[1], prepared.judge[0] + LONGEST)
-    split = prepared.judge[0] - begin if begin < prepared.judge[0] else (end - begin) // 2
+    begin = max(prediction.first, prepared.plan.judge[0] - LONGEST)
+    end = min(prepared.plan.judge[1], prepared.plan.judge[0] + LONGEST)
+    split = prepared.plan.judge[0] - begin if begin < prepared.plan.judge[0] else (end - begin) // 2
     wanted = tuple(Sensor(c, m) for m in MOTIONS[:2] for c in model.coordinates)
     try:
         free = prediction.motion(wanted, (begin, end))
@@ -81,7 +81,7 @@ def family_gains(prediction: StructurePrediction) -> list[FamilyGain]:
         for family, shapes in families:
             columns = transforms.passed(paths @ e, [transforms.lines(x) for x in shapes])
             before, after = _held_out(own, columns.reshape(len(residual), -1), residual, cut)
-            gain = statistics.gain(before, after, evenly=prepared.anew)
+            gain = statistics.gain(before, after, evenly=bool(prepared.record.stretches))
             found.append(FamilyGain(place, family, gain))
     return found
 
@@ -89,7 +89,8 @@ def family_gains(prediction: StructurePrediction) -> list[FamilyGain]:
 def _from_the_fit(prediction: StructurePrediction) -> StructurePrediction:
     """The same with the fitted stretches before the judged ones, which are as loud; of a decay, halves are not."""
     fit, prepared = prediction.fit, prediction.prepared
-    if not prepared.anew or prediction.diverged or fit.span != (prepared.fit[0], prepared.judge[0]):
+    meets = fit.span == (prepared.plan.fit[0], prepared.plan.judge[0])
+    if not prepared.record.stretches or prediction.diverged or not meets:
         return prediction
     return replace(prediction, first=fit.first, initial=np.concatenate([fit.initial, prediction.initial]))
 

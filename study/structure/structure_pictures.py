@@ -120,7 +120,7 @@ def responses_figure(comparison: StructureComparison) -> Figure:
         f"{comparison.prepared.record.name}: motions", f"model {comparison.model.name}; close-up where it fails most",
         rows=len(order), width=WIDE, panel=1.5, share=False,
     )  # fmt: skip
-    time = prediction.prepared.record.time[slice(*prediction.prepared.judge)]
+    time = prediction.prepared.record.time[slice(*prediction.prepared.plan.judge)]
     names: list[str] = []
     for panel, i in zip(axes, order, strict=True):
         sensor, near = prediction.prepared.sensors[int(i)], close_by(prediction, int(i))
@@ -137,7 +137,7 @@ def responses_figure(comparison: StructureComparison) -> Figure:
 
 def close_by(prediction: StructurePrediction, sensor: int) -> slice:
     """The samples of a close-up, all of one stretch: that of the largest mean square."""
-    judged = prediction.prepared.judge
+    judged = prediction.prepared.plan.judge
     runs = [(begin - judged[0], end - judged[0]) for begin, end in prediction.prepared.record.runs(judged)]
     left = prediction.residual[:, sensor]
     begin, end = max(runs, key=lambda run: float(np.mean(left[slice(*run)] ** 2)))

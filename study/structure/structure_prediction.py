@@ -7,8 +7,8 @@ import numpy as np
 
 from study.compare.noise import SIGNIFICANT
 from study.records import noise_floor
+from study.records.prepared import Prepared
 from study.records.record import Sensor
-from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_fit import StructureFit, fit_structure
 from study.structure.structure_run import prepare_run
 from study.support.arrays import Floats
@@ -20,7 +20,7 @@ class StructurePrediction:
     """Measured and predicted motions on the judging part; n samples, s sensors."""
 
     fit: StructureFit
-    prepared: PreparedStructure
+    prepared: Prepared
     first: int  # sample of the record at which the run begins
     initial: Floats  # state there
     predicted: Floats  # shape (n, s)
@@ -30,7 +30,7 @@ class StructurePrediction:
     @property
     def measured(self) -> Floats:
         """Shape (n, s)."""
-        return self.prepared.measured[slice(*self.prepared.judge)]
+        return self.prepared.measured[slice(*self.prepared.plan.judge)]
 
     @cached_property
     def residual(self) -> Floats:
@@ -77,7 +77,7 @@ class StructurePrediction:
 
     def motion(self, sensors: tuple[Sensor, ...], span: tuple[int, int] | None = None) -> Floats:
         """Motions of the free run on the judging part, or another that it covers, shape (samples, sensors)."""
-        begin, end = span or self.prepared.judge
+        begin, end = span or self.prepared.plan.judge
         run = prepare_run(
             self.fit.model, self.prepared.record, sensors=sensors, steps_per_sample=self.fit.steps,
             span=(self.first, end),
@@ -88,31 +88,31 @@ class StructurePrediction:
         """Of the motions on the judging part by the keys of a fit with the same motion and the initial state."""
         run = prepare_run(
             fit.model, self.prepared.record, fit.keys, sensors=self.prepared.sensors, steps_per_sample=fit.steps,
-            span=(self.first, self.prepared.judge[1]),
+            span=(self.first, self.prepared.plan.judge[1]),
         )  # fmt: skip
         values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
         jacobian = run.respond(values, self.initial, range(len(self.initial)))[1]
-        return jacobian.transpose(1, 0, 2)[self.prepared.judge[0] - self.first :]
+        return jacobian.transpose(1, 0, 2)[self.prepared.plan.judge[0] - self.first :]
 
 
-def predict_structure(fit: StructureFit, prepared: PreparedStructure) -> StructurePrediction:
+def predict_structure(fit: StructureFit, prepared: Prepared) -> StructurePrediction:
     """Run a fitted structure along the judging part.
 
     Where that follows the fitting part the run goes on through both; elsewhere its initial state, and nothing else, is
     estimated from the judging part.
     """
-    judged = prepared.measured[slice(*prepared.judge)]
+    judged = prepared.measured[slice(*prepared.plan.judge)]
     try:
         first, initial = fit.first, fit.initial
-        if prepared.anew or prepared.judge[0] != fit.span[1]:
-            swapped = replace(prepared, fit=prepared.judge, judge=prepared.fit)
-            first = prepared.judge[0]
+        if prepared.record.stretches or prepared.plan.judge[0] != fit.span[1]:
+            swapped = replace(prepared, plan=replace(prepared.plan, fit=prepared.plan.judge, judge=prepared.plan.fit))
+            first = prepared.plan.judge[0]
             initial = fit_structure(fit.model, swapped, tuple(fit.model.values), steps=fit.steps).initial
         runs = [
             prepare_run(
                 fit.model, prepared.record, sensors=prepared.sensors, steps_per_sample=n * fit.steps,
-                span=(first, prepared.judge[1]),
-            ).respond({}, initial)[0].T[prepared.judge[0] - first :]
+                span=(first, prepared.plan.judge[1]),
+            ).respond({}, initial)[0].T[prepared.plan.judge[0] - first :]
             for n in (1, 2)
         ]  # fmt: skip
     except DivergenceError:

@@ -7,22 +7,22 @@ from dataclasses import replace
 import numpy as np
 
 from study.equations.model import Model
+from study.records.prepared import Prepared
 from study.structure.free_decay import free_decay_start
 from study.structure.linear_start import structure_linear_start
 from study.structure.mass_matrix import linear_keys, loose_motions
-from study.structure.prepared_structure import PreparedStructure
 from study.structure.structure_fit import StructureFit, fit_structure
 from study.support.errors import DivergenceError, expect
 
 
-def known_linear(model: Model, prepared: PreparedStructure) -> dict[str, float]:
+def known_linear(model: Model, prepared: Prepared) -> dict[str, float]:
     """The linear terms of a structure: what it holds of them, and the best linear approximation of the rest."""
     held = {key: value for key, value in model.values.items() if value is not None}
     start = structure_linear_start if model.forces else free_decay_start
     return {key: held[key] for key in linear_keys(model) if key in held} | start(model, prepared, held)
 
 
-def first_fit(model: Model, prepared: PreparedStructure) -> StructureFit:
+def first_fit(model: Model, prepared: Prepared) -> StructureFit:
     """Fit all that a structure leaves open; what it gives is held.
 
     Terms with an open shape parameter are searched for one after the other beside the others.
@@ -44,7 +44,7 @@ def first_fit(model: Model, prepared: PreparedStructure) -> StructureFit:
     return fit if not unknown else fit_structure(replace(fit.model, terms=terms), prepared, fit.held, steps=fit.steps)
 
 
-def _fitted(model: Model, prepared: PreparedStructure, linear: Mapping[str, float]) -> StructureFit:
+def _fitted(model: Model, prepared: Prepared, linear: Mapping[str, float]) -> StructureFit:
     """From the linear terms alone, and where that diverges or stays far from the motion, with half of them."""
     open_keys = [key for key, value in model.values.items() if value is None]
     start = dict.fromkeys(open_keys, 0.0) | {key: linear[key] for key in open_keys if key in linear}
@@ -60,7 +60,7 @@ def _fitted(model: Model, prepared: PreparedStructure, linear: Mapping[str, floa
     return min(fits, key=lambda fit: float(np.mean((fit.residual / prepared.scale) ** 2)))
 
 
-def _endless(model: Model, prepared: PreparedStructure) -> str:
+def _endless(model: Model, prepared: Prepared) -> str:
     """Why no fit begins."""
     said = f"{model.name!r} has no finite motion under the forces of {prepared.record.name!r}"
     loose = loose_motions(model)

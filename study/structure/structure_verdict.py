@@ -85,8 +85,9 @@ def diagnose_structure(
 def placed_search_base(comparison: StructureComparison) -> PlacedBaseline:
     """The fitted structure as candidates are tried beside it, on no more samples than a search takes."""
     prepared, fit = comparison.prepared, comparison.fit
-    first, last = prepared.fit
-    wanted = LONG if prepared.anew else int(np.clip((last - first) // 2, SHORT, LONG))  # loud and quiet stretches
+    first, last = prepared.plan.fit
+    loud_and_quiet = bool(prepared.record.stretches)
+    wanted = LONG if loud_and_quiet else int(np.clip((last - first) // 2, SHORT, LONG))
     look = prepared.shortened(wanted)
     again = fit_structure(
         fit.model, look, fit.held, steps=fit.steps, initial=same_states(fit, look), noise=sized(prepared.scale)
@@ -133,7 +134,7 @@ def _stands_out(first: PlacedRanked) -> bool:
 
     Measured ones seldom lack one effect alone: what is left beside the first is asked for when it is added.
     """
-    return first.prediction.prepared.anew and first.gain.explained > MOST and not first.unphysical
+    return bool(first.prediction.prepared.record.stretches) and first.gain.explained > MOST and not first.unphysical
 
 
 def _left(prediction: StructurePrediction, families: Sequence[FamilyGain]) -> float:

@@ -8,8 +8,9 @@ import numpy as np
 
 from study.diagnose.verdict import MISSING, NOTHING
 from study.equations.model import ModelTerm
+from study.records.prepared import Prepared
 from study.structure.placed_ranking import PlacedRanked
-from study.structure.prepared_structure import PreparedStructure, prepare_structure
+from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure
 from study.structure.structure_fit import fit_structure, settled_structure
 from study.structure.structure_verdict import StructureDiagnosis, diagnose_structure
@@ -96,7 +97,7 @@ def _there(row: PlacedRanked, hidden: ModelTerm) -> bool:
     return row.entry.place.path == hidden.place.path
 
 
-def _true(trial: StructureTrial, prepared: PreparedStructure) -> Row:
+def _true(trial: StructureTrial, prepared: Prepared) -> Row:
     """Error of the true model, fitted from its true values, and how many of these its 95 % intervals hold.
 
     Without noise nothing is asked of intervals: what is left is the integration's.

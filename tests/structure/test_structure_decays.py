@@ -56,17 +56,19 @@ def test_a_decay_is_fitted_and_judged_in_turn_and_its_motion_begins_anew():
     record = prepared.record
     runs = record.runs((0, len(record)))
     assert len(record.stretches) == len(runs) >= 6
-    assert prepared.fit == (0, prepared.judge[0])
+    assert prepared.plan.fit == (0, prepared.plan.judge[0])
     firsts = sorted((s.first, s.last) for s in record.stretches)
     assert all(end == begin for (_, end), (begin, _) in itertools.pairwise(firsts)), "each sample once"
-    fitted = [s.first for s, (_, end) in zip(record.stretches, runs, strict=True) if end <= prepared.fit[1]]
+    fitted = [s.first for s, (_, end) in zip(record.stretches, runs, strict=True) if end <= prepared.plan.fit[1]]
     assert fitted == [first for first, _ in firsts[::2]], "every other block is judged"
     begin = record.joints[0]
     assert record.time[begin] == pytest.approx(3.0 + DT * record.stretches[1].first)
     assert record.time[begin] - record.time[begin - 1] > 10 * DT
     whole = prepare_structure(decay(), model())
     a = record.stretches[1]
-    assert np.allclose(prepared.complete["a"][:, begin : begin + len(a)], whole.complete["a"][:, a.first : a.last])
+    assert np.allclose(
+        prepared.record.motion("a")[:, begin : begin + len(a)], whole.record.motion("a")[:, a.first : a.last]
+    )
 
 
 def test_derivatives_by_the_states_of_each_stretch_are_those_of_the_motion():
@@ -74,7 +76,7 @@ def test_derivatives_by_the_states_of_each_stretch_are_those_of_the_motion():
     fit = compare_structure(model(more=HARD), prepared).fit
     jacobian = linearise_structure(fit, prepared)
     states = len(fit.initial) // 4
-    assert states == len(prepared.record.runs(prepared.fit))
+    assert states == len(prepared.record.runs(prepared.plan.fit))
     run = prepare_run(fit.model, prepared.record, sensors=prepared.sensors, steps_per_sample=fit.steps, span=fit.span)
     for state in (0, 5, len(fit.initial) - 1):
         moved = np.zeros(len(fit.initial))
@@ -82,7 +84,7 @@ def test_derivatives_by_the_states_of_each_stretch_are_those_of_the_motion():
         change = (run.respond({}, fit.initial + moved)[0] - run.respond({}, fit.initial - moved)[0]).T / 2e-6
         column = jacobian[:, :, len(fit.keys) + state]
         assert np.allclose(change, column, atol=1e-5 * np.max(np.abs(column)))
-        begin, end = prepared.record.runs(prepared.fit)[state // 4]
+        begin, end = prepared.record.runs(prepared.plan.fit)[state // 4]
         assert not np.any(column[:begin])
         assert not np.any(column[end:])
 
