@@ -7,47 +7,37 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, cast
 
-from study.equations.model import Model
 from study.equations.model_file import format_model
-from study.records.record import write_csv
+from study.records.record import Record, write_csv
+from study.structure.structure_record import write_structure_csv
 from study.support.errors import StudyError
 from study.support.files import read_text, replace_file, replacing
 from study.support.yaml_text import shown
 from study.trials.draw import Trial
 
-KEYS = {"hidden", "shares", "noise", "fault", "truth"}
 WANTED = "the answer file of a trial, as 'study trial' writes it"
 
 
 def write_trial(trial: Trial, folder: Path) -> tuple[Path, Path, Path]:
     """Write record, believed model and sealed answer: their paths, or a ``StudyError`` if that cannot be."""
-    record = trial.record
-    return write_trial_files(record.name, lambda path: write_csv(record, path), trial.believed, contents(trial), folder)
-
-
-def write_trial_files(
-    stem: str, record_to: Callable[[Path], object], believed: Model, content: Mapping[str, Any], folder: Path
-) -> tuple[Path, Path, Path]:
-    """Write the three files of a trial named ``stem``, as :func:`write_trial`; ``record_to`` writes its record."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StudyError(
             f"{folder}: no such folder can be made ({error.strerror}); expected a writable place"
         ) from None
+    stem = trial.record.name
     record, model, answer = (folder / f"{stem}{ending}" for ending in (".csv", ".yaml", ".answer.json"))
     with replacing(record) as beside:
-        record_to(beside)
-    replace_file(model, format_model(believed).encode())
-    seal(content, answer, stem)
-    return record, model, answer
-
-
-def seal(content: Mapping[str, Any], answer: Path, stem: str) -> None:
-    """Write an answer that no glance gives away."""
-    sealed = base64.b64encode(json.dumps(content).encode()).decode()
-    page = {"trial": stem, "open_with": f"study trial --open {answer.name}", "answer": sealed}
+        if isinstance(trial.record, Record):
+            write_csv(trial.record, beside)
+        else:
+            write_structure_csv(trial.record, beside)
+    replace_file(model, format_model(trial.believed).encode())
+    hidden = base64.b64encode(json.dumps(contents(trial)).encode()).decode()
+    page = {"trial": stem, "open_with": f"study trial --open {answer.name}", "answer": hidden}
     replace_file(answer, (json.dumps(page, indent=1) + "\n").encode())
+    return record, model, answer
 
 
 def contents(trial: Trial) -> dict[str, Any]:
@@ -67,7 +57,7 @@ def unseal(path: Path) -> dict[str, Any]:
         answer: object = json.loads(base64.b64decode(sealed, validate=True))
     except (ValueError, KeyError, TypeError, RecursionError, binascii.Error):
         raise StudyError(f"{path}: this holds no sealed answer; expected {WANTED}") from None
-    if not isinstance(answer, dict) or set(cast(dict[str, Any], answer)) != KEYS:
+    if not isinstance(answer, dict) or set(cast(dict[str, Any], answer)) != set(KINDS):
         raise StudyError(f"{path}: the answer in it is not that of a trial; expected {WANTED}")
     found = cast(dict[str, Any], answer)
     for key, kind in KINDS.items():
@@ -79,17 +69,15 @@ def unseal(path: Path) -> dict[str, Any]:
 
 
 def _is_number(value: object) -> bool:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    return abs(value) < LARGEST
-
-
-def _are(value: object, kind: Callable[[object], bool]) -> bool:
-    return isinstance(value, list) and all(kind(item) for item in cast(list[object], value))
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < LARGEST
 
 
 def _is_text(value: object) -> bool:
     return isinstance(value, str)
+
+
+def _are(value: object, kind: Callable[[object], bool]) -> bool:
+    return isinstance(value, list) and all(kind(item) for item in cast(list[object], value))
 
 
 def _is_fault(value: object) -> bool:
@@ -112,12 +100,8 @@ def answer_in_words(answer: Mapping[str, Any]) -> str:
     hidden = [f"{name} ({100.0 * share:.0f} %)" for name, share in zip(answer["hidden"], answer["shares"], strict=True)]
     what = f"hidden, with the share of the restoring force: {', '.join(hidden)}" if hidden else "nothing is hidden"
     noise = f"noise: {100.0 * answer['noise']:g} % of the mean square of the response"
-    return f"{what}\n{noise}\n{_fault(answer['fault'])}\nthe model that made the record:\n\n{answer['truth']}"
-
-
-def _fault(fault: Mapping[str, Any]) -> str:
-    if not fault:
-        return "fault of the measurement: none"
-    unit = "" if fault["unit"] == "1" else f" {fault['unit']}"
-    name = str(fault["fault"]).replace("_", " ")
-    return f"fault of the measurement: {name} of the {fault['channel']}, {fault['value']:.4g}{unit}"
+    fault, said = answer["fault"], "none"
+    if fault:
+        unit = "" if fault["unit"] == "1" else f" {fault['unit']}"
+        said = f"{str(fault['fault']).replace('_', ' ')} of the {fault['channel']}, {fault['value']:.4g}{unit}"
+    return f"{what}\n{noise}\nfault of the measurement: {said}\nthe model that made the record:\n\n{answer['truth']}"

@@ -16,8 +16,8 @@ from study.identify.time_domain.fit_model import fit_model
 from study.records.prepared import prepare_record
 from study.records.readers import read_record
 from study.support.errors import StudyError
-from study.trials import HIDDEN, SHARE, WIDE, make_trial, sealed, share_of
-from study.trials.experiment import DAMPINGS, KINDS, MEMORIES, PERIODS, RATES, SAMPLES, wide
+from study.trials import DRIVEN, HIDDEN, SHARE, make_trial, sealed, share_of
+from study.trials.driven import DAMPINGS, KINDS, MEMORIES, PERIODS, RATES, SAMPLES, SLOWEST, wide
 
 
 @pytest.mark.parametrize("name", HIDDEN)
@@ -95,7 +95,7 @@ def test_a_trial_with_a_fault_is_the_same_trial_before_it() -> None:
 
 @pytest.mark.long
 def test_any_fault_means_one_in_half_of_the_trials() -> None:
-    named = [make_trial(seed, (), 0.0, "displacement", "any", WIDE).fault.get("fault") for seed in range(40)]
+    named = [make_trial(seed, (), 0.0, "displacement", "any", DRIVEN).fault.get("fault") for seed in range(40)]
     without = named.count(None)
     assert 10 <= without <= 30
     assert len(set(named)) > 5
@@ -122,9 +122,9 @@ def test_the_wide_range_reaches_its_ends_and_every_record_is_long_enough() -> No
 @pytest.mark.parametrize("seed", range(4))
 def test_a_wide_trial_is_the_motion_of_its_truth_and_forgets_its_start(seed: int) -> None:
     """Against an integration with other steps, from another state."""
-    trial = make_trial(4000 + seed, (), 0.0, "displacement", ranges=WIDE)
+    trial = make_trial(4000 + seed, (), 0.0, "displacement", test=DRIVEN)
     initial = (float(np.std(trial.record["displacement"])), 0.0)
-    steps = Integrator("rk4", trial.experiment.steps(16))
+    steps = Integrator("rk4", 16 * int(np.ceil(max(1.0, SLOWEST / trial.about["samples_a_period"]))))
     again = simulate(trial.truth, trial.record["force"], trial.record.dt, steps, initial=initial)["displacement"]
     half = len(again) // 2
     measured = trial.record["displacement"]
@@ -173,7 +173,7 @@ def test_command_writes_record_model_and_sealed_answer(tmp_path: Path, capsys: p
     answer = tmp_path / "new" / "trial_7.answer.json"
     assert f"study trial --open {answer}" in said
     record, model = read_record(tmp_path / "new" / "trial_7.csv"), read_model(tmp_path / "new" / "trial_7.yaml")
-    trial = make_trial(7, ("quadratic_damping",), 0.05, "acceleration", ranges=WIDE)
+    trial = make_trial(7, ("quadratic_damping",), 0.05, "acceleration", test=DRIVEN)
     np.testing.assert_array_equal(record["acceleration"], trial.record["acceleration"])
     assert model == trial.believed
     for path in (tmp_path / "new").iterdir():

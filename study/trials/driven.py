@@ -1,21 +1,39 @@
-"""The experiment of a trial: a linear oscillator, how it is driven, and how it is sampled.
+"""Trials of a force on a mass and spring: a linear oscillator, how it is driven, and how it is sampled.
 
 Two ranges are drawn from. ``REPORT_LIKE`` is sampled and damped as the report's systems are, give or take a factor of
-two; ``WIDE`` is what laboratories do.
+two; ``WIDE`` is what laboratories do. Half of the systems have a known nonlinearity of the report's kind.
 """
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from study.equations.model import Model, ModelTerm
+from study.equations.free_run import predict_response
+from study.equations.model import Model, ModelTerm, free
+from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
-from study.records.excitation import Excitation
-from study.records.record import MOTIONS
+from study.records.excitation import Excitation, displacement_noise, force
+from study.records.record import MOTIONS, Record
+from study.support.arrays import Floats
+from study.support.errors import StudyError, expect
+from study.trials.effects import (
+    LINEAR,
+    SHARE,
+    Asked,
+    Rig,
+    Shares,
+    Sizing,
+    beyond_linear,
+    drawn_effect,
+    force_along,
+    forgets,
+    grown,
+    share_of,
+)  # fmt: skip
 
-LINEAR = ("inertia", "linear_damping", "linear_stiffness")  # what a linear model has: it cannot be hidden behind one
 SLOWEST = 12.5  # samples a period of the linear system from which on the plain number of steps a sample will do
 RATES = (5.0, 200.0)  # samples a period
 DAMPINGS = (0.001, 0.30)  # share of the critical damping
@@ -28,6 +46,10 @@ BETWEEN = 25.0  # periods of the linear system in one repetition, at least
 REACH = (1.5, 8.0)  # highest frequency of the force over that of the linear system
 SAMPLED = 0.4  # ... and over the sampling rate, at most
 KINDS = ("gaussian_lowpass", "pierson_moskowitz", "random_phase_multisine", "linear_sweep", "logarithmic_sweep")
+KNOWN = ("none", "none", "cubic_stiffness", "van_der_pol_damping")  # of which one is drawn
+KNOWN_SHARE = 0.15
+STEPS = 32  # per sample of the record, and more where there are few samples a period
+PUSH = 20  # samples at the start, at most half a period
 
 
 @dataclass(frozen=True)
@@ -65,6 +87,74 @@ class Ranges:
     experiment: Callable[[np.random.Generator], Experiment]
     accurate: float  # relative change of the measured motion with half of the integration steps, at most
     drowned: float = math.inf  # rms of a hidden harmonic force over that of the measured one, at most
+
+
+def driven_rig(rng: np.random.Generator, asked: Asked, ranges: Ranges) -> Rig:
+    """A linear oscillator under a force, every second one with a known nonlinearity."""
+    experiment = ranges.experiment(rng)
+    drive = force(experiment.excitation, experiment.samples, experiment.dt, asked.seed)
+
+    def simulated(model: Model, steps: int, drive: Floats = drive) -> Record:
+        return simulate(model, drive, experiment.dt, Integrator("rk4", experiment.steps(steps)))
+
+    def motion(model: Model) -> Record:
+        return simulated(model, 2)
+
+    def strength(unit: ModelTerm, record: Record) -> tuple[float, float]:
+        restoring = drive - (experiment.system.values["m"] or 0.0) * record["acceleration"]
+        return beyond_linear(force_along(unit, record), [record[c] for c in MOTIONS]), float(np.std(restoring))
+
+    def recorded(truth: Model, _: Shares) -> tuple[Record, Shares]:
+        record = simulated(truth, 8)
+        size = float(np.std(record["displacement"])) / float(np.std(linear["displacement"]))
+        expect(0.1 < size < 10.0, "the motion is of another size than the linear one, by which shapes were drawn")
+        push = min(PUSH, int(np.ceil(experiment.samples_a_period / 2.0)))
+        calm = forgets(lambda f: simulated(truth, 2, f)["displacement"], drive, push)
+        expect(calm, "the motion does not forget how it began")
+        # On a resonance a harmonic force would have to be many times larger than the measured one to be the wanted
+        # share of the restoring force, and what the measured force does then lies below the noise.
+        harmonic = math.hypot(truth.values.get("fh_cos") or 0.0, truth.values.get("fh_sin") or 0.0)
+        most = ranges.drowned * math.sqrt(2.0) * float(np.std(drive))
+        expect(harmonic <= most, "the harmonic force drowns the measured one")
+        shares = tuple(share_of(truth, name, record) for name in asked.hidden)
+        expect(all(SHARE[0] <= share <= SHARE[1] for share in shares), "an effect has changed the share of another")
+        fine, coarse = (
+            predict_response(truth, record, response=asked.response, steps_per_sample=experiment.steps(STEPS) // n)
+            for n in (1, 2)
+        )
+        accurate = float(np.std(fine - coarse)) < ranges.accurate * float(np.std(fine))
+        expect(accurate, "so many steps do not give the motion")
+        if asked.noise > 0.0:
+            fine = fine + displacement_noise(fine, asked.noise, asked.seed)
+        return Record(experiment.dt, {"force": drive, asked.response: fine}, record.units), shares
+
+    base, quiet = experiment.system, simulated(experiment.system, 4)
+    linear, sizing = quiet, Sizing(12, secant=experiment.secant)
+    rig = Rig(base, lambda term: drawn_effect(rng, free(term), quiet), motion, strength, recorded, sizing, {})
+    known = str(rng.choice(KNOWN))
+    if known != "none" and known not in asked.hidden:
+        with suppress(StudyError):  # without it, where it cannot be so strong
+            base, _ = grown(base, replace(free(get(known)), coefficients=(1.0,)), KNOWN_SHARE, rig)
+    if base is not experiment.system:
+        quiet = simulated(base, 4)
+    expect(_seen(base, asked), f"the {asked.response} does not show them")
+    about = {
+        "samples_a_period": experiment.samples_a_period, "samples": experiment.samples,
+        "damping": experiment.damping, "excitation": experiment.kind,
+        "known": "+".join(t.name for t in base.terms[len(LINEAR) :]) or "linear",
+    }  # fmt: skip
+    return replace(rig, base=base, about=about)
+
+
+def _seen(base: Model, asked: Asked) -> bool:
+    """A steady force moves a system to another place, which only a displacement shows if no force depends on the place.
+
+    Linear stiffness does not count: it is the same everywhere.
+    """
+    effects = [get(name) for name in asked.hidden]
+    if asked.response == "displacement" or not any(term.steady for term in effects):
+        return True
+    return not all(term.placeless for term in (*effects, *(entry.term for entry in base.terms)))
 
 
 def report_like(rng: np.random.Generator) -> Experiment:
