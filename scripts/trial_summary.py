@@ -25,7 +25,8 @@ def main(
     drawings: Sequence[str], style: Path,
 ) -> None:  # fmt: skip
     table = pd.concat([pd.read_csv(path) for path in parts], ignore_index=True).sort_values("seed", kind="stable")
-    counts = dict(zip(CONFUSIONS[name], (rates.confusion(table, name), rates.confusion_of_places(table)), strict=False))
+    made = zip(CONFUSIONS[name], (rates.confusion, rates.confusion_of_places), strict=False)
+    counts = {picture: count(table) for picture, count in made}
     found = {"trials": table, "summary": rates.target_summary(table, name, wanted), **counts}
     if name == TRIALS:
         found |= {LADDER: rates.error_by_noise(table)}

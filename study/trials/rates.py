@@ -321,9 +321,9 @@ def _wanted(wanted: Wanted, key: str, place: int) -> float:
     return values[place] if place < len(values) else math.nan
 
 
-def confusion(table: pd.DataFrame, name: str) -> pd.DataFrame:
+def confusion(table: pd.DataFrame) -> pd.DataFrame:
     """Numbers of trials by what was hidden (rows: each effect alone, none) and what was said (columns)."""
-    rows = [row for row in rows_of(table) if name != TRIALS or row["kind"] in (SINGLE, NONE)]
+    rows = [row for row in rows_of(table) if row.get("kind", SINGLE) in (SINGLE, NONE)]
     return _counted([(row["hidden"] or NONE, _said(row)) for row in rows])
 
 

@@ -162,7 +162,7 @@ def test_summary_confusion_and_ladder_of_a_table(tmp_path: Path) -> None:
     assert found.loc[("mean size of the tie set, noise 10 %", "without"), "value"] == 2.0
     assert found.loc[(held, "without"), "value"] == pytest.approx(0.8), "without noise nothing is asked"
     assert found.loc[("the fault named, its value within its interval", "with"), "reached"] == "no", "0 of 1, to 79 %"
-    counts = rates.confusion(read, TRIALS).set_index("hidden")
+    counts = rates.confusion(read).set_index("hidden")
     assert counts.loc["relaxation", "relaxation"] == 2
     assert counts.loc["relaxation", "unknown_effect"] == 1
     assert counts.loc["none", "nothing_missing"] == 1

@@ -111,7 +111,7 @@ def test_confusions_count_effects_and_places():
         {**GOOD, "hidden": "none", "place": "", "verdict": "nothing_missing", "first": "", "first_place": ""},
         {**GOOD, "first_place": "ground-mass3"},
     ]  # fmt: skip
-    effects = rates.confusion(read(rows), STRUCTURES).set_index("hidden")
+    effects = rates.confusion(read(rows)).set_index("hidden")
     assert effects.loc["cubic_stiffness"].to_dict() == {
         "cubic_stiffness": 3, "dead_band": 1, "unknown_effect": 1, "nothing_missing": 0,
     }  # fmt: skip
