@@ -19,37 +19,13 @@ from study.records.excitation import Excitation, displacement_noise, force
 from study.records.record import MOTIONS, Record
 from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
-from study.trials.effects import (
-    LINEAR,
-    SHARE,
-    Asked,
-    Rig,
-    Shares,
-    Sizing,
-    beyond_linear,
-    drawn_effect,
-    force_along,
-    forgets,
-    grown,
-    share_of,
-)  # fmt: skip
+from study.trials import effects
+from study.trials.effects import LINEAR, SHARE, Asked, Rig, Shares, Sizing, evenly_in_log, oscillator, share_of
 
-SLOWEST = 12.5  # samples a period of the linear system from which on the plain number of steps a sample will do
-RATES = (5.0, 200.0)  # samples a period
-DAMPINGS = (0.001, 0.30)  # share of the critical damping
-SAMPLES = (1_000, 200_000)  # in a record
-PERIODS = 50.0  # of the linear system, that a record holds at least: half of them are fitted, half judged
-MEMORIES = 8.0  # times in which its motion falls to 1/e, that a record holds at least
-WHOLE = 16  # samples: a record is a multiple of these, and so of every number of repetitions
-REPEATED = (1, 2, 4, 8)  # times that a periodic force is repeated in a record; once is not for a sweep
-BETWEEN = 25.0  # periods of the linear system in one repetition, at least
-REACH = (1.5, 8.0)  # highest frequency of the force over that of the linear system
-SAMPLED = 0.4  # ... and over the sampling rate, at most
 KINDS = ("gaussian_lowpass", "pierson_moskowitz", "random_phase_multisine", "linear_sweep", "logarithmic_sweep")
 KNOWN = ("none", "none", "cubic_stiffness", "van_der_pol_damping")  # of which one is drawn
-KNOWN_SHARE = 0.15
+SLOWEST = 12.5  # samples a period of the linear system from which on the plain number of steps a sample will do
 STEPS = 32  # per sample of the record, and more where there are few samples a period
-PUSH = 20  # samples at the start, at most half a period
 
 
 @dataclass(frozen=True)
@@ -62,7 +38,6 @@ class Experiment:
     dt: float  # sampling interval in seconds
     samples: int  # in the record
     excitation: Excitation
-    secant: bool = True  # whether effects are sized by the secant method; seeds of old rest on a slower one
 
     @property
     def samples_a_period(self) -> float:
@@ -81,17 +56,29 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Ranges:
-    """What trials are drawn from."""
+    """What trials are drawn from: where nothing else is said, what laboratories do."""
 
-    responses: tuple[str, ...]  # one of which is measured
-    experiment: Callable[[np.random.Generator], Experiment]
-    accurate: float  # relative change of the measured motion with half of the integration steps, at most
-    drowned: float = math.inf  # rms of a hidden harmonic force over that of the measured one, at most
+    experiment: Callable[[np.random.Generator, "Ranges"], Experiment]
+    responses: tuple[str, ...] = MOTIONS  # one of which is measured
+    known: float = 0.15  # share of the restoring force that a known nonlinearity carries
+    accurate: float = 3e-4  # relative change of the measured motion with half of the integration steps, at most
+    drowned: float = 0.5  # rms of a hidden harmonic force over that of the measured one, at most
+    secant: bool = True  # whether effects are sized by the secant method; seeds of old rest on a slower one
+    rates: tuple[float, float] = (5.0, 200.0)  # samples a period
+    dampings: tuple[float, float] = (0.001, 0.30)  # share of the critical damping
+    samples: tuple[int, int] = (1_000, 200_000)  # in a record
+    periods: float = 50.0  # of the linear system, that a record holds at least: half are fitted, half judged
+    memories: float = 8.0  # times in which its motion falls to 1/e, that a record holds at least
+    whole: int = 16  # samples: a record is a multiple of these, and so of every number of repetitions
+    repeated: tuple[int, ...] = (1, 2, 4, 8)  # times that a periodic force is repeated; once is not for a sweep
+    between: float = 25.0  # periods of the linear system in one repetition, at least
+    reach: tuple[float, float] = (1.5, 8.0)  # highest frequency of the force over that of the linear system
+    sampled: float = 0.4  # ... and over the sampling rate, at most
 
 
 def driven_rig(rng: np.random.Generator, asked: Asked, ranges: Ranges) -> Rig:
     """A linear oscillator under a force, every second one with a known nonlinearity."""
-    experiment = ranges.experiment(rng)
+    experiment = ranges.experiment(rng, ranges)
     drive = force(experiment.excitation, experiment.samples, experiment.dt, asked.seed)
 
     def simulated(model: Model, steps: int, drive: Floats = drive) -> Record:
@@ -102,14 +89,16 @@ def driven_rig(rng: np.random.Generator, asked: Asked, ranges: Ranges) -> Rig:
 
     def strength(unit: ModelTerm, record: Record) -> tuple[float, float]:
         restoring = drive - (experiment.system.values["m"] or 0.0) * record["acceleration"]
-        return beyond_linear(force_along(unit, record), [record[c] for c in MOTIONS]), float(np.std(restoring))
+        return effects.beyond_linear(effects.force_along(unit, record), [record[c] for c in MOTIONS]), float(
+            np.std(restoring)
+        )
 
     def recorded(truth: Model, _: Shares) -> tuple[Record, Shares]:
         record = simulated(truth, 8)
         size = float(np.std(record["displacement"])) / float(np.std(linear["displacement"]))
         expect(0.1 < size < 10.0, "the motion is of another size than the linear one, by which shapes were drawn")
-        push = min(PUSH, int(np.ceil(experiment.samples_a_period / 2.0)))
-        calm = forgets(lambda f: simulated(truth, 2, f)["displacement"], drive, push)
+        push = min(20, int(np.ceil(experiment.samples_a_period / 2.0)))  # samples: not more than half a period
+        calm = effects.forgets(lambda f: simulated(truth, 2, f)["displacement"], drive, push)
         expect(calm, "the motion does not forget how it began")
         # On a resonance a harmonic force would have to be many times larger than the measured one to be the wanted
         # share of the restoring force, and what the measured force does then lies below the noise.
@@ -129,12 +118,12 @@ def driven_rig(rng: np.random.Generator, asked: Asked, ranges: Ranges) -> Rig:
         return Record(experiment.dt, {"force": drive, asked.response: fine}, record.units), shares
 
     base, quiet = experiment.system, simulated(experiment.system, 4)
-    linear, sizing = quiet, Sizing(12, secant=experiment.secant)
-    rig = Rig(base, lambda term: drawn_effect(rng, free(term), quiet), motion, strength, recorded, sizing, {})
+    linear, sizing = quiet, Sizing(12, secant=ranges.secant)
+    rig = Rig(base, lambda term: effects.drawn_effect(rng, free(term), quiet), motion, strength, recorded, sizing, {})
     known = str(rng.choice(KNOWN))
     if known != "none" and known not in asked.hidden:
         with suppress(StudyError):  # without it, where it cannot be so strong
-            base, _ = grown(base, replace(free(get(known)), coefficients=(1.0,)), KNOWN_SHARE, rig)
+            base, _ = effects.grown(base, replace(free(get(known)), coefficients=(1.0,)), ranges.known, rig)
     if base is not experiment.system:
         quiet = simulated(base, 4)
     expect(_seen(base, asked), f"the {asked.response} does not show them")
@@ -151,52 +140,54 @@ def _seen(base: Model, asked: Asked) -> bool:
 
     Linear stiffness does not count: it is the same everywhere.
     """
-    effects = [get(name) for name in asked.hidden]
-    if asked.response == "displacement" or not any(term.steady for term in effects):
+    hidden = [get(name) for name in asked.hidden]
+    if asked.response == "displacement" or not any(term.steady for term in hidden):
         return True
-    return not all(term.placeless for term in (*effects, *(entry.term for entry in base.terms)))
+    return not all(term.placeless for term in (*hidden, *(entry.term for entry in base.terms)))
 
 
-def report_like(rng: np.random.Generator) -> Experiment:
+def report_like(rng: np.random.Generator, _: Ranges) -> Experiment:
     """8,192 samples, 12.5 to 25 of them a period, 2 to 10 % of critical damping, low-passed Gaussian force."""
     mass = float(10.0 ** rng.uniform(-2.0, 3.0))
     f_n = float(10.0 ** rng.uniform(-0.5, 2.0))
     zeta = float(rng.uniform(0.02, 0.10))
     dt = float(rng.uniform(0.04, 0.08)) / f_n
     excitation = Excitation(level=float(10.0 ** rng.uniform(-1.0, 5.0)), reading="filtered", cutoff=0.25 / dt)
-    return Experiment(_oscillator(mass, f_n, zeta), zeta, f_n, dt, 8192, excitation, secant=False)
+    return Experiment(oscillator(mass, f_n, zeta), zeta, f_n, dt, 8192, excitation)
 
 
-def wide(rng: np.random.Generator) -> Experiment:
+def wide(rng: np.random.Generator, ranges: Ranges) -> Experiment:
     """Samples a period and damping evenly on a logarithmic scale, any excitation, and a record that is long enough.
 
-    It holds ``PERIODS`` periods and ``MEMORIES`` memory times of the linear system; above that least length the
-    density of the number of samples falls as its inverse square, since long records take long: half of them hold less
-    than twice the least. What would need more than the most is drawn again.
+    It holds so many periods and memory times of the linear system; above that least length the density of the number of
+    samples falls as its inverse square, since long records take long: half of them hold less than twice the least. What
+    would need more than the most is drawn again.
     """
     mass = float(10.0 ** rng.uniform(-2.0, 3.0))
     f_n = float(10.0 ** rng.uniform(-0.5, 2.0))
-    rate, zeta, least = 0.0, 0.0, float(np.inf)
-    while least > SAMPLES[1]:
-        rate, zeta = _evenly_in_log(rng, RATES), _evenly_in_log(rng, DAMPINGS)
-        least = max(float(SAMPLES[0]), PERIODS * rate, MEMORIES * rate / (2.0 * np.pi * zeta))
-    samples = 1.0 / rng.uniform(1.0 / SAMPLES[1], 1.0 / least)
-    samples = WHOLE * int(np.clip(np.ceil(samples / WHOLE), SAMPLES[0] // WHOLE + 1, SAMPLES[1] // WHOLE))
-    excitation = _excitation(rng, f_n, rate, samples / rate)
-    return Experiment(_oscillator(mass, f_n, zeta), zeta, f_n, 1.0 / (rate * f_n), samples, excitation)
+    (fewest, most), whole = ranges.samples, ranges.whole
+    rate, zeta, least = 0.0, 0.0, math.inf
+    while least > most:
+        rate, zeta = evenly_in_log(rng, *ranges.rates), evenly_in_log(rng, *ranges.dampings)
+        least = max(float(fewest), ranges.periods * rate, ranges.memories * rate / (2.0 * np.pi * zeta))
+    samples = 1.0 / rng.uniform(1.0 / most, 1.0 / least)
+    samples = whole * int(np.clip(np.ceil(samples / whole), fewest // whole + 1, most // whole))
+    excitation = _excitation(rng, ranges, f_n, rate, samples / rate)
+    return Experiment(oscillator(mass, f_n, zeta), zeta, f_n, 1.0 / (rate * f_n), samples, excitation)
 
 
-def _excitation(rng: np.random.Generator, f_n: float, rate: float, periods: float) -> Excitation:
+def _excitation(rng: np.random.Generator, ranges: Ranges, f_n: float, rate: float, periods: float) -> Excitation:
     """A force around the resonance, for a record of so many periods of it.
 
     Sweeps are repeated, so that the part to judge is driven at the frequencies of the part to fit.
     """
     kind = str(rng.choice(KINDS))
     level = float(10.0 ** rng.uniform(-1.0, 5.0))
-    highest = f_n * _evenly_in_log(rng, (REACH[0], min(REACH[1], SAMPLED * rate)))
-    lowest = f_n * _evenly_in_log(rng, (0.1, 0.5))
+    highest = f_n * evenly_in_log(rng, ranges.reach[0], min(ranges.reach[1], ranges.sampled * rate))
+    lowest = f_n * evenly_in_log(rng, 0.1, 0.5)
     peak = f_n * float(rng.uniform(0.4, 1.2))
-    repeated = int(rng.choice([n for n in REPEATED if periods / n >= BETWEEN and (n > 1 or "sweep" not in kind)]))
+    least = 2 if "sweep" in kind else 1
+    repeated = int(rng.choice([n for n in ranges.repeated if periods / n >= ranges.between and n >= least]))
     odd, falls = bool(rng.integers(2)), bool(rng.integers(2))
     match kind:
         case "gaussian_lowpass":
@@ -209,21 +200,11 @@ def _excitation(rng: np.random.Generator, f_n: float, rate: float, periods: floa
             )
         case _:
             first, last = (highest, lowest) if falls else (lowest, highest)
+            sweep = kind.removesuffix("_sweep")
             return Excitation(
-                "swept_sine", level, start_frequency=first, stop_frequency=last, sweep=kind.removesuffix("_sweep"),
-                periods=repeated,
-            )  # fmt: skip
+                "swept_sine", level, start_frequency=first, stop_frequency=last, sweep=sweep, periods=repeated
+            )
 
 
-def _oscillator(mass: float, f_n: float, zeta: float) -> Model:
-    omega = 2.0 * np.pi * f_n
-    values = (mass, 2.0 * zeta * omega * mass, omega**2 * mass)
-    return Model("truth", tuple(ModelTerm(get(n), (v,), ()) for n, v in zip(LINEAR, values, strict=True)))
-
-
-def _evenly_in_log(rng: np.random.Generator, bounds: tuple[float, float]) -> float:
-    return math.exp(rng.uniform(math.log(bounds[0]), math.log(bounds[1])))
-
-
-REPORT_LIKE = Ranges(("displacement", "acceleration"), report_like, 1e-3)
-WIDE = Ranges(MOTIONS, wide, 3e-4, drowned=0.5)
+WIDE = Ranges(wide)
+REPORT_LIKE = Ranges(report_like, ("displacement", "acceleration"), accurate=1e-3, drowned=math.inf, secant=False)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtri
 
-from study.equations.model import Model, ModelTerm
+from study.equations.model import Model, ModelTerm, free
 from study.equations.term import ShapeParameter, Term
-from study.equations.terms import LIBRARY
+from study.equations.terms import LIBRARY, get
 from study.faults.kinds_of_tests import made_ready
 from study.identify.frequency_domain.inputs import Input, input_history, reverse_inputs
 from study.identify.time_domain.part_fit import fit_part, linearise
@@ -27,9 +27,8 @@ SHARE = (0.10, 0.40)  # of the rms restoring force, in every trial
 STEEPEST = 3.0  # power of the amount by which a share is taken to grow, or one over it, at most
 FARTHEST = 100.0  # logarithm of what an amount may grow by at once; with far less the motion escapes
 FORGOTTEN = 1e-3  # share of the motion that a push at the start may still move in the second half
-CANDIDATES = 20  # about as many are asked for
-VISIBLE = float(-ndtri(ALPHA / CANDIDATES) + ndtri(0.95))  # standard errors at which 19 of 20 tests find an effect
-RUNS = 6  # of the fit that finds the states of the stretches of a record without noise, from the truth
+# Standard errors at which 19 of 20 tests of about 20 candidates find an effect.
+VISIBLE = float(-ndtri(ALPHA / 20) + ndtri(0.95))
 Shares = tuple[float, ...]  # one for each hidden effect
 
 
@@ -66,6 +65,23 @@ class Rig:
     recorded: Callable[[Model, Shares], tuple[Any, Shares]]
     sizing: Sizing
     about: Mapping[str, Any]  # how it is driven and sampled, as a table says it
+
+
+def evenly_in_log(rng: np.random.Generator, low: float, high: float) -> float:
+    """A number drawn evenly on a logarithmic scale."""
+    return math.exp(rng.uniform(math.log(low), math.log(high)))
+
+
+def linear_model(values: Mapping[str, float]) -> Model:
+    """The model with those linear terms whose coefficients, ``m``, ``c`` and ``k``, are given."""
+    terms = [free(get(name)).with_values(values) for name in LINEAR]
+    return Model("truth", tuple(t for t in terms if t.coefficients != (None,)))
+
+
+def oscillator(mass: float, frequency: float, damping: float) -> Model:
+    """A linear one by its natural frequency in Hz and its share of the critical damping."""
+    omega = 2.0 * np.pi * frequency
+    return linear_model({"m": mass, "c": 2.0 * damping * omega * mass, "k": omega**2 * mass})
 
 
 def drawn_effect(
@@ -193,7 +209,7 @@ def _rate(item: Input, record: Record) -> Floats:
     return (ahead - behind) / (2.0 * step) * record["velocity"]
 
 
-def forgets(motion: Callable[[Floats], Floats], force: Floats, samples: int, *, slight: bool = False) -> bool:
+def forgets(motion: Callable[[Floats], Floats], force: Floats, samples: int = 20, *, slight: bool = False) -> bool:
     """Whether the motion forgets a push of so many samples: that of a chaotic system does not, and no free run follows.
 
     A push at the start, of a tenth of the rms force, must have moved in the second half less than ``FORGOTTEN`` of the
@@ -231,7 +247,8 @@ def stands_out(clean: Record, truth: Model, name: str, noise: float) -> bool:
     try:
         model, prepared = made_ready([clean], truth.with_values(dict.fromkeys(truth.values)), Layout())
         start = {key: value for key, value in truth.numbers().items() if key not in model.held_keys}
-        fit = fit_part(model, prepared, model.held_keys, start, max_iterations=RUNS)
+        # From the truth, and without noise: few rounds find the states of the stretches.
+        fit = fit_part(model, prepared, model.held_keys, start, max_iterations=6)
         jacobian = linearise(fit, prepared)
     except StudyError:
         return False

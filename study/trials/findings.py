@@ -26,7 +26,6 @@ from study.trials.draw import Trial
 from study.trials.kept import Row
 
 Found = Mapping[str, Any]  # a fault of the measurement as diagnosis.json has it
-WHATEVER_ITS_P_VALUE = 0  # effects asked for: a p value times none is below any alpha
 FAR = 20.0  # standard errors: rivals that are farther behind stand in no tie set
 
 
@@ -62,7 +61,8 @@ def evidence_row(diagnosis: Diagnosis, hidden: Sequence[str]) -> Row:
     behind = {row.name: max(row.distance, 0.0) for row in rows}
     true = next((row for row in rows if row.name in hidden), None)
     before = diagnosis.comparison.prediction
-    believable = [r.p_value for r in rows if credible(before, r.prediction, r.interval, WHATEVER_ITS_P_VALUE)]
+    # Those that would be believed whatever their p value: one of zero is below any alpha.
+    believable = [r.p_value for r in rows if credible(before, r.prediction, r.interval, 0.0)]
     return {
         "smallest_p": min(believable, default=1.0),
         "true_p": math.nan if true is None else true.p_value,

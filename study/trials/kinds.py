@@ -21,24 +21,12 @@ from study.records.excitation import displacement_noise
 from study.records.record import MOTIONS, SI_UNITS, Record
 from study.support.arrays import Floats
 from study.support.errors import expect
-from study.trials.effects import (
-    HIDDEN,
-    LINEAR,
-    SHARE,
-    Asked,
-    Rig,
-    Shares,
-    Sizing,
-    beyond_linear,
-    drawn_shape,
-    forgets,
-    stands_out,
-)  # fmt: skip
+from study.trials import effects
+from study.trials.effects import HIDDEN, LINEAR, SHARE, Asked, Rig, Shares, Sizing, evenly_in_log, linear_model
 
 TIMED = ("periodic_stiffness", "harmonic_force")  # what knows of time: no program of a test is in step with it
 DAMPED = 2.5  # times as large a share, of the viscous force, is what a hidden damper carries
 STEPS = 8  # of the integration, a sample
-PUSH = 20  # samples in which the force is disturbed
 # The motion that each linear term acts on.
 SHAPES: Mapping[str, str] = MappingProxyType(dict(zip(LINEAR, reversed(MOTIONS), strict=True)))
 
@@ -65,21 +53,21 @@ def rig_of_a_test(rng: np.random.Generator, asked: Asked, make: Callable[[np.ran
 
     def effect(term: Term) -> tuple[ModelTerm, float]:
         """Shape, share and sign, in the order in which the published ones were drawn; more of what damps."""
-        entry = replace(free(term), coefficients=(1.0,), parameters=drawn_shape(rng, term, quiet))
+        entry = replace(free(term), coefficients=(1.0,), parameters=effects.drawn_shape(rng, term, quiet))
         share = float(rng.uniform(*SHARE)) * (DAMPED if damps(_force(entry, quiet)) else 1.0)
         opposite = term.either_sign and rng.random() < 0.5 and not term.steady
         return replace(entry, coefficients=(-1.0 if opposite else 1.0,)), share
 
     def strength(unit: ModelTerm, record: Record) -> tuple[float, float]:
         force = _force(unit, record)
-        alone = beyond_linear(force, [record[SHAPES[t.name]] for t in base.terms])
+        alone = effects.beyond_linear(force, [record[SHAPES[t.name]] for t in base.terms])
         return alone, viscous if damps(force) else spring or viscous
 
     def recorded(truth: Model, shares: Shares) -> tuple[Record, Shares]:
         record = bench.respond(truth)
         clean = record[bench.measured]
         size = math.sqrt(asked.noise) * float(np.std(clean))
-        seen = all(stands_out(record, truth, name, size) for name in asked.hidden)
+        seen = all(effects.stands_out(record, truth, name, size) for name in asked.hidden)
         expect(seen, "no test could find the effect")
         added = displacement_noise(clean - np.mean(clean), asked.noise, asked.seed)
         return record.with_channels({bench.measured: clean + added}), shares
@@ -87,24 +75,11 @@ def rig_of_a_test(rng: np.random.Generator, asked: Asked, make: Callable[[np.ran
     return Rig(base, effect, lambda _: quiet, strength, recorded, Sizing(0), {})
 
 
-def _evenly(rng: np.random.Generator, low: float, high: float) -> float:
-    """A number drawn evenly on a logarithmic scale."""
-    return math.exp(rng.uniform(math.log(low), math.log(high)))
-
-
 def _oscillator(rng: np.random.Generator, damping: tuple[float, float]) -> tuple[Model, float, float]:
     """Inertia, damping and stiffness, with the natural frequency in Hz and the sampling interval."""
-    frequency, mass = _evenly(rng, 0.3, 30.0), float(np.exp(rng.uniform(-2.0, 4.0)))
-    zeta = _evenly(rng, *damping)
-    omega = 2.0 * np.pi * frequency
-    values = {"m": mass, "c": 2.0 * zeta * omega * mass, "k": mass * omega**2}
-    return _linear(values), frequency, 1.0 / (frequency * float(rng.uniform(16.0, 40.0)))
-
-
-def _linear(values: Mapping[str, float]) -> Model:
-    """The model with those linear terms whose coefficients are given."""
-    terms = [free(get(name)).with_values(values) for name in LINEAR]
-    return Model("believed", tuple(t for t in terms if t.coefficients != (None,)))
+    frequency, mass = evenly_in_log(rng, 0.3, 30.0), float(np.exp(rng.uniform(-2.0, 4.0)))
+    model = effects.oscillator(mass, frequency, evenly_in_log(rng, *damping))
+    return model, frequency, 1.0 / (frequency * float(rng.uniform(16.0, 40.0)))
 
 
 def _per_unit_mass(model: Model) -> Model:
@@ -180,21 +155,21 @@ def _base(rng: np.random.Generator) -> Bench:
 
 def _calm(truth: Model, force: Floats, dt: float) -> Record:
     """Force and displacement of a system that does not magnify every disturbance."""
-    calm = forgets(lambda f: _run(truth, f, dt, motions=["displacement"])["displacement"], force, PUSH, slight=True)
+    calm = effects.forgets(lambda f: _run(truth, f, dt, motions=["displacement"])["displacement"], force, slight=True)
     expect(calm, "the motion is chaotic")
     return _run(truth, force, dt, motions=["displacement"])
 
 
 def _component(rng: np.random.Generator) -> Bench:
     """A damper or mount in a rig that prescribes its motion: noise in a band; the force is measured."""
-    frequency, samples = _evenly(rng, 0.5, 20.0), 3000
+    frequency, samples = evenly_in_log(rng, 0.5, 20.0), 3000
     dt = 1.0 / (frequency * float(rng.uniform(30.0, 60.0)))
     stroke = float(np.exp(rng.uniform(-6.0, -2.0)))
     u = stroke * _band(rng, samples, 1.5 * frequency * dt)
     v = np.asarray(np.fft.irfft(np.fft.rfft(u) * 2j * np.pi * np.fft.rfftfreq(samples, dt), samples))
     a = np.asarray(np.fft.irfft(np.fft.rfft(v) * 2j * np.pi * np.fft.rfftfreq(samples, dt), samples))
     k, omega = float(np.exp(rng.uniform(4.0, 10.0))), 2.0 * np.pi * frequency
-    model = _linear({"k": k, "c": float(rng.uniform(0.2, 2.0)) * k / omega})
+    model = linear_model({"k": k, "c": float(rng.uniform(0.2, 2.0)) * k / omega})
     motion = {"force": np.zeros(samples), "displacement": u, "velocity": v, "acceleration": a}
     record = Record(dt, motion, dict(SI_UNITS))
 
@@ -210,7 +185,7 @@ def _axis(rng: np.random.Generator) -> Bench:
     """A mass without a spring under position control, that moves to and fro with rests between."""
     mass, samples, dt = float(np.exp(rng.uniform(0.0, 5.0))), 4000, 0.005
     omega = 2.0 * np.pi * float(rng.uniform(1.5, 3.0))  # of the control
-    model = _linear({"m": mass, "c": float(rng.uniform(0.5, 3.0)) * mass})
+    model = linear_model({"m": mass, "c": float(rng.uniform(0.5, 3.0)) * mass})
     wanted = _moves(rng, samples, dt)
     stiff, damped = mass * omega**2, 1.4 * mass * omega
     drive = stiff * wanted + damped * np.gradient(wanted, dt)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.special import ndtri
 
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
 from study.equations.terms import LIBRARY, same_elsewhere
@@ -23,7 +24,7 @@ from study.trials.runs import COMPLETED, NONE, PAIR, REMOVED, SINGLE, WITH, WITH
 
 VERY_LITTLE, LITTLE = 0.01, 0.05  # noise up to which ties are to be short, and the true effect has to come first
 COUNTED = 1e-6  # relative: what is counted or read off has no interval, and no last bit either
-WITHIN, ROUNDING = 1.05, 1e-9  # held-out error after adding, over that of the true model; beside the response
+WITHIN = 1.05  # held-out error after adding, over that of the true model
 SAME, END, OTHER, FAILED = "the same place", "a place with an end in common", "another place", "not_diagnosed"
 ALPHAS = (1e-4, 1e-3, 0.005, 0.01, 0.02, 0.05, 0.1)
 FACTORS = (
@@ -36,7 +37,7 @@ FACTORS = (
     4.0,
     5.0,
 )  # of which a table says what each would do: a run keeps what its verdict rested on
-NORMAL = 1.959963984540054  # 97.5 % of a standard normal variable lie below
+NORMAL = float(ndtri(0.975))
 
 
 @dataclass(frozen=True)
@@ -174,7 +175,8 @@ def no_fault_score(row: Row) -> float:
 
 def as_good_as_truth(row: Row) -> float:
     """One if the held-out error after adding is within 5 % of that of the true model, fitted in the same way."""
-    return float(bool(row["error_after"] <= WITHIN * row["error_true"] + ROUNDING))
+    rounding = 1e-9  # what the integration leaves where there is no noise
+    return float(bool(row["error_after"] <= WITHIN * row["error_true"] + rounding))
 
 
 def _hidden(test: Member = lambda _: True) -> Member:

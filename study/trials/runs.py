@@ -32,8 +32,6 @@ from study.trials.kinds import TESTS
 
 SINGLE, NONE, PAIR, REMOVED, COMPLETED = "single", "none", "pair", "removed", "completed"
 WITHOUT, WITH = "without", "with"  # a fault of the measurement
-FIRST_OF_TESTS, EACH_TEST = 630_001, 50  # seed, and trials of each kind of test
-FIRST_OF_STRUCTURES, EVERY_STRUCTURE, NONE_EVERY = 20_000, 120, 6  # seed, trials, and out of how many one hides nothing
 
 
 @dataclass(frozen=True)
@@ -94,19 +92,19 @@ def _wanted(
     ]
 
 
-def orders_of_tests(first: int = FIRST_OF_TESTS, each: int = EACH_TEST) -> list[Order]:
+def orders_of_tests(first: int = 630_001, each: int = 50) -> list[Order]:
     """So many trials of each kind of test, effects and noises as they are drawn."""
     return [Order("", seed, None, None, None, test=test) for seed in range(first, first + each) for test in TESTS]
 
 
-def structure_orders(count: int = EVERY_STRUCTURE, first: int = FIRST_OF_STRUCTURES) -> list[Order]:
-    """So many trials of structures, laid out evenly over effects, noises, motions and sizes."""
+def structure_orders(count: int = 120, first: int = 20_000) -> list[Order]:
+    """So many trials of structures, laid out evenly over effects, noises, motions and sizes; every sixth hides none."""
     effects = [str(name) for name in np.random.default_rng(first).permutation(HIDDEN)]
     noises, motions = FAMILIES[STRUCTURE].noises, FAMILIES[STRUCTURE].motions
     every: list[Order] = []
     for i in range(count):
-        none = i % NONE_EVERY == NONE_EVERY - 1
-        hidden = () if none else (effects[(i - i // NONE_EVERY) % len(effects)],)
+        none = i % 6 == 5
+        hidden = () if none else (effects[(i - i // 6) % len(effects)],)
         noise, motion = noises[i % len(noises)], motions[(i // len(noises)) % len(motions)]
         kind, size = NONE if none else SINGLE, 2 + (i // 2) % 4
         every.append(Order(kind, first + i, hidden, noise, motion, test=STRUCTURE, coordinates=size))

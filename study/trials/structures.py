@@ -25,7 +25,6 @@ SHAKER = "shaker"  # the force
 SAMPLES = 8192
 FASTEST = (8.0, 14.0)  # samples in a period of the fastest mode
 SLOWEST = 120.0  # periods of the slowest mode in a record, at least
-PUSH = 10  # samples at the start
 
 
 def structure_rig(rng: np.random.Generator, asked: Asked) -> Rig:
@@ -57,7 +56,7 @@ def structure_rig(rng: np.random.Generator, asked: Asked) -> Rig:
 
     def recorded(truth: Model, shares: Shares) -> tuple[StructureRecord, Shares]:
         if asked.hidden:
-            calm = forgets(lambda f: simulated(truth, 2, ["displacement"], f).measured.T, drive, PUSH)
+            calm = forgets(lambda f: simulated(truth, 2, ["displacement"], f).measured.T, drive, 10)
             expect(calm, "the motion does not forget how it began")
         quiet = simulated(truth, 16, [asked.response])
         level = np.sqrt(asked.noise)

@@ -17,7 +17,7 @@ from study.records.prepared import prepare_record
 from study.records.readers import read_record
 from study.support.errors import StudyError
 from study.trials import DRIVEN, HIDDEN, SHARE, make_trial, sealed, share_of
-from study.trials.driven import DAMPINGS, KINDS, MEMORIES, PERIODS, RATES, SAMPLES, SLOWEST, wide
+from study.trials.driven import KINDS, SLOWEST, WIDE, wide
 
 
 @pytest.mark.parametrize("name", HIDDEN)
@@ -103,18 +103,18 @@ def test_any_fault_means_one_in_half_of_the_trials() -> None:
 
 def test_the_wide_range_reaches_its_ends_and_every_record_is_long_enough() -> None:
     rng = np.random.default_rng(1)
-    drawn = [wide(rng) for _ in range(2000)]
+    drawn = [wide(rng, WIDE) for _ in range(2000)]
     rates, dampings = (np.array([getattr(e, name) for e in drawn]) for name in ("samples_a_period", "damping"))
     samples = np.array([e.samples for e in drawn])
-    for values, bounds in ((rates, RATES), (dampings, DAMPINGS), (samples, SAMPLES)):
+    for values, bounds in ((rates, WIDE.rates), (dampings, WIDE.dampings), (samples, WIDE.samples)):
         assert bounds[0] * (1.0 - 1e-9) <= np.min(values) < 1.05 * bounds[0]
         assert 0.95 * bounds[1] < np.max(values) <= bounds[1] * (1.0 + 1e-9)
-    assert np.all(samples >= PERIODS * rates * (1.0 - 1e-9))
-    assert np.all(samples >= MEMORIES * rates / (2.0 * np.pi * dampings) * (1.0 - 1e-9))
+    assert np.all(samples >= WIDE.periods * rates * (1.0 - 1e-9))
+    assert np.all(samples >= WIDE.memories * rates / (2.0 * np.pi * dampings) * (1.0 - 1e-9))
     assert {e.kind for e in drawn} == set(KINDS)
     # evenly on a logarithmic scale, as far as long records are not refused
-    assert np.mean(rates < np.sqrt(RATES[0] * RATES[1])) == pytest.approx(0.5, abs=0.04)
-    assert np.mean(dampings < np.sqrt(DAMPINGS[0] * DAMPINGS[1])) == pytest.approx(0.5, abs=0.04)
+    assert np.mean(rates < np.sqrt(np.prod(WIDE.rates))) == pytest.approx(0.5, abs=0.04)
+    assert np.mean(dampings < np.sqrt(np.prod(WIDE.dampings))) == pytest.approx(0.5, abs=0.04)
     assert all(e.excitation.highest * e.dt <= 0.4 + 1e-9 for e in drawn)
     assert all(e.excitation.periods > 1 for e in drawn if "sweep" in e.kind)
 
