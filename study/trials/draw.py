@@ -130,14 +130,14 @@ def _check(test: str, hidden: Sequence[str] | None, response: str | None, fault:
     family, names = FAMILIES[test], hidden or ()
     for name in names:
         known = get(name).name in family.possible
-        expect(known, f"{name!r} cannot be hidden in {test}; take {', '.join(family.possible)}")
+        expect(known, f"{name!r} cannot be hidden in {test}; expected one of {', '.join(family.possible)}")
     once = len(set(names)) == len(names)
     expect(once, f"the effects to hide are {', '.join(names)}; each may be named once")
     motions = MOTIONS if len(family.motions) > 1 else family.motions
     fits = response is None or response in motions
-    expect(fits, f"response is {response!r}; in {test} it must be one of {', '.join(motions)}")
+    expect(fits, f"response is {response!r}; in {test} expected one of {', '.join(motions)}")
     faults = (NO_FAULT, ANY, *FAULTS) if test in (DRIVEN, LIKE_THE_REPORT) else (NO_FAULT,)
-    expect(fault in faults, f"fault is {fault!r}; in {test} it must be one of {', '.join(faults)}")
+    expect(fault in faults, f"fault is {fault!r}; in {test} expected one of {', '.join(faults)}")
     expect(coordinates is None or test == STRUCTURE, f"{test} has a single coordinate; expected {STRUCTURE}")
 
 

@@ -53,7 +53,7 @@ def test_a_trial_of_a_structure_is_written_and_opened(tmp_path, capsys):
     assert "nothing is hidden" in capsys.readouterr().out
     assert main(["trial", "--seed", "3", "--coordinates", "2", "--fault", "any", "--out", str(tmp_path)]) == 2
     assert main(["trial", "--seed", "3", "--coordinates", "2", "--hidden", "inertia", "--out", str(tmp_path)]) == 2
-    with pytest.raises(StudyError, match="must be one of displacement"):
+    with pytest.raises(StudyError, match="expected one of displacement"):
         make_trial(1, response="strain", test=STRUCTURE)
 
 

@@ -181,7 +181,7 @@ def test_command_writes_record_model_and_sealed_answer(tmp_path: Path, capsys: p
     assert b"quadratic_damping" not in said.encode()
     assert main(["trial", "--open", str(answer)]) == 0
     assert "quadratic_damping" in capsys.readouterr().out
-    assert parse_model(sealed.unseal(answer)["truth"], answer) == trial.truth
+    assert parse_model(sealed.unseal(answer).truth, answer) == trial.truth
 
 
 @pytest.mark.parametrize(("fault", "said"), [("delay", "delay of the velocity"), ("force_noise", "force noise of the")])
@@ -189,8 +189,9 @@ def test_answer_names_the_fault(tmp_path: Path, capsys: pytest.CaptureFixture[st
     words = ["--seed", "3", "--hidden", "none", "--response", "velocity", "--fault", fault, "--out", str(tmp_path)]
     assert main(["trial", *words]) == 0
     assert fault not in capsys.readouterr().out
-    imposed = sealed.unseal(tmp_path / "trial_3.answer.json")["fault"]
-    assert imposed["fault"] == fault
+    imposed = sealed.unseal(tmp_path / "trial_3.answer.json").fault
+    assert isinstance(imposed, sealed.Imposed)
+    assert imposed.fault == fault
     assert main(["trial", "--open", str(tmp_path / "trial_3.answer.json")]) == 0
     assert f"fault of the measurement: {said}" in capsys.readouterr().out
 
@@ -205,7 +206,7 @@ def test_a_fault_that_there_is_not_is_refused(tmp_path: Path, capsys: pytest.Cap
 
 def test_command_hides_nothing_when_told_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["trial", "--seed", "3", "--hidden", "none", "--noise", "0", "--out", str(tmp_path)]) == 0
-    assert sealed.unseal(tmp_path / "trial_3.answer.json")["hidden"] == []
+    assert sealed.unseal(tmp_path / "trial_3.answer.json").hidden == []
     capsys.readouterr()
     assert main(["trial", "--open", str(tmp_path / "trial_3.answer.json")]) == 0
     assert capsys.readouterr().out.startswith("nothing is hidden")
