@@ -20,7 +20,7 @@ from study.records.record import MOTIONS, Record
 from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 from study.trials import effects
-from study.trials.effects import LINEAR, SHARE, Asked, Rig, Shares, Sizing, evenly_in_log, oscillator, share_of
+from study.trials.effects import LINEAR, SHARE, Asked, Rig, Shares, Sizing, evenly_in_log, linear_oscillator, share_of
 
 KINDS = ("gaussian_lowpass", "pierson_moskowitz", "random_phase_multisine", "linear_sweep", "logarithmic_sweep")
 KNOWN = ("none", "none", "cubic_stiffness", "van_der_pol_damping")  # of which one is drawn
@@ -153,7 +153,7 @@ def report_like(rng: np.random.Generator, _: Ranges) -> Experiment:
     zeta = float(rng.uniform(0.02, 0.10))
     dt = float(rng.uniform(0.04, 0.08)) / f_n
     excitation = Excitation(level=float(10.0 ** rng.uniform(-1.0, 5.0)), reading="filtered", cutoff=0.25 / dt)
-    return Experiment(oscillator(mass, f_n, zeta), zeta, f_n, dt, 8192, excitation)
+    return Experiment(linear_oscillator(mass, f_n, zeta), zeta, f_n, dt, 8192, excitation)
 
 
 def wide(rng: np.random.Generator, ranges: Ranges) -> Experiment:
@@ -173,7 +173,7 @@ def wide(rng: np.random.Generator, ranges: Ranges) -> Experiment:
     samples = 1.0 / rng.uniform(1.0 / most, 1.0 / least)
     samples = whole * int(np.clip(np.ceil(samples / whole), fewest // whole + 1, most // whole))
     excitation = _excitation(rng, ranges, f_n, rate, samples / rate)
-    return Experiment(oscillator(mass, f_n, zeta), zeta, f_n, 1.0 / (rate * f_n), samples, excitation)
+    return Experiment(linear_oscillator(mass, f_n, zeta), zeta, f_n, 1.0 / (rate * f_n), samples, excitation)
 
 
 def _excitation(rng: np.random.Generator, ranges: Ranges, f_n: float, rate: float, periods: float) -> Excitation:

@@ -78,7 +78,7 @@ def linear_model(values: Mapping[str, float]) -> Model:
     return Model("truth", tuple(t for t in terms if t.coefficients != (None,)))
 
 
-def oscillator(mass: float, frequency: float, damping: float) -> Model:
+def linear_oscillator(mass: float, frequency: float, damping: float) -> Model:
     """A linear one by its natural frequency in Hz and its share of the critical damping."""
     omega = 2.0 * np.pi * frequency
     return linear_model({"m": mass, "c": 2.0 * damping * omega * mass, "k": omega**2 * mass})

@@ -78,7 +78,7 @@ def rig_of_a_test(rng: np.random.Generator, asked: Asked, make: Callable[[np.ran
 def _oscillator(rng: np.random.Generator, damping: tuple[float, float]) -> tuple[Model, float, float]:
     """Inertia, damping and stiffness, with the natural frequency in Hz and the sampling interval."""
     frequency, mass = evenly_in_log(rng, 0.3, 30.0), float(np.exp(rng.uniform(-2.0, 4.0)))
-    model = effects.oscillator(mass, frequency, evenly_in_log(rng, *damping))
+    model = effects.linear_oscillator(mass, frequency, evenly_in_log(rng, *damping))
     return model, frequency, 1.0 / (frequency * float(rng.uniform(16.0, 40.0)))
 
 
