@@ -51,7 +51,7 @@ def _run(arguments: argparse.Namespace) -> None:
     masses = arguments.coordinates
     both = masses is not None and arguments.test is not None
     expect(not both, "--coordinates asks for a structure, --test for another test; expected one of them")
-    test = draw.STRUCTURE if masses is not None else arguments.test or draw.DRIVEN
+    test = draw.STRUCTURE if masses is not None else arguments.test or draw.DRIVEN_MASS
     hidden = _names(arguments.hidden)
     trial = draw.make_trial(arguments.seed, hidden, arguments.noise, arguments.response, arguments.fault, test, masses)
     print(_written(trial, *sealed.write_trial(trial, arguments.out)))

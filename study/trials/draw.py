@@ -14,13 +14,13 @@ from study.faults.imposed import FAULTS, impose
 from study.records.record import MOTIONS, Record
 from study.structure.structure_record import StructureRecord
 from study.support.errors import DivergenceError, StudyError, expect
-from study.trials.driven import REPORT_LIKE, WIDE, driven_rig
+from study.trials.driven import LABORATORIES, REPORT_LIKE, driven_rig
 from study.trials.effects import HIDDEN, Asked, Rig, grown
 from study.trials.kinds import POSSIBLE, TESTS, rig_of_a_test
 from study.trials.structures import structure_rig
 
 # Kinds of test, beside those of ``kinds``: a force on mass and spring, and on masses between springs.
-DRIVEN, LIKE_THE_REPORT, STRUCTURE = "driven", "like_the_report", "structure"
+DRIVEN_MASS, LIKE_THE_REPORT, STRUCTURE = "driven", "like_the_report", "structure"
 NOISES = (0.0, 0.01, 0.05, 0.10)
 ATTEMPTS = 300  # systems drawn until one carries the effects at the wanted strength and stays finite
 ANY, NO_FAULT = "any", "none"  # what may be said of the fault beside its name
@@ -136,7 +136,7 @@ def _check(test: str, hidden: Sequence[str] | None, response: str | None, fault:
     motions = MOTIONS if len(family.motions) > 1 else family.motions
     fits = response is None or response in motions
     expect(fits, f"response is {response!r}; in {test} expected one of {', '.join(motions)}")
-    faults = (NO_FAULT, ANY, *FAULTS) if test in (DRIVEN, LIKE_THE_REPORT) else (NO_FAULT,)
+    faults = (NO_FAULT, ANY, *FAULTS) if test in (DRIVEN_MASS, LIKE_THE_REPORT) else (NO_FAULT,)
     expect(fault in faults, f"fault is {fault!r}; in {test} expected one of {', '.join(faults)}")
     expect(coordinates is None or test == STRUCTURE, f"{test} has a single coordinate; expected {STRUCTURE}")
 
@@ -186,7 +186,7 @@ FAMILIES: Mapping[str, Family] = MappingProxyType(
             name: Family(
                 "trial", (2026,), HIDDEN, _of_driven, NOISES, ranges.responses, partial(driven_rig, ranges=ranges)
             )
-            for name, ranges in ((LIKE_THE_REPORT, REPORT_LIKE), (DRIVEN, WIDE))
+            for name, ranges in ((LIKE_THE_REPORT, REPORT_LIKE), (DRIVEN_MASS, LABORATORIES))
         },
         **{
             name: Family(

@@ -1,7 +1,7 @@
 """Trials of a force on a mass and spring: a linear oscillator, how it is driven, and how it is sampled.
 
 Two ranges are drawn from. ``REPORT_LIKE`` is sampled and damped as the report's systems are, give or take a factor of
-two; ``WIDE`` is what laboratories do. Half of the systems have a known nonlinearity of the report's kind.
+two; ``LABORATORIES`` is what laboratories do. Half of the systems have a known nonlinearity of the report's kind.
 """
 
 import math
@@ -22,10 +22,10 @@ from study.support.errors import StudyError, expect
 from study.trials import effects
 from study.trials.effects import LINEAR, SHARE, Asked, Rig, Shares, Sizing, evenly_in_log, linear_oscillator, share_of
 
-KINDS = ("gaussian_lowpass", "pierson_moskowitz", "random_phase_multisine", "linear_sweep", "logarithmic_sweep")
-KNOWN = ("none", "none", "cubic_stiffness", "van_der_pol_damping")  # of which one is drawn
-SLOWEST = 12.5  # samples a period of the linear system from which on the plain number of steps a sample will do
-STEPS = 32  # per sample of the record, and more where there are few samples a period
+EXCITATIONS = ("gaussian_lowpass", "pierson_moskowitz", "random_phase_multisine", "linear_sweep", "logarithmic_sweep")
+KNOWN_EFFECTS = ("none", "none", "cubic_stiffness", "van_der_pol_damping")  # of which one is drawn
+PLAIN_RATE = 12.5  # samples a period of the linear system from which on the plain number of steps a sample will do
+FINE_STEPS = 32  # per sample of the record, and more where there are few samples a period
 
 
 @dataclass(frozen=True)
@@ -46,12 +46,12 @@ class Experiment:
 
     @property
     def kind(self) -> str:
-        """Which of ``KINDS`` drives it."""
+        """Which of ``EXCITATIONS`` drives it."""
         return f"{self.excitation.sweep}_sweep" if self.excitation.kind == "swept_sine" else self.excitation.kind
 
     def steps(self, plain: int) -> int:
-        """Integration steps a sample, for as many a period as ``plain`` ones give a system of ``SLOWEST`` samples."""
-        return plain * max(1, int(np.ceil(SLOWEST / self.samples_a_period)))
+        """Integration steps a sample: as many a period as ``plain`` ones are at ``PLAIN_RATE`` samples a period."""
+        return plain * max(1, int(np.ceil(PLAIN_RATE / self.samples_a_period)))
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def driven_rig(rng: np.random.Generator, asked: Asked, ranges: Ranges) -> Rig:
         shares = tuple(share_of(truth, name, record) for name in asked.hidden)
         expect(all(SHARE[0] <= share <= SHARE[1] for share in shares), "an effect has changed the share of another")
         fine, coarse = (
-            predict_response(truth, record, response=asked.response, steps_per_sample=experiment.steps(STEPS) // n)
+            predict_response(truth, record, response=asked.response, steps_per_sample=experiment.steps(FINE_STEPS) // n)
             for n in (1, 2)
         )
         accurate = float(np.std(fine - coarse)) < ranges.accurate * float(np.std(fine))
@@ -120,7 +120,7 @@ def driven_rig(rng: np.random.Generator, asked: Asked, ranges: Ranges) -> Rig:
     base, quiet = experiment.system, simulated(experiment.system, 4)
     linear, sizing = quiet, Sizing(12, secant=ranges.secant)
     rig = Rig(base, lambda term: effects.drawn_effect(rng, free(term), quiet), motion, strength, recorded, sizing, {})
-    known = str(rng.choice(KNOWN))
+    known = str(rng.choice(KNOWN_EFFECTS))
     if known != "none" and known not in asked.hidden:
         with suppress(StudyError):  # without it, where it cannot be so strong
             base, _ = effects.grown(base, replace(free(get(known)), coefficients=(1.0,)), ranges.known, rig)
@@ -181,7 +181,7 @@ def _excitation(rng: np.random.Generator, ranges: Ranges, f_n: float, rate: floa
 
     Sweeps are repeated, so that the part to judge is driven at the frequencies of the part to fit.
     """
-    kind = str(rng.choice(KINDS))
+    kind = str(rng.choice(EXCITATIONS))
     level = float(10.0 ** rng.uniform(-1.0, 5.0))
     highest = f_n * evenly_in_log(rng, ranges.reach[0], min(ranges.reach[1], ranges.sampled * rate))
     lowest = f_n * evenly_in_log(rng, 0.1, 0.5)
@@ -206,5 +206,5 @@ def _excitation(rng: np.random.Generator, ranges: Ranges, f_n: float, rate: floa
             )
 
 
-WIDE = Ranges(wide)
+LABORATORIES = Ranges(wide)
 REPORT_LIKE = Ranges(report_like, ("displacement", "acceleration"), accurate=1e-3, drowned=math.inf, secant=False)

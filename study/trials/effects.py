@@ -28,7 +28,7 @@ STEEPEST = 3.0  # power of the amount by which a share is taken to grow, or one 
 FARTHEST = 100.0  # logarithm of what an amount may grow by at once; with far less the motion escapes
 FORGOTTEN = 1e-3  # share of the motion that a push at the start may still move in the second half
 # Standard errors at which 19 of 20 tests of about 20 candidates find an effect.
-VISIBLE = float(-ndtri(ALPHA / 20) + ndtri(0.95))
+VISIBLE_ERRORS = float(-ndtri(ALPHA / 20) + ndtri(0.95))
 Shares = tuple[float, ...]  # one for each hidden effect
 
 
@@ -227,7 +227,7 @@ def forgets(motion: Callable[[Floats], Floats], force: Floats, samples: int = 20
 
 
 def stands_out(clean: Record, truth: Model, name: str, noise: float) -> bool:
-    """Whether the coefficient of an effect would stand ``VISIBLE`` standard errors from zero, of white noise.
+    """Whether the coefficient of an effect would stand ``VISIBLE_ERRORS`` standard errors from zero, of white noise.
 
     This is asked of the true model alone (the bound of Cramer and Rao), so that no property of the search decides which
     trials there are.
@@ -257,4 +257,4 @@ def stands_out(clean: Record, truth: Model, name: str, noise: float) -> bool:
     inverse = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale), rcond=1e-12, hermitian=True)
     at = fit.keys.index(entry.symbols[0])
     error = noise * float(np.sqrt(max(inverse[at, at], 0.0)) / scale[at])
-    return abs(entry.coefficients[0] or 0.0) >= VISIBLE * error
+    return abs(entry.coefficients[0] or 0.0) >= VISIBLE_ERRORS * error

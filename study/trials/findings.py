@@ -26,7 +26,7 @@ from study.trials.draw import Trial
 from study.trials.kept import Row
 
 Found = Mapping[str, Any]  # a fault of the measurement as diagnosis.json has it
-FAR = 20.0  # standard errors: rivals that are farther behind stand in no tie set
+FAR_BEHIND = 20.0  # standard errors: rivals that are farther behind stand in no tie set
 
 
 def compared(trial: Trial, model: Model) -> tuple[Comparison, tuple[Fault, ...]]:
@@ -55,7 +55,7 @@ def evidence_row(diagnosis: Diagnosis, hidden: Sequence[str]) -> Row:
 
     ``smallest_p`` is the smallest p value (of so many candidates) of those that would be believed if it were small
     enough, ``true_p`` that of the hidden effect, ``distance`` how far that is behind the first in standard errors, and
-    ``rivals`` how far each is that is less than ``FAR`` behind, the first included.
+    ``rivals`` how far each is that is less than ``FAR_BEHIND`` behind, the first included.
     """
     rows = diagnosis.candidates
     behind = {row.name: max(row.distance, 0.0) for row in rows}
@@ -67,7 +67,7 @@ def evidence_row(diagnosis: Diagnosis, hidden: Sequence[str]) -> Row:
         "smallest_p": min(believable, default=1.0),
         "true_p": math.nan if true is None else true.p_value,
         "distance": math.nan if true is None else behind[true.name],
-        "rivals": "+".join(f"{d:.2f}" for d in behind.values() if d < FAR),
+        "rivals": "+".join(f"{d:.2f}" for d in behind.values() if d < FAR_BEHIND),
     }
 
 

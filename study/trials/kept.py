@@ -11,7 +11,7 @@ import pandas as pd
 Row = dict[str, Any]
 TRIALS, BY_TEST, STRUCTURES = "trials", "trials_by_test", "trials_of_structures"
 TIMES = ("seconds",)  # of another machine, or another hour
-ALIKE = 0.01  # relative: numbers of two runs of the same code on two machines
+SAME_RUN = 0.01  # relative: numbers of two runs of the same code on two machines
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def differing_trials(own: pd.DataFrame, kept: pd.DataFrame, name: str) -> list[s
     """What came out otherwise than in a kept table: ``"seed 7: verdict"`` and so on; both as their file reads.
 
     ``kept`` may hold trials that ``own`` lacks. What was drawn and what was said must be the same word by word, errors
-    to ``ALIKE``; what is loose is not compared.
+    to ``SAME_RUN``; what is loose is not compared.
     """
     table = KEPT_TABLES[name]
     keys = [key for key in ("test", "seed") if key in table.columns]
@@ -93,7 +93,7 @@ def _apart(column: str, own: pd.DataFrame, before: pd.DataFrame, table: KeptTabl
     else:
         numbers = [pd.to_numeric(c, errors="coerce").to_numpy(dtype=np.float64) for c in (one, other)]
         floor = 1e-6 if column.startswith("error") else 0.0  # what the integration leaves where there is no noise
-        same = np.isclose(*numbers, rtol=ALIKE, atol=floor, equal_nan=True)
+        same = np.isclose(*numbers, rtol=SAME_RUN, atol=floor, equal_nan=True)
     return [int(seed) for seed in own["seed"].to_numpy()[~same]]
 
 

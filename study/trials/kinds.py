@@ -26,7 +26,7 @@ from study.trials.effects import HIDDEN, LINEAR, SHARE, Asked, Rig, Shares, Sizi
 
 TIMED = ("periodic_stiffness", "harmonic_force")  # what knows of time: no program of a test is in step with it
 DAMPED = 2.5  # times as large a share, of the viscous force, is what a hidden damper carries
-STEPS = 8  # of the integration, a sample
+TEST_STEPS = 8  # of the integration, a sample
 # The motion that each linear term acts on.
 SHAPES: Mapping[str, str] = MappingProxyType(dict(zip(LINEAR, reversed(MOTIONS), strict=True)))
 
@@ -95,7 +95,7 @@ def _run(
     record = Record(dt, {"force": force}, dict(SI_UNITS))
     return record.with_channels(
         {
-            name: predict_response(model, record, response=name, steps_per_sample=STEPS, initial=initial)
+            name: predict_response(model, record, response=name, steps_per_sample=TEST_STEPS, initial=initial)
             for name in motions
         }
     )
@@ -175,7 +175,7 @@ def _component(rng: np.random.Generator) -> Bench:
 
     def respond(truth: Model) -> Record:
         initial = (0.0,) * len(truth.states)
-        force = predict_response(truth, record, response="force", steps_per_sample=STEPS, initial=initial)
+        force = predict_response(truth, record, response="force", steps_per_sample=TEST_STEPS, initial=initial)
         return record.with_channels({"force": force})
 
     return Bench(model, record, respond, "force")

@@ -16,7 +16,7 @@ from study.records.record import Record
 from study.support.document import Block, Image, Text, table
 from study.trials import rates
 from study.trials.draw import make_trial
-from study.trials.effects import VISIBLE
+from study.trials.effects import VISIBLE_ERRORS
 from study.trials.kept import BY_TEST, STRUCTURES, TRIALS, Row
 from study.trials.runs import WITH, WITHOUT
 
@@ -24,7 +24,7 @@ HEADING = ("trial", "noise", "hidden", "first", "2 ln (likelihood of the hidden 
 PAGES: Mapping[str, str] = MappingProxyType(
     {TRIALS: "tool.md", BY_TEST: "kinds_of_tests.md", STRUCTURES: "structures.md"}
 )
-GROUPS: Mapping[str, str] = MappingProxyType({WITHOUT: "without faults", WITH: "with a fault", "": "reached"})
+GROUP_HEADINGS: Mapping[str, str] = MappingProxyType({WITHOUT: "without faults", WITH: "with a fault", "": "reached"})
 # What was hidden and what was said: pictures of the counts, as ``figures/`` and docs have them, and their titles.
 CONFUSIONS: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
@@ -36,10 +36,10 @@ CONFUSIONS: Mapping[str, Mapping[str, str]] = MappingProxyType(
         },
     }
 )
-SHOWN = (
+WHAT_SHOWS = (
     "An effect is shown by a record without noise, and by one with noise if its coefficient in the fit of the true "
-    f"model stands {VISIBLE:.1f} standard errors from zero: of less, a test that asks for so many candidates finds "
-    "fewer than 19 of 20, however it is made."
+    f"model stands {VISIBLE_ERRORS:.1f} standard errors from zero: of less, a test that asks for so many candidates "
+    "finds fewer than 19 of 20, however it is made."
 )
 
 
@@ -62,7 +62,7 @@ def reached(trials: pd.DataFrame, name: str, wanted: rates.Wanted | None = None)
     asked = {line["group"] for line in lines if line["reached"]}
     heading, columns = ["reach"], list[tuple[str, bool]]()
     for group in rates.groups_of(trials, name):
-        heading += [GROUPS.get(group, group), *(["wanted"] if group in asked else [])]
+        heading += [GROUP_HEADINGS.get(group, group), *(["wanted"] if group in asked else [])]
         columns += [(group, False), *([(group, True)] if group in asked else [])]
     names = dict.fromkeys(line["reach"] for line in lines)
     rows = [[what, *(_text(cells.get((what, group)), aim) for group, aim in columns)] for what in names]
@@ -77,7 +77,7 @@ def _about(trials: pd.DataFrame, name: str) -> str:
         "count as failed; in brackets 95 % intervals (Wilson, 1927) and the number of trials."
     )
     if name == BY_TEST:
-        return f"{said} {SHOWN}"
+        return f"{said} {WHAT_SHOWS}"
     return f"{said} A target is reached if the interval reaches it; what is not is marked *."
 
 

@@ -17,26 +17,19 @@ from scipy.special import ndtri
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
 from study.equations.terms import LIBRARY, same_elsewhere
 from study.support.arrays import Floats
-from study.trials.effects import VISIBLE
+from study.trials.effects import VISIBLE_ERRORS
 from study.trials.kept import BY_TEST, STRUCTURES, TRIALS, Row, rows_of
 from study.trials.kinds import TESTS
 from study.trials.runs import COMPLETED, NONE, PAIR, REMOVED, SINGLE, WITH, WITHOUT
 
-VERY_LITTLE, LITTLE = 0.01, 0.05  # noise up to which ties are to be short, and the true effect has to come first
+FAINT_NOISE, MODEST_NOISE = 0.01, 0.05  # noise up to which ties are to be short, and the true effect has to come first
 COUNTED = 1e-6  # relative: what is counted or read off has no interval, and no last bit either
 WITHIN = 1.05  # held-out error after adding, over that of the true model
-SAME, END, OTHER, FAILED = "the same place", "a place with an end in common", "another place", "not_diagnosed"
+SAME_PLACE, END_IN_COMMON, ANOTHER_PLACE = "the same place", "a place with an end in common", "another place"
+NOT_DIAGNOSED = "not_diagnosed"
+# Of which a table says what each would do: a run keeps what its verdict rested on.
 ALPHAS = (1e-4, 1e-3, 0.005, 0.01, 0.02, 0.05, 0.1)
-FACTORS = (
-    0.5,
-    1.0,
-    1.5,
-    2.0,
-    2.5,
-    3.0,
-    4.0,
-    5.0,
-)  # of which a table says what each would do: a run keeps what its verdict rested on
+FACTORS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)
 NORMAL = float(ndtri(0.975))
 
 
@@ -183,8 +176,13 @@ def _hidden(test: Member = lambda _: True) -> Member:
     return lambda row: row["hidden"] != NONE and test(row)
 
 
-def _kinds(*kinds: str, test: Member = lambda _: True) -> Member:
-    return lambda row: row["kind"] in kinds and test(row)
+def _kinds(*kinds: str) -> Member:
+    return lambda row: row["kind"] in kinds
+
+
+def _single(test: Member = lambda _: True, above: float = -1.0, up_to: float = math.inf) -> Member:
+    """One effect hidden, behind noise above one level and up to another."""
+    return lambda row: row["kind"] == SINGLE and above < row["noise"] <= up_to and test(row)
 
 
 def _nothing_hidden(row: Row) -> bool:
@@ -195,6 +193,10 @@ def _faulty(row: Row) -> bool:
     return row["fault"] != ""
 
 
+def _named(row: Row) -> bool:
+    return row["tie_set"] != ""
+
+
 def _visible(row: Row) -> bool:
     """Whether the hidden effect leaves anything to be seen: a constant force behind a high-pass does not."""
     return not row["error_true"] >= row["error_before"]
@@ -202,16 +204,12 @@ def _visible(row: Row) -> bool:
 
 def _stands_out(row: Row) -> bool:
     """Whether the record of a test shows the hidden effect; what could not be diagnosed is taken to."""
-    return row["noise"] == 0.0 or row["shown"] >= VISIBLE or row["trouble"] != ""
+    return row["noise"] == 0.0 or row["shown"] >= VISIBLE_ERRORS or row["trouble"] != ""
 
 
 def _asks(column: str) -> Member:
     """Whether intervals were asked for: without noise they are as wide as rounding."""
     return lambda row: not row["trouble"] and row["noise"] > 0.0 and row[column] > 0
-
-
-def _tied_with_noise(least: float, most: float) -> Member:
-    return _kinds(SINGLE, test=lambda row: row["tie_set"] != "" and least < row["noise"] <= most)
 
 
 def _is(column: str) -> Score:
@@ -226,16 +224,13 @@ def _both(row: Row) -> float:
     return _is("effect_first")(row) * _is("place_first")(row)
 
 
-REACH: Mapping[str, tuple[Reach, ...]] = MappingProxyType(
+TARGETS: Mapping[str, tuple[Reach, ...]] = MappingProxyType(
     {
         TRIALS: (
-            Reach("true effect first, noise to 5 %", _kinds(SINGLE, test=lambda r: r["noise"] <= LITTLE), first_score,
-                  "first"),
-            Reach("true effect first, noise 10 %", _kinds(SINGLE, test=lambda r: r["noise"] > LITTLE), first_score,
-                  "first_in_noise"),
-            Reach("tie set holds the truth", _kinds(SINGLE), tied_score, "tied"),
-            Reach("... where the true model leaves less than that without the effect", _kinds(SINGLE, test=_visible),
-                  tied_score),
+            Reach("true effect first, noise to 5 %", _single(up_to=MODEST_NOISE), first_score, "first"),
+            Reach("true effect first, noise 10 %", _single(above=MODEST_NOISE), first_score, "first_in_noise"),
+            Reach("tie set holds the truth", _single(), tied_score, "tied"),
+            Reach("... where the true model leaves less than that without the effect", _single(_visible), tied_score),
             Reach("nothing missing where nothing is, and of completed models", _kinds(NONE, COMPLETED), nothing_score,
                   "nothing"),
             Reach("... where nothing is", _kinds(NONE), nothing_score),
@@ -247,12 +242,12 @@ REACH: Mapping[str, tuple[Reach, ...]] = MappingProxyType(
             Reach("... of those that the record shows beside the true equation", lambda r: r["fault_shown"] == "yes",
                   fault_score),
             Reach("no fault named where there is none", lambda r: not _faulty(r), no_fault_score),
-            Reach("error after adding within 5 % of the true model's", _kinds(SINGLE), as_good_as_truth),
-            Reach("mean size of the tie set, noise to 1 %", _tied_with_noise(-1.0, VERY_LITTLE), _number("tie_size"),
+            Reach("error after adding within 5 % of the true model's", _single(), as_good_as_truth),
+            Reach("mean size of the tie set, noise to 1 %", _single(_named, up_to=FAINT_NOISE), _number("tie_size"),
                   "size", size=True),
-            Reach("mean size of the tie set, noise 5 %", _tied_with_noise(VERY_LITTLE, LITTLE), _number("tie_size"),
-                  "size_in_noise", size=True),
-            Reach("mean size of the tie set, noise 10 %", _tied_with_noise(LITTLE, 1.0), _number("tie_size"),
+            Reach("mean size of the tie set, noise 5 %", _single(_named, FAINT_NOISE, MODEST_NOISE),
+                  _number("tie_size"), "size_in_noise", size=True),
+            Reach("mean size of the tie set, noise 10 %", _single(_named, MODEST_NOISE), _number("tie_size"),
                   size=True),
             Reach("95 % intervals of coefficients that hold the truth, with noise", _asks("asked"), _number("held"),
                   "held", asked="asked"),
@@ -266,8 +261,8 @@ REACH: Mapping[str, tuple[Reach, ...]] = MappingProxyType(
                   asked="asked"),
         ),
         STRUCTURES: (
-            Reach("effect and place first, noise to 1 %", _hidden(lambda r: r["noise"] <= VERY_LITTLE), _both, "first"),
-            Reach("effect and place first, noise of 5 %", _hidden(lambda r: r["noise"] > VERY_LITTLE), _both,
+            Reach("effect and place first, noise to 1 %", _hidden(lambda r: r["noise"] <= FAINT_NOISE), _both, "first"),
+            Reach("effect and place first, noise of 5 %", _hidden(lambda r: r["noise"] > FAINT_NOISE), _both,
                   "first_in_noise"),
             Reach("effect first", _hidden(), _is("effect_first")),
             Reach("place first", _hidden(), _is("place_first")),
@@ -297,7 +292,7 @@ def target_summary(table: pd.DataFrame, name: str, wanted: Wanted | None = None)
     found: list[Row] = []
     for place, group in enumerate(groups_of(table, name)):
         own = [row for row in rows if not column or row[column] == group]
-        for reach in REACH[name]:
+        for reach in TARGETS[name]:
             rate = reach.of(own)
             most = _wanted(wanted, reach.key if reach.size else f"{reach.key}_most", place)
             least = math.nan if reach.size else _wanted(wanted, reach.key, place)
@@ -335,7 +330,7 @@ def confusion_of_places(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _said(row: Row) -> str:
-    return FAILED if row["trouble"] else row["first"] if row["verdict"] == MISSING else row["verdict"]
+    return NOT_DIAGNOSED if row["trouble"] else row["first"] if row["verdict"] == MISSING else row["verdict"]
 
 
 def _where_hidden(row: Row) -> str:
@@ -350,7 +345,7 @@ def _where_said(row: Row) -> str:
     said, true = _path(row["first_place"]), _path(row["place"])
     if not said:
         return _said(row)
-    return SAME if said == true else END if (said & true) - {"ground"} else OTHER
+    return SAME_PLACE if said == true else END_IN_COMMON if (said & true) - {"ground"} else ANOTHER_PLACE
 
 
 def _path(label: str) -> set[str]:
@@ -361,8 +356,8 @@ def _path(label: str) -> set[str]:
 
 def _counted(pairs: Sequence[tuple[str, str]]) -> pd.DataFrame:
     """In the order of the library; what is no effect comes last."""
-    order = [*LIBRARY, SAME, END, OTHER]
-    last = [NONE, NOTHING, UNKNOWN, FAILED]
+    order = [*LIBRARY, SAME_PLACE, END_IN_COMMON, ANOTHER_PLACE]
+    last = [NONE, NOTHING, UNKNOWN, NOT_DIAGNOSED]
 
     def ordered(names: Iterable[str]) -> list[str]:
         known = {name: (last.index(name), 0, "") for name in last}

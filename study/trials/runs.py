@@ -17,14 +17,13 @@ import numpy as np
 from study.diagnose.adding import added
 from study.diagnose.confirmed_faults import confirmed
 from study.diagnose.verdict import NOTHING, diagnose
-from study.equations.place import Place
 from study.faults.fault import fault_fields
 from study.faults.imposed import FAULTS
 from study.records.record import MOTIONS
 from study.reproduction.settings import TrialSettings
 from study.support.errors import StudyError
 from study.trials import findings
-from study.trials.draw import DRIVEN, FAMILIES, NO_FAULT, STRUCTURE, Trial, make_trial
+from study.trials.draw import DRIVEN_MASS, FAMILIES, NO_FAULT, STRUCTURE, Trial, make_trial
 from study.trials.effects import HIDDEN
 from study.trials.findings import compared, intervals, tie_set
 from study.trials.kept import BY_TEST, KEPT_TABLES, STRUCTURES, TRIALS, Row
@@ -44,7 +43,7 @@ class Order:
     noise: float | None  # mean square of the noise over that of the response
     response: str | None  # what is measured
     faults: str = WITHOUT  # ``with`` or ``without`` one of the measurement
-    test: str = DRIVEN  # one of ``draw.FAMILIES``
+    test: str = DRIVEN_MASS  # one of ``draw.FAMILIES``
     coordinates: int | None = None  # of a structure
 
 
@@ -113,7 +112,7 @@ def structure_orders(count: int = 120, first: int = 20_000) -> list[Order]:
 
 def run_trial(order: Order) -> Row:
     """Make a trial, diagnose it and compare with the answer; a fault a user would be told of is kept in ``trouble``."""
-    judged, nothing = JUDGED.get(order.test, _judged_test), "" if order.test == DRIVEN else NONE
+    judged, nothing = JUDGES.get(order.test, _judged_test), "" if order.test == DRIVEN_MASS else NONE
     row: Row = {
         "kind": order.kind, "seed": order.seed, "test": order.test, "faults": order.faults, "noise": order.noise,
         "response": order.response, "coordinates": order.coordinates,
@@ -134,12 +133,12 @@ def run_trial(order: Order) -> Row:
 
 def table_of(order: Order) -> str:
     """The kept table that a trial belongs to."""
-    return {DRIVEN: TRIALS, STRUCTURE: STRUCTURES}.get(order.test, BY_TEST)
+    return {DRIVEN_MASS: TRIALS, STRUCTURE: STRUCTURES}.get(order.test, BY_TEST)
 
 
 def _drawn(trial: Trial) -> Row:
     """What was drawn, beside the kind of rig and the effects."""
-    places = [entry.place.label for entry in trial.effects if entry.place is not None]
+    places = [entry.place.label for entry in trial.effects]
     shares = sum(trial.shares) if trial.test == STRUCTURE else "+".join(f"{share:.3f}" for share in trial.shares)
     fault = {f"fault_{key}": trial.fault.get(key, "") for key in ("channel", "value", "unit")}
     row: Row = {"noise": trial.noise, "response": trial.response, "place": "+".join(places), "share": shares}
@@ -199,7 +198,7 @@ def _judged_structure(_: Order, trial: Trial) -> Row:
     hidden = next(iter(trial.effects), None)
     ties = [r for r in rows if r.name in tie_set(diagnosis)]
     first = ties[0] if ties else None
-    there = [hidden is not None and _path(r.entry.place) == _path(hidden.place) for r in ties]
+    there = [hidden is not None and r.entry.place.path == hidden.place.path for r in ties]
     same = [hidden is not None and r.term.name == hidden.term.name for r in ties]
     row: Row = {
         "verdict": diagnosis.verdict, "error_before": before.error,
@@ -207,7 +206,7 @@ def _judged_structure(_: Order, trial: Trial) -> Row:
         "effect_first": bool(same and same[0]), "place_first": bool(there and there[0]),
         "tie_holds": any(a and b for a, b in zip(same, there, strict=True)) if hidden else diagnosis.verdict == NOTHING,
     }  # fmt: skip
-    if first is not None and first.entry.place is not None:
+    if first is not None:
         row |= {
             "first": first.term.name, "first_place": first.entry.place.label, "error_after": first.prediction.error,
             "p_value": first.p_value, "tie_set": " ".join(r.name for r in ties),
@@ -220,11 +219,6 @@ def _judged_structure(_: Order, trial: Trial) -> Row:
     return row | {"error_true": true.prediction.error, "true_inside": held["held"], "true_keys": held["asked"]}
 
 
-def _path(place: Place | None) -> frozenset[str]:
-    assert place is not None, "every term of a structure has a place"
-    return place.path
-
-
-JUDGED: Mapping[str, Callable[[Order, Trial], Row]] = MappingProxyType(
-    {DRIVEN: _judged_driven, STRUCTURE: _judged_structure}
+JUDGES: Mapping[str, Callable[[Order, Trial], Row]] = MappingProxyType(
+    {DRIVEN_MASS: _judged_driven, STRUCTURE: _judged_structure}
 )

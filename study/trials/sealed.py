@@ -14,7 +14,7 @@ from study.support.errors import StudyError, expect
 from study.support.files import read_text, replace_file, replacing
 from study.trials.draw import Trial
 
-WANTED = "the answer file of a trial, as 'study trial' writes it"
+ANSWER_FILE = "the answer file of a trial, as 'study trial' writes it"
 
 
 def write_trial(trial: Trial, folder: Path) -> tuple[Path, Path, Path]:
@@ -68,15 +68,15 @@ class Answer(Section):
 
 def unseal(path: Path) -> Answer:
     """The answer of a trial; a ``StudyError`` if the file holds none."""
-    text = read_text(path, WANTED)
+    text = read_text(path, ANSWER_FILE)
     try:
         page: object = json.loads(text)
         content: object = json.loads(base64.b64decode(cast(dict[str, Any], page)["answer"], validate=True))
     except (ValueError, KeyError, TypeError, RecursionError, binascii.Error):
-        raise StudyError(f"{path}: this holds no sealed answer; expected {WANTED}") from None
+        raise StudyError(f"{path}: this holds no sealed answer; expected {ANSWER_FILE}") from None
     answer = checked(Answer, content, f"{path}: the answer in it")
     alike = len(answer.hidden) == len(answer.shares)
-    expect(alike, f"{path}: the answer in it has not a share for each effect; expected {WANTED}")
+    expect(alike, f"{path}: the answer in it has not a share for each effect; expected {ANSWER_FILE}")
     return answer
 
 

@@ -22,20 +22,20 @@ from study.support.errors import expect
 from study.trials.effects import Asked, Rig, Shares, Sizing, beyond_linear, drawn_effect, force_along, forgets
 
 SHAKER = "shaker"  # the force
-SAMPLES = 8192
-FASTEST = (8.0, 14.0)  # samples in a period of the fastest mode
-SLOWEST = 120.0  # periods of the slowest mode in a record, at least
+STRUCTURE_SAMPLES = 8192
+FASTEST_MODE = (8.0, 14.0)  # samples in a period of the fastest mode
+SLOWEST_MODE = 120.0  # periods of the slowest mode in a record, at least
 
 
 def structure_rig(rng: np.random.Generator, asked: Asked) -> Rig:
     """Masses between springs and dampers, sampled as the fastest mode asks, under a force that drives all modes."""
     base = random_structure(rng, asked.coordinates or int(rng.integers(2, 6)))
     frequency = modes_of(base).frequency
-    dt = 1.0 / (frequency[-1] * float(rng.uniform(*FASTEST)))
-    expect(frequency[0] * SAMPLES * dt >= SLOWEST, "the slowest mode is too slow")
+    dt = 1.0 / (frequency[-1] * float(rng.uniform(*FASTEST_MODE)))
+    expect(frequency[0] * STRUCTURE_SAMPLES * dt >= SLOWEST_MODE, "the slowest mode is too slow")
     level = float(10.0 ** rng.uniform(-1.0, 4.0))
     excitation = Excitation(level=level, reading="filtered", cutoff=1.3 * frequency[-1])
-    drive = force(excitation, SAMPLES, dt, asked.seed)
+    drive = force(excitation, STRUCTURE_SAMPLES, dt, asked.seed)
 
     def simulated(model: Model, steps: int, motions: Sequence[str], drive: Floats = drive) -> StructureRecord:
         sensors = tuple(Sensor(c, m) for m in motions for c in model.coordinates)
@@ -71,15 +71,15 @@ def structure_rig(rng: np.random.Generator, asked: Asked) -> Rig:
 
 def _strength(base: Model, dt: float, unit: ModelTerm, motion: Floats) -> tuple[float, float]:
     """Beside the structure's own force at the place, or where it has none, the larger force of inertia there."""
-    place = _place(unit)
+    place = unit.place
     e = np.array(place.direction(base.coordinates))
     along = relative_record(place, base, motion, dt)
     alone = beyond_linear(force_along(unit, along, differenced=True), [x @ e for x in motion])
     values, orders = base.numbers(), {"linear_stiffness": 0, "linear_damping": 1}
     springs = [
-        values[t.symbols[0]] * (motion[orders[t.term.name]] @ np.array(_place(t).direction(base.coordinates)))
+        values[t.symbols[0]] * (motion[orders[t.term.name]] @ np.array(t.place.direction(base.coordinates)))
         for t in base.terms
-        if t.term.name in orders and _place(t).path == place.path
+        if t.term.name in orders and t.place.path == place.path
     ]
     if springs:
         return alone, float(np.std(np.sum(springs, axis=0)))
@@ -106,8 +106,3 @@ def random_structure(rng: np.random.Generator, count: int) -> Model:
             terms.append(ModelTerm(get("linear_stiffness"), (stiffness,), (), place))
             terms.append(ModelTerm(get("linear_damping"), (damping,), (), place))
     return Model("structure", tuple(terms), tuple(names), ((SHAKER, str(rng.choice(names))),))
-
-
-def _place(entry: ModelTerm) -> Place:
-    assert entry.place is not None, "every term of a structure has a place"
-    return entry.place

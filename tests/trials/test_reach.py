@@ -14,7 +14,7 @@ from study.faults.imposed import FAULTS
 from study.reproduction.config import load_config
 from study.reproduction.settings import TrialSettings
 from study.support.errors import StudyError
-from study.trials import DRIVEN, HIDDEN, findings, make_trial, rates, runs
+from study.trials import DRIVEN_MASS, HIDDEN, findings, make_trial, rates, runs
 from study.trials.kept import KEPT_TABLES, TRIALS, differing_trials
 from study.trials.rates import mean, proportion
 from study.trials.runs import Order
@@ -109,7 +109,7 @@ def test_a_fault_that_the_true_equation_does_not_show_is_told_apart() -> None:
         (560269, (), 0.1, "drop_outs", "no"),
         (560266, ("quintic_stiffness",), 0.0, "delay", "yes"),
     ):
-        trial = make_trial(seed, hidden, noise, "velocity", fault, DRIVEN)
+        trial = make_trial(seed, hidden, noise, "velocity", fault, DRIVEN_MASS)
         assert findings.fault_shown(trial, []) == shown
         assert findings.fault_shown(trial, [fault]) == "yes"
 
@@ -229,7 +229,7 @@ def test_a_trial_that_cannot_be_made_is_a_row_with_its_trouble(monkeypatch: pyte
 
 
 def test_every_trial_with_a_fault_has_one_and_all_have_their_turn(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runs, "JUDGED", {DRIVEN: lambda *_: {}})
+    monkeypatch.setattr(runs, "JUDGES", {DRIVEN_MASS: lambda *_: {}})
     made = [runs.run_trial(Order("none", 5000 + i, (), 0.01, "velocity", "with")) for i in range(len(FAULTS))]
     assert {m["fault"] for m in made} == set(FAULTS)
     assert all(m["trouble"] == "" for m in made)

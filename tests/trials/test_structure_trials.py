@@ -60,7 +60,7 @@ def test_a_trial_of_a_structure_is_written_and_opened(tmp_path, capsys):
 def test_several_effects_are_hidden_at_places_of_their_own_and_each_is_as_strong_as_is_drawn():
     trial = make_trial(5, ("cubic_stiffness", "quadratic_damping"), 0.0, test=STRUCTURE, coordinates=3)
     assert sorted(entry.term.name for entry in trial.effects) == ["cubic_stiffness", "quadratic_damping"]
-    assert all(entry.place is not None for entry in trial.effects)
+    assert all(set(entry.place.moving) <= set(trial.believed.coordinates) for entry in trial.effects)
     assert all(SHARE[0] * 0.85 < share < SHARE[1] * 1.15 for share in trial.shares)
 
 

@@ -16,8 +16,8 @@ from study.identify.time_domain.fit_model import fit_model
 from study.records.prepared import prepare_record
 from study.records.readers import read_record
 from study.support.errors import StudyError
-from study.trials import DRIVEN, HIDDEN, SHARE, make_trial, sealed, share_of
-from study.trials.driven import KINDS, SLOWEST, WIDE, wide
+from study.trials import DRIVEN_MASS, HIDDEN, SHARE, make_trial, sealed, share_of
+from study.trials.driven import EXCITATIONS, LABORATORIES, PLAIN_RATE, wide
 
 
 @pytest.mark.parametrize("name", HIDDEN)
@@ -95,7 +95,7 @@ def test_a_trial_with_a_fault_is_the_same_trial_before_it() -> None:
 
 @pytest.mark.long
 def test_any_fault_means_one_in_half_of_the_trials() -> None:
-    named = [make_trial(seed, (), 0.0, "displacement", "any", DRIVEN).fault.get("fault") for seed in range(40)]
+    named = [make_trial(seed, (), 0.0, "displacement", "any", DRIVEN_MASS).fault.get("fault") for seed in range(40)]
     without = named.count(None)
     assert 10 <= without <= 30
     assert len(set(named)) > 5
@@ -103,18 +103,22 @@ def test_any_fault_means_one_in_half_of_the_trials() -> None:
 
 def test_the_wide_range_reaches_its_ends_and_every_record_is_long_enough() -> None:
     rng = np.random.default_rng(1)
-    drawn = [wide(rng, WIDE) for _ in range(2000)]
+    drawn = [wide(rng, LABORATORIES) for _ in range(2000)]
     rates, dampings = (np.array([getattr(e, name) for e in drawn]) for name in ("samples_a_period", "damping"))
     samples = np.array([e.samples for e in drawn])
-    for values, bounds in ((rates, WIDE.rates), (dampings, WIDE.dampings), (samples, WIDE.samples)):
+    for values, bounds in (
+        (rates, LABORATORIES.rates),
+        (dampings, LABORATORIES.dampings),
+        (samples, LABORATORIES.samples),
+    ):
         assert bounds[0] * (1.0 - 1e-9) <= np.min(values) < 1.05 * bounds[0]
         assert 0.95 * bounds[1] < np.max(values) <= bounds[1] * (1.0 + 1e-9)
-    assert np.all(samples >= WIDE.periods * rates * (1.0 - 1e-9))
-    assert np.all(samples >= WIDE.memories * rates / (2.0 * np.pi * dampings) * (1.0 - 1e-9))
-    assert {e.kind for e in drawn} == set(KINDS)
+    assert np.all(samples >= LABORATORIES.periods * rates * (1.0 - 1e-9))
+    assert np.all(samples >= LABORATORIES.memories * rates / (2.0 * np.pi * dampings) * (1.0 - 1e-9))
+    assert {e.kind for e in drawn} == set(EXCITATIONS)
     # evenly on a logarithmic scale, as far as long records are not refused
-    assert np.mean(rates < np.sqrt(np.prod(WIDE.rates))) == pytest.approx(0.5, abs=0.04)
-    assert np.mean(dampings < np.sqrt(np.prod(WIDE.dampings))) == pytest.approx(0.5, abs=0.04)
+    assert np.mean(rates < np.sqrt(np.prod(LABORATORIES.rates))) == pytest.approx(0.5, abs=0.04)
+    assert np.mean(dampings < np.sqrt(np.prod(LABORATORIES.dampings))) == pytest.approx(0.5, abs=0.04)
     assert all(e.excitation.highest * e.dt <= 0.4 + 1e-9 for e in drawn)
     assert all(e.excitation.periods > 1 for e in drawn if "sweep" in e.kind)
 
@@ -122,9 +126,9 @@ def test_the_wide_range_reaches_its_ends_and_every_record_is_long_enough() -> No
 @pytest.mark.parametrize("seed", range(4))
 def test_a_wide_trial_is_the_motion_of_its_truth_and_forgets_its_start(seed: int) -> None:
     """Against an integration with other steps, from another state."""
-    trial = make_trial(4000 + seed, (), 0.0, "displacement", test=DRIVEN)
+    trial = make_trial(4000 + seed, (), 0.0, "displacement", test=DRIVEN_MASS)
     initial = (float(np.std(trial.record["displacement"])), 0.0)
-    steps = Integrator("rk4", 16 * int(np.ceil(max(1.0, SLOWEST / trial.about["samples_a_period"]))))
+    steps = Integrator("rk4", 16 * int(np.ceil(max(1.0, PLAIN_RATE / trial.about["samples_a_period"]))))
     again = simulate(trial.truth, trial.record["force"], trial.record.dt, steps, initial=initial)["displacement"]
     half = len(again) // 2
     measured = trial.record["displacement"]
@@ -173,7 +177,7 @@ def test_command_writes_record_model_and_sealed_answer(tmp_path: Path, capsys: p
     answer = tmp_path / "new" / "trial_7.answer.json"
     assert f"study trial --open {answer}" in said
     record, model = read_record(tmp_path / "new" / "trial_7.csv"), read_model(tmp_path / "new" / "trial_7.yaml")
-    trial = make_trial(7, ("quadratic_damping",), 0.05, "acceleration", test=DRIVEN)
+    trial = make_trial(7, ("quadratic_damping",), 0.05, "acceleration", test=DRIVEN_MASS)
     np.testing.assert_array_equal(record["acceleration"], trial.record["acceleration"])
     assert model == trial.believed
     for path in (tmp_path / "new").iterdir():

@@ -8,7 +8,7 @@ from study.equations.model import Model, free
 from study.equations.terms import get
 from study.records.record import Record
 from study.trials import make_trial
-from study.trials.effects import VISIBLE, forgets, stands_out
+from study.trials.effects import VISIBLE_ERRORS, forgets, stands_out
 from study.trials.runs import Order, run_trial
 
 NAMES = ("inertia", "linear_damping", "linear_stiffness", "cubic_stiffness")
@@ -43,7 +43,7 @@ def test_an_effect_stands_out_of_so_much_noise_and_no_more():
 def test_what_is_drawn_with_noise_shows_in_the_fit_of_the_true_model(test):
     row = run_trial(Order("", 630003, None, None, None, test=test))
     assert row["hidden"] != "none"
-    assert row["noise"] == 0.0 or row["shown"] > 0.5 * VISIBLE
+    assert row["noise"] == 0.0 or row["shown"] > 0.5 * VISIBLE_ERRORS
 
 
 def test_derivatives_that_overflow_end_no_trial():
