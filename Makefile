@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 COMPILED := setup.py $(wildcard study/equations/c/*)
 
-.PHONY: study report test test-long test-cluster checks lint picture fault_pictures notebooks docs gallery readme estimators trials structure_trials clean
+.PHONY: study report test test-long test-cluster checks lint picture fault_pictures notebooks docs gallery readme estimators trials clean
 
 study: $(READY)
 	$(BIN)/snakemake -j2
@@ -62,14 +62,11 @@ estimators: $(READY)
 	$(BIN)/snakemake -j2 estimators
 	$(BIN)/python scripts/estimator_docs.py
 
+# TABLE: trials, trials_by_test or trials_of_structures.
+TABLE = trials
 trials: $(READY)
-	$(BIN)/snakemake -j2 trials
-	$(BIN)/python scripts/trial_docs.py results/trials/trials.csv figures/trials_confusion.png
-
-structure_trials: $(READY)
-	$(BIN)/snakemake -j2 trials_mdof
-	$(BIN)/python scripts/structure_trial_docs.py results/trials_mdof/trials.csv \
-	  figures/trials_of_structures_effects.png figures/trials_of_structures_places.png
+	$(BIN)/snakemake -j2 $(TABLE)
+	$(BIN)/python scripts/trial_docs.py $(TABLE) results/$(TABLE)/trials.csv
 
 $(READY): requirements.lock pyproject.toml $(COMPILED)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \

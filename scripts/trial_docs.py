@@ -1,6 +1,6 @@
-"""Write docs/tool.md's tables of the trials from docs/trials.csv; ``make trials`` puts the newest run there first.
+"""Write what docs say of the trials from their kept tables; ``make trials`` puts the newest run of one there first.
 
-python scripts/trial_docs.py [results/trials/trials.csv figures/trials_confusion.png]
+python scripts/trial_docs.py [TABLE results/TABLE/trials.csv]
 """
 
 import sys
@@ -14,22 +14,26 @@ from study.support import document
 from study.support.errors import StudyError
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
-from study.trials import trial_pages
+from study.trials.kept import TRIALS
+from study.trials.pages import CONFUSIONS, PAGES, blocks
 
 
-def main(page: Path, wanted: Mapping[str, Sequence[float]], newest: Sequence[Path] = ()) -> None:
-    kept = page.with_name("trials.csv")
-    for path in newest or (kept,):
+def main(docs: Path, name: str, wanted: Mapping[str, Sequence[float]], newest: Path | None = None) -> None:
+    kept = docs / f"{name}.csv"
+    new = {} if newest is None else {newest: kept}
+    if newest is not None:
+        new |= {Path("figures") / f"{picture}.png": docs / f"{picture}.png" for picture in CONFUSIONS[name]}
+    for path in new or (kept,):
         if not path.is_file():
-            raise StudyError(f"{path}: there is no such file; run 'snakemake -j2 trials' first")
-    for path in newest:
-        replace_file(kept if path.suffix == ".csv" else page.with_name(path.name), path.read_bytes())
-    table = pd.read_csv(kept)
-    document.put(page, "reach", trial_pages.reached(table, wanted))
-    document.put(page, "constants", trial_pages.constants(table))
+            raise StudyError(f"{path}: there is no such file; run 'make trials TABLE={name}' first")
+    for path, page in new.items():
+        replace_file(page, path.read_bytes())
+    for place, said in blocks(pd.read_csv(kept), name, wanted if name == TRIALS else None).items():
+        document.put(docs / PAGES[name], place, said)
 
 
 if __name__ == "__main__":
     with one_sentence():
         targets = load_config(Path("config")).settings.trials.wanted.plain()
-        main(Path("docs/tool.md"), targets, [Path(name) for name in sys.argv[1:]])
+        for table in sys.argv[1:2] or PAGES:
+            main(Path("docs"), table, targets, Path(sys.argv[2]) if len(sys.argv) > 2 else None)

@@ -1,4 +1,4 @@
-"""Snakemake step: all trials -> one table, confusion, reach, ladder, and their pictures."""
+"""Snakemake step: all trials of a table -> one table, reach, confusion, error by noise, and their pictures."""
 
 import sys
 from collections.abc import Mapping, Sequence
@@ -12,40 +12,40 @@ from study.figures import page
 from study.reproduction import tables
 from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
-from study.trials import constants_table, reach, trial_pictures
+from study.trials import rates, trial_pictures
+from study.trials.kept import TRIALS
+from study.trials.pages import CONFUSIONS
 
 KINDS = {"single": "one effect hidden", "pair": "two effects hidden"}
+LADDER = "trials_ladder"
 
 
 def main(
-    parts: Sequence[str], wanted: Mapping[str, Sequence[float]], outputs: Mapping[str, str],
-    drawings: Mapping[str, Sequence[str]], style: Path,
+    name: str, parts: Sequence[str], wanted: Mapping[str, Sequence[float]] | None, outputs: Sequence[str],
+    drawings: Sequence[str], style: Path,
 ) -> None:  # fmt: skip
-    table = pd.concat([pd.read_csv(path) for path in parts], ignore_index=True).sort_values("seed")
-    summary, confusion, ladder = (
-        reach.target_summary(table, wanted),
-        reach.confusion(table),
-        reach.error_by_noise(table),
-    )
-    found = {
-        "trials": table, "summary": summary, "confusion": confusion, "ladder": ladder,
-        "alpha": constants_table.against_alpha(table), "k": constants_table.against_k(table),
-    }  # fmt: skip
-    for name, path in outputs.items():
-        tables.write_table(found[name], Path(path))
-    print(summary.to_string(index=False), file=sys.stderr)
+    table = pd.concat([pd.read_csv(path) for path in parts], ignore_index=True).sort_values("seed", kind="stable")
+    made = zip(CONFUSIONS[name], (rates.confusion, rates.confusion_of_places), strict=False)
+    counts = {picture: count(table) for picture, count in made}
+    found = {"trials": table, "summary": rates.target_summary(table, name, wanted), **counts}
+    if name == TRIALS:
+        found |= {LADDER: rates.error_by_noise(table)}
+        found |= {"alpha": rates.against_alpha(table), "k": rates.against_k(table)}
+    for path in map(Path, outputs):
+        tables.write_table(found[path.stem], path)
+    print(found["summary"].to_string(index=False), file=sys.stderr)
     with styles.context(style):
-        figures = {"confusion": _confusion(confusion), "ladder": _ladder(ladder)}
-        for name, paths in drawings.items():
-            for path in paths:
-                replace_file(Path(path), page.rendered(figures[name], Path(path).suffix[1:]))
+        for path in map(Path, drawings):
+            own = found[path.stem]
+            figure = _ladder(own) if path.stem == LADDER else _confusion(CONFUSIONS[name][path.stem], own)
+            replace_file(path, page.rendered(figure, path.suffix[1:]))
 
 
-def _confusion(counts: pd.DataFrame) -> Figure:
-    figure = Figure(figsize=(10.2, 8.6), layout="constrained")
-    axes = figure.subplots()
-    axes.set_title("Trials: which effect was hidden, and what diagnose said (% of each row)", fontweight="bold")
-    trial_pictures.confusion_panel(axes, counts)
+def _confusion(title: str, counts: pd.DataFrame) -> Figure:
+    down, across = counts.shape
+    figure = Figure(figsize=(4.4 + 0.42 * max(across, 9), 2.6 + 0.32 * down), layout="constrained")
+    trial_pictures.confusion_panel(figure.subplots(), counts)
+    figure.suptitle(f"{title} (% of each row)", fontweight="bold", fontsize=10)
     return figure
 
 
@@ -65,7 +65,6 @@ if "snakemake" in globals():
     step = globals()["snakemake"]
     with one_sentence():
         main(
-            step.input.parts, step.params.wanted,
-            {name: step.output[name] for name in ("trials", "summary", "confusion", "ladder", "alpha", "k")},
-            {"confusion": step.output.confusion_figure, "ladder": step.output.ladder_figure}, Path(step.input.style),
+            step.params.table, step.input.parts, step.params.wanted, step.output.tables, step.output.figures,
+            Path(step.input.style),
         )  # fmt: skip

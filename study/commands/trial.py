@@ -43,44 +43,18 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    from study.trials import WIDE, make_trial, sealed
+    from study.trials import draw, sealed
 
     if arguments.open is not None:
         print(sealed.answer_in_words(sealed.unseal(arguments.open)))
         return
-    hidden, noise, response = _names(arguments.hidden), arguments.noise, arguments.response
-    if arguments.coordinates is not None:
-        print(_structure(arguments, hidden))
-        return
-    if arguments.test is not None:
-        from study.trials.kinds import make_test
-
-        other = response is not None or arguments.fault != "none"
-        expect(not other, "--test draws no --response and no --fault; expected neither of them beside it")
-        trial = make_test(arguments.test, arguments.seed, hidden, noise)
-        print(_written(trial, *sealed.write_trial(trial, arguments.out)))
-        return
-    trial = make_trial(arguments.seed, hidden, noise, response, arguments.fault, WIDE)
+    masses = arguments.coordinates
+    both = masses is not None and arguments.test is not None
+    expect(not both, "--coordinates asks for a structure, --test for another test; expected one of them")
+    test = draw.STRUCTURE if masses is not None else arguments.test or draw.DRIVEN_MASS
+    hidden = _names(arguments.hidden)
+    trial = draw.make_trial(arguments.seed, hidden, arguments.noise, arguments.response, arguments.fault, test, masses)
     print(_written(trial, *sealed.write_trial(trial, arguments.out)))
-
-
-def _structure(arguments: argparse.Namespace, hidden: tuple[str, ...] | None) -> str:
-    """A trial of a structure on disk, and what to try with it."""
-    from study.support.errors import expect
-    from study.trials.structure_draw import make_structure_trial
-    from study.trials.structure_sealed import write_structure_trial
-
-    one = hidden is None or len(hidden) < 2
-    expect(one, f"--hidden names {', '.join(hidden or ())}; expected one effect, or none, in a structure")
-    expect(arguments.fault == "none", "--fault is not drawn for structures; expected --coordinates without it")
-    name = None if hidden is None else "none" if not hidden else hidden[0]
-    trial = make_structure_trial(arguments.seed, name, arguments.noise, arguments.response, arguments.coordinates)
-    record, model, answer = write_structure_trial(trial, arguments.out)
-    return (
-        f"{record}: force and {trial.response} of {len(trial.record.sensors)} masses, {len(trial.record)} samples at "
-        f"{trial.record.dt:.4g} s\n{model}: the structure its owner believes in\n{answer}: the answer, sealed; "
-        f"'study trial --open {answer}' shows it\n\nTry: study diagnose {record} --model {model}"
-    )
 
 
 def _names(text: str | None) -> tuple[str, ...] | None:
@@ -90,9 +64,10 @@ def _names(text: str | None) -> tuple[str, ...] | None:
 
 
 def _written(trial: "Trial", record: Path, model: Path, answer: Path) -> str:
+    terms = dict.fromkeys(entry.term.name for entry in trial.believed.terms)
     return (
-        f"{record}: {' and '.join(trial.record.channels)}, {len(trial.record)} samples at {trial.record.dt:.4g} s\n"
-        f"{model}: the model its owner believes in ({', '.join(t.name for t in trial.believed.terms)})\n"
+        f"{record}: {' and '.join(trial.channels)}, {len(trial.record)} samples at {trial.record.dt:.4g} s\n"
+        f"{model}: the model its owner believes in ({', '.join(terms)})\n"
         f"{answer}: the answer, sealed; 'study trial --open {answer}' shows it\n\n"
         f"Try: study diagnose {record} --model {model}"
     )

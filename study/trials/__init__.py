@@ -1,7 +1,6 @@
-"""Records with a hidden effect: the proof, and the practice ground, of ``diagnose``."""
+"""Records with hidden effects: the proof, and the practice ground, of ``diagnose``."""
 
-from study.trials.draw import HIDDEN, NOISES, Trial, make_trial
-from study.trials.experiment import REPORT_LIKE, WIDE
-from study.trials.strength import SHARE, share_of
+from study.trials.draw import DRIVEN_MASS, FAMILIES, LIKE_THE_REPORT, NOISES, Trial, make_trial
+from study.trials.effects import HIDDEN, SHARE, share_of
 
-__all__ = ["HIDDEN", "NOISES", "REPORT_LIKE", "SHARE", "WIDE", "Trial", "make_trial", "share_of"]
+__all__ = ["DRIVEN_MASS", "FAMILIES", "HIDDEN", "LIKE_THE_REPORT", "NOISES", "SHARE", "Trial", "make_trial", "share_of"]

@@ -1,30 +1,26 @@
-"""A trial: an experiment, a hidden effect (or none, or two), a sensor and its fault, all drawn from one seed."""
+"""Trials: a system and how it is tested, effects hidden in it (or none), a sensor and its fault, all from one seed."""
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from study.equations.free_run import predict_response
-from study.equations.model import Model, ModelTerm, free
-from study.equations.simulate import Integrator, simulate
-from study.equations.term import ShapeParameter, Term
-from study.equations.terms import LIBRARY, get
-from study.records.excitation import displacement_noise, force
+from study.equations.model import Model, ModelTerm
+from study.equations.terms import get
+from study.faults.imposed import FAULTS, impose
 from study.records.record import MOTIONS, Record
-from study.support.arrays import Floats
-from study.support.errors import DivergenceError, StudyError
-from study.trials.experiment import LINEAR, REPORT_LIKE, Experiment, Ranges
-from study.trials.strength import SHARE, grown_to_share, share_of
+from study.support.errors import DivergenceError, StudyError, expect
+from study.trials.driven import LABORATORIES, REPORT_LIKE, driven_rig
+from study.trials.effects import HIDDEN, Asked, Rig, grown
+from study.trials.kinds import POSSIBLE, TESTS, rig_of_a_test
+from study.trials.structures import structure_rig
 
-HIDDEN = tuple(name for name in LIBRARY if name not in LINEAR)
+# Kinds of test, beside those of ``kinds``: a force on mass and spring, and on masses between springs.
+DRIVEN_MASS, LIKE_THE_REPORT, STRUCTURE = "driven", "like_the_report", "structure"
 NOISES = (0.0, 0.01, 0.05, 0.10)
-KNOWN = ("none", "none", "cubic_stiffness", "van_der_pol_damping")  # of which one is drawn
-KNOWN_SHARE = 0.15
-STEPS = 32  # per sample of the record, and more where there are few samples a period
-PUSH, FORGOTTEN = 20, 1e-3  # samples at the start, at most half a period; share of the motion in the second half
 ATTEMPTS = 300  # systems drawn until one carries the effects at the wanted strength and stays finite
 ANY, NO_FAULT = "any", "none"  # what may be said of the fault beside its name
 
@@ -33,19 +29,26 @@ ANY, NO_FAULT = "any", "none"  # what may be said of the fault beside its name
 class Trial:
     """A record, what its owner believes, and the truth."""
 
-    record: Record  # force and one measured motion
+    record: Record  # force and one measured motion, of every mass of a structure
     believed: Model  # the model without the hidden effects, nothing known of its coefficients
     truth: Model  # the model that made the record
-    hidden: tuple[str, ...]  # names of the hidden effects
+    hidden: tuple[str, ...]  # names of the hidden effects, in a structure with their places
     noise: float  # mean square of the noise over that of the response
     shares: tuple[float, ...]  # of the restoring force in each hidden effect, beyond any linear model
-    experiment: Experiment | None  # the linear system, its excitation and how it was sampled; None for other tests
+    test: str  # one of ``FAMILIES``
+    response: str  # the measured motion
+    about: Mapping[str, Any]  # how the system is driven and sampled, as a table says it
     fault: Mapping[str, Any] = field(default_factory=dict[str, Any])  # of the measurement: its name, channel and value
 
     @property
-    def response(self) -> str:
-        """The measured motion."""
-        return next(c for c in self.record.channels if c in MOTIONS)
+    def effects(self) -> tuple[ModelTerm, ...]:
+        """The hidden effects, at their places."""
+        return tuple(entry for entry in self.truth.terms if entry.name in self.hidden)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """What the record's columns are called."""
+        return tuple(self.record.channels)
 
     @property
     def completed(self) -> Model:
@@ -54,14 +57,29 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class _Wanted:
-    """What a trial is to be."""
+class Family:
+    """Trials of one kind of test. What is drawn of them, and in which order, is that of the published records."""
 
-    seed: int
-    hidden: tuple[str, ...]
-    noise: float
-    response: str
-    ranges: Ranges
+    stem: str  # of the names of files
+    stream: tuple[int, ...]  # what the generator of a seed is begun with, beside that
+    possible: tuple[str, ...]  # effects that may be hidden
+    effects: Callable[[np.random.Generator], Iterable[str]]  # hidden where none are asked for
+    noises: tuple[float, ...]
+    motions: tuple[str, ...]  # of which one is measured; where it may be another, any may be asked for
+    rig: Callable[[np.random.Generator, Asked], Rig]
+    anyway: bool = False  # whether effects are drawn that are not wanted
+
+    def asked(
+        self, rng: np.random.Generator, seed: int, hidden: Sequence[str] | None, noise: float | None,
+        response: str | None, coordinates: int | None,
+    ) -> Asked:  # fmt: skip
+        """What a trial is to be: what is given is taken, the rest drawn."""
+        drawn = self.effects(rng) if hidden is None or self.anyway else ()
+        several = len(self.motions) > 1
+        level = float(rng.choice(self.noises)) if several or noise is None else noise
+        motion = str(rng.choice(self.motions)) if several else self.motions[0]
+        names = tuple(str(name) for name in (drawn if hidden is None else hidden))
+        return Asked(seed, names, level if noise is None else noise, response or motion, coordinates)
 
 
 def make_trial(
@@ -70,214 +88,114 @@ def make_trial(
     noise: float | None = None,
     response: str | None = None,
     fault: str = NO_FAULT,
-    ranges: Ranges = REPORT_LIKE,
+    test: str = LIKE_THE_REPORT,
+    coordinates: int | None = None,
 ) -> Trial:
     """A trial of this seed; what is given is not drawn.
 
     No effect is hidden with an empty sequence; ``noise`` is a mean square over that of the response, ``response`` is
     ``displacement``, ``velocity`` or ``acceleration``. ``fault`` is one of ``study.faults.imposed.FAULTS``, ``any`` for
-    one that is drawn in half of the trials, or ``none``. It comes last and has a stream of its own: the trial without
-    it is the same record before the fault.
+    one that is drawn in half of the trials, or ``none``; it comes last and has a stream of its own: the trial without
+    it is the same record before the fault. ``test`` is one of ``FAMILIES``; a ``structure`` has so many
+    ``coordinates``.
 
     Raises
     ------
     StudyError
-        If an effect cannot be hidden, the response is no motion, or there is no such fault.
+        If there is no such test, effect, response or fault in it.
     DivergenceError
         If no system was found that stays finite with these effects.
     """
-    rng = np.random.default_rng([2026, seed])
-    if hidden is None:
-        count = int(rng.choice([0, 1, 1, 1, 1, 2]))
-        hidden = tuple(str(n) for n in rng.choice(HIDDEN, count, replace=False))
-    _check(hidden, response)
-    drawn_noise = float(rng.choice(NOISES))
-    drawn_response = str(rng.choice(ranges.responses))
-    noise = drawn_noise if noise is None else noise
-    wanted = _Wanted(seed, tuple(hidden), noise, response or drawn_response, ranges)
+    expect(test in FAMILIES, f"test is {test!r}; expected one of {', '.join(FAMILIES)}")
+    _check(test, hidden, response, fault, coordinates)
+    family = FAMILIES[test]
+    rng = np.random.default_rng([family.stream[0], seed, *family.stream[1:]])
+    asked = family.asked(rng, seed, hidden, noise, response, coordinates)
+    refused = ""
     for _ in range(ATTEMPTS):
-        trial = _attempt(rng, wanted)
-        if trial is not None:
-            return _with_fault(trial, fault, seed)
-    raise DivergenceError(f"no system of trial {seed} stays finite with {', '.join(hidden)}", 0.0)
+        try:
+            trial = _attempt(rng, asked, test)
+        except (StudyError, np.linalg.LinAlgError) as error:
+            refused = str(error)
+        else:
+            return _with_fault(trial, seed, fault)
+    what = ", ".join(asked.hidden) or "nothing hidden"
+    raise DivergenceError(f"no system of {family.stem} {seed} stays finite with {what}; of the last, {refused}", 0.0)
 
 
-def _with_fault(trial: Trial, fault: str, seed: int) -> Trial:
-    if fault == NO_FAULT:
-        return trial
-    from study.faults.imposed import FAULTS, impose  # most trials have none
-
-    rng = np.random.default_rng([2026, seed, 1])
-    if fault == ANY:
-        fault = str(rng.choice([*FAULTS, *[NO_FAULT] * len(FAULTS)]))
-        return _with_fault(trial, fault, seed)
-    if fault not in FAULTS:
-        raise StudyError(f"fault is {fault!r}; expected {ANY}, {NO_FAULT} or one of {', '.join(FAULTS)}")
-    record, what = impose(trial.record, trial.response, fault, rng)
-    return replace(trial, record=record, fault=what)
-
-
-def _check(hidden: Sequence[str], response: str | None) -> None:
-    for name in hidden:
-        if get(name).name not in HIDDEN:
-            raise StudyError(f"{name!r} cannot be hidden, a linear model has it; take {', '.join(HIDDEN)}")
-    if len(set(hidden)) < len(hidden):
-        raise StudyError(f"the effects to hide are {', '.join(hidden)}; each may be named once")
-    if response is not None and response not in MOTIONS:
-        raise StudyError(f"response is {response!r}; it must be one of {', '.join(MOTIONS)}")
+def _check(test: str, hidden: Sequence[str] | None, response: str | None, fault: str, coordinates: int | None) -> None:
+    """Refuse what there is not in such a test."""
+    family, names = FAMILIES[test], hidden or ()
+    for name in names:
+        known = get(name).name in family.possible
+        expect(known, f"{name!r} cannot be hidden in {test}; expected one of {', '.join(family.possible)}")
+    once = len(set(names)) == len(names)
+    expect(once, f"the effects to hide are {', '.join(names)}; each may be named once")
+    motions = MOTIONS if len(family.motions) > 1 else family.motions
+    fits = response is None or response in motions
+    expect(fits, f"response is {response!r}; in {test} expected one of {', '.join(motions)}")
+    faults = (NO_FAULT, ANY, *FAULTS) if test in (DRIVEN_MASS, LIKE_THE_REPORT) else (NO_FAULT,)
+    expect(fault in faults, f"fault is {fault!r}; in {test} expected one of {', '.join(faults)}")
+    expect(coordinates is None or test == STRUCTURE, f"{test} has a single coordinate; expected {STRUCTURE}")
 
 
-def _attempt(rng: np.random.Generator, wanted: _Wanted) -> Trial | None:
-    experiment = wanted.ranges.experiment(rng)
-    drive = force(experiment.excitation, experiment.samples, experiment.dt, wanted.seed)
-    try:
-        quiet = _simulated(experiment.system, drive, experiment, 4)
-        base, known = _with_own_nonlinearity(rng, wanted.hidden, drive, experiment, quiet)
-        if _unseen(base, wanted.hidden, wanted.response):
-            return None
-        truth = _with_effects(rng, base, wanted.hidden, known, drive, experiment)
-        if truth is None:
-            return None
-        record = _simulated(truth, drive, experiment, 8)
-        if not _of_this_size(record, quiet) or not _forgets(truth, drive, experiment):
-            return None
-        if _drowned(truth, drive, wanted.ranges.drowned):
-            return None
-    except DivergenceError:
-        return None
-    shares = tuple(share_of(truth, name, record) for name in wanted.hidden)
-    if any(not SHARE[0] <= share <= SHARE[1] for share in shares):
-        return None
-    values = _measured(truth, record, experiment, wanted)
-    if values is None:
-        return None
-    if wanted.noise > 0.0:
-        values = values + displacement_noise(values, wanted.noise, wanted.seed)
-    name = f"trial_{wanted.seed}"
-    measured = Record(experiment.dt, {"force": drive, wanted.response: values}, record.units, name)
-    return Trial(measured, _nothing_known(base, name), truth, wanted.hidden, wanted.noise, shares, experiment)
+def _attempt(rng: np.random.Generator, asked: Asked, test: str) -> Trial:
+    """The trial of the next system that is drawn, or a ``StudyError`` that says why it makes none."""
+    family = FAMILIES[test]
+    rig = family.rig(rng, asked)
+    effects = [rig.effect(get(name)) for name in asked.hidden]
+    truth, shares = rig.base, dict[str, float]()
+    # What comes later changes the motion, and so the share of what came before: that is sized again at the end.
+    for unit, target in (*effects, *effects[: -1 if rig.sizing.rounds else 0]):
+        truth, shares[unit.name] = grown(truth.without_term(unit.name), unit, target, rig)
+    record, carried = rig.recorded(truth, tuple(shares[unit.name] for unit, _ in effects))
+    name, hidden = f"{family.stem}_{asked.seed}", tuple(unit.name for unit, _ in effects)
+    return Trial(
+        replace(record, name=name), _nothing_known(rig.base, name), truth, hidden, asked.noise, carried, test,
+        asked.response, rig.about,
+    )  # fmt: skip
 
 
 def _nothing_known(model: Model, name: str) -> Model:
     return replace(model, name=name).with_values(dict.fromkeys(model.values, None))
 
 
-def _simulated(model: Model, drive: Floats, experiment: Experiment, steps: int) -> Record:
-    return simulate(model, drive, experiment.dt, Integrator("rk4", experiment.steps(steps)))
+def _with_fault(trial: Trial, seed: int, fault: str) -> Trial:
+    if fault == NO_FAULT or trial.believed.named:
+        return trial
+    rng = np.random.default_rng([2026, seed, 1])
+    if fault == ANY:
+        return _with_fault(trial, seed, str(rng.choice([*FAULTS, *[NO_FAULT] * len(FAULTS)])))
+    record, what = impose(trial.record, trial.response, fault, rng)
+    return replace(trial, record=record, fault=what)
 
 
-def _of_this_size(record: Record, quiet: Record) -> bool:
-    """Whether the motion is about as large as that of the linear system, by which shape parameters are drawn."""
-    return bool(0.1 < np.std(record["displacement"]) / np.std(quiet["displacement"]) < 10.0)
+def _of_driven(rng: np.random.Generator) -> Iterable[str]:
+    return rng.choice(HIDDEN, int(rng.choice([0, 1, 1, 1, 1, 2])), replace=False)
 
 
-def _unseen(base: Model, hidden: tuple[str, ...], response: str) -> bool:
-    """A steady force moves a system to another place, which only a displacement shows if no force depends on the place.
-
-    Linear stiffness does not count: it is the same everywhere.
-    """
-    effects = [get(name) for name in hidden]
-    if response == "displacement" or not any(term.steady for term in effects):
-        return False
-    return all(term.placeless for term in (*effects, *(entry.term for entry in base.terms)))
+def _of_a_test(possible: Sequence[str], rng: np.random.Generator) -> Iterable[str]:
+    return rng.choice(possible, int(rng.random() < 0.75), replace=False)
 
 
-def _drowned(truth: Model, drive: Floats, most: float) -> bool:
-    """Whether a hidden harmonic force is more than so many times as large (rms) as the measured one.
-
-    On a resonance it would have to be many times larger to be the wanted share of the restoring force, and what the
-    measured force does then lies below the noise.
-    """
-    values = truth.values
-    amplitude = math.hypot(values.get("fh_cos") or 0.0, values.get("fh_sin") or 0.0)
-    return amplitude > most * math.sqrt(2.0) * float(np.std(drive))
-
-
-def _measured(truth: Model, record: Record, experiment: Experiment, wanted: _Wanted) -> Floats | None:
-    """The motion without visible error of integration; None where so many steps do not give it."""
-    steps = experiment.steps(STEPS)
-    coarse, fine = (
-        predict_response(truth, record, response=wanted.response, steps_per_sample=n) for n in (steps // 2, steps)
-    )
-    return fine if float(np.std(fine - coarse)) < wanted.ranges.accurate * float(np.std(fine)) else None
-
-
-def _forgets(model: Model, drive: Floats, experiment: Experiment) -> bool:
-    """Whether the motion forgets a small push at its start: that of a chaotic system does not, and no free run follows.
-
-    A spring that pushes away from the centre would make such a system, with two places to rest.
-    """
-    half = len(drive) // 2
-    pushed = drive.copy()
-    pushed[: min(PUSH, int(np.ceil(experiment.samples_a_period / 2.0)))] += 0.1 * float(np.std(drive))
-    one, other = (_simulated(model, f, experiment, 2)["displacement"][half:] for f in (drive, pushed))
-    return float(np.std(one - other)) < FORGOTTEN * float(np.std(one))
-
-
-def _grown(
-    model: Model, entry: ModelTerm, drive: Floats, experiment: Experiment, target: float
-) -> tuple[Model, float] | None:
-    return grown_to_share(model, entry, drive, experiment.dt, target, experiment.steps(2), secant=experiment.secant)
-
-
-def _with_own_nonlinearity(
-    rng: np.random.Generator, hidden: tuple[str, ...], drive: Floats, experiment: Experiment, quiet: Record
-) -> tuple[Model, Record]:
-    """Half of the systems have a known nonlinearity of the report's kind from the start."""
-    known, base = str(rng.choice(KNOWN)), experiment.system
-    if known == "none" or known in hidden:
-        return base, quiet
-    known_system = _grown(base, free(get(known)), drive, experiment, KNOWN_SHARE)
-    if known_system is None:
-        return base, quiet
-    return known_system[0], _simulated(known_system[0], drive, experiment, 4)
-
-
-def _with_effects(
-    rng: np.random.Generator,
-    model: Model,
-    hidden: tuple[str, ...],
-    quiet: Record,
-    drive: Floats,
-    experiment: Experiment,
-) -> Model | None:
-    """The model and the hidden effects, as strong as is drawn; None where that cannot be.
-
-    What comes later changes the motion, and so the share of what came before: that is sized again at the end.
-    """
-    wanted = {name: (float(rng.uniform(*SHARE)), _drawn(rng, get(name), quiet)) for name in hidden}
-    for name in (*hidden, *hidden[:-1]):
-        target, entry = wanted[name]
-        stronger = _grown(model.without_term(name), entry, drive, experiment, target)
-        if stronger is None:
-            return None
-        model = stronger[0]
-    return model
-
-
-def _drawn(rng: np.random.Generator, term: Term, quiet: Record) -> ModelTerm:
-    """Shape parameters in the range where the effect shows, in the units of the system."""
-    scale = float(np.std(quiet["displacement"]))
-    omega = float(np.std(quiet["velocity"])) / scale
-    values: list[float] = []
-    for parameter in term.parameters:
-        share = float(rng.uniform(*parameter.drawn))
-        values.append(share * values[-1] if parameter.relative else in_own_unit(share, parameter, scale, omega))
-    entry = free(term)
-    angle = float(rng.uniform(0.0, 2.0 * np.pi))
-    sign = -1.0 if term.either_sign and angle > np.pi else 1.0
-    shape = (np.cos(angle), np.sin(angle)) if len(term.components) == 2 else (sign,)
-    return replace(entry, coefficients=tuple(float(s) for s in shape), parameters=tuple(values))
-
-
-def in_own_unit(value: float, parameter: ShapeParameter, scale: float, omega: float) -> float:
-    """A value in the unit of its quantity, from one in units of rms displacement and angular rate (rad/s)."""
-    match parameter.quantity:
-        case "length":
-            return value * scale
-        case "1/length":
-            return value / scale
-        case "time":
-            return value / omega
-        case _:
-            return value * omega / (2.0 * np.pi)
+FAMILIES: Mapping[str, Family] = MappingProxyType(
+    {
+        **{
+            name: Family(
+                "trial", (2026,), HIDDEN, _of_driven, NOISES, ranges.responses, partial(driven_rig, ranges=ranges)
+            )
+            for name, ranges in ((LIKE_THE_REPORT, REPORT_LIKE), (DRIVEN_MASS, LABORATORIES))
+        },
+        **{
+            name: Family(
+                name, (2026, *name.encode()), possible, partial(_of_a_test, possible), NOISES[:3], ("displacement",),
+                partial(rig_of_a_test, make=TESTS[name]),
+            )
+            for name, possible in POSSIBLE.items()
+        },
+        STRUCTURE: Family(
+            STRUCTURE, (2027,), HIDDEN, lambda rng: (rng.choice(HIDDEN),), NOISES[:3], ("displacement", "acceleration"),
+            structure_rig, anyway=True,
+        ),
+    }
+)  # fmt: skip

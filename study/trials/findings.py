@@ -1,6 +1,6 @@
-"""What a trial is scored by: the tie set, what the measurement suffered from, evidence, and intervals that hold.
+"""What a trial is scored by: its diagnosis, the tie set, what the measurement suffered from, intervals that hold.
 
-The fields of a diagnosis are read here and nowhere else in the trials.
+Models are compared, and the fields of a diagnosis read, here and nowhere else in the trials.
 """
 
 import math
@@ -8,26 +8,38 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from study.compare.comparison import Comparison
+from study.compare.prediction import predict
 from study.diagnose.credibility import credible
 from study.diagnose.verdict import MISSING, Diagnosis
 from study.equations.model import Model
-from study.faults import accounting
 from study.faults.fault import Fault
+from study.faults.kinds_of_tests import accounted_test
+from study.identify.time_domain.part_fit import fit_part
 from study.records.prepared import Prepared
+from study.structure.prepared_structure import prepare_structure
+from study.structure.structure_comparison import StructureComparison, compare_structure
+from study.structure.structure_fit import fit_structure, settled_structure
+from study.structure.structure_verdict import StructureDiagnosis, diagnose_structure
+from study.support.errors import StudyError
+from study.trials.draw import Trial
+from study.trials.kept import Row
 
-Row = dict[str, Any]
 Found = Mapping[str, Any]  # a fault of the measurement as diagnosis.json has it
-WHATEVER_ITS_P_VALUE = 0  # effects asked for: a p value times none is below any alpha
-FAR = 20.0  # standard errors: rivals that are farther behind stand in no tie set
+FAR_BEHIND = 20.0  # standard errors: rivals that are farther behind stand in no tie set
 
 
-def accounted_comparison(model: Model, prepared: Prepared) -> tuple[Comparison, tuple[Fault, ...]]:
+def compared(trial: Trial, model: Model) -> tuple[Comparison, tuple[Fault, ...]]:
     """The comparison that a diagnosis begins with, and the faults of the measurement that it accounts for."""
-    found = accounting.accounted(model, prepared)
+    found = accounted_test([trial.record], model)
     return found.comparison, found.faults
 
 
-def tie_set(diagnosis: Diagnosis) -> tuple[str, ...]:
+def diagnosed_structure(trial: Trial) -> StructureDiagnosis:
+    """What is said of a structure."""
+    return diagnose_structure(compare_structure(trial.believed, prepare_structure(trial.record, trial.believed)))
+
+
+def tie_set(diagnosis: Diagnosis | StructureDiagnosis) -> tuple[str, ...]:
     """The effects that the record cannot tell apart, the one put first among them; empty where none is named."""
     if diagnosis.verdict != MISSING:
         return ()
@@ -40,22 +52,23 @@ def evidence_row(diagnosis: Diagnosis, hidden: Sequence[str]) -> Row:
 
     ``smallest_p`` is the smallest p value (of so many candidates) of those that would be believed if it were small
     enough, ``true_p`` that of the hidden effect, ``distance`` how far that is behind the first in standard errors, and
-    ``rivals`` how far each is that is less than ``FAR`` behind, the first included.
+    ``rivals`` how far each is that is less than ``FAR_BEHIND`` behind, the first included.
     """
     rows = diagnosis.candidates
     behind = {row.name: max(row.distance, 0.0) for row in rows}
     true = next((row for row in rows if row.name in hidden), None)
     before = diagnosis.comparison.prediction
-    believable = [r.p_value for r in rows if credible(before, r.prediction, r.interval, WHATEVER_ITS_P_VALUE)]
+    # Those that would be believed whatever their p value: one of zero is below any alpha.
+    believable = [r.p_value for r in rows if credible(before, r.prediction, r.interval, 0.0)]
     return {
         "smallest_p": min(believable, default=1.0),
         "true_p": math.nan if true is None else true.p_value,
         "distance": math.nan if true is None else behind[true.name],
-        "rivals": "+".join(f"{d:.2f}" for d in behind.values() if d < FAR),
+        "rivals": "+".join(f"{d:.2f}" for d in behind.values() if d < FAR_BEHIND),
     }
 
 
-def intervals(comparison: Comparison, truth: Model) -> Row:
+def intervals(comparison: Comparison | StructureComparison, truth: Model) -> Row:
     """How many of the coefficients of a model with the true terms lie in their 95 % intervals: ``held`` of ``asked``.
 
     Nothing is asked of a model with other terms.
@@ -66,6 +79,36 @@ def intervals(comparison: Comparison, truth: Model) -> Row:
     spans = [(true[c.key], c.interval) for c in comparison.coefficients]
     inside = [span[0] <= value <= span[1] for value, span in spans if span is not None]
     return {"held": sum(inside), "asked": len(inside)}
+
+
+def true_comparison(trial: Trial, diagnosis: StructureDiagnosis) -> StructureComparison:
+    """The true model of a structure, fitted from its true values."""
+    prepared = diagnosis.comparison.prepared
+    fit = fit_structure(trial.completed, prepared, (), trial.truth.numbers())
+    return compare_structure(trial.completed, prepared, settled_structure(fit, prepared))
+
+
+def error_of_truth(trial: Trial, prepared: Prepared, steps: int) -> float:
+    """Held-out response error of the true model, fitted as any other, from the true values; NaN if it cannot be."""
+    try:
+        return predict(fit_part(trial.truth, prepared, (), steps=steps), prepared).error
+    except StudyError:
+        return math.nan
+
+
+def fault_shown(trial: Trial, found: Sequence[str]) -> str:
+    """Whether the record shows its fault, ``yes`` or ``no``: it was found, or is beside the true equation.
+
+    Empty without a fault. What no search finds beside the very equation that made the record is too small for it.
+    """
+    imposed = trial.fault.get("fault", "")
+    if not imposed or imposed in found:
+        return "yes" if imposed else ""
+    try:
+        seen = [fault.fault for fault in compared(trial, trial.completed)[1]]
+    except StudyError:
+        seen = []
+    return "yes" if imposed in seen else "no"
 
 
 def measurement(found: Sequence[Found], imposed: Found) -> Row:

@@ -1,39 +1,101 @@
-"""The table of trials that is published, and whether this code still gives it."""
+"""The tables of trials that are kept in docs: their columns, and whether this code still gives them."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
 
-from study.trials.reach import WORDS
-from study.trials.runs import COLUMNS
-
+Row = dict[str, Any]
+TRIALS, BY_TEST, STRUCTURES = "trials", "trials_by_test", "trials_of_structures"
 TIMES = ("seconds",)  # of another machine, or another hour
-LOOSE = ("left", "smallest_p", "true_p", "distance", "rivals", "error_true")  # they change with rounding
-ALIKE = 0.01  # relative: numbers of two runs of the same code on two machines
+SAME_RUN = 0.01  # relative: numbers of two runs of the same code on two machines
 
 
-def differing_trials(
-    own: pd.DataFrame, kept: pd.DataFrame, columns: Sequence[str] = COLUMNS, words: Collection[str] = WORDS,
-    loose: Collection[str] = LOOSE,
-) -> list[str]:  # fmt: skip
-    """What came out otherwise than in a kept table: ``"seed 7: verdict"`` and so on; both as ``trials.csv`` has them.
+@dataclass(frozen=True)
+class KeptTable:
+    """What the rows of a table hold."""
+
+    columns: tuple[str, ...]
+    words: tuple[str, ...]  # the columns that are no numbers
+    loose: tuple[str, ...]  # those that change with rounding, as whatever lies at the edge of a tie
+
+
+KEPT_TABLES: Mapping[str, KeptTable] = MappingProxyType(
+    {
+        TRIALS: KeptTable(
+            (
+                "kind", "seed", "hidden", "noise", "faults", "response", "samples_a_period", "samples", "damping",
+                "excitation", "known", "share", "fault", "fault_channel", "fault_value", "fault_unit", "faults_found",
+                "fault_rivals", "fault_shown", "found", "found_channel", "found_value", "found_low", "found_high",
+                "verdict", "first", "tie_set", "tie_size", "pair", "second_verdict", "second_tie_set", "whole_tie_set",
+                "error_before", "error_after", "error_after_two", "error_true", "noise_floor", "left", "held", "asked",
+                "smallest_p", "true_p", "distance", "rivals", "seconds", "trouble",
+            ),
+            (
+                "kind", "hidden", "response", "known", "faults", "fault", "fault_channel", "faults_found",
+                "fault_rivals", "fault_shown", "found", "found_channel", "verdict", "first", "tie_set",
+                "second_verdict", "second_tie_set", "whole_tie_set", "pair", "trouble",
+            ),
+            ("left", "smallest_p", "true_p", "distance", "rivals", "error_true"),
+        ),
+        BY_TEST: KeptTable(
+            (
+                "test", "seed", "noise", "hidden", "verdict", "first", "tied", "right", "shown", "error_before",
+                "error_after", "held", "asked", "seconds", "trouble",
+            ),
+            ("test", "hidden", "verdict", "first", "tied", "trouble"),
+            ("tied", "shown", "error_after", "held", "asked", "trouble"),
+        ),
+        STRUCTURES: KeptTable(
+            (
+                "seed", "coordinates", "hidden", "place", "noise", "response", "share", "verdict", "first",
+                "first_place", "effect_first", "place_first", "tie_set", "tie_holds", "error_before", "error_after",
+                "error_true", "noise_floor", "left", "asked", "p_value", "true_inside", "true_keys", "seconds",
+                "trouble",
+            ),
+            (
+                "hidden", "place", "response", "verdict", "first", "first_place", "effect_first", "place_first",
+                "tie_set", "tie_holds", "trouble",
+            ),
+            ("left", "p_value", "error_true"),
+        ),
+    }
+)  # fmt: skip
+
+
+def rows_of(table: pd.DataFrame) -> list[Row]:
+    """The rows of a table as it is read, empty cells as empty words."""
+    words = {word for kept in KEPT_TABLES.values() for word in kept.words}
+    filled = {c: _text(table[c]) for c in table.columns if c in words}
+    return cast(list[Row], table.assign(**filled).to_dict("records"))
+
+
+def differing_trials(own: pd.DataFrame, kept: pd.DataFrame, name: str) -> list[str]:
+    """What came out otherwise than in a kept table: ``"seed 7: verdict"`` and so on; both as their file reads.
 
     ``kept`` may hold trials that ``own`` lacks. What was drawn and what was said must be the same word by word, errors
-    to ``ALIKE``; those of the ``columns`` that are ``words`` are no numbers, and what is ``loose`` is not compared.
+    to ``SAME_RUN``; what is loose is not compared.
     """
-    before = kept.set_index("seed").reindex(own["seed"]).reset_index()
-    strict = [c for c in columns if c not in (*TIMES, *loose)]
-    return [f"seed {seed}: {column}" for column in strict for seed in _apart(column, own, before, words)]
+    table = KEPT_TABLES[name]
+    keys = [key for key in ("test", "seed") if key in table.columns]
+    before = own[keys].merge(kept, on=keys, how="left")
+    strict = [c for c in table.columns if c not in (*keys, *TIMES, *table.loose)]
+    return [f"seed {seed}: {column}" for column in strict for seed in _apart(column, own, before, table)]
 
 
-def _apart(column: str, own: pd.DataFrame, before: pd.DataFrame, words: Collection[str]) -> Sequence[int]:
+def _apart(column: str, own: pd.DataFrame, before: pd.DataFrame, table: KeptTable) -> Sequence[int]:
     one, other = own[column], before[column]
-    if column in words:
-        first, second = (c.astype(object).where(c.notna(), "").astype(str).to_numpy() for c in (one, other))
-        same = first == second
+    if column in table.words:
+        same = _text(one).to_numpy() == _text(other).to_numpy()
     else:
         numbers = [pd.to_numeric(c, errors="coerce").to_numpy(dtype=np.float64) for c in (one, other)]
         floor = 1e-6 if column.startswith("error") else 0.0  # what the integration leaves where there is no noise
-        same = np.isclose(*numbers, rtol=ALIKE, atol=floor, equal_nan=True)
+        same = np.isclose(*numbers, rtol=SAME_RUN, atol=floor, equal_nan=True)
     return [int(seed) for seed in own["seed"].to_numpy()[~same]]
+
+
+def _text(column: "pd.Series[Any]") -> "pd.Series[Any]":
+    return column.astype(object).where(column.notna(), "").astype(str)

@@ -1,59 +1,61 @@
 """What diagnose makes of trials: one row each, the sealed answer beside what was found.
 
-Five kinds: one effect hidden, none, a pair (diagnose, add what comes first, diagnose again), one effect hidden and
-taken out of the library (``removed``), and one effect that the model has already (``completed``).
+Those that are driven are of five kinds: one effect hidden, none, a pair (diagnose, add what comes first, diagnose
+again), one effect hidden and taken out of the library (``removed``), and one effect that the model has already
+(``completed``). Other tests, and structures, hide one effect or none.
 """
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import combinations
+from types import MappingProxyType
 
 import numpy as np
 
-from study.compare.comparison import Comparison
-from study.compare.prediction import predict
 from study.diagnose.adding import added
 from study.diagnose.confirmed_faults import confirmed
-from study.diagnose.verdict import diagnose
+from study.diagnose.verdict import NOTHING, diagnose
 from study.faults.fault import fault_fields
 from study.faults.imposed import FAULTS
-from study.identify.time_domain.part_fit import fit_part
-from study.records.prepared import Prepared, prepare_record
 from study.records.record import MOTIONS
 from study.reproduction.settings import TrialSettings
 from study.support.errors import StudyError
-from study.trials.draw import HIDDEN, NO_FAULT, Trial, make_trial
-from study.trials.experiment import WIDE
-from study.trials.findings import Row, accounted_comparison, evidence_row, intervals, measurement, tie_set
+from study.trials import findings
+from study.trials.draw import DRIVEN_MASS, FAMILIES, NO_FAULT, STRUCTURE, Trial, make_trial
+from study.trials.effects import HIDDEN
+from study.trials.findings import compared, intervals, tie_set
+from study.trials.kept import BY_TEST, KEPT_TABLES, STRUCTURES, TRIALS, Row
+from study.trials.kinds import TESTS
 
 SINGLE, NONE, PAIR, REMOVED, COMPLETED = "single", "none", "pair", "removed", "completed"
 WITHOUT, WITH = "without", "with"  # a fault of the measurement
-COLUMNS = (
-    "kind", "seed", "hidden", "noise", "faults", "response", "samples_a_period", "samples", "damping", "excitation",
-    "known", "share", "fault", "fault_channel", "fault_value", "fault_unit",
-    "faults_found", "fault_rivals", "fault_shown", "found", "found_channel", "found_value", "found_low", "found_high",
-    "verdict", "first", "tie_set", "tie_size", "pair", "second_verdict", "second_tie_set", "whole_tie_set",
-    "error_before", "error_after", "error_after_two", "error_true", "noise_floor", "left", "held", "asked",
-    "smallest_p", "true_p", "distance", "rivals", "seconds", "trouble",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Order:
-    """A trial to be run."""
+    """A trial to be run; what is None is drawn."""
 
-    kind: str  # ``single``, ``none``, ``pair``, ``removed`` or ``completed``
+    kind: str  # ``single``, ``none``, ``pair``, ``removed`` or ``completed``; empty where that is drawn
     seed: int  # of the trial
-    hidden: tuple[str, ...]  # effects to hide
-    noise: float  # mean square of the noise over that of the response
-    response: str  # what is measured
+    hidden: tuple[str, ...] | None  # effects to hide
+    noise: float | None  # mean square of the noise over that of the response
+    response: str | None  # what is measured
     faults: str = WITHOUT  # ``with`` or ``without`` one of the measurement
+    test: str = DRIVEN_MASS  # one of ``draw.FAMILIES``
+    coordinates: int | None = None  # of a structure
 
 
-def orders(settings: TrialSettings) -> list[Order]:
-    """Every trial of the published run, each with a seed of its own: those without a fault, then those with one.
+def orders(table: str, settings: TrialSettings) -> list[Order]:
+    """Every trial of a kept table; ``settings`` are those of ``trials``."""
+    if table == TRIALS:
+        return driven_orders(settings)
+    return structure_orders() if table == STRUCTURES else orders_of_tests()
+
+
+def driven_orders(settings: TrialSettings) -> list[Order]:
+    """Every trial of a force on mass and spring, each with a seed of its own: those without a fault, then with one.
 
     Each kind is laid out evenly over effects, noises and responses; then the order is shuffled, so that the first few
     are a fair sample of all.
@@ -89,94 +91,134 @@ def _wanted(
     ]
 
 
+def orders_of_tests(first: int = 630_001, each: int = 50) -> list[Order]:
+    """So many trials of each kind of test, effects and noises as they are drawn."""
+    return [Order("", seed, None, None, None, test=test) for seed in range(first, first + each) for test in TESTS]
+
+
+def structure_orders(count: int = 120, first: int = 20_000) -> list[Order]:
+    """So many trials of structures, laid out evenly over effects, noises, motions and sizes; every sixth hides none."""
+    effects = [str(name) for name in np.random.default_rng(first).permutation(HIDDEN)]
+    noises, motions = FAMILIES[STRUCTURE].noises, FAMILIES[STRUCTURE].motions
+    every: list[Order] = []
+    for i in range(count):
+        none = i % 6 == 5
+        hidden = () if none else (effects[(i - i // 6) % len(effects)],)
+        noise, motion = noises[i % len(noises)], motions[(i // len(noises)) % len(motions)]
+        kind, size = NONE if none else SINGLE, 2 + (i // 2) % 4
+        every.append(Order(kind, first + i, hidden, noise, motion, test=STRUCTURE, coordinates=size))
+    return every
+
+
 def run_trial(order: Order) -> Row:
     """Make a trial, diagnose it and compare with the answer; a fault a user would be told of is kept in ``trouble``."""
-    row: Row = dict.fromkeys(COLUMNS, "")
-    row |= {"kind": order.kind, "seed": order.seed, "hidden": "+".join(order.hidden), "faults": order.faults}
-    row |= {"noise": order.noise, "response": order.response}
+    judged, nothing = JUDGES.get(order.test, _judged_test), "" if order.test == DRIVEN_MASS else NONE
+    row: Row = {
+        "kind": order.kind, "seed": order.seed, "test": order.test, "faults": order.faults, "noise": order.noise,
+        "response": order.response, "coordinates": order.coordinates,
+        "hidden": "" if order.hidden is None else "+".join(order.hidden) or nothing,
+    }  # fmt: skip
+    begun = time.perf_counter()
     try:
         fault = FAULTS[order.seed % len(FAULTS)] if order.faults == WITH else NO_FAULT
-        trial = make_trial(order.seed, order.hidden, order.noise, order.response, fault, WIDE)
-        row |= _answer(trial)
+        trial = make_trial(order.seed, order.hidden, order.noise, order.response, fault, order.test, order.coordinates)
+        row |= {**trial.about, **_drawn(trial), "hidden": "+".join(e.term.name for e in trial.effects) or nothing}
         begun = time.perf_counter()
-        row |= _judged(order, trial)
-        row["seconds"] = round(time.perf_counter() - begun, 1)
+        row |= judged(order, trial)
     except StudyError as error:
         row["trouble"] = str(error)
-    return row
+    row["seconds"] = round(time.perf_counter() - begun, 1)
+    return {column: row.get(column, "") for column in KEPT_TABLES[table_of(order)].columns}
 
 
-def _answer(trial: Trial) -> Row:
-    experiment = trial.experiment
-    assert experiment is not None, "these trials are of a force on a mass and spring"
-    return {
-        "samples_a_period": experiment.samples_a_period, "samples": experiment.samples,
-        "damping": experiment.damping, "excitation": experiment.kind,
-        "known": "+".join(t.name for t in trial.believed.terms[3:]) or "linear",
-        "share": "+".join(f"{share:.3f}" for share in trial.shares),
-        "fault": trial.fault.get("fault", ""), "fault_channel": trial.fault.get("channel", ""),
-        "fault_value": trial.fault.get("value", ""), "fault_unit": trial.fault.get("unit", ""),
-    }  # fmt: skip
+def table_of(order: Order) -> str:
+    """The kept table that a trial belongs to."""
+    return {DRIVEN_MASS: TRIALS, STRUCTURE: STRUCTURES}.get(order.test, BY_TEST)
 
 
-def _judged(order: Order, trial: Trial) -> Row:
-    prepared = prepare_record(trial.record)
-    before, faults = accounted_comparison(trial.completed if order.kind == COMPLETED else trial.believed, prepared)
-    diagnosis = diagnose(before, without=order.hidden if order.kind == REMOVED else ())
+def _drawn(trial: Trial) -> Row:
+    """What was drawn, beside the kind of rig and the effects."""
+    places = [entry.place.label for entry in trial.effects]
+    shares = sum(trial.shares) if trial.test == STRUCTURE else "+".join(f"{share:.3f}" for share in trial.shares)
+    fault = {f"fault_{key}": trial.fault.get(key, "") for key in ("channel", "value", "unit")}
+    row: Row = {"noise": trial.noise, "response": trial.response, "place": "+".join(places), "share": shares}
+    return row | {"fault": trial.fault.get("fault", ""), **fault}
+
+
+def _judged_driven(order: Order, trial: Trial) -> Row:
+    before, faults = compared(trial, trial.completed if order.kind == COMPLETED else trial.believed)
+    diagnosis = diagnose(before, without=order.hidden or () if order.kind == REMOVED else ())
     named = tie_set(diagnosis)
     after = added(before, diagnosis.candidates[0].term) if named else before
-    first = next((c.name for c in diagnosis.candidates), "")
+    found = [fault_fields(fault) for fault in confirmed(faults, diagnosis)]
     row: Row = {
-        "verdict": diagnosis.verdict, "first": first, "tie_set": "+".join(named),
-        "tie_size": len(named), "pair": "+".join(diagnosis.pair), "left": diagnosis.left,
+        "fault_shown": findings.fault_shown(trial, [str(field["fault"]) for field in found]),
+        "verdict": diagnosis.verdict, "first": next((c.name for c in diagnosis.candidates), ""),
+        "tie_set": "+".join(named), "tie_size": len(named), "pair": "+".join(diagnosis.pair), "left": diagnosis.left,
         "error_before": before.prediction.error, "error_after": after.prediction.error,
-        "error_true": error_of_truth(trial, before.prepared, after.fit.steps_per_sample),
+        "error_true": findings.error_of_truth(trial, before.prepared, after.fit.steps_per_sample),
         "noise_floor": before.prediction.floor,
     }  # fmt: skip
-    found = [fault_fields(fault) for fault in confirmed(faults, diagnosis)]
-    row["fault_shown"] = fault_shown(trial, prepared, [str(field["fault"]) for field in found])
-    row |= evidence_row(diagnosis, order.hidden) | measurement(found, trial.fault) | intervals(after, trial.truth)
+    row |= findings.evidence_row(diagnosis, trial.hidden) | findings.measurement(found, trial.fault)
+    row |= intervals(after, trial.truth)
     if named and order.kind == PAIR:
-        row |= _second(after, trial)
+        second = diagnose(after)
+        ties = tie_set(second)
+        last = added(after, second.candidates[0].term) if ties else after
+        row |= {"second_verdict": second.verdict, "second_tie_set": "+".join(ties)}
+        row |= {"error_after_two": last.prediction.error, **intervals(last, trial.truth)}
     if named and order.kind == REMOVED:
         row["whole_tie_set"] = "+".join(tie_set(diagnose(before)))
     return row
 
 
-def _second(after: Comparison, trial: Trial) -> Row:
-    """Diagnose again after adding what came first."""
-    diagnosis = diagnose(after)
-    named = tie_set(diagnosis)
-    last = added(after, diagnosis.candidates[0].term) if named else after
-    return {
-        "second_verdict": diagnosis.verdict, "second_tie_set": "+".join(named),
-        "error_after_two": last.prediction.error, **intervals(last, trial.truth),
-    }  # fmt: skip
+def _judged_test(_: Order, trial: Trial) -> Row:
+    """With the true model's intervals, and how far the hidden effect stands out: its coefficient over its error.
 
-
-def error_of_truth(trial: Trial, prepared: Prepared, steps: int) -> float:
-    """Held-out response error of the true model, fitted as any other, from the true values; NaN if it cannot be."""
-    try:
-        return predict(fit_part(trial.truth, prepared, (), steps=steps), prepared).error
-    except StudyError:
-        return math.nan
-
-
-def fault_shown(trial: Trial, prepared: Prepared, found: Sequence[str]) -> str:
-    """Whether the record shows its fault, ``yes`` or ``no``: it was found, or is beside the true equation.
-
-    Empty without a fault. What no search finds beside the very equation that made the record is too small for it.
+    Of a record without noise nothing is asked: there an interval is as wide as rounding.
     """
-    imposed = trial.fault.get("fault", "")
-    if not imposed or imposed in found:
-        return "yes" if imposed else ""
+    diagnosis = diagnose(compared(trial, trial.believed)[0])
+    named = tie_set(diagnosis)
+    right = bool(named) and set(named) >= set(trial.hidden) if trial.hidden else diagnosis.verdict == NOTHING
+    row: Row = {
+        "verdict": diagnosis.verdict, "first": named[0] if named else "", "tied": "+".join(named[1:]),
+        "right": int(right), "error_before": diagnosis.comparison.prediction.error,
+        "error_after": diagnosis.candidates[0].prediction.error if named else "",
+    }  # fmt: skip
+    if trial.noise > 0.0:
+        true = compared(trial, trial.completed)[0]
+        standing = [abs(c.value) / c.error for c in true.coefficients if c.term in trial.hidden and c.error]
+        row |= {"shown": round(standing[0], 1) if standing else ""} | intervals(true, trial.truth)
+    return row
+
+
+def _judged_structure(_: Order, trial: Trial) -> Row:
+    diagnosis = findings.diagnosed_structure(trial)
+    before, rows = diagnosis.comparison.prediction, diagnosis.candidates
+    hidden = next(iter(trial.effects), None)
+    ties = [r for r in rows if r.name in tie_set(diagnosis)]
+    first = ties[0] if ties else None
+    there = [hidden is not None and r.entry.place.path == hidden.place.path for r in ties]
+    same = [hidden is not None and r.term.name == hidden.term.name for r in ties]
+    row: Row = {
+        "verdict": diagnosis.verdict, "error_before": before.error,
+        "noise_floor": before.floor, "left": diagnosis.left, "asked": diagnosis.asked,
+        "effect_first": bool(same and same[0]), "place_first": bool(there and there[0]),
+        "tie_holds": any(a and b for a, b in zip(same, there, strict=True)) if hidden else diagnosis.verdict == NOTHING,
+    }  # fmt: skip
+    if first is not None:
+        row |= {
+            "first": first.term.name, "first_place": first.entry.place.label, "error_after": first.prediction.error,
+            "p_value": first.p_value, "tie_set": " ".join(r.name for r in ties),
+        }  # fmt: skip
     try:
-        seen = [fault.fault for fault in accounted_comparison(trial.completed, prepared)[1]]
+        true = findings.true_comparison(trial, diagnosis)
     except StudyError:
-        seen = []
-    return "yes" if imposed in seen else "no"
+        return row | {"error_true": math.nan}
+    held = intervals(true, trial.truth) if trial.noise > 0.0 else {"held": "", "asked": ""}
+    return row | {"error_true": true.prediction.error, "true_inside": held["held"], "true_keys": held["asked"]}
 
 
-def chunk(every: Sequence[Order], number: int, count: int) -> list[Order]:
-    """The part of the trials that job ``number`` of ``count`` runs: every count-th, so that all take equally long."""
-    return list(every[number::count])
+JUDGES: Mapping[str, Callable[[Order, Trial], Row]] = MappingProxyType(
+    {DRIVEN_MASS: _judged_driven, STRUCTURE: _judged_structure}
+)

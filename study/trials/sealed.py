@@ -3,121 +3,86 @@
 import base64
 import binascii
 import json
-from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, cast
 
-from study.equations.model import Model
 from study.equations.model_file import format_model
 from study.records.record import write_csv
-from study.support.errors import StudyError
+from study.support.config_files import Section, checked
+from study.support.errors import StudyError, expect
 from study.support.files import read_text, replace_file, replacing
-from study.support.yaml_text import shown
 from study.trials.draw import Trial
 
-KEYS = {"hidden", "shares", "noise", "fault", "truth"}
-WANTED = "the answer file of a trial, as 'study trial' writes it"
+ANSWER_FILE = "the answer file of a trial, as 'study trial' writes it"
 
 
 def write_trial(trial: Trial, folder: Path) -> tuple[Path, Path, Path]:
     """Write record, believed model and sealed answer: their paths, or a ``StudyError`` if that cannot be."""
-    record = trial.record
-    return write_trial_files(record.name, lambda path: write_csv(record, path), trial.believed, contents(trial), folder)
-
-
-def write_trial_files(
-    stem: str, record_to: Callable[[Path], object], believed: Model, content: Mapping[str, Any], folder: Path
-) -> tuple[Path, Path, Path]:
-    """Write the three files of a trial named ``stem``, as :func:`write_trial`; ``record_to`` writes its record."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StudyError(
             f"{folder}: no such folder can be made ({error.strerror}); expected a writable place"
         ) from None
+    stem = trial.record.name
     record, model, answer = (folder / f"{stem}{ending}" for ending in (".csv", ".yaml", ".answer.json"))
     with replacing(record) as beside:
-        record_to(beside)
-    replace_file(model, format_model(believed).encode())
-    seal(content, answer, stem)
-    return record, model, answer
-
-
-def seal(content: Mapping[str, Any], answer: Path, stem: str) -> None:
-    """Write an answer that no glance gives away."""
+        write_csv(trial.record, beside)
+    replace_file(model, format_model(trial.believed).encode())
+    content = {
+        "hidden": trial.hidden, "shares": trial.shares, "noise": trial.noise, "fault": dict(trial.fault),
+        "truth": format_model(trial.truth),
+    }  # fmt: skip
     sealed = base64.b64encode(json.dumps(content).encode()).decode()
     page = {"trial": stem, "open_with": f"study trial --open {answer.name}", "answer": sealed}
     replace_file(answer, (json.dumps(page, indent=1) + "\n").encode())
+    return record, model, answer
 
 
-def contents(trial: Trial) -> dict[str, Any]:
-    """What the answer holds: hidden effects, their shares of the restoring force, noise, fault, and the true model."""
-    return {
-        "hidden": list(trial.hidden), "shares": list(trial.shares), "noise": trial.noise, "fault": dict(trial.fault),
-        "truth": format_model(trial.truth),
-    }  # fmt: skip
+class Imposed(Section):
+    """A fault of the measurement, as it was put on."""
+
+    fault: str
+    channel: str
+    value: float
+    unit: str
 
 
-def unseal(path: Path) -> dict[str, Any]:
+class Nothing(Section):
+    """No fault."""
+
+
+class Answer(Section):
+    """What is sealed."""
+
+    hidden: list[str]  # effects
+    shares: list[float]  # of the force that each is sized by
+    noise: float  # mean square, over that of the response
+    fault: Imposed | Nothing
+    truth: str  # the model that made the record
+
+
+def unseal(path: Path) -> Answer:
     """The answer of a trial; a ``StudyError`` if the file holds none."""
-    text = read_text(path, WANTED)
+    text = read_text(path, ANSWER_FILE)
     try:
         page: object = json.loads(text)
-        sealed = cast(dict[str, Any], page)["answer"]
-        answer: object = json.loads(base64.b64decode(sealed, validate=True))
+        content: object = json.loads(base64.b64decode(cast(dict[str, Any], page)["answer"], validate=True))
     except (ValueError, KeyError, TypeError, RecursionError, binascii.Error):
-        raise StudyError(f"{path}: this holds no sealed answer; expected {WANTED}") from None
-    if not isinstance(answer, dict) or set(cast(dict[str, Any], answer)) != KEYS:
-        raise StudyError(f"{path}: the answer in it is not that of a trial; expected {WANTED}")
-    found = cast(dict[str, Any], answer)
-    for key, kind in KINDS.items():
-        if not kind(found[key]):
-            raise StudyError(f"{path}: the answer in it has {key} = {shown(found[key])}; expected {WANTED}")
-    if len(found["hidden"]) != len(found["shares"]):
-        raise StudyError(f"{path}: the answer in it has not a share for each effect; expected {WANTED}")
-    return found
+        raise StudyError(f"{path}: this holds no sealed answer; expected {ANSWER_FILE}") from None
+    answer = checked(Answer, content, f"{path}: the answer in it")
+    alike = len(answer.hidden) == len(answer.shares)
+    expect(alike, f"{path}: the answer in it has not a share for each effect; expected {ANSWER_FILE}")
+    return answer
 
 
-def _is_number(value: object) -> bool:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    return abs(value) < LARGEST
-
-
-def _are(value: object, kind: Callable[[object], bool]) -> bool:
-    return isinstance(value, list) and all(kind(item) for item in cast(list[object], value))
-
-
-def _is_text(value: object) -> bool:
-    return isinstance(value, str)
-
-
-def _is_fault(value: object) -> bool:
-    if not isinstance(value, dict):
-        return False
-    fault = cast(dict[str, object], value)
-    words = all(_is_text(fault.get(key)) for key in ("unit", "fault", "channel"))
-    return not fault or (words and _is_number(fault.get("value")))
-
-
-LARGEST = 1e50  # of a number in an answer
-KINDS: Mapping[str, Callable[[object], bool]] = {
-    "hidden": lambda value: _are(value, _is_text), "shares": lambda value: _are(value, _is_number),
-    "noise": _is_number, "fault": _is_fault, "truth": _is_text,
-}  # fmt: skip
-
-
-def answer_in_words(answer: Mapping[str, Any]) -> str:
+def answer_in_words(answer: Answer) -> str:
     """An answer for people."""
-    hidden = [f"{name} ({100.0 * share:.0f} %)" for name, share in zip(answer["hidden"], answer["shares"], strict=True)]
+    hidden = [f"{name} ({100.0 * share:.0f} %)" for name, share in zip(answer.hidden, answer.shares, strict=True)]
     what = f"hidden, with the share of the restoring force: {', '.join(hidden)}" if hidden else "nothing is hidden"
-    noise = f"noise: {100.0 * answer['noise']:g} % of the mean square of the response"
-    return f"{what}\n{noise}\n{_fault(answer['fault'])}\nthe model that made the record:\n\n{answer['truth']}"
-
-
-def _fault(fault: Mapping[str, Any]) -> str:
-    if not fault:
-        return "fault of the measurement: none"
-    unit = "" if fault["unit"] == "1" else f" {fault['unit']}"
-    name = str(fault["fault"]).replace("_", " ")
-    return f"fault of the measurement: {name} of the {fault['channel']}, {fault['value']:.4g}{unit}"
+    noise = f"noise: {100.0 * answer.noise:g} % of the mean square of the response"
+    fault, said = answer.fault, "none"
+    if isinstance(fault, Imposed):
+        unit = "" if fault.unit == "1" else f" {fault.unit}"
+        said = f"{fault.fault.replace('_', ' ')} of the {fault.channel}, {fault.value:.4g}{unit}"
+    return f"{what}\n{noise}\nfault of the measurement: {said}\nthe model that made the record:\n\n{answer.truth}"

@@ -9,13 +9,13 @@ from matplotlib.axes import Axes
 
 from study.figures.page import frame_cells
 
-STEPS = {
+STEPS_OF_ADDING = {
     "before": ("before", "C1", "s", -0.27),
     "after": ("after adding what was found", "C0", "o", -0.09),
     "after_two": ("after adding twice", "C4", "D", 0.09),
     "true": ("true model", "black", "_", 0.27),
 }
-DARK = 0.6  # share from which a number is written in white
+WHITE_FROM = 0.6  # share from which a number is written in white
 
 
 def confusion_panel(axes: Axes, counts: pd.DataFrame) -> Axes:
@@ -33,7 +33,7 @@ def confusion_panel(axes: Axes, counts: pd.DataFrame) -> Axes:
         if value > 0.0:
             axes.text(
                 j, i, f"{100.0 * value:.0f}", ha="center", va="center", fontsize=8,
-                color="white" if value > DARK else "black",
+                color="white" if value > WHITE_FROM else "black",
             )  # fmt: skip
     titles = [f"{name} ({int(n.sum())})" for name, n in zip(hidden, numbers, strict=True)]
     frame_cells(axes, titles, names, 90.0)
@@ -46,7 +46,7 @@ def error_by_noise_panel(axes: Axes, rows: pd.DataFrame) -> Axes:
     """Mean held-out error of the response with its standard error, at each noise, for one kind of trial."""
     noises = sorted(rows["noise"].unique())
     place = {noise: i for i, noise in enumerate(noises)}
-    for step, (label, colour, marker, shift) in STEPS.items():
+    for step, (label, colour, marker, shift) in STEPS_OF_ADDING.items():
         own = rows[rows["step"] == step]
         if not len(own):
             continue

@@ -10,7 +10,7 @@ from study import cli
 from study.equations.simulate import Integrator, simulate
 from study.records.excitation import Excitation, force
 from study.records.record import Record, write_csv
-from study.trials.kinds import make_test
+from study.trials import make_trial
 
 LINEAR = "name: rig\nterms: [inertia, linear_damping, linear_stiffness]\n"
 DT = 0.02
@@ -111,7 +111,7 @@ def test_stretches_that_cannot_be_used_are_refused_in_one_sentence(options, word
 
 
 def drawn(test: str, seed: int, hidden: tuple[str, ...], noise: float = 0.01) -> None:
-    write_csv(make_test(test, seed, hidden, noise).record, Path("record.csv"))
+    write_csv(make_trial(seed, hidden, noise, test=test).record, Path("record.csv"))
 
 
 @pytest.mark.long

@@ -12,8 +12,7 @@ from study.explore import session as sessions
 from study.records.prepared import prepare_record
 from study.records.readers import read_record
 from study.support.numbers import percent
-from study.trials import make_trial
-from study.trials.experiment import REPORT_LIKE, WIDE
+from study.trials import DRIVEN_MASS, LIKE_THE_REPORT, make_trial
 from study.trials.sealed import write_trial
 
 ALIKE = 1e-9  # relative: the same computation, whoever asks for it
@@ -27,8 +26,8 @@ OVERSAMPLED = 520001, "quadratic_damping", 0.05, "velocity"
 @pytest.mark.parametrize(("seed", "hidden", "noise", "response"), [*TRIALS, OVERSAMPLED])
 def test_one_error_and_one_floor(seed, hidden, noise, response, tmp_path, capsys):
     fine = seed == OVERSAMPLED[0]
-    ranges = WIDE if fine else REPORT_LIKE
-    data, model, _ = write_trial(make_trial(seed, (hidden,), noise, response, ranges=ranges), tmp_path)
+    test = DRIVEN_MASS if fine else LIKE_THE_REPORT
+    data, model, _ = write_trial(make_trial(seed, (hidden,), noise, response, test=test), tmp_path)
 
     def told(*words):
         assert cli.main([str(w) for w in words]) == 0

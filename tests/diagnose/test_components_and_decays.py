@@ -11,14 +11,14 @@ from study.equations.terms import get
 from study.faults.imposed import shifted
 from study.faults.kinds_of_tests import accounted_test
 from study.records.record import SI_UNITS, Record
-from study.trials.kinds import make_test
+from study.trials import make_trial
 
 LOST = "loses the motion"
 
 
 def test_of_forms_that_are_one_force_the_simplest_comes_first():
     """Without noise: a contact never left, and a relaxation without end, make a constant force to the last digits."""
-    trial = make_test("component", 620026, ("constant_force",), 0.0)
+    trial = make_trial(620026, ("constant_force",), 0.0, test="component")
     first = diagnose(accounted_test([trial.record], trial.believed).comparison).candidates[0]
     assert first.name == "constant_force"
     assert {"one_sided_contact", "relaxation"} & set(first.tied_with)
@@ -26,7 +26,7 @@ def test_of_forms_that_are_one_force_the_simplest_comes_first():
 
 @pytest.mark.parametrize(("hidden", "late"), [((), 1.0), (("relaxation",), 0.0)])
 def test_a_force_that_is_read_late_is_told_from_a_relaxation(hidden, late):
-    trial = make_test("component", 9 if late else 14, hidden, 0.01)
+    trial = make_trial(9 if late else 14, hidden, 0.01, test="component")
     record = trial.record.with_channels({"force": shifted(trial.record["force"], late)})
     diagnosis = diagnose(accounted_test([record], trial.believed).comparison)
     assert diagnosis.candidates[0].name == "relaxation"

@@ -10,7 +10,7 @@ from study.compare.comparison import compare
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN, Diagnosis, diagnose
 from study.equations.terms import LIBRARY
 from study.records.prepared import prepare_record
-from study.trials import Trial, make_trial, runs
+from study.trials import Trial, findings, make_trial, runs
 from study.trials.runs import Order
 
 FIRST_SEED = 900_000
@@ -35,7 +35,7 @@ def test_hidden_effect_comes_first_or_is_named_in_the_tie(place: int, name: str)
     assert diagnosis.verdict == MISSING
     assert name == first.name or name in first.tied_with
     assert first.response_error < comparison.prediction.error
-    truth = runs.error_of_truth(trial, comparison.prepared, first.fit.steps_per_sample)
+    truth = findings.error_of_truth(trial, comparison.prepared, first.fit.steps_per_sample)
     assert first.response_error < 1.05 * truth + 1e-6  # where nothing is noise, the rounding of the fit
 
 

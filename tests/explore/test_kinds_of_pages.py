@@ -23,7 +23,6 @@ from study.explore.saved import saved
 from study.faults.kinds_of_tests import accounted_test
 from study.records.record import Record
 from study.support.errors import StudyError
-from study.trials.kinds import make_test
 
 DT, STIFFNESS, DAMPING = 0.005, 2000.0, 30.0
 
@@ -36,7 +35,11 @@ def begun(kind: str) -> sessions.Session:
         record = _component()
     else:
         free_run = kind == FREE
-        trial = make_test("free_decay", 9, ["hysteresis"], 0.0) if free_run else trials.make_trial(4, ["dead_band"])
+        trial = (
+            trials.make_trial(9, ["hysteresis"], 0.0, test="free_decay")
+            if free_run
+            else trials.make_trial(4, ["dead_band"])
+        )
         believed, record = trial.believed, trial.record.part(0, min(4000, len(trial.record)))
     return sessions.begin_with(accounted_test([record], believed).comparison)
 

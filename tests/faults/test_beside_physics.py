@@ -7,11 +7,11 @@ from study import trials
 from study.faults.accounting import accounted
 from study.faults.imposed import impose, shifted
 from study.records.prepared import prepare_record
-from study.trials.experiment import WIDE
+from study.trials import DRIVEN_MASS
 
 
 def found(seed, hidden, noise, response, fault, completed=False):
-    made = trials.make_trial(seed, (hidden,), noise, response, fault, WIDE)
+    made = trials.make_trial(seed, (hidden,), noise, response, fault, DRIVEN_MASS)
     model = made.completed if completed else made.believed
     return made.fault["value"], accounted(model, prepare_record(made.record)).faults
 
@@ -51,7 +51,9 @@ def test_a_mass_that_friction_holds_has_not_dropped_out_and_its_reversals_are_no
 
 def test_noise_on_the_force_of_a_nonlinear_system_is_measured_as_its_motion_passes_it_on():
     """Passed through the nearest linear system it would be 9 % larger, six of its standard errors."""
-    made = trials.make_trial(520321, ("cubic_damping", "bilinear_stiffness"), 0.0, "acceleration", "force_noise", WIDE)
+    made = trials.make_trial(
+        520321, ("cubic_damping", "bilinear_stiffness"), 0.0, "acceleration", "force_noise", DRIVEN_MASS
+    )
     (noise,) = accounted(made.completed, prepare_record(made.record)).faults
     assert noise.fault == "force_noise"
     assert noise.value == pytest.approx(made.fault["value"], rel=0.03)
@@ -60,7 +62,7 @@ def test_noise_on_the_force_of_a_nonlinear_system_is_measured_as_its_motion_pass
 @pytest.mark.long
 def test_a_fault_found_in_a_stretch_has_the_value_that_the_whole_record_tells():
     """In 8,192 samples of either part, 113 periods of a structure that remembers 65, the delay is -0.64 samples."""
-    made = trials.make_trial(520303, (), 0.01, "velocity", "delay", WIDE)
+    made = trials.make_trial(520303, (), 0.01, "velocity", "delay", DRIVEN_MASS)
     (delay,) = accounted(made.believed, prepare_record(made.record)).faults
     assert abs(delay.value - made.fault["value"]) < 3.0 * delay.error < 0.03
 
@@ -69,7 +71,7 @@ def test_a_fault_found_in_a_stretch_has_the_value_that_the_whole_record_tells():
 @pytest.mark.parametrize("late", [-1.42, -1.0, 1.5])
 def test_a_delay_that_loses_the_fit_is_found_along_the_motion(late: float) -> None:
     """A complete model, its velocity read 1.42 samples early: "nothing missing" was said at 72 %."""
-    made = trials.make_trial(560354, (), 0.0, "velocity", "none", WIDE)
+    made = trials.make_trial(560354, (), 0.0, "velocity", "none", DRIVEN_MASS)
     read = shifted(made.record["velocity"], late)
     result = accounted(made.believed, prepare_record(made.record.with_channels({"velocity": read})))
     (delay,) = result.faults
@@ -85,14 +87,14 @@ def test_a_delay_that_takes_a_part_of_a_missing_effect_does_not_displace_it():
 
 
 def test_drop_outs_beside_noise_are_counted_where_the_motion_passes_through_zero_too():
-    made = trials.make_trial(520339, ("signed_quadratic_stiffness",), 0.01, "velocity", "drop_outs", WIDE)
+    made = trials.make_trial(520339, ("signed_quadratic_stiffness",), 0.01, "velocity", "drop_outs", DRIVEN_MASS)
     (fault,) = accounted(made.completed, prepare_record(made.record)).faults
     assert fault.value == pytest.approx(made.fault["value"], rel=1e-9)
 
 
 def test_a_clipped_record_that_is_looked_at_in_part_first_keeps_what_was_read_within_the_limits():
     """All that the first look had left out was taken for limits in the second, and nothing was left to judge."""
-    made = trials.make_trial(520340, ("van_der_pol_damping",), 0.1, "velocity", "clipping", WIDE)
+    made = trials.make_trial(520340, ("van_der_pol_damping",), 0.1, "velocity", "clipping", DRIVEN_MASS)
     (fault,) = accounted(made.believed, prepare_record(made.record)).faults
     assert fault.fault == "clipping"
     assert 0.02 < np.mean(fault.lost) < 0.2
@@ -101,7 +103,7 @@ def test_a_clipped_record_that_is_looked_at_in_part_first_keeps_what_was_read_wi
 @pytest.mark.long
 @pytest.mark.parametrize("fault", ["spikes", "drop_outs"])
 def test_spikes_and_drop_outs_beside_friction_are_found(fault):
-    made = trials.make_trial(520277, ("coulomb_friction",), 0.0, "acceleration", ranges=WIDE)
+    made = trials.make_trial(520277, ("coulomb_friction",), 0.0, "acceleration", test=DRIVEN_MASS)
     record, known = impose(made.record, "acceleration", fault, np.random.default_rng(3))
     faults = accounted(made.completed, prepare_record(record)).faults
     assert [f.fault for f in faults] == [fault]
@@ -111,7 +113,7 @@ def test_spikes_and_drop_outs_beside_friction_are_found(fault):
 @pytest.mark.long
 def test_a_record_that_is_over_in_its_middle_has_lost_nothing():
     """Zeros to the end of the file, where nothing was written, were called 50 % drop-outs."""
-    made = trials.make_trial(520303, (), 0.0, "displacement", "none", WIDE)
+    made = trials.make_trial(520303, (), 0.0, "displacement", "none", DRIVEN_MASS)
     record = made.record
     half = len(record) // 2
     over = {name: np.where(np.arange(len(record)) < half, record[name], 0.0) for name in ("force", "displacement")}

@@ -1,6 +1,7 @@
 """Every fault can be drawn: in truth in grey, as read in black, where it is seen, with its value in words."""
 
 import importlib.util
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -8,27 +9,40 @@ import pytest
 from PIL import Image
 
 from study.faults.fault import CLIPPING, DRIFT, DROP_OUTS, FORCE_NOISE, GAIN_CHANGE, NAMES, SPIKES, Fault
-from study.faults.fault_examples import Example, example, measured_example
-from study.faults.fault_pictures import picture, shown_samples
 from study.faults.imposed import impose
 from study.figures.sheet import in_style
 
 ROOT = Path(__file__).parents[2]
 
 
+def loaded():
+    spec = importlib.util.spec_from_file_location("fault_pictures_script", ROOT / "scripts" / "fault_pictures.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # its dataclass looks for it there
+    spec.loader.exec_module(module)
+    return module
+
+
+script = loaded()
+
+
 @pytest.fixture(scope="module")
 def clean(systems):
-    return measured_example(systems["duffing"], "displacement")
+    return script.measured_example(systems["duffing"], "displacement")
 
 
 @pytest.fixture
 def faulty(clean):
     """An example of a fault that is found with its very value."""
 
-    def make(fault: str) -> Example:
+    def make(fault: str) -> script.Example:
         record, known = impose(clean, "displacement", fault, np.random.default_rng(5))
         size = known["value"]
-        return Example(clean, record, size, Fault(fault, known["channel"], size, 0.01 * abs(size), known["unit"]))
+        return script.Example(
+            clean, record, size, Fault(fault, known["channel"], size, 0.01 * abs(size), known["unit"])
+        )
 
     return make
 
@@ -36,9 +50,9 @@ def faulty(clean):
 @pytest.mark.parametrize("fault", NAMES)
 def test_every_fault_is_drawn_where_it_is_seen(fault, faulty):
     one = faulty(fault)
-    first, last = shown_samples(one)
+    first, last = script.shown_samples(one)
     with in_style():
-        figure = picture(one)
+        figure = script.picture(one)
     signal, difference = figure.axes
     true, read = (line.get_ydata() for line in signal.get_lines())
     added = difference.get_lines()[0].get_ydata()
@@ -57,28 +71,23 @@ def test_every_fault_is_drawn_where_it_is_seen(fault, faulty):
 @pytest.mark.parametrize("fault", [SPIKES, DROP_OUTS, CLIPPING])
 def test_what_spoils_some_samples_is_shown_between_sound_ones(fault, faulty):
     one = faulty(fault)
-    first, last = shown_samples(one)
+    first, last = script.shown_samples(one)
     changed = one.clean[one.channel][first:last] != one.faulty[one.channel][first:last]
     assert 0 < np.count_nonzero(changed) < 0.3 * (last - first)
 
 
 @pytest.mark.parametrize("fault", [DRIFT, GAIN_CHANGE])
 def test_what_is_as_slow_as_the_record_is_shown_along_all_of_it(fault, faulty, clean):
-    assert shown_samples(faulty(fault)) == (0, len(clean))
+    assert script.shown_samples(faulty(fault)) == (0, len(clean))
 
 
 def test_an_example_is_what_the_search_finds(systems):
-    one = example(systems["duffing"], SPIKES)
+    one = script.example(systems["duffing"], SPIKES)
     assert one.found.fault == SPIKES
     assert one.found.value == pytest.approx(one.size, rel=0.2)
 
 
 def test_the_script_writes_a_picture_and_says_what_was_found(tmp_path, capsys):
-    spec = importlib.util.spec_from_file_location("fault_pictures_script", ROOT / "scripts" / "fault_pictures.py")
-    assert spec is not None
-    assert spec.loader is not None
-    script = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(script)
     script.main(ROOT / "models", tmp_path / "new", [CLIPPING])
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["clipping.png"]
     with Image.open(tmp_path / "new" / "clipping.png") as drawn, Image.open(ROOT / "docs/faults/clipping.png") as shown:

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from study.faults.kinds_of_tests import accounted_test
-from study.trials.kinds import make_test
+from study.trials import make_trial
 
 
 @pytest.mark.parametrize("late", [0.0, 1.5])
 def test_a_delay_of_the_response_to_a_moving_base_is_found_and_none_invented(late: float):
-    trial = make_test("base", 7, (), 1e-4)
+    trial = make_trial(7, (), 1e-4, test="base")
     u = trial.record["displacement"]
     lines = np.fft.rfft(u) * np.exp(-2j * np.pi * np.fft.rfftfreq(len(u)) * late)
     record = trial.record.with_channels({"displacement": np.fft.irfft(lines, len(u))})

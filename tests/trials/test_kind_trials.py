@@ -6,9 +6,9 @@ import pandas as pd
 import pytest
 
 from study.support.document import markdown
-from study.trials import kind_rates
-from study.trials.kind_runs import COLUMNS, FIRST_SEED, run_test
-from study.trials.likelihoods import log_likelihood_ratio, second_places
+from study.trials import pages, rates, runs
+from study.trials.kept import BY_TEST, KEPT_TABLES, differing_trials
+from study.trials.pages import log_likelihood_ratio, second_places
 
 DOCS = Path("docs")
 
@@ -18,28 +18,27 @@ def kept() -> pd.DataFrame:
 
 
 @pytest.mark.parametrize("test", ["free_decay", "base", "axis", "blows"])
-def test_the_first_row_of_each_kind_is_what_this_code_gives(test: str):
-    table = kept()
-    before = table[(table["test"] == test) & (table["seed"] == FIRST_SEED)].iloc[0]
-    own = pd.Series(run_test(test, FIRST_SEED))
-    for column in kind_rates.EXACT:
-        expected = "" if pd.isna(before[column]) else before[column]
-        assert own[column] == expected, column
-    assert own["error_before"] == pytest.approx(before["error_before"], rel=0.01, abs=1e-6)
+def test_the_first_row_of_each_kind_is_what_this_code_gives(test: str, tmp_path: Path):
+    order = next(order for order in runs.orders_of_tests() if order.test == test)
+    pd.DataFrame([runs.run_trial(order)]).to_csv(tmp_path / "own.csv", index=False)
+    assert differing_trials(pd.read_csv(tmp_path / "own.csv"), kept(), BY_TEST) == []
 
 
 def test_the_rates_of_the_page_are_those_of_the_table():
-    assert tuple(kept().columns) == COLUMNS
-    assert markdown(kind_rates.rate_blocks(kept())).strip() in (DOCS / "kinds_of_tests.md").read_text()
+    assert tuple(kept().columns) == KEPT_TABLES[BY_TEST].columns
+    assert markdown(pages.reached(kept(), BY_TEST)).strip() in (DOCS / "kinds_of_tests.md").read_text()
 
 
 def test_a_row_that_could_not_be_diagnosed_counts_as_failed():
     table = kept()
     worse = pd.concat([table, table[table["hidden"] != "none"].head(1).assign(right=None, trouble="it diverged")])
-    before, after = (markdown(kind_rates.rate_blocks(t)) for t in (table, worse))
+    before, after = (markdown(pages.reached(t, BY_TEST)) for t in (table, worse))
     failed = int(table["trouble"].notna().sum())
-    assert f"; {failed} could not be diagnosed" in before
-    assert f"; {failed + 1} could not be diagnosed" in after
+    assert f", {failed} of which could not be made or diagnosed" in before
+    assert f", {failed + 1} of which could not be made or diagnosed" in after
+    rates_of = [rates.target_summary(t, BY_TEST).set_index(["group", "reach"])["value"] for t in (table, worse)]
+    worsened = worse["test"].iloc[-1]
+    assert rates_of[1][worsened, "first or tied"] < rates_of[0][worsened, "first or tied"]
 
 
 def test_the_whole_record_of_a_decay_tells_two_laws_of_damping_no_better():

@@ -11,20 +11,18 @@ from scipy.stats import binomtest
 
 from study.diagnose.verdict import diagnose
 from study.faults.imposed import FAULTS
-from study.records.prepared import prepare_record
 from study.reproduction.config import load_config
 from study.reproduction.settings import TrialSettings
 from study.support.errors import StudyError
-from study.trials import constants_table, findings, kept, make_trial, reach, runs
-from study.trials.draw import HIDDEN
-from study.trials.experiment import WIDE
-from study.trials.findings import accounted_comparison
+from study.trials import DRIVEN_MASS, HIDDEN, findings, make_trial, rates, runs
+from study.trials.kept import KEPT_TABLES, TRIALS, differing_trials
 from study.trials.rates import mean, proportion
-from study.trials.runs import COLUMNS, Order
+from study.trials.runs import Order
 
 ROOT = Path(__file__).parents[2]
 CONFIG = load_config(ROOT / "config").settings.trials
 KEPT = ROOT / "docs" / "trials.csv"
+COLUMNS = KEPT_TABLES[TRIALS].columns
 AGAIN, QUICK = 12, 3000  # trials that are run again: the first, those of records with fewer samples among them
 SETTINGS = TrialSettings(
     first_seed=100, noises=(0.0, 0.05), rounds=1, none=2, completed=1, pairs=4, removed=1, jobs=3
@@ -50,7 +48,7 @@ def written(rows: list[Row], path: Path) -> pd.DataFrame:
 
 
 def test_orders_cover_every_effect_and_noise_with_seeds_of_their_own() -> None:
-    orders = runs.orders(SETTINGS)
+    orders = runs.driven_orders(SETTINGS)
     each = 17 * 2 + 2 * 2 + 17 + 4
     assert len({o.seed for o in orders}) == len(orders) == 2 * each + 17
     assert [o.seed for o in orders] == list(range(100, 100 + len(orders)))
@@ -62,12 +60,10 @@ def test_orders_cover_every_effect_and_noise_with_seeds_of_their_own() -> None:
         assert {o.hidden for o in own if o.kind == "completed"} == {(n,) for n in HIDDEN}
         assert {o.response for o in own} == {"displacement", "velocity", "acceleration"}
     assert {o.faults for o in orders if o.kind == "removed"} == {"without"}
-    parts = [runs.chunk(orders, i, 3) for i in range(3)]
-    assert sorted((o for part in parts for o in part), key=lambda o: o.seed) == orders
 
 
 def test_the_published_run_has_400_trials_and_its_first_are_of_all_kinds() -> None:
-    orders = runs.orders(CONFIG)
+    orders = runs.driven_orders(CONFIG)
     assert len(orders) >= 400
     assert {o.kind for o in orders[:40]} == {"single", "none", "pair", "removed", "completed"}
 
@@ -82,29 +78,29 @@ def test_the_published_run_has_400_trials_and_its_first_are_of_all_kinds() -> No
     ],
 )
 def test_a_tie_that_holds_the_truth_is_no_first_place(given: Row, first: float, tied: float) -> None:
-    assert reach.first_score(row(**(FOUND | given))) == first
-    assert reach.tied_score(row(**(FOUND | given))) == tied
+    assert rates.first_score(row(**(FOUND | given))) == first
+    assert rates.tied_score(row(**(FOUND | given))) == tied
 
 
 def test_pair_needs_both_first_and_removed_unknown_or_the_tie_set_of_the_whole_library() -> None:
     pair = {"kind": "pair", "hidden": "relaxation+hysteresis", "tie_set": "hysteresis+dead_band"}
-    assert reach.pair_score(row(**pair, second_tie_set="relaxation")) == 1.0
-    assert reach.pair_score(row(**pair, second_tie_set="cubic_damping+relaxation")) == 0.0
-    assert reach.pair_score(row(**pair)) == 0.0
+    assert rates.pair_score(row(**pair, second_tie_set="relaxation")) == 1.0
+    assert rates.pair_score(row(**pair, second_tie_set="cubic_damping+relaxation")) == 0.0
+    assert rates.pair_score(row(**pair)) == 0.0
     removed = {"kind": "removed", "hidden": "relaxation", "first": "hysteresis", "verdict": "missing_effect"}
-    assert reach.removed_score(row(**removed, tie_set="hysteresis+dead_band")) == 0.0
-    assert reach.removed_score(row(**removed, whole_tie_set="relaxation")) == 0.0
-    assert reach.removed_score(row(**removed, whole_tie_set="relaxation+hysteresis")) == 1.0
-    assert reach.removed_score(row(kind="removed", verdict="nothing_missing")) == 0.0
-    assert reach.removed_score(row(kind="removed", verdict="unknown_effect")) == 1.0
+    assert rates.removed_score(row(**removed, tie_set="hysteresis+dead_band")) == 0.0
+    assert rates.removed_score(row(**removed, whole_tie_set="relaxation")) == 0.0
+    assert rates.removed_score(row(**removed, whole_tie_set="relaxation+hysteresis")) == 1.0
+    assert rates.removed_score(row(kind="removed", verdict="nothing_missing")) == 0.0
+    assert rates.removed_score(row(kind="removed", verdict="unknown_effect")) == 1.0
 
 
 def test_a_fault_counts_by_name_channel_and_value() -> None:
     told = {"fault": "delay", "fault_channel": "velocity", "fault_value": 0.5, "found": "delay",
             "found_channel": "velocity", "found_low": 0.4, "found_high": 0.6}  # fmt: skip
-    assert reach.fault_score(row(**told)) == 1.0
+    assert rates.fault_score(row(**told)) == 1.0
     for other in ({"fault_value": 0.7}, {"found": "hum"}, {"found_channel": "force"}, {"found_low": np.nan}):
-        assert reach.fault_score(row(**(told | other))) == 0.0
+        assert rates.fault_score(row(**(told | other))) == 0.0
 
 
 @pytest.mark.long
@@ -113,9 +109,9 @@ def test_a_fault_that_the_true_equation_does_not_show_is_told_apart() -> None:
         (560269, (), 0.1, "drop_outs", "no"),
         (560266, ("quintic_stiffness",), 0.0, "delay", "yes"),
     ):
-        trial = make_trial(seed, hidden, noise, "velocity", fault, WIDE)
-        assert runs.fault_shown(trial, prepare_record(trial.record), []) == shown
-        assert runs.fault_shown(trial, prepare_record(trial.record), [fault]) == "yes"
+        trial = make_trial(seed, hidden, noise, "velocity", fault, DRIVEN_MASS)
+        assert findings.fault_shown(trial, []) == shown
+        assert findings.fault_shown(trial, [fault]) == "yes"
 
 
 @pytest.mark.parametrize(("good", "of"), [(40, 40), (38, 40), (0, 7), (1, 2)])
@@ -153,24 +149,26 @@ def test_summary_confusion_and_ladder_of_a_table(tmp_path: Path) -> None:
         ],
         tmp_path,
     )
-    found = reach.target_summary(read, WANTED).set_index(["reach", "faults"])
+    found = rates.target_summary(read, TRIALS, WANTED).set_index(["reach", "group"])
     first = found.loc[("true effect first, noise to 5 %", "without")]
     assert (first["trials"], first["value"], first["least"]) == (3, pytest.approx(1 / 3), 0.97)
     assert first["reached"] == "no", "one of three, at most 79 %"
     assert found.loc[("true effect first, noise 10 %", "without"), "reached"] == ""
     nothing = "nothing missing where nothing is, and of completed models"
+    held = "95 % intervals of coefficients that hold the truth, with noise"
     assert found.loc[(nothing, "without"), "value"] == found.loc[(nothing, "with"), "value"] == 1.0
     assert found.loc[(nothing, "with"), "least"] == 0.95
     assert found.loc[("both of two, by diagnose and add", "without"), "value"] == 1.0
     assert found.loc[("mean size of the tie set, noise 10 %", "without"), "value"] == 2.0
-    assert found.loc[(reach.HELD, "without"), "value"] == pytest.approx(0.8), "without noise nothing is asked"
+    assert found.loc[(held, "without"), "value"] == pytest.approx(0.8), "without noise nothing is asked"
     assert found.loc[("the fault named, its value within its interval", "with"), "reached"] == "no", "0 of 1, to 79 %"
-    counts = reach.confusion(read).set_index("hidden")
+    counts = rates.confusion(read).set_index("hidden")
     assert counts.loc["relaxation", "relaxation"] == 2
     assert counts.loc["relaxation", "unknown_effect"] == 1
     assert counts.loc["none", "nothing_missing"] == 1
-    assert counts.to_numpy().sum() == 4
-    rungs = reach.error_by_noise(read).set_index(["kind", "noise", "step"])
+    assert counts.loc["relaxation", "not_diagnosed"] == 1
+    assert counts.to_numpy().sum() == 5
+    rungs = rates.error_by_noise(read).set_index(["kind", "noise", "step"])
     assert rungs.loc[("single", 0.0, "after"), "mean_error"] == pytest.approx(0.25)
 
 
@@ -185,10 +183,10 @@ def test_any_alpha_and_any_k_after_the_fact(tmp_path: Path) -> None:
         ],
         tmp_path,
     )
-    alphas = constants_table.against_alpha(read).set_index("alpha")
+    alphas = rates.against_alpha(read).set_index("alpha")
     assert alphas["false_alarms"].loc[[0.01, 0.05, 0.1]].tolist() == [0.0, 0.5, 0.5]
     assert alphas["missed"].loc[[0.01, 0.05]].tolist() == [pytest.approx(1 / 3), 0.0]
-    factors = constants_table.against_k(read).set_index("k")
+    factors = rates.against_k(read).set_index("k")
     assert factors["holds"].loc[[1.5, 2.0]].tolist() == [0.5, 1.0]
     assert factors["size"].loc[[0.5, 2.0, 3.0]].tolist() == [1.0, 1.5, 2.0]
 
@@ -196,13 +194,13 @@ def test_any_alpha_and_any_k_after_the_fact(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_evidence_and_intervals_are_those_of_the_diagnosis() -> None:
     trial = make_trial(901, ("quadratic_damping",), 0.01, "displacement")
-    comparison, faults = accounted_comparison(trial.completed, prepare_record(trial.record))
+    comparison, faults = findings.compared(trial, trial.completed)
     assert faults == ()
     inside = findings.intervals(comparison, trial.truth)
     true = trial.truth.numbers()
     assert inside["asked"] == len(comparison.coefficients) == len(true)
     assert inside["held"] == sum(c.interval[0] <= true[c.key] <= c.interval[1] for c in comparison.coefficients)
-    lacking, _ = accounted_comparison(trial.believed, prepare_record(trial.record))
+    lacking, _ = findings.compared(trial, trial.believed)
     assert findings.intervals(lacking, trial.truth) == {"held": 0, "asked": 0}
     diagnosis = diagnose(lacking)
     said = findings.evidence_row(diagnosis, trial.hidden)
@@ -231,7 +229,7 @@ def test_a_trial_that_cannot_be_made_is_a_row_with_its_trouble(monkeypatch: pyte
 
 
 def test_every_trial_with_a_fault_has_one_and_all_have_their_turn(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runs, "_judged", lambda *_: {})
+    monkeypatch.setattr(runs, "JUDGES", {DRIVEN_MASS: lambda *_: {}})
     made = [runs.run_trial(Order("none", 5000 + i, (), 0.01, "velocity", "with")) for i in range(len(FAULTS))]
     assert {m["fault"] for m in made} == set(FAULTS)
     assert all(m["trouble"] == "" for m in made)
@@ -244,12 +242,12 @@ def test_the_kept_table_is_what_this_code_gives(tmp_path: Path) -> None:
     table = pd.read_csv(KEPT)
     assert list(table.columns) == list(COLUMNS)
     first = table.sort_values("seed").head(AGAIN)
-    orders = {order.seed: order for order in runs.orders(CONFIG)}
+    orders = {order.seed: order for order in runs.driven_orders(CONFIG)}
     assert set(table["seed"]) <= set(orders)
     quick = [orders[int(seed)] for seed in first.loc[first["samples"] < QUICK, "seed"]]
     assert len(quick) >= 3
     own = written([runs.run_trial(order) for order in quick], tmp_path)
-    assert kept.differing_trials(own, table) == [], "other settings, other code, or other rounding"
+    assert differing_trials(own, table, TRIALS) == [], "other settings, other code, or other rounding"
 
 
 @pytest.mark.parametrize(
@@ -259,10 +257,10 @@ def test_a_kept_table_of_another_run_shows(column: str, value: object) -> None:
     table = pd.read_csv(KEPT)
     seed, other = int(table["seed"].iloc[1]), table.copy()
     other.loc[other["seed"] == seed, column] = value
-    assert kept.differing_trials(table, other) == [f"seed {seed}: {column}"]
+    assert differing_trials(table, other, TRIALS) == [f"seed {seed}: {column}"]
     slower = table.assign(seconds=99.0).sample(frac=1.0, random_state=1)
-    assert kept.differing_trials(table, slower) == []
-    assert kept.differing_trials(table, table[table["seed"] != seed])
+    assert differing_trials(table, slower, TRIALS) == []
+    assert differing_trials(table, table[table["seed"] != seed], TRIALS)
 
 
 def test_the_page_for_users_holds_the_numbers_of_its_table(tmp_path: Path) -> None:
@@ -273,7 +271,7 @@ def test_the_page_for_users_holds_the_numbers_of_its_table(tmp_path: Path) -> No
     spec.loader.exec_module(script)
     for name in ("tool.md", "trials.csv"):
         (tmp_path / name).write_bytes((ROOT / "docs" / name).read_bytes())
-    script.main(tmp_path / "tool.md", CONFIG.wanted.plain())
+    script.main(tmp_path, TRIALS, CONFIG.wanted.plain())
     assert (tmp_path / "tool.md").read_text() == (ROOT / "docs" / "tool.md").read_text()
     with pytest.raises(StudyError, match="there is no such file"):
-        script.main(tmp_path / "tool.md", CONFIG.wanted.plain(), [tmp_path / "none.csv"])
+        script.main(tmp_path, TRIALS, CONFIG.wanted.plain(), tmp_path / "none.csv")

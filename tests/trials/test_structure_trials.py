@@ -13,10 +13,11 @@ from study.cli import main
 from study.equations.model_file import read_model
 from study.structure.modes import modes_of
 from study.support.errors import StudyError
-from study.trials import kept
-from study.trials.structure_draw import HIDDEN, SHARE, make_structure_trial, random_structure
-from study.trials.structure_rates import confusion_of_effects, confusion_of_places, structure_rates
-from study.trials.structure_runs import COLUMNS, LOOSE, WORDS, run_structure, structure_orders
+from study.trials import HIDDEN, SHARE, make_trial, rates
+from study.trials.draw import STRUCTURE
+from study.trials.kept import KEPT_TABLES, STRUCTURES, differing_trials
+from study.trials.runs import run_trial, structure_orders
+from study.trials.structures import random_structure
 
 ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "docs" / "trials_of_structures.csv"
@@ -24,13 +25,14 @@ AGAIN = 8  # of the first trials, those of two coordinates are run again
 
 
 def test_a_trial_is_the_same_for_the_same_seed():
-    one, other = (make_structure_trial(7, "cubic_stiffness", 0.01, "displacement", 3) for _ in range(2))
-    np.testing.assert_array_equal(one.record.measured, other.record.measured)
+    asked = {"hidden": ("cubic_stiffness",), "noise": 0.01, "response": "displacement", "coordinates": 3}
+    one, other = (make_trial(7, test=STRUCTURE, **asked) for _ in range(2))
+    for sensor in one.record.sensors:
+        np.testing.assert_array_equal(one.record[sensor], other.record[sensor])
     assert one.truth == other.truth
-    assert one.hidden is not None
-    assert one.hidden.term.name == "cubic_stiffness"
-    assert SHARE[0] * 0.85 < one.share < SHARE[1] * 1.15
-    assert one.hidden.name not in one.believed
+    assert [entry.term.name for entry in one.effects] == ["cubic_stiffness"]
+    assert SHARE[0] * 0.85 < one.shares[0] < SHARE[1] * 1.15
+    assert one.hidden[0] not in one.believed
     assert set(one.believed.values.values()) == {None}
     assert len(one.record.sensors) == 3
 
@@ -53,15 +55,22 @@ def test_a_trial_of_a_structure_is_written_and_opened(tmp_path, capsys):
     assert main(["trial", "--seed", "3", "--coordinates", "2", "--fault", "any", "--out", str(tmp_path)]) == 2
     assert main(["trial", "--seed", "3", "--coordinates", "2", "--hidden", "inertia", "--out", str(tmp_path)]) == 2
     with pytest.raises(StudyError, match="expected one of displacement"):
-        make_structure_trial(1, response="strain")
+        make_trial(1, response="strain", test=STRUCTURE)
+
+
+def test_several_effects_are_hidden_at_places_of_their_own_and_each_is_as_strong_as_is_drawn():
+    trial = make_trial(5, ("cubic_stiffness", "quadratic_damping"), 0.0, test=STRUCTURE, coordinates=3)
+    assert sorted(entry.term.name for entry in trial.effects) == ["cubic_stiffness", "quadratic_damping"]
+    assert all(set(entry.place.moving) <= set(trial.believed.coordinates) for entry in trial.effects)
+    assert all(SHARE[0] * 0.85 < share < SHARE[1] * 1.15 for share in trial.shares)
 
 
 def test_orders_cover_effects_sizes_noises():
-    orders = structure_orders(120)
+    orders = structure_orders()
     assert len({o.seed for o in orders}) == 120
-    assert len({o.hidden for o in orders}) == 1 + len(HIDDEN)
+    assert {o.hidden for o in orders} == {(), *((name,) for name in HIDDEN)}
     assert {o.coordinates for o in orders} == {2, 3, 4, 5}
-    assert sum(o.hidden == "none" for o in orders) == 20
+    assert sum(o.hidden == () for o in orders) == 20
 
 
 GOOD = {
@@ -71,13 +80,19 @@ GOOD = {
 }  # fmt: skip
 
 
+def read(rows):
+    """As the kept table is read."""
+    buffer = io.StringIO()
+    pd.DataFrame(rows, columns=list(KEPT_TABLES[STRUCTURES].columns)).to_csv(buffer, index=False)
+    buffer.seek(0)
+    return pd.read_csv(buffer)
+
+
 def test_rates_count_what_holds():
-    bad = {
-        **GOOD, "effect_first": "False", "error_after": "", "noise": "0.05", "true_inside": "6", "true_keys": "8",
-    }  # fmt: skip
+    bad = {**GOOD, "effect_first": False, "error_after": "", "noise": 0.05, "true_inside": 6, "true_keys": 8}
     none = {**GOOD, "hidden": "none", "verdict": "unknown_effect"}
-    found = {str(r["what"]): r for r in structure_rates([GOOD, bad, none])}
-    shares = {what: (row["share"], row["trials"]) for what, row in found.items()}
+    found = rates.target_summary(read([GOOD, bad, none]), STRUCTURES).set_index("reach").to_dict("index")
+    shares = {what: (row["value"], row["trials"]) for what, row in found.items()}
     assert shares["effect and place first, noise to 1 %"] == (1.0, 1)
     assert shares["effect and place first, noise of 5 %"] == (0.0, 1)
     assert shares["effect first"] == (0.5, 2)
@@ -97,46 +112,42 @@ def test_confusions_count_effects_and_places():
         {**GOOD, "hidden": "none", "place": "", "verdict": "nothing_missing", "first": "", "first_place": ""},
         {**GOOD, "first_place": "ground-mass3"},
     ]  # fmt: skip
-    effects = confusion_of_effects(rows).set_index("hidden")
+    effects = rates.confusion(read(rows)).set_index("hidden")
     assert effects.loc["cubic_stiffness"].to_dict() == {
-        "cubic_stiffness": 3, "dead_band": 1, "unknown effect": 1, "nothing missing": 0,
+        "cubic_stiffness": 3, "dead_band": 1, "unknown_effect": 1, "nothing_missing": 0,
     }  # fmt: skip
-    assert effects.loc["none", "nothing missing"] == 1
-    places = confusion_of_places(rows).set_index("hidden")
+    assert effects.loc["none", "nothing_missing"] == 1
+    places = rates.confusion_of_places(read(rows)).set_index("hidden")
     assert places.loc["between two, 3 coordinates"].to_dict() == {
-        "the same place": 1, "a place with an end in common": 1, "another place": 1, "unknown effect": 1,
-        "nothing missing": 0,
+        "the same place": 1, "a place with an end in common": 1, "another place": 1, "unknown_effect": 1,
+        "nothing_missing": 0,
     }  # fmt: skip
     assert places.loc["to the ground, or a force on it, 3 coordinates", "the same place"] == 1
 
 
 @pytest.mark.long
 def test_the_kept_table_is_what_this_code_gives():
-    """Its first trials again; where this fails, `make structure_trials` is due."""
-    table = pd.read_csv(KEPT, keep_default_na=False, na_values=["nan", ""])
-    assert list(table.columns) == list(COLUMNS)
-    orders = {order.seed: order for order in structure_orders(120)}
+    """Its first trials again; where this fails, `make trials TABLE=trials_of_structures` is due."""
+    table = pd.read_csv(KEPT)
+    assert tuple(table.columns) == KEPT_TABLES[STRUCTURES].columns
+    orders = {order.seed: order for order in structure_orders()}
     assert list(table["seed"]) == list(orders)[: len(table)], "the first of the run, none left out"
     quick = [order for order in list(orders.values())[:AGAIN] if order.coordinates == 2]
     assert len(quick) == 2
-    buffer = io.StringIO()
-    pd.DataFrame([run_structure(order) for order in quick], columns=list(COLUMNS)).to_csv(buffer, index=False)
-    buffer.seek(0)
-    own = pd.read_csv(buffer, keep_default_na=False, na_values=["nan", ""])
-    assert kept.differing_trials(own, table, COLUMNS, WORDS, LOOSE) == []
-    other = own.assign(first_place="ground-mass9")
-    assert len(kept.differing_trials(other, table, COLUMNS, WORDS, LOOSE)) == 2
+    own = read([run_trial(order) for order in quick])
+    assert differing_trials(own, table, STRUCTURES) == []
+    assert len(differing_trials(own.assign(first_place="ground-mass9"), table, STRUCTURES)) == 2
 
 
 def test_the_page_holds_the_numbers_of_the_kept_table(tmp_path):
-    spec = importlib.util.spec_from_file_location("structure_trial_docs", ROOT / "scripts" / "structure_trial_docs.py")
+    spec = importlib.util.spec_from_file_location("trial_docs", ROOT / "scripts" / "trial_docs.py")
     assert spec is not None
     assert spec.loader is not None
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
     for name in ("structures.md", KEPT.name):
         (tmp_path / name).write_bytes((ROOT / "docs" / name).read_bytes())
-    script.main(tmp_path / "structures.md")
+    script.main(tmp_path, STRUCTURES, {})
     assert (tmp_path / "structures.md").read_text() == (ROOT / "docs" / "structures.md").read_text()
     with pytest.raises(StudyError, match="there is no such file"):
-        script.main(tmp_path / "structures.md", [tmp_path / "none.csv"])
+        script.main(tmp_path, STRUCTURES, {}, tmp_path / "none.csv")

@@ -16,8 +16,8 @@ from study.identify.time_domain.fit_model import fit_model
 from study.records.prepared import prepare_record
 from study.records.readers import read_record
 from study.support.errors import StudyError
-from study.trials import HIDDEN, SHARE, WIDE, make_trial, sealed, share_of
-from study.trials.experiment import DAMPINGS, KINDS, MEMORIES, PERIODS, RATES, SAMPLES, wide
+from study.trials import DRIVEN_MASS, HIDDEN, SHARE, make_trial, sealed, share_of
+from study.trials.driven import EXCITATIONS, LABORATORIES, PLAIN_RATE, wide
 
 
 @pytest.mark.parametrize("name", HIDDEN)
@@ -95,7 +95,7 @@ def test_a_trial_with_a_fault_is_the_same_trial_before_it() -> None:
 
 @pytest.mark.long
 def test_any_fault_means_one_in_half_of_the_trials() -> None:
-    named = [make_trial(seed, (), 0.0, "displacement", "any", WIDE).fault.get("fault") for seed in range(40)]
+    named = [make_trial(seed, (), 0.0, "displacement", "any", DRIVEN_MASS).fault.get("fault") for seed in range(40)]
     without = named.count(None)
     assert 10 <= without <= 30
     assert len(set(named)) > 5
@@ -103,18 +103,22 @@ def test_any_fault_means_one_in_half_of_the_trials() -> None:
 
 def test_the_wide_range_reaches_its_ends_and_every_record_is_long_enough() -> None:
     rng = np.random.default_rng(1)
-    drawn = [wide(rng) for _ in range(2000)]
+    drawn = [wide(rng, LABORATORIES) for _ in range(2000)]
     rates, dampings = (np.array([getattr(e, name) for e in drawn]) for name in ("samples_a_period", "damping"))
     samples = np.array([e.samples for e in drawn])
-    for values, bounds in ((rates, RATES), (dampings, DAMPINGS), (samples, SAMPLES)):
+    for values, bounds in (
+        (rates, LABORATORIES.rates),
+        (dampings, LABORATORIES.dampings),
+        (samples, LABORATORIES.samples),
+    ):
         assert bounds[0] * (1.0 - 1e-9) <= np.min(values) < 1.05 * bounds[0]
         assert 0.95 * bounds[1] < np.max(values) <= bounds[1] * (1.0 + 1e-9)
-    assert np.all(samples >= PERIODS * rates * (1.0 - 1e-9))
-    assert np.all(samples >= MEMORIES * rates / (2.0 * np.pi * dampings) * (1.0 - 1e-9))
-    assert {e.kind for e in drawn} == set(KINDS)
+    assert np.all(samples >= LABORATORIES.periods * rates * (1.0 - 1e-9))
+    assert np.all(samples >= LABORATORIES.memories * rates / (2.0 * np.pi * dampings) * (1.0 - 1e-9))
+    assert {e.kind for e in drawn} == set(EXCITATIONS)
     # evenly on a logarithmic scale, as far as long records are not refused
-    assert np.mean(rates < np.sqrt(RATES[0] * RATES[1])) == pytest.approx(0.5, abs=0.04)
-    assert np.mean(dampings < np.sqrt(DAMPINGS[0] * DAMPINGS[1])) == pytest.approx(0.5, abs=0.04)
+    assert np.mean(rates < np.sqrt(np.prod(LABORATORIES.rates))) == pytest.approx(0.5, abs=0.04)
+    assert np.mean(dampings < np.sqrt(np.prod(LABORATORIES.dampings))) == pytest.approx(0.5, abs=0.04)
     assert all(e.excitation.highest * e.dt <= 0.4 + 1e-9 for e in drawn)
     assert all(e.excitation.periods > 1 for e in drawn if "sweep" in e.kind)
 
@@ -122,9 +126,9 @@ def test_the_wide_range_reaches_its_ends_and_every_record_is_long_enough() -> No
 @pytest.mark.parametrize("seed", range(4))
 def test_a_wide_trial_is_the_motion_of_its_truth_and_forgets_its_start(seed: int) -> None:
     """Against an integration with other steps, from another state."""
-    trial = make_trial(4000 + seed, (), 0.0, "displacement", ranges=WIDE)
+    trial = make_trial(4000 + seed, (), 0.0, "displacement", test=DRIVEN_MASS)
     initial = (float(np.std(trial.record["displacement"])), 0.0)
-    steps = Integrator("rk4", trial.experiment.steps(16))
+    steps = Integrator("rk4", 16 * int(np.ceil(max(1.0, PLAIN_RATE / trial.about["samples_a_period"]))))
     again = simulate(trial.truth, trial.record["force"], trial.record.dt, steps, initial=initial)["displacement"]
     half = len(again) // 2
     measured = trial.record["displacement"]
@@ -173,7 +177,7 @@ def test_command_writes_record_model_and_sealed_answer(tmp_path: Path, capsys: p
     answer = tmp_path / "new" / "trial_7.answer.json"
     assert f"study trial --open {answer}" in said
     record, model = read_record(tmp_path / "new" / "trial_7.csv"), read_model(tmp_path / "new" / "trial_7.yaml")
-    trial = make_trial(7, ("quadratic_damping",), 0.05, "acceleration", ranges=WIDE)
+    trial = make_trial(7, ("quadratic_damping",), 0.05, "acceleration", test=DRIVEN_MASS)
     np.testing.assert_array_equal(record["acceleration"], trial.record["acceleration"])
     assert model == trial.believed
     for path in (tmp_path / "new").iterdir():
@@ -181,7 +185,7 @@ def test_command_writes_record_model_and_sealed_answer(tmp_path: Path, capsys: p
     assert b"quadratic_damping" not in said.encode()
     assert main(["trial", "--open", str(answer)]) == 0
     assert "quadratic_damping" in capsys.readouterr().out
-    assert parse_model(sealed.unseal(answer)["truth"], answer) == trial.truth
+    assert parse_model(sealed.unseal(answer).truth, answer) == trial.truth
 
 
 @pytest.mark.parametrize(("fault", "said"), [("delay", "delay of the velocity"), ("force_noise", "force noise of the")])
@@ -189,8 +193,9 @@ def test_answer_names_the_fault(tmp_path: Path, capsys: pytest.CaptureFixture[st
     words = ["--seed", "3", "--hidden", "none", "--response", "velocity", "--fault", fault, "--out", str(tmp_path)]
     assert main(["trial", *words]) == 0
     assert fault not in capsys.readouterr().out
-    imposed = sealed.unseal(tmp_path / "trial_3.answer.json")["fault"]
-    assert imposed["fault"] == fault
+    imposed = sealed.unseal(tmp_path / "trial_3.answer.json").fault
+    assert isinstance(imposed, sealed.Imposed)
+    assert imposed.fault == fault
     assert main(["trial", "--open", str(tmp_path / "trial_3.answer.json")]) == 0
     assert f"fault of the measurement: {said}" in capsys.readouterr().out
 
@@ -205,7 +210,7 @@ def test_a_fault_that_there_is_not_is_refused(tmp_path: Path, capsys: pytest.Cap
 
 def test_command_hides_nothing_when_told_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["trial", "--seed", "3", "--hidden", "none", "--noise", "0", "--out", str(tmp_path)]) == 0
-    assert sealed.unseal(tmp_path / "trial_3.answer.json")["hidden"] == []
+    assert sealed.unseal(tmp_path / "trial_3.answer.json").hidden == []
     capsys.readouterr()
     assert main(["trial", "--open", str(tmp_path / "trial_3.answer.json")]) == 0
     assert capsys.readouterr().out.startswith("nothing is hidden")
