@@ -60,8 +60,6 @@ def structure_rig(rng: np.random.Generator, asked: Asked) -> Rig:
         quiet = simulated(truth, 16, [asked.response])
         level = np.sqrt(asked.noise)
         noisy = {str(s): x + level * float(np.std(x)) * rng.standard_normal(len(x)) for s, x in quiet.motions.items()}
-            str(s): quiet[s] + level * float(np.std(quiet[s])) * rng.standard_normal(len(quiet)) for s in quiet.sensors
-        }
         return quiet.with_channels(noisy), shares
 
     return Rig(
