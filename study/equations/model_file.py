@@ -43,11 +43,6 @@ def read_model(path: Path) -> Model:
     """Read a model file; a coefficient or shape parameter that it leaves out is None, to be fitted.
 
     What a killed run has left half changed is put back first.
-
-    Raises
-    ------
-    StudyError
-        If the file cannot be read or is no model, naming the file, the value and what was expected.
     """
     recover(path)
     return parse_model(read_text(path, WANTED), path)
@@ -92,11 +87,6 @@ def add_term(path: Path, entry: Term | ModelTerm) -> Model:
 
     Every byte that was there stays, comments, order and quoting included; on any failure the file is untouched. A
     ModelTerm's known values are written as held.
-
-    Raises
-    ------
-    StudyError
-        If the file is no model, has the term already, or cannot be written.
     """
     text = text_with(path, entry)
     replace_file(path, text.encode())
@@ -104,7 +94,7 @@ def add_term(path: Path, entry: Term | ModelTerm) -> Model:
 
 
 def text_with(path: Path, entry: Term | ModelTerm) -> str:
-    """The text of a model file with a term more; raises as :func:`add_term`."""
+    """The text of a model file with a term more."""
     text = read_text(path, WANTED)
     before = parse_model(text, path)
     new = entry if isinstance(entry, ModelTerm) else free(entry)
@@ -121,11 +111,6 @@ def drop_term(path: Path, name: str) -> Model:
     """Take a term out of a model file, and return the model that the file now holds.
 
     Every other byte stays, but for a comment behind the entry on its own line; on any failure the file is untouched.
-
-    Raises
-    ------
-    StudyError
-        If the file is no model, lacks the term or has no other, or cannot be written.
     """
     text = text_without(path, name)
     replace_file(path, text.encode())
@@ -133,7 +118,7 @@ def drop_term(path: Path, name: str) -> Model:
 
 
 def text_without(path: Path, name: str) -> str:
-    """The text of a model file without a term, which stays in the file; raises as :func:`drop_term`."""
+    """The text of a model file without a term, which stays in the file."""
     text = read_text(path, WANTED)
     before = parse_model(text, path)
     if name not in before or (len(before.terms) == 1 and not before.measured):
