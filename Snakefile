@@ -3,12 +3,12 @@ import sys
 from pathlib import Path
 
 from study.reproduction.config import load_config
-from study.support.workflow_step import alone, one_sentence, remove_half_written
+from study.support.workflow_step import one_sentence, only_run, remove_half_written
 
 with one_sentence():
     STUDY = load_config(Path("config"))
     if workflow.is_main_process and not workflow.dryrun:
-        LOCK = alone(Path(".snakemake/running"))  # held until this process ends
+        LOCK = only_run(Path(".snakemake/running"))  # held until this process ends
         remove_half_written(Path("results"), Path("figures"))
 
 

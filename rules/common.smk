@@ -1,6 +1,6 @@
 # What several rules share: the modules that each stage rests on, settings and files by case.
 from study.identify.estimators import ESTIMATORS
-from study.support.code_dependencies import rests_on
+from study.support.workflow_step import rests_on
 
 # Touching study/identify/frequency_domain/conditioned.py re-runs identification and what follows, not simulation, though the two share
 # study/reproduction/make_record.py: what only identification uses is not followed from there.

@@ -63,11 +63,6 @@ def load_measurements(
 
     No record, nor the target of its climb, nor its entry, may have one of the names of ``cases`` or of the workflow's
     other ``targets``.
-
-    Raises
-    ------
-    StudyError
-        At the first fault, naming file, row and value.
     """
     measurements: dict[str, Measurement] = {}
     models = folder.parent / "models"

@@ -23,18 +23,12 @@ def per_unit_mass(model: Model, prepared: Prepared) -> tuple[Model, Prepared]:
 
 
 def with_known_mass(model: Model) -> Model:
-    """A model on a moving base: with the mass that it gives, or one, as the base acts through the mass alone.
-
-    Raises
-    ------
-    StudyError
-        If it gives other coefficients and no mass: the force of the base is in proportion to it.
-    """
+    """A model on a moving base: with the mass that it gives, or one, as the base acts through the mass alone."""
     if "m" not in model.values or model.values["m"] is not None:
         return model
     symbols = [s for t in model.terms for s in t.term.symbols]
     given = [s for s in symbols if model.values[s] is not None]
-    expect(
+    expect(  # the force of the base is in proportion to the mass
         not given,
         f"model {model.name!r} gives {', '.join(given)} and no mass, through which the base acts; expected the inertia "
         "as well, such as {term: inertia, value: 5.3}, or none of them",

@@ -31,7 +31,7 @@ from study.equations.redundancy import repeated_force
 from study.equations.terms import Term
 from study.support import yaml_text
 from study.support.errors import StudyError
-from study.support.files import read_text, recover, replace_file
+from study.support.files import read_text, recover
 from study.support.yaml_text import as_list, as_mapping, scalar, shown
 
 MOST_TERMS = 200
@@ -43,11 +43,6 @@ def read_model(path: Path) -> Model:
     """Read a model file; a coefficient or shape parameter that it leaves out is None, to be fitted.
 
     What a killed run has left half changed is put back first.
-
-    Raises
-    ------
-    StudyError
-        If the file cannot be read or is no model, naming the file, the value and what was expected.
     """
     recover(path)
     return parse_model(read_text(path, WANTED), path)
@@ -87,24 +82,11 @@ def format_entry(entry: ModelTerm) -> str:
     return fields["term"] if len(fields) == 1 else _flow(fields)
 
 
-def add_term(path: Path, entry: Term | ModelTerm) -> Model:
-    """Append a term to a model file, and return the model that the file now holds.
-
-    Every byte that was there stays, comments, order and quoting included; on any failure the file is untouched. A
-    ModelTerm's known values are written as held.
-
-    Raises
-    ------
-    StudyError
-        If the file is no model, has the term already, or cannot be written.
-    """
-    text = text_with(path, entry)
-    replace_file(path, text.encode())
-    return parse_model(text, path)
-
-
 def text_with(path: Path, entry: Term | ModelTerm) -> str:
-    """The text of a model file with a term more; raises as :func:`add_term`."""
+    """The text of a model file with a term more; the known values of a ModelTerm are written as held.
+
+    Every byte that was there stays, comments, order and quoting included.
+    """
     text = read_text(path, WANTED)
     before = parse_model(text, path)
     new = entry if isinstance(entry, ModelTerm) else free(entry)
@@ -117,23 +99,11 @@ def text_with(path: Path, entry: Term | ModelTerm) -> str:
     return extended
 
 
-def drop_term(path: Path, name: str) -> Model:
-    """Take a term out of a model file, and return the model that the file now holds.
-
-    Every other byte stays, but for a comment behind the entry on its own line; on any failure the file is untouched.
-
-    Raises
-    ------
-    StudyError
-        If the file is no model, lacks the term or has no other, or cannot be written.
-    """
-    text = text_without(path, name)
-    replace_file(path, text.encode())
-    return parse_model(text, path)
-
-
 def text_without(path: Path, name: str) -> str:
-    """The text of a model file without a term, which stays in the file; raises as :func:`drop_term`."""
+    """The text of a model file without a term.
+
+    Every other byte stays, but for a comment behind the entry on its own line.
+    """
     text = read_text(path, WANTED)
     before = parse_model(text, path)
     if name not in before or (len(before.terms) == 1 and not before.measured):
@@ -147,8 +117,18 @@ def revised(text: str, source: str, model: Model) -> str:
     The model has terms of the file in their order, values held or freed, and perhaps further terms behind them; what it
     lacks of the file is taken out. ``source`` is named in messages.
     """
-    text = _shortened(text, source, model)
-    before = parse_model(text, Path(source)).terms
+    wanted, gone = [t.name for t in model.terms], list[int]()
+    entries = parse_model(text, Path(source)).terms
+    for number, entry in enumerate(entries):
+        if wanted[number - len(gone) :][:1] != [entry.name]:
+            gone.append(number)
+    if len(gone) == len(entries) and entries and (wanted or not model.measured):
+        raise StudyError(f"{source}: none of its terms is left; expected a model that keeps one")
+    for number in reversed(gone):
+        text = yaml_text.without_entry(text, "terms", number)
+    if not wanted:  # a linear part as measured is a model of its own
+        text = NO_TERMS.sub(lambda found: f"terms: []{'  ' + found[1] if found[1] else ''}", text)
+    before = [entry for number, entry in enumerate(entries) if number not in gone]
     for number, entry in enumerate(model.terms):
         if number >= len(before):
             text = yaml_text.with_entry(text, "terms", format_entry(entry))
@@ -156,24 +136,6 @@ def revised(text: str, source: str, model: Model) -> str:
             text = yaml_text.with_changed(text, "terms", number, format_entry(entry))
     if not _holds(text, Path(source), model):
         raise StudyError(f"{source}: its layout leaves no clear place for a change; expected one entry a line")
-    return text
-
-
-def _shortened(text: str, source: str, model: Model) -> str:
-    """The text with those entries alone that the model begins with, in their order."""
-    wanted, gone = [t.name for t in model.terms], list[int]()
-    entries = parse_model(text, Path(source)).terms
-    if model.measured and entries and not wanted:  # its linear part is a model of its own
-        for number in reversed(range(len(entries))):
-            text = yaml_text.without_entry(text, "terms", number)
-        return NO_TERMS.sub(lambda found: f"terms: []{'  ' + found[1] if found[1] else ''}", text)
-    for number, entry in enumerate(entries):
-        if wanted[number - len(gone) :][:1] != [entry.name]:
-            gone.append(number)
-    if len(gone) == len(entries):
-        raise StudyError(f"{source}: none of its terms is left; expected a model that keeps one")
-    for number in reversed(gone):
-        text = yaml_text.without_entry(text, "terms", number)
     return text
 
 

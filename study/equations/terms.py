@@ -217,13 +217,7 @@ def get(name: str) -> Term:
 
 
 def find_terms(word: str) -> tuple[Term, ...]:
-    """The library's terms that a word finds: in the name, or where no name has it, in formula, meaning or cause.
-
-    Raises
-    ------
-    StudyError
-        If it finds none.
-    """
+    """The library's terms that a word finds: in the name, or where no name has it, in formula, meaning or cause."""
     sought = word.strip().lower().replace(" ", "_")
     named = tuple(t for t in LIBRARY.values() if sought in t.name)
     plain = sought.replace("_", " ")

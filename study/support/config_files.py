@@ -51,13 +51,7 @@ R = TypeVar("R", bound=TableRow)
 
 
 def read_yaml(path: Path, kind: type[S]) -> S:
-    """A YAML file as a section, read without executing or repeating anything: tags and aliases are refused.
-
-    Raises
-    ------
-    StudyError
-        At the first fault, naming file, key and value.
-    """
+    """A YAML file as a section, read without executing or repeating anything: tags and aliases are refused."""
     text = read_text(path, "a text in YAML")
     try:
         content = read_plain(text)
@@ -69,13 +63,7 @@ def read_yaml(path: Path, kind: type[S]) -> S:
 
 
 def read_rows(path: Path, kind: type[R]) -> list[tuple[str, R]]:
-    """Rows of a tab-separated table, each with the words that say where it stands; rows count as an editor's lines do.
-
-    Raises
-    ------
-    StudyError
-        At the first fault, naming file, row, column and value.
-    """
+    """Rows of a tab-separated table, each with the words that say where it stands, counted as an editor does."""
     text = read_text(path, "a table with tabs between its cells").removeprefix("\ufeff")  # a spreadsheet's mark
     lines = [(number, line) for number, line in enumerate(text.splitlines(), start=1) if line.strip()]
     if len(lines) < 2:
@@ -105,13 +93,7 @@ def _row(where: str, cells: Sequence[str], heading: Sequence[str], kind: type[R]
 
 
 def checked(kind: type[S], content: object, where: str) -> S:
-    """Plain data as a section; ``where`` begins the sentence of a fault.
-
-    Raises
-    ------
-    StudyError
-        With the fault that explains most.
-    """
+    """Plain data as a section; ``where`` begins the sentence of a fault."""
     try:
         return kind.model_validate(content)
     except StudyError as error:  # a validator's own sentence

@@ -113,13 +113,7 @@ def unpadded(heading: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
 
 
 def put(path: Path, mark: str, blocks: Sequence[Block]) -> None:
-    """Write blocks into a Markdown file, in place of what stands between ``<!-- mark -->`` and ``<!-- /mark -->``.
-
-    Raises
-    ------
-    StudyError
-        If the file does not have exactly one such place.
-    """
+    """Write blocks into a Markdown file, in place of what stands between ``<!-- mark -->`` and ``<!-- /mark -->``."""
     place = re.compile(rf"(<!-- {mark} -->\n).*?(<!-- /{mark} -->)", re.DOTALL)
     block = markdown(blocks)
     text, count = place.subn(lambda match: match[1] + block + match[2], path.read_text(encoding="utf-8"))

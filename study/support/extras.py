@@ -27,11 +27,6 @@ def needed(module: str, use: str, extra: str) -> Any:
         What cannot be done without it; the sentence begins with it.
     extra : str
         The extra of this project that brings the package.
-
-    Raises
-    ------
-    StudyError
-        If it is not installed, naming the extra.
     """
     if sentence := lacking(module, use, extra):
         raise StudyError(sentence)

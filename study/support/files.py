@@ -28,13 +28,7 @@ FREE_SPACE = "expected a writable folder with free space"
 
 
 def read_text(path: Path, wanted: str) -> str:
-    """The text of a file that may be anything; a message names what was ``wanted``.
-
-    Raises
-    ------
-    StudyError
-        If it is missing, no regular file, unreadable, over 1 MB, or not UTF-8.
-    """
+    """The text of a file that may be anything; a message names what was ``wanted``."""
     try:
         mode = path.stat().st_mode
         kind = "a folder" if stat.S_ISDIR(mode) else "not a regular file"
@@ -59,11 +53,6 @@ def replacing(path: Path) -> Generator[Path, None, None]:
 
     Readers see the old content or the new one, and any failure leaves the old one. Permission bits are
     kept; a symbolic link stays one.
-
-    Raises
-    ------
-    StudyError
-        If it cannot be written (no permission, no space).
     """
     target = Path(os.path.realpath(path))
     beside = target.with_name(f"{BESIDE}{secrets.token_hex(8)}{target.suffix}")
@@ -90,13 +79,7 @@ def replace_file(path: Path, data: bytes) -> None:
 
 
 def write_files(folder: Path, files: Mapping[str, bytes], inputs: Iterable[Path] = ()) -> None:
-    """Write files into a folder, which is made if need be.
-
-    Raises
-    ------
-    StudyError
-        If they cannot be written, or one would take the place of one of the ``inputs``.
-    """
+    """Write files into a folder, which is made if need be; none takes the place of one of the ``inputs``."""
     keep(inputs, (folder / name for name in files))
     with made(folder), _moved_together({folder / name: content for name, content in files.items()}):
         pass
@@ -155,11 +138,6 @@ def locked(path: Path) -> Generator[None, None, None]:
     """Nobody else changes this file within the block; who comes second waits.
 
     The lock is a file beside it, which goes when the block ends. That of a killed run is taken over.
-
-    Raises
-    ------
-    StudyError
-        If the folder cannot be written to.
     """
     target = Path(os.path.realpath(path))
     beside = target.with_name(f".{target.name}.lock")
@@ -202,7 +180,7 @@ def journal_of(path: Path) -> Path:
 
 
 def replace_together(path: Path, files: Mapping[Path, bytes], others: Mapping[Path, bytes] | None = None) -> None:
-    """Replace files of one folder in one step; to be called with ``path``, the first of them, :func:`locked`.
+    """Replace files of one folder in one step, or none; to be called with ``path``, the first of them, :func:`locked`.
 
     Parameters
     ----------
@@ -212,11 +190,6 @@ def replace_together(path: Path, files: Mapping[Path, bytes], others: Mapping[Pa
         New contents, by path within the folder of ``path``.
     others : mapping of Path to bytes, optional
         Results that are written with them; they are not put back.
-
-    Raises
-    ------
-    StudyError
-        If any cannot be written; then all are as they were.
     """
     expect(all(file.parent == path.parent for file in files), f"{path}: its folder holds not all of {list(files)}")
     try:
@@ -236,13 +209,7 @@ def replace_together(path: Path, files: Mapping[Path, bytes], others: Mapping[Pa
 
 
 def recover(path: Path) -> None:
-    """Put back what a killed run left half changed; where it cannot be put back, say so.
-
-    Raises
-    ------
-    StudyError
-        If the folder is write-protected, or the journal is none of this module's.
-    """
+    """Put back what a killed run left half changed; where it cannot be put back, say so."""
     if os.path.exists(journal_of(path)):  # noqa: PTH110  (false also for a name that no file can have)
         with locked(path):  # whose first act it is
             pass

@@ -56,11 +56,11 @@ def normal_inverse(normal: Floats, size: Floats | None = None) -> Floats:
     Shapes (..., p, p). ``size`` has the lengths of the columns; the roots of the diagonal if left out. Of unknowns of
     which the data tell a sum alone, the shortest amounts are taken.
     """
-    if size is None:
-        size = np.sqrt(np.diagonal(normal, axis1=-2, axis2=-1))
+    symmetric = size is None
+    size = np.sqrt(np.diagonal(normal, axis1=-2, axis2=-1)) if size is None else size
     size = np.where(size > 0.0, size, np.inf)
     scale = size[..., :, None] * size[..., None, :]
-    return np.asarray(_pinv(normal / scale, rcond=INDISTINCT), dtype=np.float64) / scale
+    return np.asarray(_pinv(normal / scale, rcond=INDISTINCT, hermitian=symmetric), dtype=np.float64) / scale
 
 
 def length_or_one(columns: Floats | Complexes) -> Floats:

@@ -101,11 +101,6 @@ def role_unit(role: str, text: str) -> Unit:
     """The unit of a channel such as ``force`` or ``time``, checked against what the channel is.
 
     Volts are accepted for all but time: an uncalibrated sensor.
-
-    Raises
-    ------
-    StudyError
-        If there is no such unit, or it cannot be a unit of this.
     """
     unit = parse_unit(text)
     powers, expected = ROLES[role]

@@ -23,13 +23,7 @@ def _yaml() -> Any:
 
 
 def read_plain(text: str) -> object:
-    """The dicts, lists, texts and numbers of a YAML text.
-
-    Raises
-    ------
-    StudyError
-        If it is not YAML, is too large or too deep, or uses aliases or tags.
-    """
+    """The dicts, lists, texts and numbers of a YAML text."""
     try:
         _screen(text)
         return _yaml().load(text)

@@ -12,11 +12,12 @@ from hypothesis import assume
 from hypothesis import strategies as st
 
 from study.equations.model import Model, ModelTerm
-from study.equations.model_file import add_term, parse_model, read_model
+from study.equations.model_file import parse_model, read_model
 from study.equations.redundancy import repeated_force
 from study.equations.simulate import simulate
 from study.equations.terms import LIBRARY, custom, get
 from study.support.errors import StudyError
+from tests.model_files import add_term
 
 MODELS = Path(__file__).parents[2] / "models"
 HERE = Path("rig.yaml")

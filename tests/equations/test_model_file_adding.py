@@ -6,9 +6,10 @@ import pytest
 
 from study.equations import model_file
 from study.equations.model import ModelTerm, free
-from study.equations.model_file import add_term, drop_term, read_model, revised
+from study.equations.model_file import read_model, revised
 from study.equations.terms import custom, get
 from study.support.errors import StudyError
+from tests.model_files import add_term, drop_term
 
 LAYOUTS = {
     "block": "# rig\nname: 'rig'  # quoted\nterms:\n  - inertia  # free\n  - {term: linear_stiffness, value: 3.5e2}\n",

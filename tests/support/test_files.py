@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from study.equations.model_file import add_term, read_model
+from study.equations.model_file import read_model
 from study.equations.terms import get
 from study.support import files
 from study.support.errors import StudyError
+from tests.model_files import add_term
 
 
 @pytest.mark.parametrize("mode", [0o600, 0o640, 0o664, 0o755])

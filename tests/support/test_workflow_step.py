@@ -7,10 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from study.support.code_dependencies import rests_on
 from study.support.errors import StudyError
 from study.support.files import replacing
-from study.support.workflow_step import alone, one_sentence, remove_half_written
+from study.support.workflow_step import one_sentence, only_run, remove_half_written, rests_on
 
 ROOT = Path(__file__).parents[2]
 
@@ -28,23 +27,23 @@ def test_other_errors_pass():
 
 
 def test_one_run_at_a_time(tmp_path):
-    held = alone(tmp_path / "new" / "running")
+    held = only_run(tmp_path / "new" / "running")
     with pytest.raises(StudyError, match="another run is at work"):
-        alone(tmp_path / "new" / "running")
+        only_run(tmp_path / "new" / "running")
     held.close()
-    alone(tmp_path / "new" / "running").close()
+    only_run(tmp_path / "new" / "running").close()
 
 
 def test_a_killed_run_holds_nobody_up(tmp_path):
-    script = "import sys, time; from pathlib import Path; from study.support.workflow_step import alone\n"
-    script += "held = alone(Path(sys.argv[1])); print('held', flush=True); time.sleep(60)"
+    script = "import sys, time; from pathlib import Path; from study.support.workflow_step import only_run\n"
+    script += "held = only_run(Path(sys.argv[1])); print('held', flush=True); time.sleep(60)"
     command = [sys.executable, "-c", script, str(tmp_path / "running")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout.readline() == "held\n"
         with pytest.raises(StudyError):
-            alone(tmp_path / "running")
+            only_run(tmp_path / "running")
         process.kill()
-    alone(tmp_path / "running").close()
+    only_run(tmp_path / "running").close()
 
 
 def test_what_killed_runs_left_half_written_is_swept(tmp_path):

@@ -122,18 +122,12 @@ def _known_parameters(entry: ModelTerm) -> tuple[tuple[str, float], ...]:
 
 
 def histories(inputs: Sequence[Input], record: Record) -> list[Floats]:
-    """Time history of each input, each of shape (n,); raises as :func:`input_history`."""
+    """Time history of each input, each of shape (n,)."""
     return [record["displacement"] if i.shape == "u" else input_history(i, record) for i in inputs]
 
 
 def input_history(item: Input, record: Record) -> Floats:
-    """g(u, v, t) of one input along a record, shape (n,); a state begins at zero.
-
-    Raises
-    ------
-    StudyError
-        If a formula needs a channel that the record lacks, or has no finite value somewhere along it.
-    """
+    """g(u, v, t) of one input along a record, shape (n,); a state begins at zero."""
     from study.equations import kernels  # slow to load; who counts inputs or checks settings needs none
 
     formula = item.shape if item.state is None else item.state

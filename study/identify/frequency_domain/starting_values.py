@@ -52,13 +52,7 @@ class LinearApproximation:
 
 
 def coherent_lines(prepared: Prepared) -> LinearApproximation:
-    """The lines by the usual segments; by longer ones where too few lines of those are driven, as in slow records.
-
-    Raises
-    ------
-    StudyError
-        If force and response have nothing in common.
-    """
+    """The lines by the usual segments; by longer ones where too few lines of those are driven, as in slow records."""
     record, response = prepared.record, prepared.response
     part = record.part(*prepared.plan.fit)
     length = min(LONGEST, 2 ** int(np.log2(max(len(part) // 8, 16))))
@@ -150,13 +144,7 @@ def oscillator(prepared: Prepared) -> dict[str, float]:
 
 
 def reverse_start(model: Model, prepared: Prepared) -> dict[str, float]:
-    """Coefficients by reverse MI/SO on the fitting part; those of the model are ignored, its shape parameters used.
-
-    Raises
-    ------
-    StudyError
-        If the part is too short, an input has no power, or the mass comes out negative.
-    """
+    """Coefficients by reverse MI/SO on the fitting part; those of the model are ignored, its shape parameters used."""
     if prepared.response == FORCE:
         _ = reverse_inputs(model)  # refuses shape parameters that are not known
         return along_the_motion(model, prepared, [s for t in model.terms for s in t.term.symbols])
@@ -242,11 +230,6 @@ def along_the_motion(model: Model, prepared: Prepared, wanted: list[str]) -> dic
     """Coefficients of a model without inertia by least squares along the prescribed motion; zero for those not wanted.
 
     Shape parameters keep the model's values.
-
-    Raises
-    ------
-    StudyError
-        If a shape parameter is not known, or nothing of the force is explained.
     """
     symbols = [s for t in model.terms for s in t.term.symbols]
     begun = model.with_values(dict.fromkeys(symbols, 0.0))
