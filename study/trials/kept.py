@@ -12,6 +12,12 @@ Row = dict[str, Any]
 TRIALS, BY_TEST, STRUCTURES = "trials", "trials_by_test", "trials_of_structures"
 TIMES = ("seconds",)  # of another machine, or another hour
 SAME_RUN = 0.01  # relative: numbers of two runs of the same code on two machines
+COLUMNS_OF_WORDS = (  # the others hold numbers
+    "kind", "test", "hidden", "place", "response", "known", "faults", "fault", "fault_channel", "faults_found",
+    "fault_rivals", "fault_shown", "found", "found_channel", "verdict", "first", "first_place", "effect_first",
+    "place_first", "tied", "tie_set", "tie_holds", "second_verdict", "second_tie_set", "whole_tie_set", "pair",
+    "trouble",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -19,7 +25,6 @@ class KeptTable:
     """What the rows of a table hold."""
 
     columns: tuple[str, ...]
-    words: tuple[str, ...]  # the columns that are no numbers
     loose: tuple[str, ...]  # those that change with rounding, as whatever lies at the edge of a tie
 
 
@@ -34,11 +39,6 @@ KEPT_TABLES: Mapping[str, KeptTable] = MappingProxyType(
                 "error_before", "error_after", "error_after_two", "error_true", "noise_floor", "left", "held", "asked",
                 "smallest_p", "true_p", "distance", "rivals", "seconds", "trouble",
             ),
-            (
-                "kind", "hidden", "response", "known", "faults", "fault", "fault_channel", "faults_found",
-                "fault_rivals", "fault_shown", "found", "found_channel", "verdict", "first", "tie_set",
-                "second_verdict", "second_tie_set", "whole_tie_set", "pair", "trouble",
-            ),
             ("left", "smallest_p", "true_p", "distance", "rivals", "error_true"),
         ),
         BY_TEST: KeptTable(
@@ -46,7 +46,6 @@ KEPT_TABLES: Mapping[str, KeptTable] = MappingProxyType(
                 "test", "seed", "noise", "hidden", "verdict", "first", "tied", "right", "shown", "error_before",
                 "error_after", "held", "asked", "seconds", "trouble",
             ),
-            ("test", "hidden", "verdict", "first", "tied", "trouble"),
             ("tied", "shown", "error_after", "held", "asked", "trouble"),
         ),
         STRUCTURES: KeptTable(
@@ -56,10 +55,6 @@ KEPT_TABLES: Mapping[str, KeptTable] = MappingProxyType(
                 "error_true", "noise_floor", "left", "asked", "p_value", "true_inside", "true_keys", "seconds",
                 "trouble",
             ),
-            (
-                "hidden", "place", "response", "verdict", "first", "first_place", "effect_first", "place_first",
-                "tie_set", "tie_holds", "trouble",
-            ),
             ("left", "p_value", "error_true"),
         ),
     }
@@ -68,8 +63,7 @@ KEPT_TABLES: Mapping[str, KeptTable] = MappingProxyType(
 
 def rows_of(table: pd.DataFrame) -> list[Row]:
     """The rows of a table as it is read, empty cells as empty words."""
-    words = {word for kept in KEPT_TABLES.values() for word in kept.words}
-    filled = {c: _text(table[c]) for c in table.columns if c in words}
+    filled = {c: _text(table[c]) for c in table.columns if c in COLUMNS_OF_WORDS}
     return cast(list[Row], table.assign(**filled).to_dict("records"))
 
 
@@ -83,12 +77,12 @@ def differing_trials(own: pd.DataFrame, kept: pd.DataFrame, name: str) -> list[s
     keys = [key for key in ("test", "seed") if key in table.columns]
     before = own[keys].merge(kept, on=keys, how="left")
     strict = [c for c in table.columns if c not in (*keys, *TIMES, *table.loose)]
-    return [f"seed {seed}: {column}" for column in strict for seed in _apart(column, own, before, table)]
+    return [f"seed {seed}: {column}" for column in strict for seed in _apart(column, own, before)]
 
 
-def _apart(column: str, own: pd.DataFrame, before: pd.DataFrame, table: KeptTable) -> Sequence[int]:
+def _apart(column: str, own: pd.DataFrame, before: pd.DataFrame) -> Sequence[int]:
     one, other = own[column], before[column]
-    if column in table.words:
+    if column in COLUMNS_OF_WORDS:
         same = _text(one).to_numpy() == _text(other).to_numpy()
     else:
         numbers = [pd.to_numeric(c, errors="coerce").to_numpy(dtype=np.float64) for c in (one, other)]

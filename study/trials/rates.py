@@ -355,18 +355,14 @@ def _path(label: str) -> set[str]:
 
 
 def _counted(pairs: Sequence[tuple[str, str]]) -> pd.DataFrame:
-    """In the order of the library; what is no effect comes last."""
-    order = [*LIBRARY, SAME_PLACE, END_IN_COMMON, ANOTHER_PLACE]
-    last = [NONE, NOTHING, UNKNOWN, NOT_DIAGNOSED]
+    """Effects and places in the order of the library, then those of nobody's, then what is neither."""
+    order = (*LIBRARY, SAME_PLACE, END_IN_COMMON, ANOTHER_PLACE, "", NONE, NOTHING, UNKNOWN, NOT_DIAGNOSED)
 
     def ordered(names: Iterable[str]) -> list[str]:
-        known = {name: (last.index(name), 0, "") for name in last}
-        first = {name: (-1, i, "") for i, name in enumerate(order)}
-        return sorted(set(names), key=lambda name: known.get(name) or first.get(name, (-1, len(order), name)))
+        return sorted(set(names), key=lambda name: (order.index(name if name in order else ""), name))
 
     hidden = ordered(one for one, _ in pairs)
-    effects = [name for name in hidden if name in LIBRARY]
-    said = ordered([*(other for _, other in pairs), *effects, NOTHING, UNKNOWN])
+    said = ordered([*(other for _, other in pairs), *(set(hidden) & set(LIBRARY)), NOTHING, UNKNOWN])
     counts = [[pairs.count((one, other)) for other in said] for one in hidden]
     return pd.DataFrame(counts, index=pd.Index(hidden, name="hidden"), columns=said).reset_index()
 
