@@ -59,7 +59,7 @@ def test_diagnosis(benchmark):
     clean = simulate_structure(truth, {"shaker": drive}, DT, steps_per_sample=STEPS)
     rng = np.random.default_rng(1)
     noisy = {n: x + 0.01 * np.std(x) * rng.standard_normal(SAMPLES) for n, x in clean.motions.items()}
-    record = replace(clean, motions={n: x for n, x in noisy.items() if n.motion == "displacement"})
+    record = clean.with_motions({n: x for n, x in noisy.items() if n.motion == "displacement"})
 
     def diagnosis():
         return diagnose_structure(compare_structure(believed, prepare_structure(record, believed)))

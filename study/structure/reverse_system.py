@@ -116,7 +116,7 @@ def _equation(
     cache: dict[tuple[float, ...], Record],
 ) -> Equation:  # fmt: skip
     record, mass = prepared.record, None
-    drives = [record[name] for name, where in model.forces if where == coordinate]
+    drives = [record[name] for name, where in model.forces if where == coordinate and np.any(record[name])]
     output = np.sum(drives, axis=0) if drives else -prepared.record.motion(coordinate)[INERTIA]
     if not drives:
         mass = next(

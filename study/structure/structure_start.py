@@ -18,7 +18,7 @@ from study.support.errors import DivergenceError, expect
 def known_linear(model: Model, prepared: Prepared) -> dict[str, float]:
     """The linear terms of a structure: what it holds of them, and the best linear approximation of the rest."""
     held = {key: value for key, value in model.values.items() if value is not None}
-    start = structure_linear_start if model.forces else free_decay_start
+    start = free_decay_start if prepared.free else structure_linear_start
     return {key: held[key] for key in linear_keys(model) if key in held} | start(model, prepared, held)
 
 

@@ -144,7 +144,7 @@ def _left(prediction: StructurePrediction, families: Sequence[FamilyGain]) -> fl
     """
     found = [f.gain.explained for f in families if f.gain.p_value * len(families) < NAMELESS]
     left = prediction.error * float(np.sqrt(max((0.0, *found))))
-    return left if prediction.fit.model.forces else max(left, prediction.above_noise)
+    return max(left, prediction.above_noise) if prediction.prepared.free else left
 
 
 def _ordered(families: Sequence[FamilyGain]) -> tuple[FamilyGain, ...]:
