@@ -18,7 +18,7 @@ from study.support import statistics
 from study.support.thresholds import TOLERANCE
 
 STEPS = 8  # of Gauss and Newton
-COARSE = (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)  # samples
+FAR_APART = (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)  # samples
 NEAR = 0.05  # standard errors: as near the value as the search has to come
 
 
@@ -73,7 +73,7 @@ def _coarse(given: Prepared, faults: Sequence[Fault], left: FittedResidual) -> t
     """
     step = float(amounts_on_both(left, adjustable.fault_columns(DELAY, left))[0][0])
     best = 0.0, left
-    for late in COARSE if abs(step) > 0.5 else ():
+    for late in FAR_APART if abs(step) > 0.5 else ():
         tried = _left(given, (*faults, Fault(DELAY, given.response, late)), left)
         if tried is not None and relative_power(tried) < relative_power(best[1]):
             best = late, tried

@@ -206,7 +206,7 @@ def _decide(rows: list[MeasuredRanked], comparison: MeasuredComparison, asked: i
         return MeasuredDiagnosis(verdict, comparison, tuple(rows), asked, left)
     first = believed[0]
     left = rms_above_noise(first.prediction)
-    enough = first.gain.explained >= ENOUGH or left <= GOOD or not first.wanders(asked)
+    enough = (first.gain.explained >= ENOUGH or left <= GOOD) and not first.wanders(asked)
     ordered = (first, *(r for r in rows if r is not first))
     return MeasuredDiagnosis(MISSING if enough else UNKNOWN, comparison, ordered, asked, left)
 

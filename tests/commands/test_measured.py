@@ -1,6 +1,5 @@
 """Measured and public records; they are found beside the project or where STUDY_DATA says (see the README)."""
 
-import os
 import shutil
 from pathlib import Path
 
@@ -20,15 +19,13 @@ from study.records.plan import make_plan
 from study.records.prepared import prepare_record
 from study.records.record import Record
 from study.support.errors import StudyError
+from tests.public_records import DATA, needs
 
 LINEAR = Model("linear", tuple(free(get(n)) for n in ("inertia", "linear_damping", "linear_stiffness")))
 RIVALS = {"cubic_stiffness", "hysteresis", "quadratic_stiffness", "quadratic_damping", "dead_band", "constant_force"}
 OTHERS = [name for name in LIBRARY if name not in RIVALS and name not in LINEAR]
 ROOT = Path(__file__).parents[2]
-DATA = Path(os.environ.get("STUDY_DATA", ROOT.parent / "shared" / "data"))
-present = pytest.mark.skipif(
-    not (DATA / "silverbox").is_dir(), reason="the public records are not here; see the README"
-)
+present = needs("silverbox", "boucwen")
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,6 @@
 """``study compare`` as a user meets it: files in, files out, one sentence for whatever goes wrong."""
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -17,9 +16,9 @@ from study.records.excitation import Excitation, force
 from study.records.record import Record, write_csv
 from study.support.errors import StudyError
 from study.support.files import check_folder, write_files
+from tests.public_records import DATA, needs
 
 DT = 0.02
-DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parents[3] / "shared" / "data"))
 LINEAR = "name: rig\nterms: [inertia, linear_damping, linear_stiffness]\n"
 WRITTEN = {
     "explore.html", "comparison.json", "comparison.csv", "coefficients.csv", "force_error.csv",
@@ -209,7 +208,7 @@ def test_help_is_quick_and_imports_nothing_heavy() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.skipif(not (DATA / "silverbox").is_dir(), reason="the public records are not there")
+@needs("silverbox")
 def test_the_silverbox_lacks_a_cubic_stiffness_and_then_little(capsys: pytest.CaptureFixture[str]) -> None:
     words = [
         "compare", str(DATA / "silverbox" / "SNLS80mV.csv"), "--column", "force=V1", "--column", "displacement=V2",
@@ -228,7 +227,7 @@ def test_the_silverbox_lacks_a_cubic_stiffness_and_then_little(capsys: pytest.Ca
 
 
 @pytest.mark.long
-@pytest.mark.skipif(not (DATA / "boucwen").is_dir(), reason="the public records are not there")
+@needs("boucwen")
 def test_the_bouc_wen_record_is_no_function_of_the_motion_and_hysteresis_reaches_its_noise(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

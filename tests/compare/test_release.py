@@ -1,16 +1,13 @@
 """Where a decay begins: against the backbone of a Duffing oscillator, and on a measured beam."""
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from study.compare import decay
 from study.compare.release import at_the_release
+from tests.public_records import DATA, needs
 
-DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parents[3] / "shared" / "data"))
 DT, OMEGA, K3, ZETA, AMPLITUDE = 0.001, 2.0 * np.pi * 37.0, 0.48, 0.005, 220.0
 
 
@@ -56,6 +53,7 @@ def test_a_decay_without_noise():
     assert damping == pytest.approx(1.2 / natural, rel=0.01)
 
 
+@needs("beam_ringdown")
 def test_the_beam_falls_from_42_to_36_9_hertz():
     """Driven at 42.05 Hz until 12.15 s; the first point lies where it is let go, the last where noise begins."""
     strain = np.loadtxt(DATA / "beam_ringdown" / "decay.csv", delimiter=",", skiprows=1, usecols=1)

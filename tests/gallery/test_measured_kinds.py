@@ -1,7 +1,6 @@
 """Measured tests without a force or without a mass: a damper, a pendulum. The data lie where STUDY_DATA says."""
 
 import itertools
-import os
 from pathlib import Path
 
 import numpy as np
@@ -21,9 +20,9 @@ from study.gallery.known import Published
 from study.identify.time_domain.fit_model import fit_model
 from study.records.readers import ReadOptions, read_record
 from study.records.record_layout import Layout, apart
+from tests.public_records import DATA, needs
 
 ROOT = Path(__file__).parents[2]
-DATA = Path(os.environ.get("STUDY_DATA", ROOT.parent / "shared" / "data"))
 MODELS = ROOT / "models" / "measured"
 AUTHORS = {"4.1": (57.4, 0.768, 0.12), "4.4": (209.7, 1.31, 0.09)}  # Kw in N, Kx in N s/mm, share left of the force
 RIVALS = {
@@ -37,6 +36,7 @@ def damper(run, model):
     return made_ready([record], read_model(MODELS / f"{model}.yaml"), Layout())
 
 
+@needs("damper")
 @pytest.mark.parametrize("run", list(AUTHORS))
 def test_the_authors_model_of_the_damper(run):
     """Of the whole run, one half of which is held out; run_4.4 rests on its one block, so its Kw is not compared."""
@@ -71,6 +71,7 @@ def pendulum():
     return made_ready([record], read_model(MODELS / "pendulum.yaml"), Layout())
 
 
+@needs("pendulum")
 def test_the_pendulum_and_the_law_of_its_friction():
     """k/I from periods and amplitudes alone, T = 4 K(sin^2(a/2)) / sqrt(k/I), is the other path to the same value."""
     model, prepared = pendulum()
@@ -105,6 +106,7 @@ def by_periods() -> float:
 
 
 @pytest.mark.long
+@needs("wing")
 def test_a_climb_of_a_structure_leaves_what_the_gallery_reads(tmp_path):
     """Each diagnosis is kept, and the structure reached."""
     options = ["--fit", "0:700", "--judge", "700:1200"]

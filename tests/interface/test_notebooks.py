@@ -1,16 +1,15 @@
 """The notebooks of docs/ run, and end with what they say."""
 
 import json
-import os
 from pathlib import Path
 
 import pytest
 
 from scripts.notebooks import run
+from tests.public_records import DATA, needs
 
 ROOT = Path(__file__).parents[2]
 NOTEBOOKS = ROOT / "docs" / "notebooks"
-DATA = Path(os.environ.get("STUDY_DATA", ROOT.parent / "shared" / "data"))
 
 
 def test_duffing():
@@ -31,7 +30,7 @@ def test_your_own_rig():
 
 
 @pytest.mark.long
-@pytest.mark.skipif(not (DATA / "silverbox" / "SNLS80mV.csv").is_file(), reason="the Silverbox's record is not here")
+@needs("silverbox")
 def test_silverbox(monkeypatch):
     monkeypatch.setenv("STUDY_DATA", str(DATA))
     _, ends = run(NOTEBOOKS / "silverbox.ipynb")

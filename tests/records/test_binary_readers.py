@@ -1,7 +1,6 @@
 """Records in MATLAB, HDF5, Parquet and UFF files, and the public measured ones."""
 
 import gc
-import os
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +14,8 @@ from scipy.io import savemat
 from study.records.readers import ReadOptions, read_record
 from study.records.record import Record
 from study.support.errors import StudyError
+from tests.public_records import DATA, needs
 
-DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parents[3] / "shared" / "data"))
-NEEDS_DATA = pytest.mark.skipif(not DATA.is_dir(), reason="the public records are not here")
 RNG = np.random.default_rng(11)
 TIME = 0.02 * np.arange(40)
 FORCE = RNG.standard_normal(40)
@@ -143,7 +141,7 @@ def test_uff_58(binary: int, fs: float, even: int, tmp_path: Path) -> None:
 # public records
 
 
-@NEEDS_DATA
+@needs("silverbox", "boucwen")
 def test_silverbox() -> None:
     mapping = {"force": "V1", "displacement": "V2"}
     volts = dict.fromkeys(mapping, "V")
@@ -159,7 +157,7 @@ def test_silverbox() -> None:
             read_record(DATA / "silverbox" / name)
 
 
-@NEEDS_DATA
+@needs("silverbox", "boucwen")
 def test_bouc_wen() -> None:
     train = read_record(DATA / "boucwen" / "train.h5", ReadOptions(columns=BOUC_WEN, period=8192))
     assert (len(train), train.dt, train.period) == (40960, 1.0 / 750.0, 8192)

@@ -1,6 +1,5 @@
 """Force and response in each other's place: suspected where physics can tell, and refused unless the user insists."""
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -13,15 +12,14 @@ from study.equations.terms import LIBRARY
 from study.records.readers import ReadOptions, read_record, suspect_swapped
 from study.records.record import MOTIONS, Record, write_csv
 from study.support.errors import StudyError
+from tests.public_records import DATA, needs
 
-DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parents[3] / "shared" / "data"))
-NEEDS_DATA = pytest.mark.skipif(not DATA.is_dir(), reason="the public records are not here")
 RNG = np.random.default_rng(11)
 BOUC_WEN = {"force": "u", "displacement": "y"}
 MODEL = "name: rig\nterms: [inertia, linear_damping, linear_stiffness]\n"
 
 
-@NEEDS_DATA
+@needs("silverbox", "boucwen")
 def test_public_records_are_not_suspected_unless_swapped() -> None:
     silverbox = {"force": "V1", "displacement": "V2"}
     for path, columns, fs, group in [

@@ -1,6 +1,5 @@
 """A measured structure: the free decay of a wing that heaves and pitches (K. H. Lee, D. Barton and others, Bristol)."""
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +17,9 @@ from study.structure.prepared_structure import prepare_structure, structure_read
 from study.structure.structure_comparison import compare_structure
 from study.structure.structure_verdict import diagnose_structure, placed_search_base
 from study.support.errors import StudyError
+from tests.public_records import DATA, needs
 
-DATA = Path(os.environ.get("STUDY_DATA", Path(__file__).parents[3] / "shared" / "data"))
-pytestmark = pytest.mark.skipif(not (DATA / "wing").is_dir(), reason="the record is not there")
+pytestmark = needs("wing")
 M_T, M_W, B, A, RHO = 16.9, 5.3, 0.15, -0.5, 1.204
 AUTHORS = {"model_1": (0.1724, 0.24, 3529.0, 54.1), "model_2": (0.1726, 0.234, 3318.0, 60.3)}
 TERMS = """
