@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 from scipy.signal import csd
 
-from study.equations.model import Model, forward_program
+from study.equations import kernels
+from study.equations.free_run import prepare
+from study.equations.model import Model
 from study.equations.model_file import read_model
+from study.equations.motion_program import motion_program
 from study.equations.simulate import METHODS, Integrator, simulate
 from study.identify.frequency_domain import coefficients, conditioned
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
@@ -22,6 +25,7 @@ from study.identify.frequency_domain.local_polynomial import (
 )
 from study.records.excitation import Excitation, force
 from study.records.interpolation import between_samples
+from study.records.record import ALONE, MOTIONS, Record, Sensor
 from study.records.spectra import Segments, cross_spectra
 
 MODELS = sorted((Path(__file__).parent.parent / "models").glob("*.yaml"))
@@ -34,16 +38,13 @@ def the_force():
 
 def integration(model: Model, method: str):
     """The compiled loop alone: SAMPLES x STEPS steps of one system."""
-    program = forward_program(model)
+    motion = motion_program(model, (), [Sensor(ALONE, m) for m in MOTIONS], switching=method == "rk4")
     drive = between_samples(the_force(), 2 * STEPS)[:, None]
-    drive = np.vstack([drive, drive[-1:], drive[-1:]])
-    registers = program.registers.copy()
+    start, bounds = np.zeros(1), np.array([0, SAMPLES])
 
     def run():
-        out, state = np.empty((SAMPLES, 3)), np.zeros(2)
-        assert METHODS[method](
-            program.code, program.first, registers, program.outputs, 0.0, DT, STEPS, drive, state, out
-        ) == -1  # fmt: skip
+        out, state = np.empty((SAMPLES, 3, 1)), np.zeros((1, motion.states, 1))
+        assert kernels.integrate(motion, start, DT, STEPS, drive, bounds, state, out, METHODS[method]) == -1
 
     return run
 
@@ -53,6 +54,21 @@ def integration(model: Model, method: str):
 @pytest.mark.benchmark(group="integration: 65,536 steps (13.1 ms is 5 million a second)")
 def test_integration(benchmark, path, method):
     benchmark(integration(read_model(path), method))
+
+
+@pytest.mark.parametrize("keyed", [True, False], ids=["derivatives", "alone"])
+@pytest.mark.benchmark(group="free runs of a Duffing system, 8,192 samples in two steps each")
+def test_respond(benchmark, keyed):
+    model = read_model(MODELS[0].parent / "duffing.yaml")
+    run = prepare(model, Record(DT, {"force": the_force()}), tuple(model.values) if keyed else ())
+    benchmark(lambda: run.respond(model.numbers(), (0.0, 0.0), 2 * keyed))
+
+
+@pytest.mark.benchmark(group="free runs of a Duffing system, 8,192 samples in two steps each")
+def test_prepare(benchmark):
+    """Again, as a search does: the program is known, and the force between its samples."""
+    model, record = read_model(MODELS[0].parent / "duffing.yaml"), Record(DT, {"force": the_force()})
+    benchmark(lambda: prepare(model, record, tuple(model.values)))
 
 
 def channels(count: int = 4, samples: int = 1_000_000):

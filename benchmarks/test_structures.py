@@ -16,7 +16,6 @@ from study.equations.simulate import Integrator, simulate
 from study.records.excitation import Excitation, force
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure
-from study.structure.structure_simulation import simulate_structure
 from study.structure.structure_verdict import diagnose_structure
 
 DT, SAMPLES, STEPS = 0.02, 8192, 4
@@ -38,8 +37,8 @@ def chain(masses: int) -> Model:
 @pytest.mark.benchmark(group="a simulation of 8,192 samples in four steps each")
 def test_chain(benchmark, masses):
     model, drive = chain(masses), force(Excitation(), SAMPLES, DT, 1)
-    simulate_structure(model, {"shaker": drive}, DT, steps_per_sample=STEPS)  # compiles
-    benchmark(lambda: simulate_structure(model, {"shaker": drive}, DT, steps_per_sample=STEPS))
+    simulate(model, {"shaker": drive}, DT, Integrator("rk4", STEPS))  # compiles
+    benchmark(lambda: simulate(model, {"shaker": drive}, DT, Integrator("rk4", STEPS)))
 
 
 @pytest.mark.benchmark(group="a simulation of 8,192 samples in four steps each")
@@ -56,7 +55,7 @@ def test_diagnosis(benchmark):
     truth, drive = chain(3), force(Excitation(), SAMPLES, DT, 1)
     known = truth.with_values(dict.fromkeys(truth.values))
     believed = replace(known, terms=tuple(t for t in known.terms if not t.name.startswith("cubic_stiffness")))
-    clean = simulate_structure(truth, {"shaker": drive}, DT, steps_per_sample=STEPS)
+    clean = simulate(truth, {"shaker": drive}, DT, Integrator("rk4", STEPS))
     rng = np.random.default_rng(1)
     noisy = {n: x + 0.01 * np.std(x) * rng.standard_normal(SAMPLES) for n, x in clean.motions.items()}
     record = clean.with_motions({n: x for n, x in noisy.items() if n.motion == "displacement"})

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from study.equations import formulas, kernels
 from study.equations.graph import Graph
-from study.equations.model import Model, free, with_registers
+from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
 from study.records.excitation import Excitation, force
@@ -112,13 +112,8 @@ def value_of() -> Callable[..., Floats]:
     def value(text: str, **columns: Floats | float) -> Floats:
         graph = Graph()
         known = {name: graph.input(name) for name in columns}
-        program = with_registers(graph.program([formulas.add_formula(graph, text, known)]), {})
-        data = np.column_stack([np.atleast_1d(np.asarray(c, dtype=float)) for c in columns.values()])
-        out = np.empty((len(data), 1))
-        positions = np.array([program.inputs[name] for name in columns], dtype=np.int64)
-        kernels.evaluate(
-            program.code, program.first, program.registers.copy(), positions, data, program.outputs, out
-        )  # fmt: skip
-        return out[:, 0]
+        program = graph.program([formulas.add_formula(graph, text, known)])
+        data = np.broadcast_arrays(*(np.atleast_1d(np.asarray(c, dtype=float)) for c in columns.values()))
+        return kernels.evaluate(program, dict(zip(columns, data, strict=True)), len(data[0]))[:, 0]
 
     return value

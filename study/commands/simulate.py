@@ -3,12 +3,8 @@
 import argparse
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from study.commands.command import Command, finite_number, whole_number
-
-if TYPE_CHECKING:
-    from study.equations.model import Model
 
 MOST_SAMPLES = 10_000_000
 USUAL, MOST_STEPS = 8, 1000
@@ -48,52 +44,31 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.equations.simulate import Integrator, simulate
     from study.records.excitation import Excitation, force
     from study.records.record import write_csv
+    from study.structure.modes import modes_of, modes_table
     from study.support.errors import at, expect
     from study.support.files import keep, replacing
 
     keep([arguments.model, path_of(arguments.model)], [arguments.out])
-    model = read_model(arguments.model)
-    if model.named:
-        _structure(model, arguments)
-        return
-    expect("inertia" in model, f"{arguments.model}: the model has no inertia; expected a term 'inertia'")
-    with at(arguments.model):
-        model.numbers()
-    excitation = Excitation(level=arguments.level, cutoff=arguments.cutoff)
-    history = force(excitation, arguments.samples, arguments.dt, arguments.seed)
-    values = model.numbers()
-    steps = arguments.steps or _enough(math.sqrt(abs(values.get("k", 0.0)) / values["m"]), arguments.dt)
-    record = simulate(model, history, arguments.dt, Integrator(steps_per_sample=steps))
-    with replacing(arguments.out) as beside:
-        write_csv(record, beside)
-    seconds = arguments.samples * arguments.dt
-    print(f"{arguments.out}: {len(record)} samples, {seconds:g} s of {model.name}, force of rms {history.std():.4g} N")
-
-
-def _structure(model: "Model", arguments: argparse.Namespace) -> None:
-    """The same of a structure: each of its forces is random on its own."""
-    from study.records.excitation import Excitation, force
-    from study.records.record import write_csv
-    from study.structure.modes import modes_of, modes_table
-    from study.structure.structure_simulation import simulate_structure
-    from study.support.errors import expect
-    from study.support.files import replacing
-
+    model, dt = read_model(arguments.model), arguments.dt
+    expect(model.named or "inertia" in model, f"{arguments.model}: the model has no inertia; expected a term 'inertia'")
     lacking = f"model {model.name!r} has no 'forces'; expected where the force acts, such as"
     expect(model.forces, f"{lacking} {{shaker: {model.coordinates[0]}}}")
+    with at(arguments.model):
+        values = model.numbers()
     excitation = Excitation(level=arguments.level, cutoff=arguments.cutoff)
-    forces = {
-        name: force(excitation, arguments.samples, arguments.dt, arguments.seed + i)
-        for i, (name, _) in enumerate(model.forces)
-    }
-    modes = modes_of(model)
-    steps = arguments.steps or _enough(2.0 * math.pi * modes.frequency.max(), arguments.dt)
-    record = simulate_structure(model, forces, arguments.dt, steps_per_sample=steps)
+    seeds = enumerate(dict(model.forces), arguments.seed)  # each force is random on its own
+    forces = {name: force(excitation, arguments.samples, dt, seed) for seed, name in seeds}
+    modes = modes_of(model) if model.named else None
+    rate = 2.0 * math.pi * modes.frequency.max() if modes else math.sqrt(abs(values.get("k", 0.0)) / values["m"])
+    steps = arguments.steps or _enough(rate, dt)
+    record = simulate(model, forces, dt, Integrator("rk4" if modes else "abm4", steps))
     with replacing(arguments.out) as beside:
         write_csv(record, beside)
-    driven = ", ".join(f"{name} at {where} of rms {forces[name].std():.4g} N" for name, where in model.forces)
-    print(f"{arguments.out}: {len(record)} samples, {arguments.samples * arguments.dt:g} s of {model.name}, {driven}")
-    print(modes_table(modes, model.coordinates))
+    sizes = [(f"{name} at {where}" if where else name, forces[name].std()) for name, where in model.forces]
+    driven = ", ".join(f"{name} of rms {size:.4g} N" for name, size in sizes)
+    print(f"{arguments.out}: {len(record)} samples, {arguments.samples * dt:g} s of {model.name}, {driven}")
+    if modes:
+        print(modes_table(modes, model.coordinates))
 
 
 def _enough(rate: float, dt: float) -> int:

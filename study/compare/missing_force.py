@@ -18,7 +18,8 @@ from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from study.compare.noise import Noise
 from study.compare.prediction import Prediction
 from study.equations import kernels
-from study.equations.model import Model, forward_graph, named_channels, with_registers
+from study.equations.equations_of_motion import acceleration_program
+from study.equations.model import Model, named_channels
 from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.identify.frequency_domain.starting_values import oscillator
 from study.records.completion import SETTLED, derivative
@@ -124,24 +125,12 @@ def unbalanced_force(model: Model, keys: Sequence[str], record: Record) -> Float
     StudyError
         If the model is incomplete, or names a channel that the record lacks.
     """
-    values = model.numbers()
-    channels = named_channels(model, record.extra)
-    forward = forward_graph(model, channels)
-    graph = forward.graph
-    slope = forward.slopes[0]
-    program = with_registers(
-        graph.program([slope, *(graph.derivative(slope, graph.input(key)) for key in keys)]), values
-    )
-    columns = [record["displacement"], record["velocity"], record.time, record["force"]]  # as the registers begin
-    columns += [record[name] for name in channels]
-    columns += [
-        input_history(item, record) for item in reverse_inputs(model) if item.state is not None
-    ]  # their memories
-    out = np.empty((len(record), 1 + len(keys)))
-    kernels.evaluate(
-        program.code, program.first, program.registers.copy(), np.arange(len(columns)),
-        np.column_stack(columns), program.outputs, out,
-    )  # fmt: skip
+    values, program = model.numbers(), acceleration_program(model, keys)
+    columns = {"u:": record["displacement"], "v:": record["velocity"], "t": record.time}
+    columns |= {f"drive:{name}": record[name] for name in ("force", *named_channels(model, record.extra))}
+    memories = [input_history(item, record) for item in reverse_inputs(model) if item.state is not None]
+    columns |= {f"z:{term.name}": z for term, z in zip(model.states, memories, strict=True)}
+    out = kernels.evaluate(program, columns, len(record))
     out[:, 0] -= record["acceleration"]
     return out * values["m"]
 

@@ -1,4 +1,4 @@
-"""What drives a free run between the samples of a record: its force, or the motion that is prescribed, and channels."""
+"""What drives a free run between the samples of a record: forces, motions that are prescribed, and channels."""
 
 from functools import lru_cache
 
@@ -8,7 +8,7 @@ from study.records.interpolation import BAND_LIMITED, between_runs, between_samp
 from study.records.record import Record
 from study.support.arrays import Floats, Ints
 
-REMEMBERED = 4  # channels whose values between the samples are cached
+REMEMBERED = 8  # channels whose values between the samples are cached
 FORCE = "force"  # also the response of a model without inertia, whose motion is prescribed
 Drive = tuple[Floats, tuple[tuple[int, float], ...], Ints | None]
 
@@ -42,7 +42,8 @@ def along_motions(record: Record, span: tuple[int, int], driving: tuple[str, ...
     first, last = span
     part = slice(factor * first, factor * (last - 1) + 1)
     columns = [_between(record[name].tobytes(), factor, _reading(record, name))[part] for name in driving]
-    return np.column_stack(columns), ((0, record.start + first * record.dt),), None
+    drive = np.column_stack(columns) if columns else np.zeros((factor * (last - first), 0))
+    return drive, ((0, record.start + first * record.dt),), None
 
 
 @lru_cache(maxsize=REMEMBERED)
@@ -54,7 +55,8 @@ def _along_stretches(record: Record, span: tuple[int, int], driving: tuple[str, 
     for run in runs:
         starts.append((begin, float(run.source.time[run.first])))
         begin += len(run)
-    drive = np.column_stack([between_runs(part, name, factor) for name in driving])
+    columns = [between_runs(part, name, factor) for name in driving]
+    drive = np.column_stack(columns) if columns else np.zeros((factor * begin, 0))
     drive.flags.writeable = False
     return drive, tuple(starts), places
 
@@ -69,4 +71,4 @@ def _between(values: bytes, factor: int, reading: str) -> Floats:
 
 def _reading(record: Record, name: str) -> str:
     """How a channel goes on between its samples: a motion is band-limited."""
-    return record.between if name == FORCE else BAND_LIMITED
+    return record.between if name in record.forces else BAND_LIMITED

@@ -6,7 +6,7 @@ the instructions that the compiled loops run. No text is ever evaluated.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 import numpy as np
@@ -64,6 +64,13 @@ class Program:
     first: int
     inputs: dict[str, int]
     outputs: Ints
+
+    def with_inputs(self, values: Mapping[str, float]) -> "Program":
+        """The program with the values of some inputs in their registers."""
+        registers = self.registers.copy()
+        for name, value in values.items():
+            registers[self.inputs[name]] = value
+        return replace(self, registers=registers)
 
 
 @dataclass

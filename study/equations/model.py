@@ -9,16 +9,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from study.equations import formulas
-from study.equations.graph import Graph, Program
 from study.equations.place import ALONE, HERE, Place
-from study.equations.term import Component, Term
-from study.support.arrays import Floats
+from study.equations.term import Term
 from study.support.errors import StudyError
 
 if TYPE_CHECKING:
     from study.records.readers.roles import Roles
-
-FIXED_INPUTS = (*formulas.VARIABLES, "force")  # the registers that every forward program begins with
 
 
 @dataclass(frozen=True)
@@ -183,64 +179,6 @@ class Model:
         return known
 
 
-@dataclass(frozen=True)
-class ForwardGraph:
-    """A model's equation of motion solved for its acceleration; without inertia, for the force.
-
-    Attributes
-    ----------
-    graph : Graph
-        The nodes; inputs are ``u, v, t, force``, channels (``channel:temperature``), states
-        ``z:term``, then every key.
-    slopes : tuple of int
-        Nodes of the acceleration, or of the force of a model without inertia, and of each state's derivative.
-    states : tuple of int
-        Nodes of u, v and each state z: what ``slopes`` (after v) are the derivatives of.
-    """
-
-    graph: Graph
-    slopes: tuple[int, ...]
-    states: tuple[int, ...]
-
-
-def forward_graph(model: Model, channels: tuple[str, ...] = ()) -> ForwardGraph:
-    """The equation of motion of a model as nodes; coefficients and shape parameters are inputs of the graph.
-
-    ``channels`` are those of the user's own terms (:func:`named_channels`), in the order of the drive.
-    """
-    graph = Graph()
-    fixed = {name: graph.input(name) for name in FIXED_INPUTS}
-    measured = {name: graph.input(f"channel:{name}") for name in channels}
-    states = {t.name: graph.input(f"z:{t.name}") for t in model.states}
-    keys = {key: graph.input(key) for key in model.values}
-    force, rates = graph.const(0.0), list[int]()
-    for entry in model.terms:
-        names = {n: fixed[n] for n in formulas.VARIABLES}
-        names |= {n: measured[n] for n in entry.term.channels if n in measured}
-        names |= {p.name: keys[f"{entry.name}.{p.name}"] for p in entry.term.parameters}
-        rate = None
-        if entry.term.state is not None:
-            names["z"] = states[entry.name]
-            rate = formulas.add_formula(graph, entry.term.state, names)
-            rates.append(rate)
-        for component in entry.term.components:
-            if component.order < 2:
-                unit = unit_force(graph, component, names, rate)
-                force = graph.add(force, graph.mul(keys[component.symbol], unit))
-    slope = graph.div(graph.sub(fixed["force"], force), keys["m"]) if "inertia" in model else force
-    return ForwardGraph(graph, (slope, *rates), (fixed["u"], fixed["v"], *states.values()))
-
-
-def has_spring(model: Model) -> bool:
-    """Whether any force of a model depends on the displacement itself, and so brings its mass back or pushes it away.
-
-    What a term remembers of the motion is no spring: it gives way.
-    """
-    forward = forward_graph(model, model.channels)
-    place = forward.states[0]
-    return any(forward.graph.constant_value(forward.graph.derivative(s, place)) != 0.0 for s in forward.slopes)
-
-
 def named_channels(model: Model, available: Collection[str]) -> tuple[str, ...]:
     """The channels that the formulas of a model name; refuses those that are not available."""
     for entry in model.terms:
@@ -251,45 +189,3 @@ def named_channels(model: Model, available: Collection[str]) -> tuple[str, ...]:
                     f"the formula of {entry.name!r} names {name!r}; it may name {known} and pi"
                 )
     return model.channels
-
-
-def unit_forces(model: Model) -> tuple[tuple[str, ...], Program]:
-    """Force of each component with a unit coefficient, as a program, and the names of their terms.
-
-    Its registers begin with u, v, t and the model's channels. Inertia, and terms with a shape parameter or a state of
-    their own, are left out.
-    """
-    graph = Graph()
-    inputs = {n: graph.input(n) for n in (*formulas.VARIABLES, *model.channels)}
-    terms = [t.term for t in model.terms if not t.term.parameters and t.term.state is None]
-    pairs = [(term.name, c) for term in terms for c in term.components if c.order < 2]
-    outputs = [unit_force(graph, c, inputs, None) for _, c in pairs]
-    return tuple(name for name, _ in pairs), graph.program(outputs)
-
-
-def unit_force(graph: Graph, component: Component, names: Mapping[str, int], rate: int | None) -> int:
-    """Force of a component with a unit coefficient: its shape, or the shape's derivative by the chain rule."""
-    shape = formulas.add_formula(graph, component.shape, names)
-    if component.order == 1:
-        total = graph.mul(graph.derivative(shape, names["u"]), names["v"])
-        total = graph.add(total, graph.derivative(shape, names["t"]))
-        if rate is not None:
-            total = graph.add(total, graph.mul(graph.derivative(shape, names["z"]), rate))
-        shape = total
-    return graph.mul(graph.const(component.factor), shape)
-
-
-def forward_program(model: Model, channels: tuple[str, ...] = ()) -> Program:
-    """The program of a model whose values are all known, with the values in their registers."""
-    if "inertia" not in model:
-        raise StudyError(f"model {model.name!r} has no inertia; a simulation needs it")
-    values, forward = model.numbers(), forward_graph(model, channels)
-    return with_registers(forward.graph.program(forward.slopes), values)
-
-
-def with_registers(program: Program, values: Mapping[str, float]) -> Program:
-    """The program with named inputs set."""
-    registers: Floats = program.registers.copy()
-    for name, value in values.items():
-        registers[program.inputs[name]] = value
-    return replace(program, registers=registers)

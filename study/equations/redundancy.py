@@ -2,7 +2,10 @@
 
 import numpy as np
 
-from study.equations.model import Model, unit_forces
+from study.equations import formulas
+from study.equations.equations_of_motion import unit_force
+from study.equations.graph import Graph
+from study.equations.model import Model
 from study.equations.terms import LIBRARY
 from study.support.arrays import Floats
 
@@ -40,17 +43,22 @@ def repeated_force(model: Model) -> str | None:
 
 
 def _forces(model: Model) -> tuple[tuple[str, ...], Floats]:
-    """Names of the terms, and their forces with unit coefficients at random motions, shape (points, components)."""
+    """Names of the terms, and their forces with unit coefficients at random motions, shape (points, components).
+
+    Inertia, and terms with a shape parameter or a state of their own, are left out.
+    """
     from study.equations import kernels  # compiled code is loaded only where a formula needs it
 
-    names, program = unit_forces(model)
+    graph, variables = Graph(), (*formulas.VARIABLES, *model.channels)
+    inputs = {name: graph.input(name) for name in variables}
+    terms = [t.term for t in model.terms if not t.term.parameters and t.term.state is None]
+    pairs = [(term.name, c) for term in terms for c in term.components if c.order < 2]
+    program = graph.program([unit_force(graph, c, inputs, None) for _, c in pairs])
     rng = np.random.default_rng(1990)
-    shape = (POINTS, 3 + len(model.channels))
+    shape = (POINTS, len(variables))
     data = rng.standard_normal(shape) * 10.0 ** rng.uniform(-DECADES, DECADES, shape)
-    positions = np.arange(shape[1], dtype=np.int64)
-    values = np.empty((POINTS, len(names)))
-    kernels.evaluate(program.code, program.first, program.registers.copy(), positions, data, program.outputs, values)
-    finite = np.all(np.isfinite(values), axis=1)
+    values = kernels.evaluate(program, dict(zip(variables, data.T, strict=True)), POINTS)
+    names, finite = tuple(name for name, _ in pairs), np.all(np.isfinite(values), axis=1)
     return names, values[finite] if np.count_nonzero(finite) >= FEWEST else np.eye(len(names))
 
 

@@ -1,40 +1,34 @@
-"""Model and force in, record out.
+"""Model and forces in, record out.
 
 The report integrates with an Adams-Bashforth predictor-corrector of order 4 at one step a sample
 (Section 2.2). Here the steps per sample are a setting, a classical Runge-Kutta is the alternative, and
-the force between the samples is its band-limited interpolation.
+the forces between the samples are their band-limited interpolation.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from study.equations import kernels
-from study.equations.model import Model, forward_program, named_channels
+from study.equations.mass_matrix import checked_mass_matrix
+from study.equations.model import Model, named_channels
+from study.equations.motion_program import motion_program
 from study.records.interpolation import between_samples
-from study.records.record import SI_UNITS, Record
+from study.records.record import MOTIONS, Record, Sensor, record_of
 from study.support.arrays import Floats
-from study.support.errors import DivergenceError, StudyError
+from study.support.errors import DivergenceError, StudyError, expect
 
 PLENTY = 8  # steps per sample with which a stable system is integrated stably
-METHODS = {"abm4": kernels.integrate_abm4, "rk4": kernels.integrate_rk4}
+METHODS = {"abm4": kernels.Method.ADAMS, "rk4": kernels.Method.ONE_BY_ONE}
 
 
 @dataclass(frozen=True)
 class Integrator:
-    """How to integrate.
+    """How to integrate; Runge-Kutta alone cuts a step where dry friction switches."""
 
-    Attributes
-    ----------
-    method : str
-        ``abm4`` (the report's) or ``rk4``.
-    steps_per_sample : int
-        Steps in each sampling interval; the report took one.
-    """
-
-    method: str = "abm4"
-    steps_per_sample: int = 8
+    method: str = "abm4"  # the report's, or ``rk4``
+    steps_per_sample: int = 8  # in each sampling interval; the report took one
 
     def __post_init__(self) -> None:
         """Refuse what no integrator can do."""
@@ -46,31 +40,37 @@ class Integrator:
 
 def simulate(
     model: Model,
-    force: Floats,
+    force: Floats | Mapping[str, Floats],
     dt: float,
     integrator: Integrator | None = None,
     *,
-    initial: Sequence[float] = (0.0, 0.0),
+    samples: int | None = None,
+    initial: Sequence[float] = (),
     start: float = 0.0,
+    sensors: Sequence[Sensor] | None = None,
     extra: Mapping[str, Floats] | None = None,
     units: Mapping[str, str] | None = None,
 ) -> Record:
-    """Response of a model to a force.
+    """Motions of a model under forces.
 
     Parameters
     ----------
     model : Model
         Every value known.
-    force : array, shape (n,)
-        Samples of the force.
+    force : array, shape (n,), or mapping of these
+        Samples of the force on a single mass; of each force by name, and of motions that are prescribed.
     dt : float
         Sampling interval in seconds.
     integrator : Integrator, optional
         Default: the report's method with eight steps a sample.
+    samples : int, optional
+        How many, where nothing drives the model.
     initial : sequence of float
-        Displacement, velocity and, if given, the terms' own states at the first sample.
+        Displacements, velocities and the terms' own states at the first sample; zero where left out.
     start : float
-        Time of the first sample (matters to terms that depend on time).
+        Time of the first sample in seconds (matters to terms that depend on time).
+    sensors : sequence of Sensor, optional
+        The motions that are wanted; all of them if left out.
     extra : mapping of arrays, optional
         Further channels, for the user's own terms to name.
     units : mapping of str, optional
@@ -79,46 +79,50 @@ def simulate(
     Raises
     ------
     DivergenceError
-        If the response leaves the range of finite numbers; names model, time and level.
+        If the motion leaves the range of finite numbers; names model, time and level.
     StudyError
-        If the model is not complete, a channel is not finite, or there are more initial values than states.
+        If the model is not complete, its mass matrix is not positive definite, a channel is not finite, or there are
+        more initial values than states.
     """
-    settings = integrator or Integrator()
-    extra = extra or {}
-    channels = named_channels(model, extra)
-    _check(model, {"force": force, **{name: extra[name] for name in channels}}, initial)
-    program = forward_program(model, channels)
-    factor = 2 * settings.steps_per_sample
-    drive = between_samples(force, factor)[:, None]
-    if channels:  # copying a long record takes longer than the integration
-        drive = np.column_stack([drive, *(between_samples(extra[name], factor) for name in channels)])
-    state = np.zeros(2 + len(model.states))
-    state[: len(initial)] = initial
-    out = np.empty((len(force), 1 + len(state)))
-    failed = METHODS[settings.method](
-        program.code, program.first, program.registers.copy(), program.outputs,
-        start, dt, settings.steps_per_sample, drive, state, out,
-    )  # fmt: skip
-    if failed >= 0:
-        _diverged(model, force, settings.steps_per_sample, start + failed * dt)
-    motion = {"force": force, "displacement": out[:, 0], "velocity": out[:, 1], "acceleration": out[:, 2]}
-    return Record(dt, {**motion, **extra}, {**SI_UNITS, **(units or {})}, model.name, start)
-
-
-def _check(model: Model, channels: Mapping[str, Floats], initial: Sequence[float]) -> None:
-    """Refuse what would only show as a divergence."""
-    for name, values in channels.items():
-        bad = np.flatnonzero(~np.isfinite(values))
+    forces, integrator = force if isinstance(force, Mapping) else {"force": force}, integrator or Integrator()
+    channels, extra = {**forces, **(extra or {})}, extra or {}
+    wanted = [Sensor(c, m) for m in MOTIONS for c in model.coordinates] if sensors is None else list(sensors)
+    model.numbers()
+    named_channels(model, extra)
+    heavy = any(entry.term.name == "inertia" for entry in model.terms)
+    expect(heavy, f"model {model.name!r} has no inertia; a simulation needs it")
+    motion = motion_program(model, (), wanted, switching=integrator.method != "abm4")
+    if model.named:
+        checked_mass_matrix(model)
+    for name in motion.drive:
+        bad = np.flatnonzero(~np.isfinite(channels[name]))
         if len(bad):
-            raise StudyError(f"the channel {name!r} is {values[bad[0]]} at sample {bad[0]}; a simulation needs numbers")
-    states = 2 + len(model.states)
-    if len(initial) > states:
-        raise StudyError(f"{len(initial)} initial values were given; model {model.name!r} has {states} states")
+            raise StudyError(
+                f"the channel {name!r} is {channels[name][bad[0]]} at sample {bad[0]}; a simulation needs numbers"
+            )
+    count = samples or min((len(channels[name]) for name in motion.drive), default=0)
+    expect(count > 0, f"{model.name!r} has no force; expected a number of samples for its free decay")
+    steps = integrator.steps_per_sample
+    if len(initial) > motion.states:
+        raise StudyError(f"{len(initial)} initial values were given; model {model.name!r} has {motion.states} states")
+    columns = [between_samples(channels[name], 2 * steps)[:, None] for name in motion.drive]
+    drive = np.hstack(columns) if columns else np.zeros((2 * steps * count, 0))
+    state = np.zeros((1, motion.states, 1))
+    state[0, : len(initial), 0] = initial
+    out = np.empty((count, len(wanted), 1))
+    failed = kernels.integrate(
+        motion, np.array([start]), dt, steps, drive, np.array([0, count]), state, out, METHODS[integrator.method]
+    )
+    if failed >= 0:
+        _diverged(model, channels, steps, start + failed * dt)
+    record = record_of(dt, forces, dict(zip(wanted, out[:, :, 0].T, strict=True)), extra, model.name, start)
+    return replace(record, units={**record.units, **(units or {})})
 
 
-def _diverged(model: Model, force: Floats, steps: int, time: float) -> None:
+def _diverged(model: Model, channels: Mapping[str, Floats], steps: int, time: float) -> None:
     """Raise with advice: more steps where there are few; with many the system itself diverges."""
-    level = float(np.mean(force**2))
+    levels = [float(np.mean(channels[name] ** 2)) for name, _ in model.forces if name in channels]
+    under = f" under a force of mean square {max(levels):.4g}" if levels else ""
     if steps < PLENTY:
         advice = f"take more steps per sample than {steps}, a lower level, or check the signs of the coefficients"
     else:
@@ -126,8 +130,4 @@ def _diverged(model: Model, force: Floats, steps: int, time: float) -> None:
             f"at {steps} steps per sample it is the system itself that runs away at this level; take a lower level or "
             "another stiffness, or check the signs of the coefficients"
         )
-    raise DivergenceError(
-        f"the simulation of {model.name!r} diverged at t = {time:.4g} s under a force of mean square {level:.4g}; "
-        + advice,
-        time,
-    )
+    raise DivergenceError(f"the simulation of {model.name!r} diverged at t = {time:.4g} s{under}; {advice}", time)

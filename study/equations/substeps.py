@@ -1,14 +1,16 @@
 """How many steps a free run of a model needs in each sampling interval of a record."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from study.equations import kernels
-from study.equations.free_run import FreeRun, prepare
+from study.equations.free_run import prepare
 from study.equations.model import Model
 from study.records.outputs import DISPLACEMENT, Outputs
 from study.records.record import Record
 from study.records.states import angular_rate, starting_states
-from study.support.arrays import Floats, Ints
+from study.support.arrays import Floats
 
 POINTS = 64  # points of the motion at which the equation of motion is linearised
 ROUGH = 0.5  # largest step times the fastest rate
@@ -37,39 +39,22 @@ def needed_steps(
 
 def _rates(model: Model, record: Record, outputs: Outputs) -> Floats:
     """Magnitude of the largest eigenvalue at each point, in rad/s, shape (points,)."""
-    run = prepare(model, record, steps_per_sample=1)
+    run = prepare(model, record, sensors=(), steps_per_sample=1)
     samples = np.unique(np.linspace(0, len(record) - 1, POINTS).astype(np.int64))
-    if run.known:
-        return _rates_of_memories(run, record, samples)
-    states = run.states
-    point = np.column_stack([starting_states(record, outputs, samples.tolist()), record.time[samples]])
-    data = np.column_stack([point, run.drive[2 * np.array(run.along(samples.tolist()))]])
-    columns = np.arange(data.shape[1], dtype=np.int64)
-    partial = np.empty((len(samples), (states - 1) * states))
-    with np.errstate(all="ignore"):
-        kernels.evaluate(
-            run.program.code, run.program.first, run.program.registers.copy(), columns, data,
-            run.variation.slots[:, 1 : 1 + states].ravel(), partial,
-        )  # fmt: skip
-    if not np.all(np.isfinite(partial)):
-        return np.full(len(samples), np.inf)
-    jacobian = np.zeros((len(samples), states, states))
-    jacobian[:, 0, 1] = 1.0
-    jacobian[:, 1:] = partial.reshape(len(samples), states - 1, states)
-    return np.asarray(np.max(np.abs(np.linalg.eigvals(jacobian)), axis=1), dtype=np.float64)
-
-
-def _rates_of_memories(run: FreeRun, record: Record, samples: Ints) -> Floats:
-    """The same of a model without inertia: how fast the terms' own states change beside a prescribed motion."""
-    states = run.states
-    if states == 0:
+    motion, n = run.motion, run.motion.dofs
+    if run.states == 0:
         return np.zeros(1)
+    names = list(motion.program.inputs)  # the time, what drives, displacements and velocities
+    moved = names[1 + len(motion.drive) :][: 2 * n]
+    states = starting_states(record, outputs, samples.tolist(), coordinates=[name[2:] for name in moved[:n]])
     drive = run.drive[2 * np.array(run.along(samples.tolist()))]
-    data = np.column_stack([drive[:, :2], record.time[samples], drive[:, 2:]])
-    columns = np.array([0, 1, 2, *range(4, data.shape[1] + 1)], dtype=np.int64)
-    partial = np.empty((len(samples), states * states))
-    kernels.evaluate(
-        run.program.code, run.program.first, run.program.registers.copy(), columns, data,
-        run.variation.slots[1:, 1 : 1 + states].ravel(), partial,
-    )  # fmt: skip
-    return np.max(np.abs(partial), axis=1)
+    columns = dict(zip(names[1:], drive.T, strict=False)) | dict(zip(moved, states.T, strict=True))
+    partial = replace(motion.program, outputs=motion.slots[:, 1 : 1 + run.states].ravel())
+    with np.errstate(all="ignore"):
+        slopes = kernels.evaluate(partial, columns | {"t": record.time[samples]}, len(samples))
+    if not np.all(np.isfinite(slopes)):
+        return np.full(len(samples), np.inf)
+    jacobian = np.zeros((len(samples), run.states, run.states))
+    jacobian[:, np.arange(n), np.arange(n, 2 * n)] = 1.0
+    jacobian[:, n:] = slopes.reshape(len(samples), -1, run.states)
+    return np.asarray(np.max(np.abs(np.linalg.eigvals(jacobian)), axis=1), dtype=np.float64)

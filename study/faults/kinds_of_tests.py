@@ -10,7 +10,8 @@ from typing import Any
 
 from study.compare.running_on import has_lost_its_way
 from study.equations.common_factor import per_unit_mass, with_known_mass
-from study.equations.model import Model, has_spring
+from study.equations.equations_of_motion import has_spring
+from study.equations.model import Model
 from study.faults.accounting import Accounted, accounted
 from study.records.driven_by_motion import on_a_moving_base, relative_to_base
 from study.records.prepared import Prepared

@@ -97,7 +97,7 @@ def between_runs(record: Record, name: str, factor: int) -> Floats:
     parts: list[Floats] = []
     runs, places = runs_of(record)
     own, begin = name in record.changed, 0
-    reading = record.between if name == "force" else BAND_LIMITED
+    reading = record.between if name in record.forces else BAND_LIMITED
     for run in runs:
         inside = (places >= begin) & (places < begin + len(run))
         along = np.interp(np.arange(begin, begin + len(run)), places[inside], record[name][inside]) if own else None

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from study.equations import terms
-from study.equations.model import Model, forward_graph, free
+from study.equations.model import Model, free, named_channels
 from study.equations.model_file import read_model
 from study.identify.estimators import ESTIMATORS
 from study.identify.estimators.base import true_parameters
@@ -99,7 +99,7 @@ def check_model(path: Path, also_assumed: str, settings: StudySettings) -> Model
     model = assumed = read_model(path)
     with at(path):
         model.numbers()
-        forward_graph(model)
+        named_channels(model, ())
     if also_assumed:
         term = terms.get(also_assumed)
         for needed in term.parameters:

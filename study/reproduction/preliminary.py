@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from study.equations.model import Model, forward_program
+from study.equations.equations_of_motion import acceleration_program
+from study.equations.model import Model
 from study.records.record import Record
 from study.support.errors import StudyError
 
@@ -69,14 +70,10 @@ def model_restoring_force(model: Model, displacement: Floats, velocity: Floats, 
     if model.states:
         names = ", ".join(t.name for t in model.states)
         raise StudyError(f"model {model.name!r} holds {names}, which remembers the past; simulate it instead")
-    program = forward_program(model)
-    columns = np.array([program.inputs[name] for name in ("u", "v", "t")], dtype=np.int64)
-    out = np.empty((len(time), 1))
-    kernels.evaluate(
-        program.code, program.first, program.registers.copy(), columns,
-        np.column_stack([displacement, velocity, time]), program.outputs, out,
-    )  # fmt: skip
-    return -model.numbers()["m"] * out[:, 0]
+    if "inertia" not in model:
+        raise StudyError(f"model {model.name!r} has no inertia; a restoring force needs it")
+    motion = {"u:": displacement, "v:": velocity, "t": time}
+    return -model.numbers()["m"] * kernels.evaluate(acceleration_program(model), motion, len(time))[:, 0]
 
 
 def harmonic_pattern(model: Model, amplitude: float, frequency: float, cycles: int = 1) -> Pattern:

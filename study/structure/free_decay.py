@@ -9,10 +9,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from study.equations.mass_matrix import linear_keys, patterns
 from study.equations.model import Model
 from study.records.plan import FEWEST
 from study.records.prepared import Prepared
-from study.structure.mass_matrix import linear_keys, patterns
 from study.structure.missing_forces import band_above_noise, in_band
 from study.support.arrays import Floats, Ints
 from study.support.errors import StudyError, expect

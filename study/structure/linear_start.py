@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from study.equations.mass_matrix import linear_keys, loose_motions, matrices, patterns
 from study.equations.model import Model
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS
 from study.records.spectra import Segments, cross_spectra
-from study.structure.mass_matrix import linear_keys, loose_motions, matrices, patterns
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares

@@ -195,7 +195,7 @@ def _derivatives(comparison: MeasuredComparison) -> Floats:
     begin = prepared.plan.fit[0] if prepared.plan.judge[0] == prepared.plan.fit[1] else prepared.plan.judge[0]
     span = (begin, prepared.plan.judge[1])
     run = modal_run(fit.model, fit.modal, prepared, prepared.sensors, fit.steps, span, fit.values, fit.keys)
-    return run.respond(fit.values, fit.initial)[1][prepared.plan.judge[0] - begin :]
+    return run.respond(fit.values, fit.initial, run.states)[1][prepared.plan.judge[0] - begin :]
 
 
 def _decide(rows: list[MeasuredRanked], comparison: MeasuredComparison, asked: int) -> MeasuredDiagnosis:

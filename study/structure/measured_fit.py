@@ -6,18 +6,17 @@ exact; damping may couple the modes.
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from study.equations.model import Model, ModelTerm, with_registers
-from study.records.interpolation import between_samples
+from study.equations.free_run import FreeRun, prepare
+from study.equations.modal_keys import ModalKeys
+from study.equations.model import Model, ModelTerm
 from study.records.prepared import Prepared
-from study.records.record import MOTIONS, Sensor
+from study.records.record import Sensor
 from study.structure.measured_start import modal_starts
-from study.structure.modal_program import ModalKeys, modal_program
 from study.structure.structure_fit import MOST_STEPS, ROUGH, SHIFT
-from study.structure.structure_run import StretchDrive, StructureRun
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError, StudyError
 from study.support.levenberg_marquardt import Point, minimise, point_at
@@ -27,74 +26,17 @@ TRIALS, TRIED = 30, 6  # free runs of a search; of one with more modes, before i
 PATIENCE = 2  # numbers of modes in turn that are no better: more are not tried
 
 
-@dataclass(frozen=True, eq=False)
-class ModalRun:
-    """Free runs of a structure by modes along a stretch of a record.
-
-    Attributes
-    ----------
-    model : Model
-        Its terms.
-    modal : ModalKeys
-        Names of its linear part.
-    run : StructureRun
-        Of the modal motions.
-    sensors : tuple of Sensor
-        What is wanted.
-    """
-
-    model: Model
-    modal: ModalKeys
-    run: StructureRun
-    sensors: tuple[Sensor, ...]
-
-    def respond(self, values: Mapping[str, float], initial: Floats) -> tuple[Floats, Floats]:
-        """Motions at the sensors, shape (samples, sensors), and their derivatives by the keys and the initial state.
-
-        Where it has no keys there are no derivatives.
-
-        Raises
-        ------
-        DivergenceError
-            If a motion leaves the range of finite numbers.
-        """
-        keys, n = self.run.keys, self.modal.modes
-        own, slopes = self.run.respond(values, initial, range(len(initial)) if keys else ())
-        kinds = list(dict.fromkeys(s.motion for s in self.sensors))
-        motion = np.empty((own.shape[1], len(self.sensors)))
-        change = np.empty((own.shape[1], len(self.sensors), slopes.shape[2]))
-        for i, sensor in enumerate(self.sensors):
-            rows = slice(kinds.index(sensor.motion) * n, (kinds.index(sensor.motion) + 1) * n)
-            names = self.modal.shape(sensor.coordinate)
-            shape = np.array([values[key] for key in names])
-            motion[:, i] = shape @ own[rows]
-            change[:, i] = np.einsum("r,rsk->sk", shape, slopes[rows])
-            for r, key in enumerate(names):
-                if key in keys:
-                    change[:, i, keys.index(key)] += own[rows][r]
-        return motion, change
-
-
 def modal_run(
     model: Model, modal: ModalKeys, prepared: Prepared, sensors: tuple[Sensor, ...], steps: int,
     span: tuple[int, int], values: Mapping[str, float], keys: tuple[str, ...] = (),
-) -> ModalRun:  # fmt: skip
+) -> FreeRun:  # fmt: skip
     """A structure by modes ready to run along a stretch of its record, ``steps`` Runge-Kutta steps a sample.
 
     What is not in ``keys`` keeps its value.
     """
-    record, (first, last) = prepared.record, span
-    columns = [record[name] for name in (*(name for name, _ in model.forces), *model.channels)]
-    part = slice(2 * steps * first, 2 * steps * (last - 1) + 1)
-    drive = np.stack([between_samples(x, 2 * steps)[part] for x in columns], axis=1)
-    made = modal_program(model, modal, keys, tuple(record.extra))
-    named = {key: values[key] for key in (*model.values, *modal.all)}
-    program = replace(made, program=with_registers(made.program, named))
-    kinds = list(dict.fromkeys(s.motion for s in sensors))
-    rows = [MOTIONS.index(kind) * modal.modes + r for kind in kinds for r in range(modal.modes)]
-    drives = (StretchDrive(drive, record.start + first * record.dt, last - first),)
-    run = StructureRun(program, keys, drives, record.dt, steps, np.array(rows, np.int64))
-    return ModalRun(model, modal, run, sensors)
+    return prepare(
+        model, prepared.record, keys, sensors=sensors, steps_per_sample=steps, span=span, modal=modal, held=values
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,11 +204,11 @@ def _fitted(
     keys = tuple(key for key in (*model.values, *modal.all) if key not in held)
     runs = modal_run(model, modal, prepared, prepared.sensors, steps, prepared.plan.fit, known, keys)
     measured, scale = prepared.measured[slice(*prepared.plan.fit)], prepared.scale
-    begin = np.zeros(runs.run.program.states) if initial is None else initial
+    begin = np.zeros(runs.states) if initial is None else initial
 
     def point(x: Floats) -> Point | None:
         try:
-            motion, slopes = runs.respond(known | dict(zip(keys, x.tolist(), strict=False)), x[len(keys) :])
+            motion, slopes = runs.respond(dict(zip(keys, x.tolist(), strict=False)), x[len(keys) :], runs.states)
         except DivergenceError:
             return None
         own = (slopes / scale[:, None]).reshape(measured.size, -1)
@@ -274,11 +216,11 @@ def _fitted(
 
     first = point(np.array([*(known[key] for key in keys), *begin]))
     if first is None:
-        raise DivergenceError(f"the free run of {model.name!r} diverges with the starting values", runs.run.start)
+        raise DivergenceError(f"the free run of {model.name!r} diverges with the starting values", runs.start)
     end = minimise(point, first, float(np.linalg.norm(measured / scale)), trials)
     x = end.point.x
     values = known | dict(zip(keys, x.tolist(), strict=False))
-    motion, slopes = runs.respond(values, x[len(keys) :])
+    motion, slopes = runs.respond(values, x[len(keys) :], runs.states)
     residual = measured - motion
     own = (slopes / scale[:, None]).reshape(measured.size, -1)
     covariance = clustered_covariance(own, (residual / scale).ravel())

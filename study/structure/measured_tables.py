@@ -9,13 +9,13 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from study.equations.mass_matrix import matrices
 from study.equations.model import Model
 from study.figures import frequency_response, page
 from study.figures.curves import InputResponse, ResponseCurve
 from study.records.record import MOTIONS, Sensor
 from study.records.spectra import cross_spectra
 from study.reproduction.tables import PARAMETER_COLUMNS, stacked
-from study.structure.mass_matrix import matrices
 from study.structure.measured_comparison import MeasuredComparison
 from study.structure.measured_fit import MeasuredFit
 from study.structure.modes import modes_of

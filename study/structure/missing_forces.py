@@ -14,6 +14,8 @@ from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from study.compare.force_map import ForceCurve, curve
 from study.compare.noise import SIGNIFICANT
 from study.equations import kernels
+from study.equations.equations_of_motion import acceleration_program
+from study.equations.mass_matrix import checked_mass_matrix, matrices
 from study.equations.model import Model, ModelTerm
 from study.equations.place import HERE, Place
 from study.identify.frequency_domain.inputs import Input, input_history, reverse_inputs
@@ -22,8 +24,6 @@ from study.records.completion import derivative
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments, autospectrum
-from study.structure.equations_of_motion import motion_program
-from study.structure.mass_matrix import checked_mass_matrix, matrices
 from study.structure.placed_units import units_at
 from study.structure.places import alignment, connections, transfer
 from study.structure.structure_prediction import StructurePrediction
@@ -181,19 +181,10 @@ def unbalanced_forces(model: Model, motion: Floats, prediction: StructurePredict
     prepared = prediction.prepared
     part = slice(*prepared.plan.judge)
     record = prepared.record
-    program = motion_program(model, tuple(record.extra))
-    states = [_state(entry, model, motion, prepared.dt) for entry in model.states]
-    drive = [record[n][part] for n in (*(name for name, _ in model.forces), *model.channels)]
-    data = np.column_stack([motion[0], motion[1], record.time[part], *drive, *states])
-    columns = np.arange(data.shape[1], dtype=np.int64)
-    registers, code = program.program.registers.copy(), program.program
-    for side in program.sides:  # the sign of a relative velocity, which the free run keeps in a register
-        registers[side] = 0.0
-    out = np.empty((len(data), program.coordinates))
-    if len(program.sides):
-        signs = np.sign(motion[1] @ program.directions.T)
-        data, columns = np.column_stack([data, signs]), np.concatenate([columns, program.sides])
-    kernels.evaluate(code.code, code.first, registers, columns, data, program.slopes[: program.coordinates], out)
+    columns = {f"{x}:{c}": motion[order][:, i] for order, x in enumerate("uv") for i, c in enumerate(model.coordinates)}
+    columns |= {f"drive:{name}": record[name][part] for name in (*dict(model.forces), *model.channels)}
+    columns |= {f"z:{entry.name}": _state(entry, model, motion, prepared.dt) for entry in model.states}
+    out = kernels.evaluate(acceleration_program(model), columns | {"t": record.time[part]}, len(motion[0]))
     mass = checked_mass_matrix(model)
     inertia = motion[2] @ mass.T
     return inertia - out @ mass.T, inertia

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from study.equations.mass_matrix import checked_mass_matrix, linear_keys, matrices, patterns
 from study.equations.model import Model
-from study.structure.mass_matrix import checked_mass_matrix, linear_keys, matrices, patterns
 from study.support.arrays import Complexes, Floats
 
 RIGID = 1e-6  # of the highest natural frequency: what is below is motion as a rigid body

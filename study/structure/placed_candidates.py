@@ -8,7 +8,7 @@ import numpy as np
 
 from study.equations import formulas, kernels
 from study.equations.graph import Graph, Program
-from study.equations.model import Model, ModelTerm, free, with_registers
+from study.equations.model import Model, ModelTerm, free
 from study.equations.place import Place
 from study.equations.term import Term
 from study.equations.terms import LIBRARY
@@ -78,10 +78,8 @@ def one_sided(term: Term) -> bool:
 
 
 def _value(program: Program, values: dict[str, float]) -> float:
-    known = {name: values.get(name, 0.3) for name in program.inputs}
-    registers = with_registers(program, known).registers.copy()
-    kernels.run(program.code, program.first, registers)
-    return float(registers[program.outputs[0]])
+    known = program.with_inputs({name: values.get(name, 0.3) for name in program.inputs})
+    return float(kernels.evaluate(known, {}, 1)[0, 0])
 
 
 def candidate_entries(model: Model, extra: Sequence[Term] = (), without: Sequence[str] = ()) -> list[ModelTerm]:

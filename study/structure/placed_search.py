@@ -14,6 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.fft import rfftfreq
 
+from study.equations.free_run import prepare
+from study.equations.mass_matrix import LINEAR, linear_keys, matrices, patterns
 from study.equations.model import Model, ModelTerm
 from study.equations.place import Place
 from study.equations.term import Term
@@ -21,13 +23,11 @@ from study.identify.frequency_domain.inputs import input_history
 from study.identify.time_domain.shape_search import MODULATION, values_to_try
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record, Sensor
-from study.structure.mass_matrix import LINEAR, linear_keys, matrices, patterns
 from study.structure.missing_forces import corrected_motion, placed_inputs, relative_record
 from study.structure.placed_lines import placed_modulation_lines, placed_residual_lines
 from study.structure.places import transfer
 from study.structure.stretch_transforms import StretchTransforms, stretch_transforms
 from study.structure.structure_fit import StructureFit, fit_structure, flat, linearise_structure
-from study.structure.structure_run import prepare_run
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
@@ -127,8 +127,8 @@ def placed_baseline(fit: StructureFit, prepared: Prepared) -> PlacedBaseline:
     """Prepare a fitted structure for the search."""
     model = fit.model
     wanted = tuple(Sensor(c, m) for m in MOTIONS for c in model.coordinates)
-    run = prepare_run(model, prepared.record, sensors=wanted, steps_per_sample=fit.steps, span=fit.span)
-    free = run.respond({}, fit.initial)[0].T
+    run = prepare(model, prepared.record, sensors=wanted, steps_per_sample=fit.steps, span=fit.span)
+    free = run.respond({}, fit.initial)[0]
     motion = corrected_motion(free, fit.residual, prepared, model.coordinates, fit.span)
     own = stretch_transforms(prepared.record.runs(fit.span))  # of one stretch every other line is one of the record
     paths = transfer(matrices(model, model.numbers()), prepared.sensors, model.coordinates, prepared.dt, own.size)

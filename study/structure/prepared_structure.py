@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from study.equations.mass_matrix import check_held_masses
 from study.equations.model import Model
 from study.records.plan import Span, compared, make_plan
 from study.records.prepared import Prepared, prepare_record
 from study.records.record import Record
 from study.records.record_layout import KindOfTest, Layout, laid_out
 from study.records.sampling_rate import EDGE, without_spare_samples
-from study.structure.mass_matrix import check_held_masses
 from study.support.errors import StudyError
 
 PERIODS = 1.5  # of a decay in a block: over more a wrong stiffness takes it out of step (docs/structures.md)

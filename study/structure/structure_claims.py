@@ -5,11 +5,11 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
+from study.equations.mass_matrix import matrices
 from study.equations.model import Model
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import cross_spectra
 from study.reproduction.claims.judgement import SEPARATOR, Condition
-from study.structure.mass_matrix import matrices
 from study.structure.measured_comparison import MeasuredComparison
 from study.structure.places import transfer
 from study.structure.reverse_tables import structure_parameters

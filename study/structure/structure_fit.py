@@ -10,11 +10,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from study.equations.free_run import FreeRun, prepare
+from study.equations.mass_matrix import matrices
 from study.equations.model import Model, ModelTerm
 from study.records.prepared import Prepared
-from study.structure.mass_matrix import matrices
 from study.structure.stretch_beginnings import beginnings
-from study.structure.structure_run import StructureRun, prepare_run
 from study.support.arrays import Floats
 from study.support.autoregression import autoregression, whitened
 from study.support.errors import DivergenceError, StudyError
@@ -123,7 +123,7 @@ class _Problem:
     """A search over the keys and the initial state."""
 
     model: Model
-    run: StructureRun
+    run: FreeRun
     measured: Floats  # (samples, sensors)
     noise: SensorNoise
     positive: tuple[str, ...]
@@ -134,13 +134,12 @@ class _Problem:
         values = dict(zip(keys, (float(v) for v in x), strict=False))
         if any(values[key] <= 0.0 for key in self.positive) or not self.positive_mass(values):
             return None
-        states = range(len(x) - len(keys))
         try:
-            response, jacobian = self.run.respond(values, x[len(keys) :], states)
+            response, jacobian = self.run.respond(values, x[len(keys) :], self.run.states)
         except DivergenceError:
             return None
-        residual = self.noise.weighted(self.measured - response.T)
-        slopes = self.noise.weighted(jacobian.transpose(1, 0, 2))
+        residual = self.noise.weighted(self.measured - response)
+        slopes = self.noise.weighted(jacobian)
         return point_at(x, residual.ravel(), slopes.reshape(residual.size, -1), len(keys), (0,))
 
     def positive_mass(self, values: Mapping[str, float]) -> bool:
@@ -196,7 +195,7 @@ def fit_structure(
     keys = tuple(key for key in model.values if key not in held)
     values = begun.numbers()
     steps = steps or structure_steps(begun, prepared.dt)
-    run = prepare_run(
+    run = prepare(
         begun, prepared.record, keys, sensors=prepared.sensors, steps_per_sample=steps, span=prepared.plan.fit
     )
     positive = tuple(key for entry in model.terms for key in positive_keys(entry) if key in keys)
@@ -213,7 +212,7 @@ def fit_structure(
     response, _ = run.respond(found, x[len(keys) :])
     undecided = tuple(key for key, unclear in zip(keys, end.point.undecided(), strict=False) if unclear)
     return StructureFit(
-        begun.with_values(found), keys, x[len(keys) :], measured - response.T, end.converged, end.message,
+        begun.with_values(found), keys, x[len(keys) :], measured - response, end.converged, end.message,
         prepared.plan.fit[0], steps, problem.noise, undecided,
     )  # fmt: skip
 
@@ -224,9 +223,9 @@ def same_states(fit: StructureFit, prepared: Prepared) -> Floats | None:
     return fit.initial if fit.first == first and (fit.span[1] == last or not prepared.record.stretches) else None
 
 
-def fitted_run(fit: StructureFit, prepared: Prepared, keys: tuple[str, ...], finer: int = 1) -> StructureRun:
+def fitted_run(fit: StructureFit, prepared: Prepared, keys: tuple[str, ...], finer: int = 1) -> FreeRun:
     """The free run of a fit along the samples that it was fitted to."""
-    return prepare_run(
+    return prepare(
         fit.model, prepared.record, keys, sensors=prepared.sensors, steps_per_sample=finer * fit.steps, span=fit.span
     )
 
@@ -235,7 +234,7 @@ def linearise_structure(fit: StructureFit, prepared: Prepared) -> Floats:
     """Derivatives of the motions on the samples that were fitted, shape (n, sensors, keys + states)."""
     run = fitted_run(fit, prepared, fit.keys)
     values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
-    return run.respond(values, fit.initial, range(len(fit.initial)))[1].transpose(1, 0, 2)
+    return run.respond(values, fit.initial, run.states)[1]
 
 
 def flat(fit: StructureFit, values: Floats) -> Floats:
@@ -246,7 +245,7 @@ def flat(fit: StructureFit, values: Floats) -> Floats:
 
 def structure_shift(fit: StructureFit, prepared: Prepared, jacobian: Floats) -> Floats:
     """By how much halving the steps would move estimates and initial state, by one step of Gauss and Newton."""
-    coarse, fine = (fitted_run(fit, prepared, (), n).respond({}, fit.initial)[0].T for n in (1, 2))
+    coarse, fine = (fitted_run(fit, prepared, (), n).respond({}, fit.initial)[0] for n in (1, 2))
     return least_squares(flat(fit, jacobian), flat(fit, coarse - fine))
 
 

@@ -11,14 +11,14 @@ import numpy as np
 from scipy.fft import next_fast_len
 
 from study.diagnose.dependence import DEGREE, TAUS, hysteretic, relaxed
+from study.equations.free_run import prepare
+from study.equations.mass_matrix import matrices
 from study.equations.place import Place
 from study.records.record import MOTIONS, Sensor
-from study.structure.mass_matrix import matrices
 from study.structure.placed_lines import placed_modulation_lines, placed_residual_lines
 from study.structure.places import connections, transfer
 from study.structure.stretch_transforms import stretch_transforms
 from study.structure.structure_prediction import StructurePrediction
-from study.structure.structure_run import prepare_run
 from study.support import statistics
 from study.support.arrays import Complexes, Floats
 from study.support.errors import DivergenceError
@@ -97,13 +97,12 @@ def _from_the_fit(prediction: StructurePrediction) -> StructurePrediction:
 
 def _derivatives(prediction: StructurePrediction, begin: int, end: int) -> Floats:
     fit = prediction.fit
-    run = prepare_run(
+    run = prepare(
         fit.model, prediction.prepared.record, fit.keys, sensors=prediction.prepared.sensors,
         steps_per_sample=fit.steps, span=(prediction.first, end),
     )  # fmt: skip
     values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
-    states = range(len(prediction.initial))
-    return run.respond(values, prediction.initial, states)[1].transpose(1, 0, 2)[begin - prediction.first :]
+    return run.respond(values, prediction.initial, run.states)[1][begin - prediction.first :]
 
 
 def _families(u: Floats, v: Floats) -> Iterator[tuple[str, list[Floats]]]:

@@ -6,11 +6,11 @@ from functools import cached_property
 import numpy as np
 
 from study.compare.noise import SIGNIFICANT
+from study.equations.free_run import prepare
 from study.records import noise_floor
 from study.records.prepared import Prepared
 from study.records.record import Sensor
 from study.structure.structure_fit import StructureFit, fit_structure
-from study.structure.structure_run import prepare_run
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError
 
@@ -78,21 +78,20 @@ class StructurePrediction:
     def motion(self, sensors: tuple[Sensor, ...], span: tuple[int, int] | None = None) -> Floats:
         """Motions of the free run on the judging part, or another that it covers, shape (samples, sensors)."""
         begin, end = span or self.prepared.plan.judge
-        run = prepare_run(
+        run = prepare(
             self.fit.model, self.prepared.record, sensors=sensors, steps_per_sample=self.fit.steps,
             span=(self.first, end),
         )  # fmt: skip
-        return run.respond({}, self.initial)[0].T[begin - self.first :]
+        return run.respond({}, self.initial)[0][begin - self.first :]
 
     def derivatives(self, fit: StructureFit) -> Floats:
         """Of the motions on the judging part by the keys of a fit with the same motion and the initial state."""
-        run = prepare_run(
+        run = prepare(
             fit.model, self.prepared.record, fit.keys, sensors=self.prepared.sensors, steps_per_sample=fit.steps,
             span=(self.first, self.prepared.plan.judge[1]),
         )  # fmt: skip
         values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
-        jacobian = run.respond(values, self.initial, range(len(self.initial)))[1]
-        return jacobian.transpose(1, 0, 2)[self.prepared.plan.judge[0] - self.first :]
+        return run.respond(values, self.initial, run.states)[1][self.prepared.plan.judge[0] - self.first :]
 
 
 def predict_structure(fit: StructureFit, prepared: Prepared) -> StructurePrediction:
@@ -109,10 +108,10 @@ def predict_structure(fit: StructureFit, prepared: Prepared) -> StructurePredict
             first = prepared.plan.judge[0]
             initial = fit_structure(fit.model, swapped, tuple(fit.model.values), steps=fit.steps).initial
         runs = [
-            prepare_run(
+            prepare(
                 fit.model, prepared.record, sensors=prepared.sensors, steps_per_sample=n * fit.steps,
                 span=(first, prepared.plan.judge[1]),
-            ).respond({}, initial)[0].T[prepared.plan.judge[0] - first :]
+            ).respond({}, initial)[0][prepared.plan.judge[0] - first :]
             for n in (1, 2)
         ]  # fmt: skip
     except DivergenceError:

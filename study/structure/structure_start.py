@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from study.equations.mass_matrix import linear_keys, loose_motions
 from study.equations.model import Model
 from study.records.prepared import Prepared
 from study.structure.free_decay import free_decay_start
 from study.structure.linear_start import structure_linear_start
-from study.structure.mass_matrix import linear_keys, loose_motions
 from study.structure.structure_fit import StructureFit, fit_structure
 from study.support.errors import DivergenceError, expect
 

@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field
 from study.equations.layout import LINEAR
 from study.equations.model import Model, ModelTerm, free
 from study.equations.model_file import read_model
+from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
 from study.identify.estimators.base import Settings
 from study.identify.frequency_domain.local_polynomial import LocalPolynomial
@@ -32,7 +33,6 @@ from study.structure.action_reaction import JointEstimate, joint_estimate
 from study.structure.places import connections
 from study.structure.prepared_structure import prepare_structure
 from study.structure.reverse_system import ESTIMATORS, Equation, ReverseSystem, equations_of, reverse_system
-from study.structure.structure_simulation import simulate_structure
 from study.support.config_files import Section, TableRow, Text, read_rows, read_yaml
 from study.support.errors import StudyError, at, expect
 
@@ -166,7 +166,7 @@ def make_structure_record(model: Model, case: StructureCase, settings: Structure
     samples, dt = settings.sampling.samples, settings.sampling.dt
     drive = force(Excitation(level=case.level, reading="filtered", cutoff=case.cutoff), samples, dt, settings.seed)
     (name, _), *_ = model.forces
-    full = simulate_structure(model, {name: drive}, dt, steps_per_sample=settings.steps_per_sample)
+    full = simulate(model, {name: drive}, dt, Integrator("rk4", settings.steps_per_sample))
     wanted = case.sensors or model.coordinates
     kinds = MOTIONS[:1] if case.noise > 0.0 else MOTIONS
     rng = np.random.default_rng(settings.noise_seed)

@@ -7,6 +7,7 @@ import numpy as np
 
 from study.equations.model import Model, ModelTerm, free
 from study.equations.place import GROUND, Place
+from study.equations.simulate import Integrator, simulate
 from study.equations.term import Term
 from study.equations.terms import get
 from study.records.excitation import Excitation, force
@@ -15,7 +16,6 @@ from study.structure.missing_forces import relative_record
 from study.structure.modes import modes_of
 from study.structure.placed_candidates import external
 from study.structure.places import connections
-from study.structure.structure_simulation import simulate_structure
 from study.support.arrays import Floats
 from study.support.errors import expect
 from study.trials.effects import Asked, Rig, Shares, Sizing, beyond_linear, drawn_effect, force_along, forgets
@@ -38,7 +38,7 @@ def structure_rig(rng: np.random.Generator, asked: Asked) -> Rig:
 
     def simulated(model: Model, steps: int, motions: Sequence[str], drive: Floats = drive) -> Record:
         sensors = tuple(Sensor(c, m) for m in motions for c in model.coordinates)
-        return simulate_structure(model, {SHAKER: drive}, dt, sensors=sensors, steps_per_sample=steps)
+        return simulate(model, {SHAKER: drive}, dt, Integrator("rk4", steps), sensors=sensors)
 
     def motion(model: Model) -> Floats:
         """Displacement, velocity and acceleration, shape (3, samples, coordinates)."""

@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from study.equations.equations_of_motion import Equations
 from study.equations.formulas import ExpressionError
 from study.equations.free_run import predict_response, prepare
-from study.equations.model import Model, forward_graph, forward_program, free
+from study.equations.model import Model, free
 from study.equations.model_file import parse_model
 from study.equations.simulate import Integrator, simulate
 from study.equations.substeps import needed_steps
@@ -59,7 +60,7 @@ def test_columns_nobody_asked_for_change_no_bit_of_a_free_run(varied: Model, bar
     values = {key: float(varied.values[key] or 0.0) for key in keys}
     one, other = (prepare(varied, r, keys, steps_per_sample=3) for r in (bare, crowded))
     assert other.drive.shape == one.drive.shape, "what no formula names is not even read"
-    np.testing.assert_array_equal(other.program.code, one.program.code)
+    np.testing.assert_array_equal(other.motion.program.code, one.motion.program.code)
     for got, expected in zip(other.respond(values, (0.001, 0.0), 3), one.respond(values, (0.001, 0.0), 3), strict=True):
         np.testing.assert_array_equal(got, expected)
     assert needed_steps(varied, crowded) == needed_steps(varied, bare)
@@ -151,8 +152,8 @@ def test_a_memory_is_no_column() -> None:
 
 def test_inputs_of_a_program_are_told_apart(varied: Model) -> None:
     model = with_channel(varied, "k*q_drawn + temp", 1.0)
-    forward = forward_graph(model, ("k", "q_drawn", "temp"))
-    assert len(set(forward.graph.names)) == 4 + 3 + 1 + len(model.values)
+    made = Equations(model)
+    assert len(set(made.graph.names)) == 4 + 3 + 1 + len(model.values)
 
 
 @pytest.mark.parametrize("channel", ["rain", "force", "displacement", "velocity", "z"])
@@ -164,4 +165,4 @@ def test_a_name_that_is_no_column_is_refused_both_ways(channel: str, varied: Mod
     with pytest.raises(StudyError, match=f"needs the channel '{channel}'"):
         histories(reverse_inputs(model), record)
     with pytest.raises(ExpressionError, match=channel):
-        forward_program(model)
+        simulate(model, bare["force"], DT)

@@ -13,11 +13,7 @@ def values(graph: Graph, node: int, points: np.ndarray) -> np.ndarray:
     """Node values at rows (a, b) of points, by the compiled kernel."""
     graph.input("a")
     graph.input("b")
-    program = graph.program([node])
-    out = np.empty((len(points), 1))
-    columns = np.array([program.inputs["a"], program.inputs["b"]])
-    kernels.evaluate(program.code, program.first, program.registers.copy(), columns, points, program.outputs, out)
-    return out[:, 0]
+    return kernels.evaluate(graph.program([node]), dict(zip("ab", points.T, strict=True)), len(points))[:, 0]
 
 
 UNARY = {

@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 
 from study.equations import kernels
-from study.equations.graph import Graph, Op
+from study.equations.graph import Graph, Op, Program
+from study.equations.model import Model
+from study.equations.motion_program import motion_program
 from study.support.errors import StudyError
 
 SOURCES = Path(kernels.__file__).parent / "c"
 
 
 def test_every_operation_is_that_of_numpy() -> None:
-    """Both ways of running: one instruction after the other, and prepared, where a result goes on unstored."""
     graph = Graph()
     a, b = graph.input("a"), graph.input("b")
     binary = [graph.add(a, b), graph.sub(a, b), graph.mul(a, b), graph.div(a, b)]
@@ -28,22 +29,29 @@ def test_every_operation_is_that_of_numpy() -> None:
     x, y = 1.7, 0.6
     expected = [x + y, x - y, x * y, x / y, max(x, y), min(x, y), 1.0, x**y, -x, abs(x), 1.0]
     expected += [float(f(x)) for f in (np.sin, np.cos, np.exp, np.log, np.sqrt, np.tanh)]
-    out = np.empty((1, len(expected)))
-    point = np.array([[x, y]])
-    kernels.evaluate(
-        program.code, program.first, program.registers.copy(), np.array([0, 1]), point, program.outputs, out
-    )
+    out = kernels.evaluate(program, {"a": np.array([x]), "b": np.array([y])}, 1)
     np.testing.assert_allclose(out[0], expected, rtol=1e-15)
 
 
-def test_arrays_that_do_not_fit_are_refused() -> None:
-    r, code = np.zeros(4), np.array([[int(Op.ADD), 0, 1]])
-    with pytest.raises(ValueError, match="do not fit"):
-        kernels.evaluate(code, 3, r, np.array([0, 1]), np.zeros((5, 3)), np.array([3]), np.empty((5, 1)))
-    with pytest.raises(ValueError, match="do not fit"):
-        kernels.integrate_rk4(code, 3, r, np.array([3]), 0.0, 0.1, 2, np.zeros((9, 1)), np.zeros(2), np.empty((5, 3)))
-    with pytest.raises(ValueError, match="do not fit"):
-        kernels.run(code, 3, np.zeros(8)[::2])
+def product() -> Program:
+    graph = Graph()
+    return graph.program([graph.mul(graph.input("a"), graph.input("b"))])
+
+
+def test_arrays_that_do_not_fit_are_refused(systems: dict[str, Model]) -> None:
+    with pytest.raises(ValueError, match="could not broadcast"):
+        kernels.evaluate(product(), {"a": np.zeros(4), "b": np.zeros(5)}, 5)
+    motion, start, bounds = motion_program(systems["linear"], (), ()), np.zeros(1), np.array([0, 5])
+    drive, states, out = np.zeros((17, 1)), np.zeros((1, 2, 1)), np.empty((5, 0, 1))
+    assert kernels.integrate(motion, start, 0.1, 2, drive, bounds, states, out) == -1
+    wrong = [
+        (start, drive[:16], bounds, states, out), (start, drive, bounds, states[:, :1], out),
+        (start, drive, np.array([0, 6]), states, out), (np.zeros(2), drive, bounds, states, out),
+        (start, drive, bounds, states, np.empty((5, 1, 1))), (start, drive, bounds, np.zeros((1, 4, 1))[:, ::2], out),
+    ]  # fmt: skip
+    for begin, driving, ends, begun, room in wrong:
+        with pytest.raises(ValueError, match="do not fit"):
+            kernels.integrate(motion, begin, 0.1, 2, driving, ends, begun, room)
 
 
 def test_a_library_that_was_not_built_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -51,7 +59,7 @@ def test_a_library_that_was_not_built_is_said(tmp_path: Path, monkeypatch: pytes
     monkeypatch.setattr(kernels, "PROJECT", "a project that is not installed")
     kernels._function.cache_clear()  # pyright: ignore[reportPrivateUsage]
     with pytest.raises(StudyError, match=r"_kernels.* is not there.*pip install"):
-        kernels.run(np.array([[int(Op.ADD), 0, 1]]), 2, np.zeros(3))
+        kernels.evaluate(product(), {}, 1)
 
 
 def test_sources_without_a_library_take_that_of_the_installed_package(
@@ -66,9 +74,7 @@ def test_sources_without_a_library_take_that_of_the_installed_package(
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(kernels, "LIBRARY", tmp_path / kernels.LIBRARY.name)
     kernels._function.cache_clear()  # pyright: ignore[reportPrivateUsage]
-    r = np.array([2.0, 3.0, 0.0])
-    kernels.run(np.array([[int(Op.MUL), 0, 1]]), 2, r)
-    assert r[2] == 6.0
+    assert kernels.evaluate(product(), {"a": np.array([2.0]), "b": np.array([3.0])}, 1)[0, 0] == 6.0
 
 
 def test_the_library_is_of_these_sources() -> None:

@@ -6,9 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from study.equations.equations_of_motion import Equations, acceleration_program
 from study.equations.formulas import ExpressionError
-from study.equations.model import Model, forward_graph, forward_program, free
+from study.equations.model import Model, free
 from study.equations.model_file import read_model
+from study.equations.motion_program import motion_program
+from study.equations.simulate import simulate
 from study.equations.terms import custom, get
 from study.support.errors import StudyError
 
@@ -39,18 +42,18 @@ def test_values_are_keyed_by_symbol_and_term(systems: dict[str, Model]) -> None:
 def test_missing_values_are_named(systems: dict[str, Model]) -> None:
     grown = systems["linear"].with_term(get("dead_band"))
     with pytest.raises(StudyError, match=r"'linear' gives no value for kg, dead_band.u_g"):
-        forward_program(grown)
+        acceleration_program(grown)
 
 
 @pytest.mark.parametrize("mass", [0.0, -1.0, float("nan")])
 def test_a_mass_is_above_zero(systems: dict[str, Model], mass: float) -> None:
     with pytest.raises(StudyError, match="mass"):
-        forward_program(systems["linear"].with_values({"m": mass}))
+        acceleration_program(systems["linear"].with_values({"m": mass}))
 
 
 def test_a_simulation_needs_inertia() -> None:
     with pytest.raises(StudyError, match="no inertia"):
-        forward_program(Model("massless", (free(get("linear_stiffness")).with_values({"k": 1.0}),)))
+        simulate(Model("massless", (free(get("linear_stiffness")).with_values({"k": 1.0}),)), np.zeros(9), 0.1)
 
 
 def test_equation_shows_every_symbol(systems: dict[str, Model]) -> None:
@@ -68,26 +71,26 @@ def test_states_are_those_with_a_memory(make_model: Callable[..., Model]) -> Non
         },
     )
     assert [t.name for t in model.states] == ["relaxation", "hysteresis"]
-    forward = forward_graph(model)
-    assert len(forward.slopes) == 3
-    assert len(forward.states) == 4
+    made = Equations(model)
+    assert len(made.slopes) == 3
+    assert len(made.states) == 4
 
 
 def test_a_users_term_sees_only_its_channels(systems: dict[str, Model]) -> None:
     model = systems["linear"].with_term(custom("wind", "wind**2")).with_values({"q_wind": 1.0})
     with pytest.raises(ExpressionError, match="'wind'"):
-        forward_program(model)
-    program = forward_program(model, ("wind",))
+        simulate(model, np.zeros(9), 0.1)
+    program = acceleration_program(model)
     assert program.registers[program.inputs["q_wind"]] == 1.0
 
 
 def test_registers_of_the_kernels_stand_first(make_model: Callable[..., Model]) -> None:
     """The integrators write into registers by position; this is the layout they rely on."""
     relaxing = {"inertia": {"m": 2.0}, "relaxation": {"kr": 1.0, "relaxation.tau": 0.5}}
-    program = forward_program(make_model("maxwell", relaxing), ("a", "b"))
-    assert [program.inputs[n] for n in ("u", "v", "t", "force", "channel:a", "channel:b", "z:relaxation")] == list(
-        range(7)
-    )
+    model = make_model("maxwell", relaxing).with_term(free(custom("wind", "b - a")).with_values({"q_wind": 1.0}))
+    program = motion_program(model, (), ()).program
+    names = ("t", "drive:force", "drive:a", "drive:b", "u:", "v:", "z:relaxation")
+    assert [program.inputs[n] for n in names] == list(range(7))
     assert program.registers[program.inputs["m"]] == 2.0
     assert np.count_nonzero(program.registers[:7]) == 0
 

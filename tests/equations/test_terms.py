@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from study.equations import formulas, kernels
+from study.equations.equations_of_motion import Equations
 from study.equations.graph import Graph
-from study.equations.model import Model, forward_graph, free, with_registers
+from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.term import Component, Term
 from study.equations.terms import LIBRARY, custom, get
@@ -92,14 +93,9 @@ def model_with(name: str) -> Model:
 
 def evaluated(model: Model, columns: dict[str, np.ndarray]) -> np.ndarray:
     """Acceleration and state derivatives of a model at given points, by the compiled kernel."""
-    forward = forward_graph(model)
-    program = with_registers(forward.graph.program(forward.slopes), model.numbers())
-    out = np.empty((len(columns["u"]), len(forward.slopes)))
-    kernels.evaluate(
-        program.code, program.first, program.registers.copy(),
-        np.array([program.inputs[c] for c in columns]), np.column_stack(list(columns.values())), program.outputs, out,
-    )  # fmt: skip
-    return out
+    made, inputs = Equations(model), {"u": "u:", "v": "v:", "force": "drive:force"}
+    program = made.graph.program(made.slopes).with_inputs(model.numbers())
+    return kernels.evaluate(program, {inputs.get(c, c): x for c, x in columns.items()}, len(columns["u"]))
 
 
 def test_every_term_has_a_row() -> None:
@@ -174,12 +170,7 @@ def test_derivatives_of_shapes_are_exact(name: str, value_of: Callable[..., np.n
             graph = Graph()
             known = {n: graph.input(n) for n in columns}
             slope = graph.derivative(formulas.add_formula(graph, text, known), known[wrt])
-            program, out = graph.program([slope]), np.empty((4, 1))
-            kernels.evaluate(
-                program.code, program.first, program.registers.copy(),
-                np.array([program.inputs[n] for n in columns]), np.column_stack(list(columns.values())),
-                program.outputs, out,
-            )  # fmt: skip
+            out = kernels.evaluate(graph.program([slope]), columns, 4)
             h = 1e-6
             above, below = {**columns, wrt: columns[wrt] + h}, {**columns, wrt: columns[wrt] - h}
             difference = (value_of(text, **above) - value_of(text, **below)) / (2 * h)

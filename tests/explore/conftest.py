@@ -15,9 +15,9 @@ from playwright.sync_api import Page, sync_playwright
 
 from scripts.page_picture import MISSING, QUIET, browser
 from study.equations.model_file import format_model, read_model
+from study.equations.simulate import Integrator, simulate
 from study.records.excitation import Excitation, force
 from study.records.record import write_csv
-from study.structure.structure_simulation import simulate_structure
 
 FRAME = Path(__file__).parents[2] / "models" / "structures" / "frame.yaml"
 
@@ -27,7 +27,7 @@ def hall(tmp_path_factory):
     """Folder with ``frame.csv`` and ``frame.yaml``."""
     folder, frame = tmp_path_factory.mktemp("hall"), read_model(FRAME)
     drive = force(Excitation(level=400.0, cutoff=12.5), 1600, 0.02, 1)
-    record, rng = simulate_structure(frame, {"shaker": drive}, 0.02), np.random.default_rng(5)
+    record, rng = simulate(frame, {"shaker": drive}, 0.02, Integrator("rk4", 8)), np.random.default_rng(5)
     kept = {s: x for s, x in record.motions.items() if s.motion == "displacement"}
     noisy = {s: x + 0.05 * np.std(x) * rng.standard_normal(len(x)) for s, x in kept.items()}
     write_csv(record.with_motions(noisy), folder / "frame.csv")

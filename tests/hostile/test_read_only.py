@@ -15,11 +15,11 @@ ROOT = Path(__file__).parents[2]
 DROP_CAPABILITY, OVERRIDES = 24, (1, 2)  # prctl's PR_CAPBSET_DROP; what lets root write where nobody may
 SEEN = """import numpy as np
 from study.equations import kernels
-from study.equations.graph import Op
+from study.equations.graph import Graph
 
-r = np.array([2.0, 3.0, 0.0])
-kernels.run(np.array([[int(Op.MUL), 0, 1]]), 2, r)
-assert r[2] == 6.0
+graph = Graph()
+program = graph.program([graph.mul(graph.input("a"), graph.input("b"))])
+assert kernels.evaluate(program, {"a": np.array([2.0]), "b": np.array([3.0])}, 1)[0, 0] == 6.0
 """
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from study.equations.model_file import read_model
+from study.equations.simulate import Integrator, simulate
 from study.records.excitation import Excitation, force
-from study.structure.structure_simulation import simulate_structure
 
 FRAME = Path(__file__).parents[2] / "models" / "structures" / "frame.yaml"
 NOISE = 0.01  # mean square over that of each motion
@@ -23,7 +23,7 @@ def frame():
 def quiet_frame(frame):
     """All motions of the frame without noise."""
     drive = force(Excitation(level=400.0, cutoff=12.5), 5000, 0.02, 1)
-    return simulate_structure(frame, {"shaker": drive}, 0.02)
+    return simulate(frame, {"shaker": drive}, 0.02, Integrator("rk4", 8))
 
 
 @pytest.fixture(scope="session")

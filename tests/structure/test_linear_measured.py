@@ -8,6 +8,7 @@ import pytest
 from study.cli import main
 from study.compare import history
 from study.equations.model_file import format_model, parse_model, read_model
+from study.equations.simulate import Integrator, simulate
 from study.identify.frequency_domain.subspace import observability
 from study.records.excitation import Excitation, force
 from study.records.record import Record, Sensor, record_of, write_csv
@@ -15,7 +16,6 @@ from study.structure.measured_comparison import compare_measured, measured_docum
 from study.structure.measured_fit import modal_run
 from study.structure.modes import modes_of
 from study.structure.prepared_structure import prepare_structure
-from study.structure.structure_simulation import simulate_structure
 from study.support.errors import StudyError
 
 ROOT = Path(__file__).parents[2]
@@ -37,7 +37,7 @@ def measured(text=MEASURED):
 def beam():
     model = read_model(ROOT / "models" / "structures" / "beam.yaml")
     drive = force(Excitation(level=1.0, reading="filtered", cutoff=30.0), SAMPLES, DT, 3)
-    return model, simulate_structure(model, {"shaker": drive}, DT, steps_per_sample=4)
+    return model, simulate(model, {"shaker": drive}, DT, Integrator("rk4", 4))
 
 
 def at_sensors(beam, motion="displacement", noise=0.01, places=("p4", "p7", "p10"), seed=4, samples=SAMPLES) -> Record:
@@ -113,7 +113,7 @@ def test_the_reports_duffing_system_is_a_structure_of_one_mode(motion, noise, re
     drive = force(Excitation(level=1.0, cutoff=12.5), 4096, 0.02, 1990)
     placed = (ROOT / "models" / "duffing.yaml").read_text().replace("value", "at: x, value")
     whole = parse_model(placed.replace("terms:", "coordinates: [x]\nforces: {shaker: x}\nterms:"), Path("whole.yaml"))
-    record = simulate_structure(whole, {"shaker": drive}, 0.02, steps_per_sample=16)
+    record = simulate(whole, {"shaker": drive}, 0.02, Integrator("rk4", 16))
     u = record.motions[Sensor("x", motion)]
     noisy = u + np.sqrt(noise) * np.std(u) * np.random.default_rng(3).standard_normal(len(u))
     model = measured("coordinates: [x]\nforces: {shaker: x}\nlinear: measured\nterms: [{term: cubic_stiffness, at: x}]")

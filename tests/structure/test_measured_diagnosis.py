@@ -9,6 +9,7 @@ import pytest
 
 from study.cli import main
 from study.equations.model_file import parse_model, read_model
+from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY
 from study.records.excitation import Excitation, force
 from study.records.record import Sensor, write_csv
@@ -17,7 +18,6 @@ from study.structure.measured_diagnosis import diagnose_measured
 from study.structure.measured_report import measured_in_words
 from study.structure.measured_screening import between_sensors, measured_entries
 from study.structure.prepared_structure import prepare_structure
-from study.structure.structure_simulation import simulate_structure
 
 ROOT = Path(__file__).parents[2]
 DT, SAMPLES = 0.005, 4000
@@ -30,7 +30,7 @@ def record():
     """Two displacements of the beam at 1 % noise."""
     model = read_model(ROOT / "models" / "structures" / "beam.yaml")
     drive = force(Excitation(level=1.0, reading="filtered", cutoff=30.0), SAMPLES, DT, 3)
-    exact, rng = simulate_structure(model, {"shaker": drive}, DT, steps_per_sample=4), np.random.default_rng(4)
+    exact, rng = simulate(model, {"shaker": drive}, DT, Integrator("rk4", 4)), np.random.default_rng(4)
     shown = {s: x for s, x in exact.motions.items() if s in {Sensor(p, "displacement") for p in ("p4", "p10")}}
     noisy = {s: x + 0.1 * np.std(x) * rng.standard_normal(len(x)) for s, x in shown.items()}
     return replace(exact.with_motions(noisy), name="beam")
@@ -97,7 +97,7 @@ def test_an_open_shape_parameter_is_searched_for():
     place = "coordinates: [x]\nforces: {shaker: x}\n"
     whole = parse_model(text.replace("terms:", f"{place}terms:"), Path("whole.yaml"))
     drive = force(Excitation(level=1.0, cutoff=12.5), 2048, 0.02, 1990)
-    record = simulate_structure(whole, {"shaker": drive}, 0.02, steps_per_sample=16)
+    record = simulate(whole, {"shaker": drive}, 0.02, Integrator("rk4", 16))
     shown = record.with_motions({s: x for s, x in record.motions.items() if s.motion == "displacement"})
     model = parse_model(f"{place}linear: measured\nterms: [{{term: dead_band, at: x}}]", Path("dead.yaml"))
     comparison = compare_measured(model, prepare_structure(shown, model))

@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from study.equations.model_file import parse_model
+from study.equations.simulate import Integrator, simulate
 from study.identify import estimators
 from study.identify.estimators.base import Settings
 from study.identify.frequency_domain.local_polynomial import LocalPolynomial
@@ -16,7 +17,6 @@ from study.records.spectra import Segments
 from study.structure.action_reaction import joint_estimate
 from study.structure.prepared_structure import prepare_structure
 from study.structure.reverse_system import equations_of, exact_responses, reverse_system
-from study.structure.structure_simulation import simulate_structure
 from study.support.errors import StudyError
 
 DT, SAMPLES = 0.02, 4096
@@ -44,14 +44,14 @@ def model(text=TWO):
 def record():
     level = Excitation(level=1.0, cutoff=12.5)
     drives = {name: force(level, SAMPLES, DT, seed) for seed, name in enumerate(("first", "second"), 1)}
-    return simulate_structure(model(), drives, DT)
+    return simulate(model(), drives, DT, Integrator("rk4", 8))
 
 
 @pytest.fixture(scope="module")
 def one_force(record):
     """The same structure driven at its first mass alone."""
     driven = model(TWO.replace(", second: b", ""))
-    return driven, simulate_structure(driven, {"first": record["first"]}, DT)
+    return driven, simulate(driven, {"first": record["first"]}, DT, Integrator("rk4", 8))
 
 
 def equations(structure, record: Record):
@@ -80,7 +80,7 @@ def test_one_coordinate_is_the_single_mass(estimator):
     placed = "".join(f"  - {{term: {t}, at: a, value: {v}}}\n" for t, v in values.items())
     structure = model(f"name: one\ncoordinates: [a]\nforces: {{shaker: a}}\nterms:\n{placed}")
     drive = force(Excitation(level=1.0, cutoff=12.5), SAMPLES, DT, 3)
-    motions = simulate_structure(structure, {"shaker": drive}, DT)
+    motions = simulate(structure, {"shaker": drive}, DT, Integrator("rk4", 8))
     alone = {s.motion: x for s, x in motions.motions.items()}
     plain = model("name: one\nterms:\n" + "".join(f"  - {t}\n" for t in kinds))
     direct = estimators.identify(estimator, plain, Record(DT, {"force": drive, **alone}), SETTINGS)
@@ -179,7 +179,7 @@ def test_the_error_of_the_difference_is_its_scatter(record, estimator, sign):
 
 def test_a_term_at_the_wrong_place_breaks_action_and_reaction(record):
     structure, own = model(), model(TWO.replace("cubic_stiffness, between: [a, b]", "cubic_stiffness, at: b"))
-    grounded = simulate_structure(own, {name: record[name] for name in record.forces}, DT)
+    grounded = simulate(own, {name: record[name] for name in record.forces}, DT, Integrator("rk4", 8))
     for motions, holds in ((record, True), (grounded, False)):
         system = reverse_system("miso", equations(structure, noisy(motions, 0, 5)), DT, SETTINGS)
         assert (joint_estimate(system).least_p > 1e-6) == holds

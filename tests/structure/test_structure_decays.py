@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from study.diagnose.verdict import MISSING, NOTHING
+from study.equations.free_run import prepare
 from study.equations.model_file import parse_model
 from study.records.record import Sensor, record_of
 from study.records.record_layout import Layout
 from study.structure.prepared_structure import prepare_structure, structure_ready
 from study.structure.structure_comparison import compare_structure
 from study.structure.structure_fit import linearise_structure
-from study.structure.structure_run import prepare_run
 from study.structure.structure_verdict import diagnose_structure
 from study.support.errors import StudyError
 
@@ -45,8 +45,8 @@ def model(*, known=False, more=""):
 def decay(more="", noise=0.003, seed=1, begin=BEGIN, samples=SAMPLES):
     """The pair let go; noise as a share of each motion's size."""
     still = record_of(DT, {}, {s: np.zeros(samples) for s in SENSORS})
-    run = prepare_run(model(known=True, more=more), still, sensors=SENSORS, steps_per_sample=4)
-    motion, rng = run.respond({}, begin)[0], np.random.default_rng(seed)
+    run = prepare(model(known=True, more=more), still, sensors=SENSORS, steps_per_sample=4)
+    motion, rng = run.respond({}, begin)[0].T, np.random.default_rng(seed)
     noisy = motion + noise * np.std(motion, axis=1, keepdims=True) * rng.standard_normal(motion.shape)
     return record_of(DT, {}, dict(zip(SENSORS, noisy, strict=True)), name="decay", start=3.0)
 
@@ -77,11 +77,11 @@ def test_derivatives_by_the_states_of_each_stretch_are_those_of_the_motion():
     jacobian = linearise_structure(fit, prepared)
     states = len(fit.initial) // 4
     assert states == len(prepared.record.runs(prepared.plan.fit))
-    run = prepare_run(fit.model, prepared.record, sensors=prepared.sensors, steps_per_sample=fit.steps, span=fit.span)
+    run = prepare(fit.model, prepared.record, sensors=prepared.sensors, steps_per_sample=fit.steps, span=fit.span)
     for state in (0, 5, len(fit.initial) - 1):
         moved = np.zeros(len(fit.initial))
         moved[state] = 1e-6
-        change = (run.respond({}, fit.initial + moved)[0] - run.respond({}, fit.initial - moved)[0]).T / 2e-6
+        change = (run.respond({}, fit.initial + moved)[0] - run.respond({}, fit.initial - moved)[0]) / 2e-6
         column = jacobian[:, :, len(fit.keys) + state]
         assert np.allclose(change, column, atol=1e-5 * np.max(np.abs(column)))
         begin, end = prepared.record.runs(prepared.plan.fit)[state // 4]

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from study.equations.mass_matrix import checked_mass_matrix
 from study.equations.model import free
 from study.equations.model_file import format_model, parse_model, read_model
 from study.equations.place import Place
 from study.equations.terms import get
-from study.structure.mass_matrix import checked_mass_matrix
 from study.support.errors import StudyError
 from tests.model_files import add_term
 

@@ -7,20 +7,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from study.equations.mass_matrix import check_held_masses, loose_motions
 from study.equations.model import free
 from study.equations.model_file import parse_model
 from study.equations.place import Place
+from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY, get
 from study.records.completion import consistent
 from study.records.excitation import Excitation, force
 from study.records.readers import ReadOptions, read_record
 from study.records.record import Sensor, write_csv
-from study.structure.mass_matrix import check_held_masses, loose_motions
 from study.structure.placed_candidates import PROMISING, elsewhere
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure
 from study.structure.structure_report import structure_diagnosis_in_words
-from study.structure.structure_simulation import simulate_structure
 from study.structure.structure_verdict import diagnose_structure
 from study.support.errors import StudyError
 
@@ -46,7 +46,7 @@ def twin_record(sensors):
     )
     drive = force(Excitation(level=400.0, cutoff=12.5), 3000, 0.02, 1)
     wanted = tuple(Sensor(c, "displacement") for c in sensors)
-    quiet = simulate_structure(truth, {"shaker": drive}, 0.02, sensors=wanted)
+    quiet = simulate(truth, {"shaker": drive}, 0.02, Integrator("rk4", 8), sensors=wanted)
     rng = np.random.default_rng(5)
     return quiet.with_motions(
         {s: x + 0.03 * np.std(x) * rng.standard_normal(len(x)) for s, x in quiet.motions.items()}
@@ -107,7 +107,7 @@ def test_a_mechanism_is_named_where_no_fit_begins():
     assert loose_motions(parse_model(HEAD + MASSES + BRANCHES + slack, HERE)) == 1, "its force follows the velocity"
     open_values = loose.with_values(dict.fromkeys(loose.values))
     drive = force(Excitation(level=400.0, cutoff=12.5), 2000, 0.02, 1)
-    free_body = simulate_structure(loose, {"shaker": drive}, 0.02)
+    free_body = simulate(loose, {"shaker": drive}, 0.02, Integrator("rk4", 8))
     rng = np.random.default_rng(5)  # noise in proportion to the drift, in which what vibrates is lost
     moved = {s: x for s, x in free_body.motions.items() if s.motion == "displacement"}
     drifting = free_body.with_motions(

@@ -105,7 +105,7 @@ def test_simulation_does_not_rest_on_identification():
     ]
     found = rests_on(ROOT / script, without=cut)
     names = {Path(p).name for p in found}
-    assert {"simulate.py", "kernels.py", "plain.c", "program.h", "excitation.py", "terms.py", "record.py"} <= names
+    assert {"simulate.py", "kernels.py", "motion.c", "program.h", "excitation.py", "terms.py", "record.py"} <= names
     assert not {"in_reverse.py", "spectra.py", "inputs.py", "coefficients.py", "local_polynomial.py"} & names
 
 

@@ -36,11 +36,6 @@ static double result_of(int64_t op, double a, double b) {
     }
 }
 
-EXPORT void run_program(const int64_t *code, int64_t count, int64_t first, double *r) {
-    for (int64_t i = 0; i < count; i++)
-        r[first + i] = result_of(code[3 * i], r[code[3 * i + 1]], r[code[3 * i + 2]]);
-}
-
 /*
  * An operand that the instruction before has computed is taken from the processor, not from the memory, where it takes
  * as long to come back as two additions: `op` of an instruction is 4 times that of graph.Op, plus 1 if its first operand
@@ -48,10 +43,9 @@ EXPORT void run_program(const int64_t *code, int64_t count, int64_t first, doubl
  */
 #if defined(__GNUC__)
 /* Each operation jumps to the next one itself: a processor foresees that better than the one jump of a switch. */
-void run_prepared(const Program *program) {
+static void run_from(const Instruction *i) {
 #define LABELS(number, result) &&from_memory_##number, &&first_##number, &&second_##number, &&both_##number,
     static const void *const OPERATIONS[] = {EACH_OPERATION(LABELS) &&end};
-    const Instruction *i = program->code;
     double last = 0.0;
     goto *OPERATIONS[i->op];
 #define OPERATION(label, one, other, result) \
@@ -72,17 +66,21 @@ void run_prepared(const Program *program) {
 end:;
 }
 #else
-void run_prepared(const Program *program) {
-    for (const Instruction *i = program->code; i->op != END; i++) *i->to = result_of(i->op / 4, *i->a, *i->b);
+static void run_from(const Instruction *i) {
+    for (; i->op != END; i++) *i->to = result_of(i->op / 4, *i->a, *i->b);
 }
 #endif
 
+void run_prepared(const Program *program) { run_from(program->code); }
+
+void run_rest(const Program *program) { run_from(program->rest); }
+
 int prepare_program(
-    Program *program, const int64_t *code, int64_t count, int64_t first, double *r, int64_t changing,
+    Program *program, const int64_t *code, int64_t count, int64_t split, int64_t first, double *r, int64_t changing,
     const int64_t *others, int64_t other_count
 ) {
     char *changes = calloc((size_t)(first + count + 1), 1);
-    program->code = malloc((size_t)(count + 1) * sizeof(Instruction));
+    Instruction *next = program->code = malloc((size_t)(count + 2) * sizeof(Instruction));
     program->r = r;
     if (!changes || !program->code) {
         free(changes);
@@ -90,20 +88,25 @@ int prepare_program(
         return 0;
     }
     for (int64_t i = 0; i < changing && i < first; i++) changes[i] = 1;
-    for (int64_t i = 0; i < other_count; i++)
-        if (others[i] >= 0) changes[others[i]] = 1;
-    Instruction *next = program->code;
-    for (int64_t i = 0; i < count; i++) {
+    for (int64_t i = 0; i < other_count; i++) changes[others[i]] = 1;
+    const double *last = 0; /* register of the instruction before */
+    for (int64_t i = 0; i <= count; i++) {
+        if (i == split || i == count) {
+            *next++ = (Instruction){END, r, r, r};
+            last = 0;
+            if (i == split) program->rest = next;
+        }
+        if (i == count) break;
         int64_t op = code[3 * i], a = code[3 * i + 1], b = code[3 * i + 2], to = first + i;
         changes[to] = changes[a] || changes[b];
         if (changes[to]) {
-            const double *last = next > program->code ? next[-1].to : 0;
             op = 4 * op + (r + a == last) + 2 * (r + b == last);
             *next++ = (Instruction){op, r + a, r + b, r + to};
+            last = r + to;
         } else
             r[to] = result_of(op, r[a], r[b]);
     }
-    *next = (Instruction){END, r, r, r};
+    if (split == count) program->rest = next - 1;
     free(changes);
     return 1;
 }
@@ -111,4 +114,20 @@ int prepare_program(
 void forget_program(Program *program) {
     free(program->code);
     program->code = 0;
+}
+
+/* Run the code for every sample: its data into the registers `columns`, the registers `outputs` into `out`. */
+EXPORT int64_t evaluate(
+    const int64_t *code, int64_t count, int64_t first, double *r, const int64_t *columns, int64_t column_count,
+    const double *data, int64_t samples, const int64_t *outputs, int64_t output_count, double *out
+) {
+    Program program;
+    if (!prepare_program(&program, code, count, count, first, r, 0, columns, column_count)) return NO_MEMORY;
+    for (int64_t i = 0; i < samples; i++) {
+        for (int64_t c = 0; c < column_count; c++) r[columns[c]] = data[i * column_count + c];
+        run_prepared(&program);
+        for (int64_t k = 0; k < output_count; k++) out[i * output_count + k] = r[outputs[k]];
+    }
+    forget_program(&program);
+    return ALL_FINITE;
 }

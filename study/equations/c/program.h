@@ -21,23 +21,22 @@ typedef struct {
 } Instruction;
 
 typedef struct {
-    Instruction *code; /* without the instructions whose results never change; ends with END */
+    Instruction *code, *rest; /* without the instructions whose results never change; each ends with END */
     double *r;
 } Program;
 
-/* Run `count` instructions of three numbers each (operation, operands), the first of which writes register `first`. */
-EXPORT void run_program(const int64_t *code, int64_t count, int64_t first, double *r);
-
 /*
- * A program made ready for many runs: what depends on nothing that changes is computed now and left out of the code.
- * Registers below `changing` change from run to run, and those in `others` (a negative one is passed over). Returns 0
- * where there is no memory.
+ * `count` instructions of three numbers each (operation, operands), the first of which writes register `first`, made
+ * ready for many runs: what depends on nothing that changes is computed now and left out of the code. Registers below
+ * `changing` change from run to run, and those in `others`. Instructions from `split` on are the `rest`, which runs by
+ * itself. Returns 0 where there is no memory.
  */
 int prepare_program(
-    Program *program, const int64_t *code, int64_t count, int64_t first, double *r, int64_t changing,
+    Program *program, const int64_t *code, int64_t count, int64_t split, int64_t first, double *r, int64_t changing,
     const int64_t *others, int64_t other_count
 );
 void forget_program(Program *program);
 void run_prepared(const Program *program);
+void run_rest(const Program *program);
 
 #endif

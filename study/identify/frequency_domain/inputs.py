@@ -13,7 +13,7 @@ import numpy as np
 
 from study.equations import formulas
 from study.equations.graph import Graph
-from study.equations.model import Model, ModelTerm, with_registers
+from study.equations.model import Model, ModelTerm
 from study.equations.place import ALONE
 from study.records.interpolation import between_samples
 from study.records.record import Record
@@ -129,35 +129,31 @@ def histories(inputs: Sequence[Input], record: Record) -> list[Floats]:
 def input_history(item: Input, record: Record) -> Floats:
     """g(u, v, t) of one input along a record, shape (n,); a state begins at zero."""
     from study.equations import kernels  # slow to load; who counts inputs or checks settings needs none
+    from study.equations.motion_program import memory_program
 
     formula = item.shape if item.state is None else item.state
     own = (*dict(item.parameters), *(("z",) if item.state is not None else ()))  # without a state, z is a channel
     wanted = [n for n in formulas.names(formula) if n not in own]
-    data = _columns(wanted, formula, record)
-    graph = Graph()
-    known = {name: graph.input(name) for name in (*wanted, *own)}
-    program = with_registers(graph.program([formulas.add_formula(graph, formula, known)]), dict(item.parameters))
-    positions = np.array([program.inputs[n] for n in wanted], dtype=np.int64)
-    registers, output = program.registers.copy(), program.outputs
+    data = dict(zip(wanted, _columns(wanted, formula, record), strict=True))
     if item.state is not None and record.joints:  # each stretch begins at zero, as a record does
         bounds = pairwise((0, *record.joints, len(record)))
         return np.concatenate([input_history(item, _alone(record.part(a, b))) for a, b in bounds])
-    if item.state is not None:
+    if item.state is None:
+        graph = Graph()
+        known = {name: graph.input(name) for name in (*wanted, *own)}
+        program = graph.program([formulas.add_formula(graph, formula, known)]).with_inputs(dict(item.parameters))
+        return _finite(kernels.evaluate(program, data, len(record))[:, 0], item, record)
+    memory = memory_program(formula, dict(item.parameters), [name for name in wanted if name != "t"])
 
-        def integrated(steps: int) -> Floats:
-            states = np.empty(len(record))
-            fine = np.column_stack([between_samples(x, 2 * steps) for x in data])
-            kernels.integrate_state(
-                program.code, program.first, registers, positions, program.inputs["z"], int(output[0]),
-                record.dt / steps, steps, fine, states,
-            )  # fmt: skip
-            return states
+    def integrated(steps: int) -> Floats:
+        fine = [between_samples(data[name], 2 * steps)[:, None] for name in memory.drive]
+        drive = np.hstack(fine) if fine else np.zeros((2 * steps * len(record), 0))
+        states, out = np.zeros((1, 1, 1)), np.full((len(record), 1, 1), np.nan)
+        start, bounds = np.array([record.time[0]]), np.array([0, len(record)])
+        kernels.integrate(memory, start, record.dt, steps, drive, bounds, states, out)
+        return out[:, 0, 0]
 
-        return _finite(_settled(integrated), item, record)
-    table = np.column_stack(data) if data else np.zeros((len(record), 0))
-    out = np.empty((len(record), 1))
-    kernels.evaluate(program.code, program.first, registers, positions, table, output, out)
-    return _finite(out[:, 0], item, record)
+    return _finite(_settled(integrated), item, record)
 
 
 def _settled(integrated: Callable[[int], Floats]) -> Floats:

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from study.equations import formulas
+from study.equations.equations_of_motion import mass_entries
 from study.equations.model import Model, ModelTerm
-from study.structure.equations_of_motion import mass_entries
 from study.support.arrays import Floats
 from study.support.errors import StudyError
 

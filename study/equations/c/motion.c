@@ -1,0 +1,351 @@
+/*
+ * Motions by Runge-Kutta with their sensitivities s: ds/dt = (df/dx) s + df/dp, of which the columns beyond those of
+ * the p are those of the initial state. Runge-Kutta applied to them gives exactly the derivative of its own map.
+ */
+
+#include "motion.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define FAR 1e150 /* whose square is still a number, its cube is not */
+enum { SUMMED, ONE_BY_ONE, ADAMS }; /* methods, as in kernels.py */
+enum { WIDEST = 12 };               /* of the widths that are written out */
+
+static const double ZERO = 0.0;
+
+/*
+ * The functions below are written out for each small width: the compiler then leaves out the loops over a row and keeps
+ * it in the processor's registers.
+ */
+
+static inline double *register_of(const Motion *m, int64_t state) { return m->program.r + 1 + m->drives + state; }
+
+static inline void drive_registers(const Motion *m, double time, const double *drive) {
+    double *r = m->program.r;
+    r[0] = time;
+    for (int64_t c = 0; c < m->drives; c++) r[1 + c] = drive[c];
+}
+
+/* A row where the program has run at the states `at`; `count` is all columns, or one. */
+static inline void computed(
+    const Motion *m, int64_t row, const double *restrict at, double *restrict to, int64_t width, int64_t count
+) {
+    const double *const *direct = m->direct + row * width;
+    const Partial *key = m->by_key + m->key_ends[row], *last_key = m->by_key + m->key_ends[row + 1];
+    const Partial *state = m->by_state + m->ends[row], *last_state = m->by_state + m->ends[row + 1];
+    if (count <= WIDEST)
+        for (int64_t c = 0; c < count; c++) to[c] = *direct[c];
+    else {
+        memset(to, 0, (size_t)count * sizeof(double));
+        for (; key < last_key; key++) to[key->of] = *key->from;
+    }
+    if (count == 1) return;
+    for (; state < last_state; state++) {
+        double by = *state->from;
+        const double *row_of_state = at + state->of * width;
+        for (int64_t c = 0; c < count; c++) to[c] += by * row_of_state[c];
+    }
+    to[0] = *direct[0];
+}
+
+/* The same of the slope of a state. */
+static inline void slope_of(
+    const Motion *m, int64_t i, const double *restrict at, double *restrict to, int64_t width, int64_t count
+) {
+    if (i < m->dofs)
+        for (int64_t c = 0; c < count; c++) to[c] = at[(m->dofs + i) * width + c];
+    else if (i == m->dofs && m->friction.alone)
+        for (int64_t c = 0; c < count; c++) to[c] = 0.0;
+    else
+        computed(m, i - m->dofs, at, to, width, count);
+}
+
+/* The same of all states where friction holds something: each slope depends on all others. */
+static void advance_held(Motion *m, const double *at, double *next, double weight, double ahead, int64_t count) {
+    held_slopes(m, at, count);
+    for (int64_t i = 0; i < m->states; i++) {
+        for (int64_t c = i * m->width; c < i * m->width + count; c++) {
+            m->sum[c] += weight * m->friction.slope[c];
+            next[c] = m->state[c] + ahead * m->friction.slope[c];
+        }
+        *register_of(m, i) = next[i * m->width];
+    }
+}
+
+/*
+ * One stage of a step: slopes at `at`, whose state the registers hold, added to the sum; the next trial and the
+ * registers of its state follow. What was just computed goes on in the processor, not by way of the memory.
+ */
+static inline void stage_of(
+    Motion *m, double time, const double *drive, const double *restrict at, double *restrict next, double weight,
+    double ahead, int64_t width, int64_t count
+) {
+    int64_t together = m->friction.held_any && !m->friction.alone;
+    if (!m->ran) {
+        drive_registers(m, time, drive);
+        if (together)
+            hold(m);
+        else
+            run_prepared(&m->program);
+    }
+    if (together) {
+        advance_held(m, at, next, weight, ahead, count);
+        return;
+    }
+    for (int64_t i = 0; i < m->states; i++) {
+        double own[WIDEST] = {0.0}, *room = count <= WIDEST ? own : m->total;
+        double *restrict sum = m->sum + i * width, *restrict to = next + i * width;
+        const double *restrict state = m->state + i * width, *restrict total = room;
+        if (count > WIDEST && i < m->dofs)
+            total = at + (m->dofs + i) * width;
+        else
+            slope_of(m, i, at, room, width, count);
+        *register_of(m, i) = state[0] + ahead * total[0];
+        for (int64_t c = 0; c < count; c++) {
+            sum[c] += weight * total[c];
+            to[c] = state[c] + ahead * total[c];
+        }
+    }
+}
+
+static inline void step_of(Motion *m, double time, double h, const double *drive, int64_t width, int64_t count) {
+    double half = h * 0.5, third = h / 3.0, sixth = h / 6.0;
+    if (!m->ran)
+        for (int64_t i = 0; i < m->states; i++) *register_of(m, i) = m->state[i * width];
+    for (int64_t i = 0; i < m->states; i++)
+        for (int64_t c = i * width; c < i * width + count; c++) m->sum[c] = m->onto ? m->state[c] : 0.0;
+    stage_of(m, time, drive, m->state, m->trial, sixth, half, width, count);
+    m->ran = 0;
+    stage_of(m, time + half, drive + m->drives, m->trial, m->other, third, half, width, count);
+    stage_of(m, time + half, drive + m->drives, m->other, m->trial, third, h, width, count);
+    stage_of(m, time + h, drive + 2 * m->drives, m->trial, m->other, sixth, half, width, count);
+    for (int64_t i = 0; i < m->states; i++)
+        for (int64_t c = i * width; c < i * width + count; c++)
+            m->state[c] = m->onto ? m->sum[c] : m->state[c] + m->sum[c];
+}
+
+void step_on(Motion *m, double time, double h, const double *drive, int64_t columns) {
+    if (columns == 1) {
+        step_of(m, time, h, drive, m->width, 1);
+        return;
+    }
+    switch (m->width) {
+#define STEP(width)                               \
+    case width:                                   \
+        step_of(m, time, h, drive, width, width); \
+        return;
+        STEP(2) STEP(4) STEP(6) STEP(8) STEP(10) STEP(12)
+    default:
+        step_of(m, time, h, drive, m->width, m->width);
+    }
+}
+
+void row_of(const Motion *m, int64_t row, const double *at, double *to) {
+    computed(m, row, at, to, m->width, m->columns);
+}
+
+void run_here(Motion *m, double time, const double *drive) {
+    for (int64_t i = 0; i < m->states; i++) *register_of(m, i) = m->state[i * m->width];
+    if (drive) drive_registers(m, time, drive);
+    if (m->friction.held_any)
+        hold(m);
+    else
+        run_prepared(&m->program);
+    m->ran = 1;
+}
+
+/* What is observed of a sample: rows of the states, then those that the program computes; 0 if not finite. */
+static int observe(Motion *m, const int64_t *observed, int64_t count, double *out) {
+    int64_t own = 0;
+    for (int64_t i = 0; i < m->dofs; i++)
+        if (!(fabs(m->state[i * m->width]) < FAR && fabs(m->state[(m->dofs + i) * m->width]) < FAR &&
+              isfinite(*m->direct[i * m->width])))
+            return 0;
+    for (int64_t k = 0; k < count; k++) own += observed[k] >= m->states;
+    if (own) run_rest(&m->program);
+    if (own && m->friction.held_any) held_slopes(m, m->state, m->columns);
+    for (int64_t k = 0; k < count; k++, out += m->columns) {
+        if (observed[k] < m->states) {
+            memcpy(out, m->state + observed[k] * m->width, (size_t)m->columns * sizeof(double));
+            continue;
+        }
+        row_of(m, observed[k] - m->states, m->state, out);
+        if (m->friction.held_any) add_held(m, observed[k] - m->states, out);
+        if (!isfinite(out[0])) return 0;
+    }
+    return 1;
+}
+
+static int64_t along_runge_kutta(
+    Motion *m, double start, double dt, int64_t steps, const double *drive, const int64_t *observed, int64_t count,
+    int64_t samples, double *out
+) {
+    double h = dt / (double)steps;
+    m->ran = 0;
+    if (m->friction.places) set_sides(m, start, drive);
+    for (int64_t sample = 0; sample < samples; sample++) {
+        const double *at = drive + 2 * steps * sample * m->drives;
+        if (!m->ran) run_here(m, start + (double)sample * dt, at);
+        if (!observe(m, observed, count, out + sample * count * m->columns)) return sample;
+        if (sample + 1 == samples) break;
+        m->ran = m->ran && m->states > 0; /* without states nothing steps on, and the drive alone does */
+        for (int64_t s = 0; s < steps && m->states > 0; s++) {
+            double time = start + (double)sample * dt + (double)s * h;
+            const double *now = at + 2 * s * m->drives;
+            if (m->friction.places)
+                switching_step(m, time, h, now);
+            else
+                step_on(m, time, h, now, m->columns);
+        }
+    }
+    return ALL_FINITE;
+}
+
+/* Adams-Bashforth predictor, Adams-Moulton corrector of order 4 (PECE) without derivatives, started by Runge-Kutta. */
+static int64_t along_adams(
+    Motion *m, double start, double dt, int64_t steps, const double *drive, const int64_t *observed, int64_t count,
+    int64_t samples, double *out
+) {
+    int64_t n = m->states, total = (samples - 1) * steps;
+    double h = dt / (double)steps, *late = m->sum, *ring = m->other + n; /* of four rows, which nothing else needs */
+    for (int64_t step = 0; step <= total; step++) {
+        double time = start + (double)step * h;
+        double *f0 = ring + (step & 3) * n, *f1 = ring + ((step + 3) & 3) * n; /* slopes of this step and the last */
+        double *f2 = ring + ((step + 2) & 3) * n, *f3 = ring + ((step + 1) & 3) * n;
+        const double *now = drive + 2 * step * m->drives;
+        run_here(m, time, now);
+        for (int64_t i = 0; i < n; i++) slope_of(m, i, m->state, f0 + i, 1, 1);
+        if (step % steps == 0 && !observe(m, observed, count, out + step / steps * count)) return step / steps;
+        if (step == total) break;
+        if (step < 3) {
+            step_on(m, time, h, now, 1);
+            continue;
+        }
+        for (int64_t i = 0; i < n; i++) {
+            double past = -59.0 * f1[i] + 37.0 * f2[i] - 9.0 * f3[i];
+            *register_of(m, i) = m->trial[i] = m->state[i] + h / 24.0 * (55.0 * f0[i] + past);
+        }
+        drive_registers(m, time + h, now + 2 * m->drives);
+        run_prepared(&m->program);
+        for (int64_t i = 0; i < n; i++) slope_of(m, i, m->trial, late + i, 1, 1);
+        for (int64_t i = 0; i < n; i++) {
+            double past = 19.0 * f0[i] - 5.0 * f1[i] + f2[i];
+            m->state[i] += h / 24.0 * (9.0 * late[i] + past);
+        }
+    }
+    return ALL_FINITE;
+}
+
+static void forget_motion(Motion *m) {
+    forget_program(&m->program);
+    free(m->direct);
+    free(m->by_key);
+    free(m->key_ends);
+    free(m->by_state);
+    free(m->ends);
+    free(m->state);
+    free(m->friction.held);
+}
+
+/*
+ * Where rows and derivatives are read; `slots` has of each row its register, those of its derivatives by the states and
+ * by the keys. What is a constant zero, below `first` but no input, is left out.
+ */
+static void find_derivatives(Motion *m, const int64_t *slots, int64_t slot_width, int64_t inputs, int64_t first) {
+    const double *r = m->program.r;
+    int64_t states = 0, keys = 0;
+    m->ends[0] = m->key_ends[0] = 0;
+    for (int64_t row = 0; row < m->rows; row++, slots += slot_width) {
+        const double **direct = m->direct + row * m->width;
+        direct[0] = r + slots[0];
+        for (int64_t c = 1; c < m->width; c++) direct[c] = &ZERO;
+        for (int64_t i = 1; i < slot_width; i++) {
+            int64_t at = slots[i], key = i - m->states;
+            if (at >= inputs && at < first && r[at] == 0.0) continue;
+            if (i <= m->states)
+                m->by_state[states++] = (Partial){i - 1, r + at};
+            else if (key < m->columns) {
+                direct[key] = r + at;
+                m->by_key[keys++] = (Partial){key, r + at};
+            }
+        }
+        m->ends[row + 1] = states;
+        m->key_ends[row + 1] = keys;
+    }
+}
+
+static int prepare_room(Motion *m) {
+    m->width = m->columns == 1 ? 1 : m->columns + m->columns % 2;
+    Friction *f = &m->friction;
+    size_t states = (size_t)m->states, rows = (size_t)m->rows, width = (size_t)m->width, size = states * width;
+    size_t places = (size_t)f->places, of_friction = places * (places + width + 3) + 2 * size + (size_t)m->dofs;
+    m->direct = malloc((rows * width + 1) * sizeof(double *));
+    m->by_key = malloc((rows * width + 1) * sizeof(Partial));
+    m->key_ends = malloc((rows + 1) * sizeof(int64_t));
+    m->by_state = malloc((rows * states + 1) * sizeof(Partial));
+    m->ends = malloc((rows + 1) * sizeof(int64_t));
+    m->state = calloc(4 * size + 4 * states + 3 * (size_t)m->drives + width + of_friction, sizeof(double));
+    f->held = calloc(2 * places + 1, sizeof(int64_t));
+    if (!m->direct || !m->by_key || !m->key_ends || !m->by_state || !m->ends || !m->state || !f->held) return 0;
+    m->trial = m->state + size;
+    m->sum = m->trial + size;
+    m->other = m->sum + size; /* and four rows of one column more, for the slopes of an Adams method */
+    f->begun = m->other + size + 4 * states;
+    f->slope = f->begun + size;
+    f->local = f->slope + size;
+    f->early = f->local + 3 * m->drives;
+    f->early_motion = f->early + places;
+    f->matrix = f->early_motion + 2 * places;
+    f->right = f->matrix + places * places;
+    f->before = f->right + places * width;
+    f->fresh = f->held + places;
+    m->total = f->before + m->dofs;
+    return 1;
+}
+
+/*
+ * Motions between neighbouring `bounds`, each from its own of the `states` and from its time in `starts`; the states
+ * become those where it ends. A motion runs on to the first sample of the next, which overwrites it; the last one does
+ * not write that sample, which another thread may own. `drive` has 2 `steps` rows a sample. `out`, shape (samples,
+ * observations, columns), gets the rows that are `observed`: of the states, then of the program. Instructions from
+ * `split` on are those of observations alone.
+ */
+EXPORT int64_t integrate(
+    int64_t method, const int64_t *code, int64_t count, int64_t split, int64_t inputs, int64_t first, double *r,
+    const int64_t *slots, int64_t rows, int64_t slot_width, const int64_t *sides, int64_t places,
+    const int64_t *by_side, const double *directions, const int64_t *shifts, const double *starts, double dt,
+    int64_t steps, const double *drive, int64_t drives, const int64_t *bounds, int64_t bound_count, double *states,
+    int64_t dofs, int64_t state_count, int64_t columns, const int64_t *observed, int64_t observed_count,
+    int64_t samples, double *out
+) {
+    Motion m = {.dofs = dofs, .states = state_count, .columns = columns, .drives = drives, .rows = rows,
+                .onto = method != SUMMED};
+    m.friction = (Friction){.places = places, .sides = sides, .by_side = by_side, .directions = directions,
+                            .shifts = shifts};
+    int64_t failed = NO_MEMORY, runs = bound_count - 1, of_sample = observed_count * columns;
+    int64_t begin = bounds[runs - 1], end = bounds[runs] + 1 < samples ? bounds[runs] + 1 : samples;
+    size_t of_row = (size_t)columns * sizeof(double);
+    double *last = malloc((size_t)((end - begin) * of_sample + 1) * sizeof(double));
+    if (last && prepare_room(&m) &&
+        prepare_program(&m.program, code, count, split, first, r, 1 + drives + state_count, sides, places)) {
+        find_derivatives(&m, slots, slot_width, inputs, first);
+        failed = ALL_FINITE;
+        for (int64_t i = 0; i < runs && failed == ALL_FINITE; i++) {
+            int64_t from = bounds[i], length = i + 1 < runs ? bounds[i + 1] + 1 - from : end - from;
+            double *y = states + i * state_count * columns, *target = i + 1 < runs ? out + from * of_sample : last;
+            for (int64_t s = 0; s < state_count; s++) memcpy(m.state + s * m.width, y + s * columns, of_row);
+            failed = (method == ADAMS ? along_adams : along_runge_kutta)(
+                &m, starts[i], dt, steps, drive + 2 * steps * from * drives, observed, observed_count, length, target
+            );
+            for (int64_t s = 0; s < state_count; s++) memcpy(y + s * columns, m.state + s * m.width, of_row);
+            if (failed >= 0) failed += from;
+        }
+        if (failed == ALL_FINITE)
+            memcpy(out + begin * of_sample, last, (size_t)((bounds[runs] - begin) * of_sample) * sizeof(double));
+    }
+    free(last);
+    forget_motion(&m);
+    return failed;
+}
