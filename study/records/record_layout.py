@@ -40,6 +40,11 @@ class Layout:
     cutoff: float | None = None  # hertz above which a measured acceleration is integrated
     as_sampled: bool = False  # whether all samples are used, though the motion asks for fewer
 
+    @property
+    def explicit(self) -> bool:
+        """Whether samples are named."""
+        return self.fit is not None or self.judge is not None
+
 
 @dataclass(frozen=True)
 class KindOfTest:
@@ -48,7 +53,7 @@ class KindOfTest:
     prescribed: bool = False  # it has no inertia: the motion is prescribed, and the force is predicted
     drifts: bool = False  # nothing brings its mass back: the motion is judged over a horizon
     unbroken: bool = False  # it wants one long stretch to fit and one to judge
-    anew: float = 0.0  # periods after which a decay begins anew; 0 where it runs on through the blocks of both parts
+    anew: float = 0.0  # periods after which a motion begins anew; 0 where it runs on through the blocks of both parts
 
 
 def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None = None) -> Prepared:
@@ -72,54 +77,36 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
     StudyError
         If ranges overlap or leave the record, the response asked for was not measured, or it cannot be completed.
     """
-    kind = kind or KindOfTest()
-    wanted = layout.response
+    kind, notes, every = kind or KindOfTest(), list[str](), 1
+    _refuse_contradictions(records, layout, kind)
     if kind.prescribed:
-        with at(records[0].name):
-            expect(wanted in (None, FORCE), f"the model has no inertia, so the force is predicted, not the {wanted}")
-        wanted = FORCE
-    sensors = compared(records[0], wanted)
-    explicit = layout.fit is not None or layout.judge is not None
-    contradiction = (
-        "--use and --fit or --judge A:B exclude each other; expected '--judge every-other-block' beside --use"
-    )
-    expect(not (explicit and (layout.use or layout.alternate)), contradiction)
-    notes, every = list[str](), 1
-    if kind.prescribed:
-        _refuse_unforced(records)
         readied = [with_prescribed_motion(record) for record in records]
         records, notes = [r for r, _ in readied], [note for _, said in readied for note in said]
+    wanted = FORCE if kind.prescribed else layout.response
+    sensors = compared(records[0], wanted)
     free = not kind.prescribed and all(_unforced(r, layout) for r in records)
     several = len(records) > 1 or len(layout.use) > 1
-    turns = several or layout.alternate or ((free or kind.prescribed) and not (explicit or kind.unbroken))
-    if kind.unbroken:
-        sentence = "the linear part of the model is as measured: frequency response functions want one long stretch"
-        asked = several or layout.alternate or layout.use
-        expect(not asked, f"{sentence}; expected --fit A:B and --judge A:B instead of stretches")
-    if not (turns or layout.use or kind.drifts or (free and kind.anew)):
+    by_itself = (free or kind.prescribed) and not (layout.explicit or kind.unbroken)
+    turns = several or layout.alternate or by_itself
+    if not (turns or layout.use or kind.drifts):
         with at(records[0].name):
             plan = make_plan(records[0], layout.fit, layout.judge, wanted)
-        if explicit or kind.unbroken or not driven_apart(records[0], plan.fit, plan.judge):
+        turns = not (layout.explicit or kind.unbroken) and driven_apart(records[0], plan.fit, plan.judge)
+        if not (turns or (free and kind.anew)):
             prepared = prepare_record(records[0], plan, layout.cutoff)
             return replace(prepared, sensors=sensors, notes=(*notes, *prepared.notes))
-        turns = True
-        notes.append(_why(records[0], plan))
+        notes += [_why(records[0], plan)] if turns else []
     completed = [complete(record, layout.cutoff) for record in records]
     if turns and not (layout.use or layout.as_sampled or free or kind.prescribed or kind.drifts):
-        shortest = sum(len(record) for record in records) // 2
-        completed, every = completed_without_spare(completed, shortest)
-    if explicit:
+        completed, every = completed_without_spare(completed, sum(len(record) for record in records) // 2)
+    if layout.explicit:
         plan = make_plan(records[0], layout.fit, layout.judge, wanted)
         fit, judge = [sure(completed[0], *plan.fit)], [sure(completed[0], *plan.judge)]
     else:
         stretches = [sure(c, *span) for c in completed for span in _samples(c.record, layout)]
-        if turns:
-            anew = kind.anew if free else 0.0
-            fit, judge = alternating([_until_rest(s, sensors) for s in stretches] if anew else stretches, sensors, anew)
-            notes.append(_said(fit, judge, len(stretches), anew=bool(anew)))
-        else:
-            middle = (stretches[0].first + stretches[0].last) // 2
-            fit, judge = [replace(stretches[0], last=middle)], [replace(stretches[0], first=middle)]
+        stretches = [_until_rest(s, sensors) for s in stretches] if turns and kind.anew else stretches
+        fit, judge = alternating(stretches, sensors, kind.anew) if turns else _halved(stretches[0])
+        notes += [_said(fit, judge, len(stretches), anew=bool(kind.anew))] if turns else []
     if kind.drifts:
         (fit, first), (judge, second) = (within_the_horizon(part, sensors) for part in (fit, judge))
         notes.append(
@@ -130,21 +117,36 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
     return replace(prepared, low=layout.cutoff or 0.0, every=every)
 
 
+def _refuse_contradictions(records: Sequence[Record], layout: Layout, kind: KindOfTest) -> None:
+    """What the user says of the parts has to go together, and with the model."""
+    if kind.prescribed:
+        wanted = layout.response
+        with at(records[0].name):
+            expect(wanted in (None, FORCE), f"the model has no inertia, so the force is predicted, not the {wanted}")
+    expect(
+        not (layout.explicit and (layout.use or layout.alternate)),
+        "--use and --fit or --judge A:B exclude each other; expected '--judge every-other-block' beside --use",
+    )
+    asked = len(records) > 1 or layout.alternate or layout.use
+    expect(
+        not (kind.unbroken and asked),
+        "the linear part of the model is as measured: frequency response functions want one long stretch; expected "
+        "--fit A:B and --judge A:B instead of stretches",
+    )
+    for record in records if kind.prescribed else ():
+        expect(
+            not record.unforced,
+            f"{record.name}: no force was measured, which a model without inertia predicts; expected a column of the "
+            "force, or a model with inertia",
+        )
+
+
 def _why(record: Record, plan: Plan) -> str:
     share = percent(shared(record, plan.fit, plan.judge), ".0f")
     return (
         f"the halves of the record share {share} of the force's power at the same frequencies, as those of a sweep or "
         "of dwells do, so that every other block is judged in place of a half (--fit and --judge A:B choose parts)"
     )
-
-
-def _refuse_unforced(records: Sequence[Record]) -> None:
-    for record in records:
-        expect(
-            not record.unforced,
-            f"{record.name}: no force was measured, which a model without inertia predicts; expected a column of the "
-            "force, or a model with inertia",
-        )
 
 
 def _unforced(record: Record, layout: Layout) -> bool:
@@ -181,6 +183,11 @@ def sure(completed: CompletedRecord, first: int, last: int) -> Stretch:
         f"{FEWEST} or more",
     )
     return Stretch(completed.record, low, high)
+
+
+def _halved(stretch: Stretch) -> tuple[list[Stretch], list[Stretch]]:
+    middle = (stretch.first + stretch.last) // 2
+    return [replace(stretch, last=middle)], [replace(stretch, first=middle)]
 
 
 def _until_rest(stretch: Stretch, sensors: Sequence[Sensor]) -> Stretch:

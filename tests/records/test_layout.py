@@ -130,3 +130,11 @@ def test_what_a_measured_linear_part_cannot_use_is_refused():
     for layout in (Layout(alternate=True), Layout(use=((1.0, 90.0),))):
         with pytest.raises(StudyError, match=r"as measured.*one long stretch; expected --fit A:B"):
             laid_out([record], layout, KindOfTest(unbroken=True))
+
+
+def test_a_decay_of_a_single_mass_may_be_judged_in_parts_that_are_named():
+    motion = of_two()["a displacement"]
+    decay = Record(DT, {"force": np.zeros(SAMPLES), "displacement": motion}, name="decay")
+    prepared = laid_out([decay], Layout(fit=(0, 1000), judge=(1000, 3000)))
+    assert (prepared.plan.fit, prepared.plan.judge) == ((0, 1000), (1000, 3000))
+    assert prepared.free
