@@ -1,8 +1,8 @@
 """Golden results: the same commands by the code of another revision and by this one, number by number.
 
-``python benchmarks/golden.py REVISION [NAME ...]`` checks the revision out beside this tree, compiles it, writes records
-with it, runs every command (or those named) with both, and lists what differs by more than 1e-9 of itself. What the
-other revision gave is kept in the folder ``.golden`` and not made again.
+``python benchmarks/golden.py REVISION [NAME ...]`` checks the revision out beside this tree, compiles it, writes
+records with it, runs every command (or those named) with both, and lists what differs by more than 1e-9 of itself. What
+the other revision gave is kept in the folder ``.golden`` and not made again.
 """
 
 import json
