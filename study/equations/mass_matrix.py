@@ -54,6 +54,13 @@ def checked_mass_matrix(model: Model) -> Floats:
     return mass
 
 
+def is_positive(model: Model, values: Mapping[str, float]) -> bool:
+    """Whether every motion of a model has a kinetic energy, with these values in place of its own."""
+    known = {key: value for key, value in model.values.items() if value is not None}
+    lowest = np.linalg.eigvalsh(matrices(model, known | dict(values))[2])
+    return bool(lowest[0] > len(lowest) * np.finfo(float).eps * lowest[-1])
+
+
 def check_held_masses(model: Model) -> None:
     """Refuse a mass matrix that no values of what is open could make positive definite.
 

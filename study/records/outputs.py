@@ -5,7 +5,6 @@ that blocks of time hold all of them and one statistic serves any number of sens
 in its own unit.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +12,8 @@ import numpy as np
 from study.records.record import ALONE, Record, Sensor
 from study.support.arrays import Floats
 from study.support.autoregression import whitened
+
+Noise = tuple[Floats, ...]  # autoregressive coefficients of each sensor's noise, the first of which weighs it
 
 
 @dataclass(frozen=True)
@@ -42,9 +43,9 @@ class Outputs:
         values = stacked.reshape(-1, len(self.sensors), *stacked.shape[1:])
         return values / np.array(self.weights).reshape(-1, *[1] * (values.ndim - 2))
 
-    def whitened(self, stacked: Floats, noise: "Sequence[Floats]") -> Floats:
+    def whitened(self, stacked: Floats, noise: Noise) -> Floats:
         """Stacked values filtered with the autoregressive coefficients of each sensor's noise, the same shape."""
-        if all(len(own) == 1 for own in noise):
+        if not noise:
             return stacked
         values = stacked.reshape(-1, len(self.sensors), *stacked.shape[1:])
         parts = [whitened(values[:, i], own) for i, own in enumerate(noise)]

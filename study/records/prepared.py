@@ -98,17 +98,17 @@ class Prepared:
 
     @property
     def fitted(self) -> Floats:
-        """The measured response of the fitting part, shape (samples to fit,)."""
-        return self.record[self.plan.response][slice(*self.plan.fit)]
+        """What was measured of the fitting part, stacked; one sensor's has the shape (samples to fit,)."""
+        return self.outputs.stacked(self.measured[slice(*self.plan.fit)])
 
     @property
     def judged(self) -> Floats:
-        """The measured response of the judging part, shape (samples to judge,)."""
-        return self.record[self.plan.response][slice(*self.plan.judge)]
+        """What was measured of the judging part, stacked; one sensor's has the shape (samples to judge,)."""
+        return self.outputs.stacked(self.measured[slice(*self.plan.judge)])
 
     @property
     def spread(self) -> float:
-        """Standard deviation of the response within the fitting part."""
+        """Standard deviation of what was measured within the fitting part."""
         return float(np.std(self.fitted))
 
     def samples_in(self, periods: float) -> int:

@@ -17,6 +17,7 @@ from study.diagnose.ranking import in_order
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
 from study.equations.model import Model, ModelTerm
 from study.equations.term import Term
+from study.identify.time_domain.weighted_fit import noise_left
 from study.records import noise_floor
 from study.structure.measured_comparison import MeasuredComparison
 from study.structure.measured_fit import MeasuredFit, fit_with_term, modal_run
@@ -25,7 +26,6 @@ from study.structure.measured_screening import Screened, measured_entries, scree
 from study.structure.measured_spectra import CoefficientSpectrum, coefficient_spectra
 from study.structure.placed_candidates import physical
 from study.structure.placed_ranking import HeldOutTest, orthonormal
-from study.structure.structure_fit import noise_left
 from study.support import statistics
 from study.support.arrays import Floats
 from study.support.cores import cores
@@ -176,15 +176,17 @@ def _ranked(rows: list[MeasuredRanked], comparison: MeasuredComparison, asked: i
     if not rows:
         return []
     best = min(rows, key=lambda r: float(r.residual @ r.residual))
-    noise = noise_left(best.fit.residual)
-    white = {r.name: noise.weighted(r.prediction.residual).ravel() for r in rows}
-    before = comparison.prediction
-    test = HeldOutTest(
-        noise, (noise.weighted(before.residual).ravel(), np.zeros(0)),
-        (orthonormal(noise.weighted(_derivatives(comparison))), np.zeros((0, 0))),
-    )  # fmt: skip
-    nothing = np.empty((0, len(before.size)))
-    chances = [test.p_value((r.prediction.residual, nothing), searched=True) for r in rows]
+    outputs = comparison.prepared.outputs
+    noise = noise_left(outputs.stacked(best.fit.residual), len(outputs))
+
+    def whitened(values: Floats) -> Floats:
+        return outputs.whitened(outputs.stacked(values), noise)
+
+    white = {r.name: whitened(r.prediction.residual) for r in rows}
+    own, columns = whitened(comparison.prediction.residual), whitened(_derivatives(comparison))
+    nothing = np.zeros(0)
+    test = HeldOutTest(outputs, noise, (own, nothing), (orthonormal(columns), np.zeros((0, 0))))
+    chances = [test.p_value((outputs.stacked(r.prediction.residual), nothing), searched=True) for r in rows]
     rows = [replace(r, p_value=min(1.0, asked * chance)) for r, chance in zip(rows, chances, strict=True)]
     return [replace(r, distance=away, tied_with=tied) for r, away, tied in in_order(rows, white, asked)]
 

@@ -13,15 +13,17 @@ import numpy as np
 from study.equations.free_run import FreeRun, prepare
 from study.equations.modal_keys import ModalKeys
 from study.equations.model import Model, ModelTerm
+from study.equations.substeps import ROUGH
+from study.identify.time_domain.settling import SHIFT
 from study.records.prepared import Prepared
 from study.records.record import Sensor
 from study.structure.measured_start import modal_starts
-from study.structure.structure_fit import MOST_STEPS, ROUGH, SHIFT
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError, StudyError
 from study.support.levenberg_marquardt import Point, minimise, point_at
 from study.support.statistics import clustered_covariance
 
+FINEST = 16  # steps in a sampling interval
 TRIALS, TRIED = 30, 6  # free runs of a search; of one with more modes, before it has to be the better
 PATIENCE = 2  # numbers of modes in turn that are no better: more are not tried
 
@@ -160,7 +162,7 @@ def _settled(fit: MeasuredFit, model: Model, prepared: Prepared, held: tuple[str
     while True:
         if not fit.converged:
             fit = _fitted(model, fit.modal, prepared, fit.values, held, fit.steps, trials, fit.initial)
-        if 2 * fit.steps > MOST_STEPS or _fine(fit, prepared):
+        if 2 * fit.steps > FINEST or _fine(fit, prepared):
             return fit
         finer = _fitted(model, fit.modal, prepared, fit.values, held, 2 * fit.steps, trials, fit.initial)
         moved = np.array([finer.values[key] - fit.values[key] for key in model.values if key not in held])
@@ -186,7 +188,7 @@ def _fine(fit: MeasuredFit, prepared: Prepared) -> bool:
 
 def _steps(modal: ModalKeys, values: Mapping[str, float], dt: float) -> int:
     fastest = float(np.sqrt(max(values[key] for key in modal.stiffness)))
-    return int(np.clip(np.ceil(fastest * dt / ROUGH), 1, MOST_STEPS))
+    return int(np.clip(np.ceil(fastest * dt / ROUGH), 1, FINEST))
 
 
 def _criterion(fit: MeasuredFit, prepared: Prepared) -> float:

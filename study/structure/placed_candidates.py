@@ -12,10 +12,11 @@ from study.equations.model import Model, ModelTerm, free
 from study.equations.place import Place
 from study.equations.term import Term
 from study.equations.terms import LIBRARY
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import Prepared
 from study.structure.placed_search import PlacedBaseline, PlacedStart, placed_starts, with_placed_term
 from study.structure.places import connections
-from study.structure.structure_fit import StructureFit, settled_structure
 from study.structure.structure_prediction import StructurePrediction, predict_structure
 from study.support.cores import cores
 from study.support.errors import StudyError
@@ -35,7 +36,7 @@ class PlacedCandidate:
     """A candidate as fitted."""
 
     entry: ModelTerm  # the effect and its place
-    fit: StructureFit
+    fit: FreeRunFit
     prediction: StructurePrediction
 
     @property
@@ -186,7 +187,7 @@ def with_best_placed_settled(tried: Sequence[PlacedCandidate], prepared: Prepare
 
     def settle(candidate: PlacedCandidate) -> PlacedCandidate:
         try:
-            fit = settled_structure(candidate.fit, prepared)
+            fit = finished(candidate.fit, prepared)
         except StudyError:
             return candidate
         prediction = predict_structure(fit, prepared)

@@ -5,8 +5,10 @@ from contextlib import suppress
 from study.equations.layout import check
 from study.equations.model import Model
 from study.equations.place import Place
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.part_fit import fit_part
+from study.identify.time_domain.weighted_fit import finished
 from study.structure.structure_comparison import StructureComparison, compare_structure
-from study.structure.structure_fit import StructureFit, fit_structure, settled_structure
 from study.structure.structure_start import first_fit
 from study.support.errors import StudyError, expect
 
@@ -43,12 +45,12 @@ def dropped_term(comparison: StructureComparison, name: str) -> StructureCompari
     fit, prepared = comparison.fit, comparison.prepared
     model = fit.model.without_term(name)
     held = tuple(key for key in fit.held if key in model.values)
-    fits: list[StructureFit] = []
+    fits: list[FreeRunFit] = []
     with suppress(StudyError):
-        fits.append(fit_structure(model, prepared, held))
+        fits.append(fit_part(model, prepared, held, steps=fit.steps_per_sample))
     given = comparison.model.without_term(name)
     with suppress(StudyError):
         fits.append(first_fit(given, prepared))
     expect(fits, f"{given.name!r} without {name} has no finite motion under the forces of {prepared.record.name!r}")
     best = min(fits, key=lambda f: f.cost)
-    return compare_structure(given, prepared, settled_structure(best, prepared))
+    return compare_structure(given, prepared, finished(best, prepared))

@@ -12,20 +12,16 @@ import numpy as np
 from study.diagnose.credibility import certain
 from study.diagnose.needless import DOUBLED, is_open, relative_interval, sentence
 from study.equations.layout import check
-from study.equations.model import Model, ModelTerm
+from study.equations.model import ModelTerm
 from study.equations.place import place_in_words
 from study.figures.labels import term_names
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.part_fit import fit_part, linearise, uncertainty
+from study.identify.time_domain.weighted_fit import noise_left
 from study.records.prepared import Prepared
 from study.structure.placed_ranking import held_out_parts, held_out_test
+from study.structure.placed_search import grown_states
 from study.structure.structure_comparison import StructureComparison
-from study.structure.structure_fit import (
-    StructureFit,
-    fit_structure,
-    flat,
-    linearise_structure,
-    noise_left,
-    structure_covariance,
-)
 from study.structure.structure_prediction import StructurePrediction, predict_structure
 from study.support.arrays import Floats
 from study.support.cores import cores
@@ -43,7 +39,7 @@ class PlacedNeedless:
     error_with: float  # held-out error of the motions, of the model as it is
     error_without: float  # the same without the term, and without those named before it
     p_value: float  # of what the term gains, if it gains nothing; the number of terms asked for accounted for
-    fit: StructureFit  # the model without it
+    fit: FreeRunFit  # the model without it
     prediction: StructurePrediction  # of that
 
     @property
@@ -79,19 +75,19 @@ def placed_needless(comparison: StructureComparison) -> tuple[PlacedNeedless, ..
 
 
 def _each_alone(
-    terms: Sequence[ModelTerm], fit: StructureFit, prediction: StructurePrediction, prepared: Prepared,
+    terms: Sequence[ModelTerm], fit: FreeRunFit, prediction: StructurePrediction, prepared: Prepared,
     asked: int,
 ) -> list[PlacedNeedless]:  # fmt: skip
     """Those of the terms that this model does not need, each for itself, of so many that were asked for."""
-    jacobian = linearise_structure(fit, prepared)
-    covariance = structure_covariance(fit, prepared, jacobian)
+    jacobian = linearise(fit, prepared)
+    covariance = uncertainty(fit, prepared, jacobian)
     parts = held_out_parts(fit, prediction, jacobian, prepared.plan.fit)
 
     def answer(entry: ModelTerm) -> PlacedNeedless | None:
         start, lost = _removal(fit, entry, jacobian)
         own = [fit.keys.index(symbol) for symbol in entry.symbols]
         sized = relative_interval(fit.values[own], covariance[np.ix_(own, own)])
-        residual = flat(fit, fit.residual)
+        residual = fit.whitened(fit.residual)
         plain = all(not t.term.parameters and t.term.state is None for t in fit.model.terms)
         if plain and sized[0] > 0.0 and float(lost @ lost) > DOUBLED * float(residual @ residual):
             return None
@@ -99,7 +95,8 @@ def _each_alone(
         if rest is None:
             return None
         without = predict_structure(rest, prepared)
-        chance = held_out_test(rest, without, noise_left(fit.residual)).p_value(parts, bool(entry.term.parameters))
+        noise = noise_left(fit.residual, len(fit.outputs))
+        chance = held_out_test(rest, without, noise).p_value(parts, bool(entry.term.parameters))
         if without.diverged or certain(without, prediction, sized, min(1.0, asked * chance)):
             return None
         return PlacedNeedless(entry, prediction.error, without.error, min(1.0, asked * chance), rest, without)
@@ -108,9 +105,9 @@ def _each_alone(
         return [n for n in pool.map(answer, terms) if n is not None]
 
 
-def _removal(fit: StructureFit, entry: ModelTerm, jacobian: Floats) -> tuple[dict[str, float], Floats]:
+def _removal(fit: FreeRunFit, entry: ModelTerm, jacobian: Floats) -> tuple[dict[str, float], Floats]:
     """The other values with what they take over of a term's motion, linearised, and what they cannot take over."""
-    columns = flat(fit, jacobian)
+    columns = fit.whitened(jacobian)
     gone = [fit.keys.index(key) for key in entry.keys if key in fit.keys]
     own = [i for i in gone if fit.keys[i] in entry.symbols]
     response = columns[:, own] @ fit.values[own]
@@ -121,7 +118,7 @@ def _removal(fit: StructureFit, entry: ModelTerm, jacobian: Floats) -> tuple[dic
     return moved, response - others @ taken
 
 
-def _without(fit: StructureFit, entry: ModelTerm, start: dict[str, float], prepared: Prepared) -> StructureFit | None:
+def _without(fit: FreeRunFit, entry: ModelTerm, start: dict[str, float], prepared: Prepared) -> FreeRunFit | None:
     """The structure without a term, fitted from the better of two starts; None where it is none, or runs from none."""
     model = fit.model.without_term(entry.name)
     try:
@@ -129,13 +126,13 @@ def _without(fit: StructureFit, entry: ModelTerm, start: dict[str, float], prepa
     except StudyError:
         return None
     held = tuple(key for key in fit.held if key in model.values)
-    fits: list[StructureFit] = []
+    fits: list[FreeRunFit] = []
     for begin in (start, {}):
         try:
             fits.append(
-                fit_structure(
-                    model, prepared, held, begin, steps=fit.steps, initial=_states(fit, model), noise=fit.noise,
-                    max_iterations=RUNS,
+                fit_part(
+                    model, prepared, held, begin, steps=fit.steps_per_sample, initial=grown_states(fit, model),
+                    noise=fit.noise, max_iterations=RUNS,
                 )
             )  # fmt: skip
         except StudyError:
@@ -143,10 +140,3 @@ def _without(fit: StructureFit, entry: ModelTerm, start: dict[str, float], prepa
         if fits[-1].converged:
             break
     return min(fits, key=lambda f: f.cost, default=None)
-
-
-def _states(fit: StructureFit, model: Model) -> Floats:
-    """The states with which the stretches of a fit begin, without those of the terms that ``model`` does not have."""
-    own, motions = [t.name for t in fit.model.states], 2 * len(fit.model.coordinates)
-    kept = [*range(motions), *(motions + i for i, t in enumerate(own) if t in {t.name for t in model.states})]
-    return fit.initial.reshape(-1, motions + len(own))[:, kept].ravel()

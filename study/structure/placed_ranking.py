@@ -12,16 +12,13 @@ from study.diagnose.constancy import CoefficientCurve, along_amplitude, along_fr
 from study.diagnose.ranking import in_order
 from study.equations.model import ModelTerm
 from study.equations.term import Term
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.part_fit import linearise, uncertainty
+from study.identify.time_domain.weighted_fit import noise_left
+from study.records.outputs import Noise, Outputs
 from study.records.record import Record
 from study.structure.placed_candidates import PlacedCandidate, physical
 from study.structure.placed_units import coefficient_unit
-from study.structure.structure_fit import (
-    SensorNoise,
-    StructureFit,
-    linearise_structure,
-    noise_left,
-    structure_covariance,
-)
 from study.structure.structure_prediction import StructurePrediction
 from study.support import statistics
 from study.support.arrays import Floats
@@ -38,7 +35,7 @@ class PlacedRanked:
     """One candidate with what an engineer needs to believe or doubt it."""
 
     entry: ModelTerm  # the effect and its place
-    fit: StructureFit
+    fit: FreeRunFit
     prediction: StructurePrediction
     gain: Gain  # what it explains of the held-out residual
     coefficient: float  # its size: the amplitude, for an effect of any phase
@@ -47,7 +44,7 @@ class PlacedRanked:
     parameter_errors: dict[str, float]
     flatness: CoefficientCurve | None  # the coefficient along frequency, at the sensor that sees most of it
     steadiness: CoefficientCurve | None  # along amplitude, at all sensors
-    parts: tuple[Floats, Floats]  # held-out residuals of judging and fitting part, each shape (samples, sensors)
+    parts: tuple[Floats, Floats]  # held-out residuals of judging and fitting part, stacked
     p_value: float = 1.0  # of what it explains, with the number of candidates accounted for (Bonferroni)
     tied_with: tuple[str, ...] = ()
     distance: float = math.inf
@@ -106,17 +103,14 @@ class PlacedRanked:
         """Whether its coefficient, of so many that are asked for, moves as that of a true term would not."""
         return ranked.wanders(self.prediction.error, self.gain, self.unsteadiness, self.steadiness, asked)
 
-    def white(self, noise: SensorNoise) -> Floats:
+    def white(self, noise: Noise) -> Floats:
         """Both held-out parts strung together, made white, sensors of one time side by side."""
-        return _white(self.parts, noise)
-
-
-def _white(parts: tuple[Floats, Floats], noise: SensorNoise) -> Floats:
-    return np.concatenate([noise.weighted(part).ravel() for part in parts if len(part)])
+        outputs = self.prediction.prepared.outputs
+        return np.concatenate([outputs.whitened(part, noise) for part in self.parts if len(part)])
 
 
 def rank_placed(
-    candidates: Sequence[PlacedCandidate], fit: StructureFit, before: StructurePrediction, asked: int
+    candidates: Sequence[PlacedCandidate], fit: FreeRunFit, before: StructurePrediction, asked: int
 ) -> list[PlacedRanked]:
     """Candidates by what they leave of samples that they were not fitted to; ``fit`` is that without any of them."""
     if not candidates:
@@ -128,7 +122,7 @@ def rank_placed(
     with ThreadPoolExecutor(cores()) as pool:
         rows = list(pool.map(row, candidates))
     best = min(rows, key=lambda r: float(r.residual @ r.residual))
-    noise = noise_left(best.fit.residual)
+    noise = noise_left(best.fit.residual, len(best.fit.outputs))
     white = {r.name: r.white(noise) for r in rows}
     test = held_out_test(fit, before, noise)
     rows = [replace(r, p_value=min(1.0, asked * test.p_value(r.parts, bool(r.term.parameters)))) for r in rows]
@@ -144,7 +138,8 @@ class HeldOutTest:
     of residual and gain on each part (Frisch and Waugh, 1933).
     """
 
-    noise: SensorNoise
+    outputs: Outputs
+    noise: Noise
     own: tuple[Floats, Floats]  # what the model leaves of judging and fitting part, white
     bases: tuple[Floats, Floats]  # orthonormal bases of what its own coefficients and initial state could change there
     anew: bool = False  # stretches of a decay: what a change explains lies in the loud ones
@@ -158,64 +153,59 @@ class HeldOutTest:
         before, after = list[Floats](), list[Floats]()
         for own, basis, part in zip(self.own[:used], self.bases, parts, strict=False):
             if len(own) and len(part):
-                change = own - self.noise.weighted(part).ravel()
+                change = own - self.outputs.whitened(part, self.noise)
                 left, moved = (x - basis @ (basis.T @ x) for x in (own, change))
                 before.append(left)
                 after.append(left - moved)
         return statistics.gain(np.concatenate(before), np.concatenate(after), evenly=self.anew).p_value
 
 
-def held_out_test(fit: StructureFit, before: StructurePrediction, noise: SensorNoise) -> HeldOutTest:
+def held_out_test(fit: FreeRunFit, before: StructurePrediction, noise: Noise) -> HeldOutTest:
     """The test of whatever a fitted structure lacks, in noise as the best candidate leaves it."""
-    jacobian = linearise_structure(fit, before.prepared)
+    jacobian, outputs = linearise(fit, before.prepared), before.prepared.outputs
     parts = held_out_parts(fit, before, jacobian, before.prepared.plan.fit)
     try:
         columns = [before.derivatives(fit), jacobian] if not before.diverged else []
     except DivergenceError:
         columns = []
-    bases = [orthonormal(noise.weighted(x)) for x in columns] or [np.zeros((part.size, 0)) for part in parts]
-    white = [noise.weighted(part).ravel() if len(part) else np.zeros(0) for part in parts]
-    return HeldOutTest(noise, (white[0], white[1]), (bases[0], bases[1]), bool(before.prepared.record.stretches))
+    bases = [orthonormal(outputs.whitened(x, noise)) for x in columns] or [np.zeros((len(p), 0)) for p in parts]
+    white = [outputs.whitened(part, noise) if len(part) else part for part in parts]
+    stretched = bool(before.prepared.record.stretches)
+    return HeldOutTest(outputs, noise, (white[0], white[1]), (bases[0], bases[1]), stretched)
 
 
 def orthonormal(columns: Floats) -> Floats:
-    """An orthonormal basis of derivatives (samples, sensors, keys), shape (samples sensors, keys)."""
-    flat = columns.reshape(-1, columns.shape[2])
-    length = np.linalg.norm(flat, axis=0)
-    return np.linalg.qr(flat / np.where(length > 0.0, length, 1.0))[0]
+    """An orthonormal basis of stacked derivatives, the same shape."""
+    length = np.linalg.norm(columns, axis=0)
+    return np.linalg.qr(columns / np.where(length > 0.0, length, 1.0))[0]
 
 
 def held_out_parts(
-    fit: StructureFit, prediction: StructurePrediction, jacobian: Floats, fitted: tuple[int, int]
+    fit: FreeRunFit, prediction: StructurePrediction, jacobian: Floats, fitted: tuple[int, int]
 ) -> tuple[Floats, Floats]:
-    """Residual of the judging part by the fitting part's coefficients, and the other way round (``diagnose.held_out``).
+    """Stacked residual of the judging part by the fitting part's coefficients, and the other way round.
 
-    The other way takes one step of Gauss and Newton by the judging part's derivatives; it is empty where that cannot
-    be, or the fit is of another part than ``fitted``, as that of a search is.
+    The other way (``diagnose.held_out``) takes one step of Gauss and Newton by the judging part's derivatives; it is
+    empty where that cannot be, or the fit is of another part than ``fitted``, as that of a search is.
     """
-    nothing = np.empty((0, prediction.residual.shape[1]))
+    judged, nothing = prediction.prepared.outputs.stacked(prediction.residual), np.zeros(0)
     if prediction.diverged or not fit.keys or fit.span != fitted:
-        return prediction.residual, nothing
-    scale, own = prediction.prepared.scale, len(fit.keys)
+        return judged, nothing
     try:
-        there = prediction.derivatives(fit) / scale[:, None]
+        there = prediction.derivatives(fit)
     except DivergenceError:
-        return prediction.residual, nothing
-    step = least_squares(there.reshape(-1, there.shape[2]), (prediction.residual / scale).ravel())[:own]
-    other = (fit.residual - jacobian[:, :, :own] @ step) / scale
-    begin = (jacobian[:, :, own:] / scale[:, None]).reshape(other.size, -1)
-    left = other.ravel() - begin @ least_squares(begin, other.ravel())
-    return prediction.residual, left.reshape(other.shape) * scale
+        return judged, nothing
+    own = len(fit.keys)
+    other = fit.residual - jacobian[:, :own] @ least_squares(there, judged)[:own]
+    return judged, other - jacobian[:, own:] @ least_squares(jacobian[:, own:], other)
 
 
 def _examined(candidate: PlacedCandidate, before: StructurePrediction) -> PlacedRanked:
     fit, prepared = candidate.fit, candidate.prediction.prepared
-    jacobian = linearise_structure(fit, prepared)
-    covariance = structure_covariance(fit, prepared, jacobian)
+    jacobian = linearise(fit, prepared)
+    covariance = uncertainty(fit, prepared, jacobian)
     coefficient, error, parameters, errors = ranked.amount(candidate.entry, fit.keys, fit.values, covariance)
-    flatness, steadiness = _curves(
-        fit, candidate.entry, prepared.dt, jacobian / prepared.scale[:, None], prepared.scale
-    )
+    flatness, steadiness = _curves(fit, candidate.entry, prepared.dt, jacobian)
     size = before.size
     return PlacedRanked(
         candidate.entry, fit, candidate.prediction,
@@ -226,7 +216,7 @@ def _examined(candidate: PlacedCandidate, before: StructurePrediction) -> Placed
 
 
 def _curves(
-    fit: StructureFit, entry: ModelTerm, dt: float, jacobian: Floats, scale: Floats
+    fit: FreeRunFit, entry: ModelTerm, dt: float, jacobian: Floats
 ) -> tuple[CoefficientCurve | None, CoefficientCurve | None]:
     """The coefficient along frequency and along amplitude (``diagnose.constancy``); sensors one after the other."""
     columns = [fit.keys.index(s) for s in entry.symbols]
@@ -234,9 +224,10 @@ def _curves(
     size = float(np.linalg.norm(direction))
     if size == 0.0:
         return None, None
-    samples, sensors, _ = jacobian.shape
-    rows = jacobian.transpose(1, 0, 2).reshape(samples * sensors, -1)
-    residual = (fit.residual / scale).T.ravel()
+    sensors = len(fit.outputs)
+    samples = len(jacobian) // sensors
+    rows = jacobian.reshape(samples, sensors, -1).transpose(1, 0, 2).reshape(samples * sensors, -1)
+    residual = fit.residual.reshape(samples, sensors).T.ravel()
     own = rows[:, columns] @ (direction / size)
     length = np.linalg.norm(rows, axis=0)
     others = np.delete(rows / np.where(length > 0.0, length, 1.0), columns, axis=1)

@@ -20,6 +20,8 @@ from study.equations.model import Model, ModelTerm
 from study.equations.place import Place
 from study.equations.term import Term
 from study.identify.frequency_domain.inputs import input_history
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.part_fit import fit_part, linearise
 from study.identify.time_domain.shape_search import MODULATION, values_to_try
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record, Sensor
@@ -27,7 +29,6 @@ from study.structure.missing_forces import corrected_motion, placed_inputs, rela
 from study.structure.placed_lines import placed_modulation_lines, placed_residual_lines
 from study.structure.places import transfer
 from study.structure.stretch_transforms import StretchTransforms, stretch_transforms
-from study.structure.structure_fit import StructureFit, fit_structure, flat, linearise_structure
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
@@ -44,7 +45,7 @@ class PlacedBaseline:
 
     Attributes
     ----------
-    fit : StructureFit
+    fit : FreeRunFit
         The fit.
     prepared : Prepared
         The record, with as much to fit as a search uses.
@@ -65,7 +66,7 @@ class PlacedBaseline:
         The same less what the model's own coefficients could do.
     """
 
-    fit: StructureFit
+    fit: FreeRunFit
     prepared: Prepared
     motion: Floats
     paths: Complexes
@@ -78,7 +79,7 @@ class PlacedBaseline:
     def passed(self, place: Place, forces: Sequence[Complexes]) -> Floats:
         """What forces at a place, given by their lines, add to the sensors, shape (n s, forces)."""
         e = np.array(place.direction(self.fit.model.coordinates))
-        return flat(self.fit, self.transforms.passed(-(self.paths @ e), forces))
+        return weighted_as(self.fit, self.transforms.passed(-(self.paths @ e), forces))
 
     def added(self, place: Place, forces: Sequence[Complexes]) -> Floats:
         """The same less what the model's own coefficients could do."""
@@ -92,7 +93,7 @@ class PlacedBaseline:
     @property
     def by_sensor(self) -> Floats:
         """What is left, shape (n, s)."""
-        return self.residual.reshape(len(self.fit.residual), -1)
+        return self.residual.reshape(self.fit.samples, -1)
 
     def modulation(self, u: Floats, place: Place) -> Floats:
         """:func:`placed_modulation_lines` of a place with the relative displacement u."""
@@ -100,7 +101,7 @@ class PlacedBaseline:
         if len(self.transforms.runs) > 1:
             linear = matrices(fit.model, fit.model.numbers())
             paths = transfer(linear, self.prepared.sensors, fit.model.coordinates, self.prepared.dt, len(u))
-        return placed_modulation_lines(u, (paths @ e) / fit.noise.deviation, self.by_sensor)
+        return placed_modulation_lines(u, (paths @ e) * np.array(fit.outputs.weights), self.by_sensor)
 
     def dated(self, record: Record) -> Record:
         """A relative motion with the time at which it was."""
@@ -123,18 +124,18 @@ class PlacedStart:
     share: float
 
 
-def placed_baseline(fit: StructureFit, prepared: Prepared) -> PlacedBaseline:
+def placed_baseline(fit: FreeRunFit, prepared: Prepared) -> PlacedBaseline:
     """Prepare a fitted structure for the search."""
     model = fit.model
     wanted = tuple(Sensor(c, m) for m in MOTIONS for c in model.coordinates)
-    run = prepare(model, prepared.record, sensors=wanted, steps_per_sample=fit.steps, span=fit.span)
+    run = prepare(model, prepared.record, sensors=wanted, steps_per_sample=fit.steps_per_sample, span=fit.span)
     free = run.respond({}, fit.initial)[0]
-    motion = corrected_motion(free, fit.residual, prepared, model.coordinates, fit.span)
+    motion = corrected_motion(free, fit.misfit, prepared, model.coordinates, fit.span)
     own = stretch_transforms(prepared.record.runs(fit.span))  # of one stretch every other line is one of the record
     paths = transfer(matrices(model, model.numbers()), prepared.sensors, model.coordinates, prepared.dt, own.size)
-    left = flat(fit, fit.residual)
+    left = fit.whitened(fit.residual)
     bare = PlacedBaseline(fit, prepared, motion, paths, own, free, free, left, left)
-    columns = flat(fit, linearise_structure(fit, prepared))  # right for the initial state and for shape parameters
+    columns = fit.whitened(linearise(fit, prepared))  # right for the initial state and for shape parameters
     for i, column in _own_columns(bare).items():
         columns[:, i] = column
     scale = np.linalg.norm(columns, axis=0)
@@ -142,6 +143,11 @@ def placed_baseline(fit: StructureFit, prepared: Prepared) -> PlacedBaseline:
     violated = left - _drifted(bare, free)
     residual = violated - basis @ (basis.T @ violated)
     return replace(bare, columns=columns, basis=basis, violated=violated, residual=residual)
+
+
+def weighted_as(fit: FreeRunFit, values: Floats) -> Floats:
+    """Values at the sensors, shape (n, s, ...), stacked and weighted as the residual of a fit was."""
+    return fit.whitened(fit.outputs.stacked(values))
 
 
 def _own_columns(base: PlacedBaseline) -> dict[int, Floats]:
@@ -152,7 +158,8 @@ def _own_columns(base: PlacedBaseline) -> dict[int, Floats]:
     for key in orders:
         if key in fit.keys:
             force = base.lines(base.motion[orders[key]] @ own[key])
-            found[fit.keys.index(key)] = flat(fit, base.transforms.back(-np.einsum("fsc,kfc->kfs", base.paths, force)))
+            motion = base.transforms.back(-np.einsum("fsc,kfc->kfs", base.paths, force))
+            found[fit.keys.index(key)] = weighted_as(fit, motion)
     for entry in model.terms:
         if not set(entry.symbols) & set(fit.keys) or entry.symbols[0] in orders:
             continue
@@ -238,9 +245,9 @@ def _grid(
 
 
 def with_placed_term(
-    fit: StructureFit, entry: ModelTerm, prepared: Prepared, base: PlacedBaseline | None = None,
+    fit: FreeRunFit, entry: ModelTerm, prepared: Prepared, base: PlacedBaseline | None = None,
     points: Sequence[PlacedStart] | None = None,
-) -> StructureFit:  # fmt: skip
+) -> FreeRunFit:  # fmt: skip
     """The fitted structure with one term more at its place, the best of fits from several starts.
 
     Raises
@@ -254,7 +261,7 @@ def with_placed_term(
     grown = fit.model.with_term(entry)
     shapes = tuple(key for key in entry.keys[len(entry.symbols) :] if key not in given)
     held = (*fit.held, *given)
-    fits: list[StructureFit] = []
+    fits: list[FreeRunFit] = []
     for point in tried:
         own = dict(zip(entry.keys, (*point.coefficients, *point.parameters), strict=True)) | given
         begun = [own | _moved(base, entry, point) | given]
@@ -281,11 +288,23 @@ def _moved(base: PlacedBaseline, entry: ModelTerm, point: PlacedStart) -> dict[s
     return dict(zip(base.fit.keys, (base.fit.values + step[: len(base.fit.keys)]).tolist(), strict=True))
 
 
-def _tried(model: Model, prepared: Prepared, held: Sequence[str], near: StructureFit, runs: int) -> StructureFit | None:
+def grown_states(fit: FreeRunFit, model: Model) -> Floats:
+    """The states with which the stretches of a fit begin, for a model with other terms; those of new terms are zero."""
+    motions, given = 2 * len(model.coordinates), np.atleast_2d(fit.initial)
+    states = np.zeros((len(given), motions + len(model.states)))
+    own = {t.name: motions + i for i, t in enumerate(fit.model.states)}
+    states[:, :motions] = given[:, :motions]
+    for i, entry in enumerate(model.states):
+        if entry.name in own:
+            states[:, motions + i] = given[:, own[entry.name]]
+    return states
+
+
+def _tried(model: Model, prepared: Prepared, held: Sequence[str], near: FreeRunFit, runs: int) -> FreeRunFit | None:
     try:
-        return fit_structure(
-            model, prepared, held, steps=near.steps, initial=near.initial, max_iterations=runs, offset=NEAR,
-            noise=near.noise,
+        return fit_part(
+            model, prepared, held, steps=near.steps_per_sample, initial=grown_states(near, model), max_iterations=runs,
+            offset=NEAR, noise=near.noise,
         )  # fmt: skip
     except StudyError:
         return None

@@ -10,12 +10,14 @@ import numpy as np
 from study.equations import model_file
 from study.equations.model import Model, ModelTerm
 from study.equations.place import HERE, Place, place_in_words
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.part_fit import linearise, uncertainty
+from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import Prepared
 from study.records.record import Record
 from study.structure.missing_forces import MissingForces, missing_forces
 from study.structure.modes import Modes, modes_of, modes_table
 from study.structure.placed_units import coefficient_unit, parameter_units
-from study.structure.structure_fit import StructureFit, linearise_structure, settled_structure, structure_covariance
 from study.structure.structure_leftover import FamilyGain, explained_by_place, family_gains
 from study.structure.structure_prediction import StructurePrediction, predict_structure
 from study.structure.structure_start import first_fit
@@ -47,7 +49,7 @@ class StructureComparison:
 
     model: Model  # as it was given
     prepared: Prepared
-    fit: StructureFit
+    fit: FreeRunFit
     covariance: Floats  # of the estimates; shape (keys, keys)
     coefficients: tuple[PlacedCoefficient, ...]
     prediction: StructurePrediction
@@ -64,7 +66,7 @@ class StructureComparison:
 def compare_structure(
     model: Model,
     prepared: Prepared,
-    fit: StructureFit | None = None,
+    fit: FreeRunFit | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> StructureComparison:
     """Fit what a structure leaves open to one part of a record and judge it on the other.
@@ -81,9 +83,8 @@ def compare_structure(
     expect(not model.measured, f"{sentence}; 'study compare', 'diagnose', 'add' and 'drop' take this one")
     report("fit")
     if fit is None:
-        fit = settled_structure(first_fit(model, prepared), prepared)
-    jacobian = linearise_structure(fit, prepared)
-    covariance = structure_covariance(fit, prepared, jacobian)[: len(fit.keys), : len(fit.keys)]
+        fit = finished(first_fit(model, prepared), prepared)
+    covariance = uncertainty(fit, prepared, linearise(fit, prepared))[: len(fit.keys), : len(fit.keys)]
     report("free run")
     prediction = predict_structure(fit, prepared)
     report("where it fails")
@@ -99,7 +100,7 @@ def compare_structure(
     )  # fmt: skip
 
 
-def _coefficients(fit: StructureFit, covariance: Floats, record: Record) -> tuple[PlacedCoefficient, ...]:
+def _coefficients(fit: FreeRunFit, covariance: Floats, record: Record) -> tuple[PlacedCoefficient, ...]:
     errors = dict(zip(fit.keys, np.sqrt(np.diag(covariance)).tolist(), strict=True))
     return tuple(
         PlacedCoefficient(key, entry.term.name, entry.place, float(value), errors.get(key), unit)

@@ -58,20 +58,20 @@ def family_gains(prediction: StructurePrediction) -> list[FamilyGain]:
     wanted = tuple(Sensor(c, m) for m in MOTIONS[:2] for c in model.coordinates)
     try:
         free = prediction.motion(wanted, (begin, end))
-        own = _derivatives(prediction, begin, end) / prepared.scale[:, None]
+        own = _derivatives(prediction, begin, end)
         predicted = prediction.motion(prepared.sensors, (begin, end))
     except DivergenceError:
         return []
-    residual = ((prepared.measured[begin:end] - predicted) / prepared.scale).ravel()
-    own = own.reshape(len(residual), -1)
+    residual = prepared.outputs.stacked(prepared.measured[begin:end] - predicted)
     own_runs = stretch_transforms(prepared.record.runs((begin, end)))
     transforms = replace(own_runs, size=next_fast_len(own_runs.size, real=True))
     linear = matrices(model, model.numbers())
     paths = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, transforms.size)
-    paths = paths / prepared.scale[:, None]
+    weights = np.array(prepared.outputs.weights)
+    paths = paths * weights[:, None]
     cut, n = split * len(prepared.sensors), len(model.coordinates)
     early = residual[:cut].reshape(split, -1)
-    short = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, split) / prepared.scale[:, None]
+    short = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, split) * weights[:, None]
     steady = placed_residual_lines(early)
     found: list[FamilyGain] = []
     for place in connections(model):
@@ -92,17 +92,19 @@ def _from_the_fit(prediction: StructurePrediction) -> StructurePrediction:
     meets = fit.span == (prepared.plan.fit[0], prepared.plan.judge[0])
     if not prepared.record.stretches or prediction.diverged or not meets:
         return prediction
-    return replace(prediction, first=fit.first, initial=np.concatenate([fit.initial, prediction.initial]))
+    states = np.concatenate([np.atleast_2d(fit.initial), np.atleast_2d(prediction.initial)])
+    return replace(prediction, first=fit.first, initial=states)
 
 
 def _derivatives(prediction: StructurePrediction, begin: int, end: int) -> Floats:
     fit = prediction.fit
     run = prepare(
         fit.model, prediction.prepared.record, fit.keys, sensors=prediction.prepared.sensors,
-        steps_per_sample=fit.steps, span=(prediction.first, end),
+        steps_per_sample=fit.steps_per_sample, span=(prediction.first, end),
     )  # fmt: skip
     values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
-    return run.respond(values, prediction.initial, run.states)[1][begin - prediction.first :]
+    slopes = run.respond(values, prediction.initial, run.moving)[1][begin - prediction.first :]
+    return prediction.prepared.outputs.stacked(slopes)
 
 
 def _families(u: Floats, v: Floats) -> Iterator[tuple[str, list[Floats]]]:

@@ -1,16 +1,17 @@
 """The free run of a fitted structure along the part that was not fitted: its error by sensor, and the noise floors."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from study.compare.noise import SIGNIFICANT
 from study.equations.free_run import prepare
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.part_fit import JudgingRun, judging_run
 from study.records import noise_floor
 from study.records.prepared import Prepared
 from study.records.record import Sensor
-from study.structure.structure_fit import StructureFit, fit_structure
 from study.support.arrays import Floats
 from study.support.errors import DivergenceError
 
@@ -19,7 +20,7 @@ from study.support.errors import DivergenceError
 class StructurePrediction:
     """Measured and predicted motions on the judging part; n samples, s sensors."""
 
-    fit: StructureFit
+    fit: FreeRunFit
     prepared: Prepared
     first: int  # sample of the record at which the run begins
     initial: Floats  # state there
@@ -79,46 +80,29 @@ class StructurePrediction:
         """Motions of the free run on the judging part, or another that it covers, shape (samples, sensors)."""
         begin, end = span or self.prepared.plan.judge
         run = prepare(
-            self.fit.model, self.prepared.record, sensors=sensors, steps_per_sample=self.fit.steps,
+            self.fit.model, self.prepared.record, sensors=sensors, steps_per_sample=self.fit.steps_per_sample,
             span=(self.first, end),
         )  # fmt: skip
         return run.respond({}, self.initial)[0][begin - self.first :]
 
-    def derivatives(self, fit: StructureFit) -> Floats:
-        """Of the motions on the judging part by the keys of a fit with the same motion and the initial state."""
-        run = prepare(
-            fit.model, self.prepared.record, fit.keys, sensors=self.prepared.sensors, steps_per_sample=fit.steps,
-            span=(self.first, self.prepared.plan.judge[1]),
-        )  # fmt: skip
-        values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
-        return run.respond(values, self.initial, run.states)[1][self.prepared.plan.judge[0] - self.first :]
+    def derivatives(self, fit: FreeRunFit) -> Floats:
+        """Stacked derivatives on the judging part by the keys of a fit with the same motion, then by the states."""
+        return JudgingRun(fit, self.prepared, self.first, self.initial).derivatives(fit)
 
 
-def predict_structure(fit: StructureFit, prepared: Prepared) -> StructurePrediction:
+def predict_structure(fit: FreeRunFit, prepared: Prepared) -> StructurePrediction:
     """Run a fitted structure along the judging part.
 
     Where that follows the fitting part the run goes on through both; elsewhere its initial state, and nothing else, is
     estimated from the judging part.
     """
-    judged = prepared.measured[slice(*prepared.plan.judge)]
     try:
-        first, initial = fit.first, fit.initial
-        if prepared.record.stretches or prepared.plan.judge[0] != fit.span[1]:
-            swapped = replace(prepared, plan=replace(prepared.plan, fit=prepared.plan.judge, judge=prepared.plan.fit))
-            first = prepared.plan.judge[0]
-            initial = fit_structure(fit.model, swapped, tuple(fit.model.values), steps=fit.steps).initial
-        runs = [
-            prepare(
-                fit.model, prepared.record, sensors=prepared.sensors, steps_per_sample=n * fit.steps,
-                span=(first, prepared.plan.judge[1]),
-            ).respond({}, initial)[0][prepared.plan.judge[0] - first :]
-            for n in (1, 2)
-        ]  # fmt: skip
+        run = judging_run(fit, prepared)
+        predicted, finer = (run.motions(finer=n) for n in (1, 2))
     except DivergenceError:
-        flat = np.broadcast_to(np.mean(judged, axis=0), judged.shape).copy()
-        return StructurePrediction(
-            fit, prepared, fit.first, fit.initial, flat, np.zeros(len(prepared.sensors)), diverged=True
-        )
-    change = np.asarray(runs[1] - runs[0], dtype=np.float64)
-    moved = np.asarray(np.sqrt(np.mean(change**2, axis=0)), dtype=np.float64)
-    return StructurePrediction(fit, prepared, first, initial, runs[0], moved)
+        judged = prepared.measured[slice(*prepared.plan.judge)]
+        still = np.broadcast_to(np.mean(judged, axis=0), judged.shape).copy()
+        none = np.zeros(judged.shape[1])
+        return StructurePrediction(fit, prepared, fit.first, fit.initial, still, none, diverged=True)
+    moved = np.sqrt(np.mean(np.subtract(finer, predicted) ** 2, axis=0))
+    return StructurePrediction(fit, prepared, run.first, run.initial, predicted, np.asarray(moved, dtype=np.float64))

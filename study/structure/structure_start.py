@@ -8,10 +8,13 @@ import numpy as np
 
 from study.equations.mass_matrix import linear_keys, loose_motions
 from study.equations.model import Model
+from study.identify.time_domain.fit_model import rough_steps
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.part_fit import fit_part
+from study.identify.time_domain.shooting import own_begins
 from study.records.prepared import Prepared
 from study.structure.free_decay import free_decay_start
 from study.structure.linear_start import structure_linear_start
-from study.structure.structure_fit import StructureFit, fit_structure
 from study.support.errors import DivergenceError, expect
 
 
@@ -22,7 +25,7 @@ def known_linear(model: Model, prepared: Prepared) -> dict[str, float]:
     return {key: held[key] for key in linear_keys(model) if key in held} | start(model, prepared, held)
 
 
-def first_fit(model: Model, prepared: Prepared) -> StructureFit:
+def first_fit(model: Model, prepared: Prepared) -> FreeRunFit:
     """Fit all that a structure leaves open; what it gives is held.
 
     Terms with an open shape parameter are searched for one after the other beside the others.
@@ -41,23 +44,37 @@ def first_fit(model: Model, prepared: Prepared) -> StructureFit:
         fit = with_placed_term(fit, entry, prepared)
     order = [t.name for t in model.terms]
     terms = tuple(sorted(fit.model.terms, key=lambda t: order.index(t.name)))
-    return fit if not unknown else fit_structure(replace(fit.model, terms=terms), prepared, fit.held, steps=fit.steps)
+    again = replace(fit.model, terms=terms)
+    return fit if not unknown else fit_part(again, prepared, fit.held, steps=fit.steps_per_sample)
 
 
-def _fitted(model: Model, prepared: Prepared, linear: Mapping[str, float]) -> StructureFit:
+def _fitted(model: Model, prepared: Prepared, linear: Mapping[str, float]) -> FreeRunFit:
     """From the linear terms alone, and where that diverges or stays far from the motion, with half of them."""
     open_keys = [key for key, value in model.values.items() if value is None]
     start = dict.fromkeys(open_keys, 0.0) | {key: linear[key] for key in open_keys if key in linear}
-    fits: list[StructureFit] = []
+    fits: list[FreeRunFit] = []
     with suppress(DivergenceError):
-        fits.append(fit_structure(model, prepared, model.held_keys, start))
-    if not fits or (not fits[0].converged and fits[0].cost > 0.5):
+        fits.append(_begun(model, prepared, start))
+    if not fits or (not fits[0].converged and 2.0 * fits[0].rms ** 2 > prepared.spread**2):
         calm = {key: 4.0 * abs(v) if key.startswith("c[") else v for key, v in start.items()}
         try:
-            fits.append(fit_structure(model, prepared, model.held_keys, calm))
+            fits.append(_begun(model, prepared, calm))
         except DivergenceError:
             expect(fits, _endless(model, prepared))
-    return min(fits, key=lambda fit: float(np.mean((fit.residual / prepared.scale) ** 2)))
+    return min(fits, key=lambda fit: fit.rms)
+
+
+def _begun(model: Model, prepared: Prepared, start: Mapping[str, float]) -> FreeRunFit:
+    """A fit from one start; of a decay from rest where its own states let the motion escape from springs far wrong."""
+    steps = rough_steps(model, prepared, start)
+    try:
+        return fit_part(model, prepared, model.held_keys, start, steps=steps)
+    except DivergenceError:
+        if not prepared.record.stretches:
+            raise
+        states = 2 * len(model.coordinates) + len(model.states)
+        rest = np.zeros((1 + len(own_begins(prepared.record, prepared.plan.fit)), states))
+        return fit_part(model, prepared, model.held_keys, start, steps=steps, initial=rest)
 
 
 def _endless(model: Model, prepared: Prepared) -> str:

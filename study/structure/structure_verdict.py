@@ -10,6 +10,8 @@ from study.diagnose.credibility import credible
 from study.diagnose.verdict import MISSING, MOST, NOTHING, UNKNOWN
 from study.equations.model import ModelTerm
 from study.equations.term import Term
+from study.identify.time_domain.part_fit import fit_part, linearise, uncertainty
+from study.identify.time_domain.weighted_fit import finished
 from study.structure.modes import Modes, modes_of
 from study.structure.placed_candidates import (
     candidate_entries,
@@ -23,14 +25,6 @@ from study.structure.placed_candidates import (
 from study.structure.placed_ranking import PlacedRanked, rank_placed
 from study.structure.placed_search import PlacedBaseline, placed_baseline, with_placed_term
 from study.structure.structure_comparison import StructureComparison, compare_structure
-from study.structure.structure_fit import (
-    fit_structure,
-    linearise_structure,
-    same_states,
-    settled_structure,
-    sized,
-    structure_covariance,
-)
 from study.structure.structure_leftover import FamilyGain, family_gains
 from study.structure.structure_prediction import StructurePrediction
 from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE
@@ -56,7 +50,7 @@ class StructureDiagnosis:
         if self.verdict != MISSING:
             return None
         fit, prepared = self.candidates[0].fit, self.comparison.prepared
-        covariance = structure_covariance(fit, prepared, linearise_structure(fit, prepared))
+        covariance = uncertainty(fit, prepared, linearise(fit, prepared))
         return modes_of(fit.model, fit.keys, covariance[: len(fit.keys), : len(fit.keys)])
 
 
@@ -89,9 +83,9 @@ def placed_search_base(comparison: StructureComparison) -> PlacedBaseline:
     loud_and_quiet = bool(prepared.record.stretches)
     wanted = LONG if loud_and_quiet else int(np.clip((last - first) // 2, SHORT, LONG))
     look = prepared.shortened(wanted)
-    again = fit_structure(
-        fit.model, look, fit.held, steps=fit.steps, initial=same_states(fit, look), noise=sized(prepared.scale)
-    )
+    begins = fit.span == look.plan.fit if look.record.stretches else fit.first == look.plan.fit[0]
+    initial = np.atleast_2d(fit.initial) if begins else None
+    again = fit_part(fit.model, look, fit.held, steps=fit.steps_per_sample, initial=initial)
     return placed_baseline(again, look)
 
 
@@ -106,7 +100,7 @@ def added_term(comparison: StructureComparison, entry: ModelTerm) -> StructureCo
     base = placed_search_base(comparison)
     fit = with_placed_term(base.fit, entry, base.prepared, base)
     model = comparison.model.with_term(entry)
-    return compare_structure(model, comparison.prepared, settled_structure(fit, comparison.prepared))
+    return compare_structure(model, comparison.prepared, finished(fit, comparison.prepared))
 
 
 def _decide(rows: list[PlacedRanked], comparison: StructureComparison, asked: int) -> StructureDiagnosis:

@@ -126,7 +126,8 @@ def clustered_covariance(jacobian: Floats, residual: Floats, others: int = 0) ->
 
     The sandwich ``H^-1 (sum over blocks g_b g_b^T) H^-1`` with ``g_b = J_b^T e_b`` and ``H = J^T J``
     (Liang and Zeger, 1986), never below the formula for white noise. ``others`` is how many unknowns the columns of the
-    Jacobian are beside.
+    Jacobian are beside. Blocks tell the variances of any number of estimates; of more than a quarter as many as there
+    are blocks they do not tell the correlations, which are those of white noise then.
     """
     scale = length_or_one(jacobian)
     j = jacobian / scale
@@ -141,6 +142,11 @@ def clustered_covariance(jacobian: Floats, residual: Floats, others: int = 0) ->
     variance = np.diag(sandwich)
     white = np.diag(inverse) * float(residual @ residual) / max(len(residual) - len(scale) - others, 1)
     larger = np.sqrt(np.maximum(variance, white) / np.maximum(variance, np.finfo(float).tiny))
-    covariance = sandwich * np.outer(larger, larger)
+    if 4 * len(scale) > count:
+        size = np.sqrt(np.maximum(np.diag(inverse), np.finfo(float).tiny))
+        own = np.sqrt(np.maximum(variance, white))
+        covariance = inverse / np.outer(size, size) * np.outer(own, own)
+    else:
+        covariance = sandwich * np.outer(larger, larger)
     np.fill_diagonal(covariance, np.maximum(variance, white))  # one that a single sample decides has no scatter at all
     return covariance / np.outer(scale, scale)

@@ -14,11 +14,12 @@ from study.diagnose.verdict import MISSING, Diagnosis
 from study.equations.model import Model
 from study.faults.fault import Fault
 from study.faults.kinds_of_tests import accounted_test
+from study.identify.time_domain.fit_model import rough_steps
 from study.identify.time_domain.part_fit import fit_part
+from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import Prepared
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import StructureComparison, compare_structure
-from study.structure.structure_fit import fit_structure, settled_structure
 from study.structure.structure_verdict import StructureDiagnosis, diagnose_structure
 from study.support.errors import StudyError
 from study.trials.draw import Trial
@@ -84,8 +85,9 @@ def intervals(comparison: Comparison | StructureComparison, truth: Model) -> Row
 def true_comparison(trial: Trial, diagnosis: StructureDiagnosis) -> StructureComparison:
     """The true model of a structure, fitted from its true values."""
     prepared = diagnosis.comparison.prepared
-    fit = fit_structure(trial.completed, prepared, (), trial.truth.numbers())
-    return compare_structure(trial.completed, prepared, settled_structure(fit, prepared))
+    model, start = trial.completed, trial.truth.numbers()
+    fit = fit_part(model, prepared, (), start, steps=rough_steps(model, prepared, start))
+    return compare_structure(model, prepared, finished(fit, prepared))
 
 
 def error_of_truth(trial: Trial, prepared: Prepared, steps: int) -> float:

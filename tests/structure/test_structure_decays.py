@@ -9,11 +9,11 @@ import pytest
 from study.diagnose.verdict import MISSING, NOTHING
 from study.equations.free_run import prepare
 from study.equations.model_file import parse_model
+from study.identify.time_domain.part_fit import linearise, run_of
 from study.records.record import Sensor, record_of
 from study.records.record_layout import Layout
 from study.structure.prepared_structure import prepare_structure, structure_ready
 from study.structure.structure_comparison import compare_structure
-from study.structure.structure_fit import linearise_structure
 from study.structure.structure_verdict import diagnose_structure
 from study.support.errors import StudyError
 
@@ -74,13 +74,13 @@ def test_a_decay_is_fitted_and_judged_in_turn_and_its_motion_begins_anew():
 def test_derivatives_by_the_states_of_each_stretch_are_those_of_the_motion():
     prepared = structure_ready(decay(HARD), model(more=HARD), Layout())
     fit = compare_structure(model(more=HARD), prepared).fit
-    jacobian = linearise_structure(fit, prepared)
-    states = len(fit.initial) // 4
-    assert states == len(prepared.record.runs(prepared.plan.fit))
-    run = prepare(fit.model, prepared.record, sensors=prepared.sensors, steps_per_sample=fit.steps, span=fit.span)
-    for state in (0, 5, len(fit.initial) - 1):
-        moved = np.zeros(len(fit.initial))
+    jacobian = fit.outputs.apart(linearise(fit, prepared))
+    assert fit.initial.shape == (len(prepared.record.runs(prepared.plan.fit)), 4)
+    run = run_of(fit, prepared)
+    for state in (0, 5, fit.initial.size - 1):
+        moved = np.zeros(fit.initial.size)
         moved[state] = 1e-6
+        moved = moved.reshape(fit.initial.shape)
         change = (run.respond({}, fit.initial + moved)[0] - run.respond({}, fit.initial - moved)[0]) / 2e-6
         column = jacobian[:, :, len(fit.keys) + state]
         assert np.allclose(change, column, atol=1e-5 * np.max(np.abs(column)))

@@ -72,7 +72,7 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
     _check_own_formulas(model, prepared)
     if start is not None:
         return settled(
-            fit_part(model, prepared, model.held_keys, start, steps=_rough(model, prepared, start)), prepared
+            fit_part(model, prepared, model.held_keys, start, steps=rough_steps(model, prepared, start)), prepared
         )
     unknown = tuple(t for t in model.terms if None in t.parameters)
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
@@ -245,7 +245,7 @@ def _unphysical(fit: FreeRunFit) -> bool:
     return any(entry.term.physical(fit.model.values) for entry in fit.model.terms)
 
 
-def _rough(model: Model, prepared: Prepared, start: Values) -> int:
+def rough_steps(model: Model, prepared: Prepared, start: Values) -> int:
     """Steps of a search's runs: those of every search, or more where the model's own rates ask for them."""
     return max(STEPS, needed_steps(model.with_values(start), prepared.record, prepared.outputs))
 
@@ -256,7 +256,7 @@ def _tried(
     """A fit from one start; None where the model has no finite response there."""
     begun = model.with_values(start)
     try:
-        steps = _rough(begun, prepared, start)
+        steps = rough_steps(begun, prepared, start)
         return fit_part(begun, prepared, held, steps=steps, max_iterations=runs, initial=initial, offset=NEAR)
     except StudyError:
         return None

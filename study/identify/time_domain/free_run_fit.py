@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.equations.free_run import FreeRun, prepare
+from study.equations.mass_matrix import is_positive
 from study.equations.model import Model
 from study.identify.frequency_domain.coefficients import Estimate
 from study.records.outputs import DISPLACEMENT, Outputs
@@ -62,6 +63,8 @@ class FreeRunFit:
         What was fitted.
     noise : tuple of arrays, shape (order + 1,)
         Autoregressive coefficients of each sensor's noise, with which the residual was weighted; empty for white noise.
+    undecided : tuple of str
+        Keys that the record does not show, or cannot tell apart.
     elsewhere : tuple of FreeRunFit
         Where the other starts of the search led whose best this is, as far as they were followed (``rivals``).
     """
@@ -80,6 +83,7 @@ class FreeRunFit:
     steps_per_sample: int = 2
     outputs: Outputs = DISPLACEMENT
     noise: tuple[Floats, ...] = ()
+    undecided: tuple[str, ...] = ()
     elsewhere: tuple["FreeRunFit", ...] = ()
 
     @property
@@ -91,6 +95,16 @@ class FreeRunFit:
     def samples(self) -> int:
         """How many samples of the record were fitted."""
         return len(self.residual) // len(self.outputs)
+
+    @property
+    def misfit(self) -> Floats:
+        """Measured minus predicted motion in the units of the sensors, shape (n, s)."""
+        return self.outputs.apart(self.residual)
+
+    @property
+    def cost(self) -> float:
+        """Mean square of the residual, weighted as it was fitted."""
+        return float(np.mean(self.whitened(self.residual) ** 2))
 
     def whitened(self, stacked: Floats) -> Floats:
         """Stacked values weighted as the residual was."""
@@ -197,7 +211,9 @@ def fit_free_run(
     measured = outputs.stacked(outputs.measured(record, (first, first + run.samples)))
     positive = {key: FAR * begin[key] for entry in model.terms for key in entry.positive if key in begin}
     kept = None if lost is None else np.repeat(~lost[first : first + run.samples], len(outputs)).astype(np.float64)
-    problem = _Problem(run, outputs, measured, free, _weights(continuity, measured, states), positive, noise, kept)
+    coupled = any(t.term.name == "inertia" and t.place.kind != "at" and set(t.keys) & set(begin) for t in model.terms)
+    weights = _weights(continuity, measured, states)
+    problem = _Problem(run, model if coupled else None, outputs, measured, free, weights, positive, noise, kept)
     end = problem.search(np.array([*begin.values(), *states.ravel()]), max_iterations, offset)
     return replace(
         _result(model, problem, end), restarts=tuple(restarts), first=first, steps_per_sample=steps_per_sample
@@ -232,6 +248,7 @@ class _Problem:
     """A search over the keys and, segment by segment, the free initial states."""
 
     run: FreeRun
+    coupled: Model | None  # of which no value may leave the mass matrix without a kinetic energy for some motion
     outputs: Outputs
     measured: Floats
     free_states: int
@@ -250,6 +267,8 @@ class _Problem:
         """Residual and Jacobian at x; None where the model has no finite response there."""
         values = dict(zip(self.run.keys, (float(v) for v in x), strict=False))
         if any(not 0.0 < values[key] <= max(limit, 0.0) for key, limit in self.positive.items()):
+            return None
+        if self.coupled is not None and not is_positive(self.coupled, values):
             return None
         states = self.states(x)
         try:
@@ -298,6 +317,7 @@ def _result(model: Model, problem: _Problem, end: End) -> FreeRunFit:
         residual=problem.residual(point.x) if problem.noise else point.residual[: len(problem.measured)],
         outputs=problem.outputs,
         noise=problem.noise,
+        undecided=tuple(unclear),
         converged=end.converged,
         iterations=end.iterations,
         message=message,

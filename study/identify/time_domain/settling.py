@@ -39,9 +39,10 @@ def continued(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
 
 def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit at its minimum with enough steps; in segments where a chaotic system loses the motion in one run."""
-    return replace(
-        from_the_motion(_settled(with_enough_steps(fit, prepared), prepared), prepared), elsewhere=fit.elsewhere
-    )
+    fine = with_enough_steps(fit, prepared)
+    if fit.model.named:  # segments begin from what is known of a single coordinate
+        return fine
+    return replace(from_the_motion(_settled(fine, prepared), prepared), elsewhere=fit.elsewhere)
 
 
 def _settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:

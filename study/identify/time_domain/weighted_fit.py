@@ -12,6 +12,7 @@ import numpy as np
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import covariance_of, fit_part, linearise
 from study.identify.time_domain.settling import continued, settled
+from study.records.outputs import Noise
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
 from study.support.autoregression import autoregression, whitened
@@ -30,7 +31,7 @@ def finished(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
 
 def weighted(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit weighted with the autoregressive noise that it leaves, or as it is where that is white or no noise."""
-    noise = noise_left(fit)
+    noise = noise_left(fit.residual, len(fit.outputs))
     if not noise or not fit.keys or fit.restarts:
         return fit
     try:
@@ -44,12 +45,9 @@ def weighted(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     return again if again.converged and _agree(fit, again, prepared) else fit
 
 
-def noise_left(fit: FreeRunFit) -> tuple[Floats, ...]:
-    """The noise that a fit leaves, as coefficients which make it white; none of a single sensor whose noise is white.
-
-    The first coefficients weigh the sensors by their noise.
-    """
-    left = fit.residual.reshape(-1, len(fit.outputs))
+def noise_left(residual: Floats, sensors: int) -> Noise:
+    """The noise that a stacked residual would be; empty if it is white, of a single sensor."""
+    left = residual.reshape(-1, sensors)
     noise = [autoregression(own) for own in left.T]
     if len(noise) == 1:
         return tuple(noise) if len(noise[0]) > 1 else ()
