@@ -35,7 +35,7 @@ def make_plan(record: Record, fit: Span | None = None, judge: Span | None = None
     StudyError
         If a part leaves the record, is too short, overlaps the other or does not move.
     """
-    sensors = compared(record, measured)
+    sensors = compared_sensors(record, measured)
     given = fit is not None or judge is not None
     half = len(record) // 2
     usual = ((0, half), (half, len(record))) if given or len(record) < 2 * FEWEST else _halves(record, sensors)
@@ -52,7 +52,7 @@ def make_plan(record: Record, fit: Span | None = None, judge: Span | None = None
     return Plan(sensors[0].motion, fit, judge)
 
 
-def compared(record: Record, wanted: str | None = None) -> tuple[Sensor, ...]:
+def compared_sensors(record: Record, wanted: str | None = None) -> tuple[Sensor, ...]:
     """One motion of each coordinate that is measured: the one that is wanted, or the first of them.
 
     Or the force, where that is wanted: the motion is prescribed then.

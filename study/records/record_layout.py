@@ -13,7 +13,7 @@ import numpy as np
 
 from study.records.completion import CompletedRecord, complete
 from study.records.driven_by_motion import with_prescribed_motion
-from study.records.plan import FEWEST, Plan, Span, compared, driven_apart, make_plan, shared
+from study.records.plan import FEWEST, Plan, Span, compared_sensors, driven_apart, make_plan, shared
 from study.records.prepared import FORCE, Prepared, prepare_record
 from study.records.record import MOTIONS, Record, Sensor, Stretch
 from study.records.sampling_rate import completed_without_spare
@@ -83,7 +83,7 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
         readied = [with_prescribed_motion(record) for record in records]
         records, notes = [r for r, _ in readied], [note for _, said in readied for note in said]
     wanted = FORCE if kind.prescribed else layout.response
-    sensors = compared(records[0], wanted)
+    sensors = compared_sensors(records[0], wanted)
     free = not kind.prescribed and all(_unforced(r, layout) for r in records)
     several = len(records) > 1 or len(layout.use) > 1
     by_itself = (free or kind.prescribed) and not (layout.explicit or kind.unbroken)

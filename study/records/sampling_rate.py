@@ -32,7 +32,7 @@ LEAST = 512  # samples in either part: what a segment of the spectra takes
 LINES = 8192  # samples in a segment of the spectrum, at most
 PARTS = 4  # segments that a record holds side by side, at least
 EDGE = 8  # samples at each end that the filter takes from what the record is continued by
-COARSE = 2.0 / 3.0  # of the power above half the Nyquist frequency: of white noise half of it is there
+TOO_COARSE = 2.0 / 3.0  # of the power above half the Nyquist frequency: of white noise half of it is there
 PASSED = 2.0 / 3.0  # of the new Nyquist frequency, and its mirror image 4/3: where the filter falls
 
 
@@ -266,7 +266,7 @@ def too_coarse(prepared: Prepared) -> str:
     power /= frequency[inside] ** (2 * MOTIONS.index(prepared.response))
     total, nyquist = np.cumsum(power), 0.5 / prepared.dt
     above = 1.0 - np.interp(0.5 * nyquist, frequency[inside], total) / total[-1]
-    if above <= COARSE:
+    if above <= TOO_COARSE:
         return ""
     middle = float(frequency[inside][np.searchsorted(total, 0.5 * total[-1])])
     return (

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from study.equations.mass_matrix import check_held_masses
 from study.equations.model import Model
-from study.records.plan import Span, compared, make_plan
+from study.records.plan import Span, compared_sensors, make_plan
 from study.records.prepared import Prepared, prepare_record
 from study.records.record import Record
 from study.records.record_layout import KindOfTest, Layout, laid_out
@@ -41,7 +41,7 @@ def structure_ready(record: Record, model: Model, layout: Layout) -> Prepared:
 def _made(prepared: Prepared, record: Record, model: Model) -> Prepared:
     if not model.measured:  # whose masses nobody lumps
         check_held_masses(model)
-    sensors = prepared.sensors or compared(record)
+    sensors = prepared.sensors or compared_sensors(record)
     seen = {sensor.coordinate for sensor in sensors}
     blind = [coordinate for coordinate in model.coordinates if coordinate not in seen]
     _check_tied(model, blind)
