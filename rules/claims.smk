@@ -18,7 +18,7 @@ with one_sentence():
 WITHOUT_NOISE = {key: value for key, value in CLAIM_SETTINGS.items() if key != "noise_seed"}
 CLAIM_RESULTS = [
     f"results/{name}"
-    for name in "excitation_reading.csv integrator_steps.csv integrator_steps.md claims.csv claims.md".split()
+    for name in "excitation_reading.csv integrator_steps.csv claims.csv".split()
 ]
 
 
@@ -55,7 +55,6 @@ rule integrator_steps:
             caption="captions/integrator_steps.rst",
             labels={"table": "Steps of the integrator", "as": "raw CSV"},
         ),
-        page="results/integrator_steps.md",
     params:
         models="models",
         settings=WITHOUT_NOISE,
@@ -79,7 +78,6 @@ rule claims:
             caption="captions/claims.rst",
             labels={"table": "Claims of the report", "as": "raw CSV"},
         ),
-        page="results/claims.md",
     params:
         models="models",
         settings=CLAIM_SETTINGS,

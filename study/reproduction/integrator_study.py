@@ -15,12 +15,10 @@ import pandas as pd
 from study.equations.model import Model
 from study.identify.estimators.base import Settings, true_parameters
 from study.identify.estimators.in_reverse import miso
+from study.reproduction.cases import make_record
 from study.reproduction.ensemble import threaded
-from study.reproduction.make_record import make_record
 from study.reproduction.settings import IntegratorSettings, RecordSettings
-from study.support.document import unpadded
 from study.support.errors import DivergenceError
-from study.support.numbers import percent
 
 Table = Mapping[str, Any]
 FINE = IntegratorSettings(method="rk4", steps_per_sample=16)
@@ -100,29 +98,3 @@ def _errors(name: str, true: float, kept: list[tuple[Mapping[str, float], Mappin
         "standard_error": float(np.std(error, ddof=1) / math.sqrt(len(error))) if len(error) > 1 else math.nan,
         "relative_error": mean / true if true != 0.0 else math.nan,
     }  # fmt: skip
-
-
-def integrator_page(table: pd.DataFrame) -> str:
-    """The table as a page: one block a system, relative errors in percent."""
-    parts = [
-        "# What the integrator's setting does to the recovered parameters",
-        "Mean error of each MI/SO estimate against the same records integrated finely "
-        f"({FINE.method}, {FINE.steps_per_sample} steps a sample), with its standard error; "
-        "relative in percent, in the parameter's own unit where the true value is zero. "
-        "The report's own setting is abm4 with one step a sample (Section 2.2).",
-    ]
-    for (system, reading), block in table.groupby(["system", "reading"], sort=False):
-        names = [str(n) for n in block["parameter"].unique() if n]
-        rows: list[list[object]] = []
-        for (method, steps), group in block.groupby(["method", "steps_per_sample"], sort=False):
-            errors = {str(row["parameter"]): _error(row) for _, row in group.iterrows()}
-            lost = f"{group['diverged'].iloc[0]} of {group['seeds'].iloc[0]}"
-            rows.append([method, steps, *(errors.get(n, "") for n in names), lost])
-        heading = ["integrator", "steps a sample", *names, "diverged"]
-        parts += [f"## {system}, unit variance {reading}", unpadded(heading, rows)]
-    return "\n\n".join(parts) + "\n"
-
-
-def _error(row: "pd.Series[Any]") -> str:
-    true, error, spread = abs(row["true"]), row["mean_error"], row["standard_error"]
-    return percent(error / true, "+.2g", spread / true) if true != 0.0 else f"{error:+.2g} +- {spread:.1g}"

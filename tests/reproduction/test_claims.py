@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from study.equations.model_file import read_model
 from study.identify.estimators.base import Settings
 from study.records.record import Record
-from study.reproduction import config, integrator_study
+from study.reproduction import config, integrator_study, study_pages
 from study.reproduction.claims import (
     claims_table,
     evidence,
@@ -31,6 +31,7 @@ from study.reproduction.claims.reported import Reported, Statement
 from study.reproduction.claims.sample import Sample, departure
 from study.reproduction.preliminary import model_restoring_force, natural_frequency
 from study.reproduction.settings import ClaimSettings, Ensembles
+from study.support import document
 
 ROOT = Path(__file__).parents[2]
 SEEDS = 6
@@ -180,7 +181,7 @@ def test_what_the_study_finds(judged: pd.DataFrame, name: str, said: str) -> Non
 
 
 def test_the_page_holds_every_row(judged: pd.DataFrame) -> None:
-    page = claims_table.claims_page(judged)
+    page = document.markdown(study_pages.titled("claims", study_pages.Results({"claims": judged}, {})))
     assert page.count("\n| [") == len(judged)
     assert page.count("<details>") == len(judged)
     beside = judged["where"].str.startswith(judgement.BESIDE)
@@ -368,7 +369,8 @@ def test_diverged_runs_are_counted_by_name(steps: pd.DataFrame) -> None:
     named = rows["diverged_seeds"].iloc[0].split(", ")
     assert len(named) == rows["diverged"].iloc[0]
     assert all(" at " in n and n.endswith(" s") for n in named)
-    page = integrator_study.integrator_page(steps)
+    results = study_pages.Results({"integrator_steps": steps}, {})
+    page = document.markdown(study_pages.titled("integrator_steps", results))
     assert f"{rows['diverged'].iloc[0]} of {rows['seeds'].iloc[0]} |" in page
 
 

@@ -15,8 +15,7 @@ from study.identify.estimators import ESTIMATORS, identify
 from study.identify.estimators.base import Settings
 from study.records.excitation import Excitation, force
 from study.records.spectra import Segments
-from study.reproduction.config import load_config
-from study.reproduction.preconditions import CURVES
+from study.reproduction.config import CURVES, load_config
 from study.support.errors import StudyError
 
 ROOT = Path(__file__).parents[2]

@@ -1,4 +1,4 @@
-"""All claims as a table and as a page."""
+"""All claims as a table."""
 
 from collections.abc import Callable
 from dataclasses import asdict
@@ -18,11 +18,9 @@ from study.reproduction.claims import (
     response,
     simulation,
 )
-from study.reproduction.claims.claim_pages import by_claim
 from study.reproduction.claims.evidence import Evidence
 from study.reproduction.claims.judgement import Claim, conclude
 from study.reproduction.claims.reported import Reported
-from study.support import document
 
 SECTIONS = (
     simulation, response, preliminary_claims, linear_system, duffing, damping, mathieu, dead_band, levels,
@@ -47,8 +45,3 @@ def judge_all(
             progress(len(claims), claims[-1])
     order = list(reported.statements)
     return pd.DataFrame([asdict(claim) for claim in sorted(claims, key=lambda c: order.index(c.id))])
-
-
-def claims_page(table: pd.DataFrame) -> str:
-    """The table as a page: counts, one line a claim, and below it the conditions of each, folded."""
-    return document.markdown([document.Heading("Claims of the report", 1), *by_claim(table)])

@@ -16,9 +16,9 @@ from study.identify.estimators.in_reverse import miso, read_curve, siso
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.records.record import Record
 from study.records.spectra import autospectrum
+from study.reproduction.cases import make_record
 from study.reproduction.claims.sample import Sample, average
 from study.reproduction.ensemble import NOISE_OFFSET, threaded
-from study.reproduction.make_record import make_record
 from study.reproduction.settings import ClaimSettings, RecordSettings
 from study.support.errors import StudyError
 
@@ -204,7 +204,7 @@ class Evidence:
 
 
 def record_settings(settings: ClaimSettings, drive: Drive) -> RecordSettings:
-    """What ``study.reproduction.make_record.make_record`` expects, for a drive."""
+    """What ``study.reproduction.cases.make_record`` expects, for a drive."""
     return RecordSettings(
         case=drive.system, excitation=settings.excitation.model_copy(update=dict(drive.excitation)), level=drive.level,
         noise=drive.noise, noise_seed=settings.noise_seed if drive.noise > 0.0 else None, sampling=settings.sampling,

@@ -55,9 +55,9 @@ def claims(*functions: Conditions, **short: Conditions) -> dict[str, Conditions]
     return {function.__name__: function for function in functions} | short
 
 
-def verdict(met: Sequence[bool]) -> str:
+def verdict(met: Sequence[bool], words: tuple[str, str, str] = (REPRODUCED, PARTLY, NOT_REPRODUCED)) -> str:
     """``reproduced`` if all hold, ``not reproduced`` if none does, else ``partly``."""
-    return REPRODUCED if all(met) else PARTLY if any(met) else NOT_REPRODUCED
+    return words[0 if all(met) else 1 if any(met) else 2]
 
 
 def conclude(reported: Reported, name: str, *conditions: Condition) -> Claim:
