@@ -18,8 +18,10 @@ def main(models: str, statements: str, steps: str, settings: dict[str, Any], out
     found = evidence.Evidence(ClaimSettings.model_validate(settings), evidence.models_of(Path(models)), rows)
     stated = reported.load_reported(Path(statements))
 
+    count = len(claims_table.claim_names(stated))
+
     def progress(number: int, claim: Claim) -> None:
-        print(f"{number} of {len(claims_table.CLAIMS)}: {claim.id}: {claim.verdict}", file=sys.stderr, flush=True)
+        print(f"{number} of {count}: {claim.id}: {claim.verdict}", file=sys.stderr, flush=True)
 
     judged = claims_table.judge_all(found, stated, progress)
     tables.write_table(judged, Path(output))

@@ -6,8 +6,8 @@ from typing import Any
 from study.identify.estimators.base import Settings
 from study.records.excitation import READINGS
 from study.reproduction import integrator_study, tables
-from study.reproduction.claims.common import SYSTEMS
 from study.reproduction.claims.evidence import Drive, models_of, record_settings
+from study.reproduction.claims.reported import SYSTEMS
 from study.reproduction.settings import ClaimSettings
 from study.support.workflow_step import one_sentence
 

@@ -166,7 +166,7 @@ def periodic_lines(case: CaseFiles) -> Figure:
     """Autospectrum of a Mathieu system's response (Figure 8), its lines marked."""
     record, values = read_csv(case.record), read_model(case.model).numbers()
     natural = preliminary.natural_frequency(values)
-    lines = preliminary.mathieu_lines(natural, values["periodic_stiffness.f_m"])
+    lines = preliminary.mathieu_frequencies(natural, values["periodic_stiffness.f_m"])
     figure, (axes,) = page.empty_page(case.title, "Autospectrum of the displacement", panel=2.9, legend_rows=1)
     frequency, density = autospectrum(record["displacement"], record.dt, case.segments)
     autospectrum_panel(axes, frequency, density, record.units["displacement"], HIGHEST)

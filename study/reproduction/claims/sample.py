@@ -72,9 +72,9 @@ def average(values: Floats | NDArray[np.bool_] | Sequence[float]) -> float:
     return float(np.mean(np.asarray(values, dtype=np.float64)))
 
 
-def how_often(flags: Iterable[bool]) -> Sample:
-    """How often something holds."""
-    return Sample(tuple(float(flag) for flag in flags))
+def share_of_power(density: Floats, keep: NDArray[np.bool_]) -> Sample:
+    """Share of the power of each record's autospectrum, shape (records, lines), that lies in the kept lines."""
+    return Sample.own_first(float(np.sum(d[keep]) / np.sum(d)) for d in density)
 
 
 def relative_distance(curve: NDArray[np.complex128], exact: NDArray[np.complex128] | Floats) -> float:
