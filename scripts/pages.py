@@ -8,8 +8,8 @@ import pandas as pd
 
 from study.reproduction import study_pages
 from study.support import document
+from study.support.document import Picture
 from study.support.files import replace_file
-from study.support.picture_page import Picture
 from study.support.workflow_step import one_sentence
 
 WORDS = ("claims", "structure_claims")  # tables in which an empty cell is an empty word

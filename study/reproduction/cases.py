@@ -9,7 +9,7 @@ from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
 from study.identify import estimators
 from study.identify.estimators.base import Identified, Settings
-from study.identify.frequency_domain.local_polynomial_method import LocalPolynomial
+from study.identify.frequency_domain.local_polynomial import LocalPolynomial
 from study.records.excitation import displacement_noise, force
 from study.records.record import Record
 from study.reproduction.settings import IdentificationSettings, RecordSettings

@@ -246,7 +246,7 @@ def _check_case(case: Case, settings: StudySettings, models: Path, taken: dict[s
 
 def _checked_model(path: Path, also_assumed: str, settings: StudySettings) -> Model:
     """A case's model, which can be simulated, and whose inputs the record can tell apart with a term more."""
-    from study.identify.frequency_domain.local_polynomial_method import LocalPolynomial
+    from study.identify.frequency_domain.local_polynomial import LocalPolynomial
 
     model = assumed = read_model(path)
     with at(path):

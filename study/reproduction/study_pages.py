@@ -11,10 +11,9 @@ from study.figures.styles import look
 from study.reproduction import ensemble
 from study.reproduction.claims.judgement import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED, SEPARATOR
 from study.reproduction.integrator_study import FINE
-from study.support import document, picture_page
-from study.support.document import Block, Bullets, Fold, Heading, Image, Text, table
+from study.support import document
+from study.support.document import Block, Bullets, Fold, Heading, Image, PageSection, Picture, Text, table
 from study.support.numbers import percent
-from study.support.picture_page import PageSection, Picture
 
 Row = Mapping[str, Any]
 TITLE = "The report, run again"
@@ -469,10 +468,10 @@ def study_page(results: Results, pictures: Sequence[Picture]) -> bytes:
     for anchor, title, make, pages in SECTIONS:
         if "study" in pages:
             search = SEARCH if anchor == "claims" else ""
-            found = search + picture_page.fragment_without_images(make(results))
+            found = search + document.fragment_without_images(make(results))
             sections.append(PageSection(anchor, title, found))
-    sections.insert(1, PageSection("figures", "Figures", picture_page.groups(pictures)))
-    return picture_page.picture_page(TITLE, sections)
+    sections.insert(1, PageSection("figures", "Figures", document.picture_groups(pictures)))
+    return document.picture_page(TITLE, sections)
 
 
 def table_page(title: str, rows: pd.DataFrame) -> str:

@@ -7,7 +7,7 @@ import pytest
 from study.reproduction.claims import reported
 from study.reproduction.claims.claims_table import CLAIMS, NUMBERS, claim_names
 from study.reproduction.claims.conditions import COHERENCES, ESTIMATES, PATTERNS
-from study.reproduction.claims.dead_band import QUANTITIES
+from study.reproduction.claims.dead_band import QUOTED
 from study.support.errors import StudyError
 from tests.conftest import LINEAR, TABLE_1
 
@@ -41,7 +41,7 @@ def test_table_1_is_the_one_the_tests_know(stated: reported.Reported, system: st
 def test_the_numbers_the_report_quotes(stated: reported.Reported) -> None:
     quoted = {"siso_stiffness": 500.0, "siso_frequency": 3.6, "duffing_share": 0.9, "dead_band_share": 0.65}
     assert {name: stated.value(name) for name in quoted} == quoted
-    assert {source for _, source, *_ in QUANTITIES} >= set(quoted)
+    assert {source for _, source, *_ in QUOTED} >= set(quoted)
 
 
 def test_a_system_of_table_1_without_a_model_is_named(stated: reported.Reported, tmp_path: Path) -> None:

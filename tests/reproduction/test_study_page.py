@@ -9,7 +9,7 @@ import pytest
 from study.reproduction import study_pages
 from study.reproduction.study_pages import LONGEST, conditions, shortened
 from study.support import document
-from study.support.picture_page import Picture
+from study.support.document import Picture
 from tests.reproduction.test_summary import CLAIMS, study
 
 PNG = bytes.fromhex("89504e470d0a1a0a") + b"picture"

@@ -9,17 +9,17 @@ from study.reproduction.claims import dead_band, identification, levels, prelimi
 from study.reproduction.claims.conditions import stated
 from study.reproduction.claims.evidence import Evidence
 from study.reproduction.claims.judgement import Claim, Conditions, conclude
-from study.reproduction.claims.reported import LEVELS, LIMIT, NOISES, Reported
+from study.reproduction.claims.reported import INPUT_VARIANCES, LIMIT, NOISES, Reported
 
-SECTIONS = (simulation, preliminary_claims, identification, dead_band, levels)
-CLAIMS: dict[str, Conditions] = {name: found for section in SECTIONS for name, found in section.CLAIMS.items()}
+MODULES = (simulation, preliminary_claims, identification, dead_band, levels)
+CLAIMS: dict[str, Conditions] = {name: found for section in MODULES for name, found in section.CLAIMS.items()}
 # Rows whose value the claims in code and the reading of unit variance ask for.
 TABLE_1 = {
     "linear": "k c f_n zeta", "duffing": "k c f_n zeta k3 c3", "van_der_pol": "k c f_n zeta k3 c3",
     "duffing_van_der_pol": "k c f_n zeta k3 c3", "mathieu": "k c f_n zeta k_m f_m", "dead_band": "k c f_n zeta u_g",
     "extreme": "k c f_n zeta k3 c3",
 }  # fmt: skip
-VALUES = """
+STATED = """
     table_1.m nyquist nyquist.dt lowpass below_10_hz error_free mathieu_lines.f_n mathieu_lines.f_m mathieu_fast.f_m
     mathieu_fast.low mathieu_fast.middle mathieu_fast.high averages resolution resolution.length resolution.seconds
     resolution.samples resolution.total overlap exact_stiffness siso_stiffness siso_frequency duffing_cubic
@@ -32,8 +32,8 @@ LIMITS = """
     excellent same_order significant_bias strong_below slight
 """
 NUMBERS = (
-    *(f"table_1.{system}.{name}" for system, names in TABLE_1.items() for name in names.split()), *VALUES.split(),
-    *(f"levels_invariant.{name}" for name in LEVELS), *(f"noise_random_only.{name}" for name in NOISES),
+    *(f"table_1.{system}.{name}" for system, names in TABLE_1.items() for name in names.split()), *STATED.split(),
+    *(f"levels_invariant.{name}" for name in INPUT_VARIANCES), *(f"noise_random_only.{name}" for name in NOISES),
     *(LIMIT + name for name in LIMITS.split()),
 )  # fmt: skip
 

@@ -18,7 +18,7 @@ from study.reproduction.claims.judgement import (
     together,
     within_share,
 )
-from study.reproduction.claims.reported import LEVELS, Reported, Stated, Statement
+from study.reproduction.claims.reported import INPUT_VARIANCES, Reported, Stated, Statement
 from study.reproduction.claims.sample import Sample, gaussian_score, is_gaussian, kurtosis
 from study.support.arrays import Floats
 from study.support.numbers import percent
@@ -47,7 +47,7 @@ def stated(evidence: Evidence, reported: Reported, statement: Statement, why: st
     ``why`` is the reason in case one is not met, that of the row if left out.
     """
     why = why or statement.why
-    levels = [reported.levels[LEVELS.index(name)] for name in statement.levels] or [1.0]
+    levels = [reported.levels[INPUT_VARIANCES.index(name)] for name in statement.levels] or [1.0]
     found: dict[str, list[Condition]] = {}
     for system in statement.systems:
         for level in levels:

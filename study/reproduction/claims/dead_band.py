@@ -187,7 +187,7 @@ CLAIMS = claims(
 
 # ---- what "unit variance" refers to: both readings against the numbers that the report quotes
 
-QUANTITIES: tuple[tuple[str, str, str, Callable[[Ensemble, Reported], Sample]], ...] = (  # name, row, system, reading
+QUOTED: tuple[tuple[str, str, str, Callable[[Ensemble, Reported], Sample]], ...] = (  # name, row, system, reading
     ("SI/SO k of the Duffing system, hand-read", "siso_stiffness", "duffing", lambda e, _: e.hand_read("k")),
     ("SI/SO k of the Duffing system, fitted", "siso_stiffness", "duffing", lambda e, _: e.siso("k")),
     ("SI/SO f_n of the Duffing system, hand-read", "siso_frequency", "duffing", lambda e, _: e.hand_read("f_n")),
@@ -205,7 +205,7 @@ def both_readings(evidence: Evidence, reported: Reported) -> pd.DataFrame:
     deviation of one record, for the report shows one.
     """
     rows: list[dict[str, Any]] = []
-    for name, source, system, read in QUANTITIES:
+    for name, source, system, read in QUOTED:
         statement, target = reported[source], reported.value(source)
         row: dict[str, Any] = {
             "quantity": name, "where": statement.where, "unit": statement.unit, "reported": target,

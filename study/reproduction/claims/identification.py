@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from study.identify.estimators import miso
+from study.identify.estimators.in_reverse import miso
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.reproduction.claims.conditions import has_line, local_maxima, near_unity, recovered, stated
 from study.reproduction.claims.evidence import Assumed, Drive, Evidence
@@ -39,7 +39,7 @@ from study.support.numbers import percent
 def coherence_forms(evidence: Evidence, _: Reported) -> Iterator[Condition]:
     """(4.38) and (4.39) on the Duffing system's own record."""
     drive = Drive("duffing")
-    result = miso.identify(evidence.model(drive), evidence.records(drive)[0], evidence.estimator_settings()).responses
+    result = miso(evidence.model(drive), evidence.records(drive)[0], evidence.estimator_settings()).responses
     assert isinstance(result, MisoResult)
     product = 1.0 - np.prod(1.0 - result.partial, axis=0)
     worst = float(np.max(np.abs(product - np.sum(result.contribution, axis=0))))

@@ -17,7 +17,7 @@ SYSTEMS = ("linear", "duffing", "van_der_pol", "duffing_van_der_pol", "mathieu",
 COMBINED = "duffing_van_der_pol"
 LINEAR_PARTS = ("m", "c", "k", "f_n", "zeta")
 PARAMETERS = (*LINEAR_PARTS, "k3", "c3", "k_m", "k_dead_band")
-LEVELS = ("lowest", "second", "third", "highest")  # input variances of Section 5.3
+INPUT_VARIANCES = ("lowest", "second", "third", "highest")  # input variances of Section 5.3
 NOISES = ("low", "middle", "high")  # of Section 5.4
 LIMIT = "limit."  # begins the ids of what was chosen here, before looking, to judge the report's words by
 # What a condition in the column ``holds_if`` may say: its subject, then a verb, with what must follow, if anything.
@@ -75,7 +75,7 @@ class Statement(TableRow):
     value: Annotated[float | None, BeforeValidator(lambda cell: None if cell == "" else cell)]  # the number
     unit: str  # its unit
     systems: Words = ()  # of Table 1: each must meet the conditions, all of them together where there are several
-    levels: Words = ()  # likewise, of ``LEVELS``; at unit variance if there is none
+    levels: Words = ()  # likewise, of ``INPUT_VARIANCES``; at unit variance if there is none
     holds_if: Annotated[tuple[Stated, ...], BeforeValidator(_stated)] = ()
     why: str = ""  # the reason, in case a condition is not met
 
@@ -92,7 +92,9 @@ class Statement(TableRow):
             holds |= self.unit != "Hz" and not re.search("[.]zeta$|^averages$", self.id)
         if not holds:
             raise ValueError(f"value is {value:g}; expected {expected}")
-        for name, known in ((n, k) for names, k in ((self.systems, SYSTEMS), (self.levels, LEVELS)) for n in names):
+        for name, known in (
+            (n, k) for names, k in ((self.systems, SYSTEMS), (self.levels, INPUT_VARIANCES)) for n in names
+        ):
             if name not in known:
                 raise ValueError(f"names {name!r}; expected some of {', '.join(known)}")
         if bool(self.holds_if) != bool(self.systems):
@@ -141,7 +143,7 @@ class Reported:
     @property
     def levels(self) -> list[float]:
         """The input variances of Section 5.3."""
-        return [self.value(f"levels_invariant.{name}") for name in LEVELS]
+        return [self.value(f"levels_invariant.{name}") for name in INPUT_VARIANCES]
 
     @property
     def noises(self) -> list[float]:
