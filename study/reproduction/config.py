@@ -67,7 +67,6 @@ class Case(TableRow):
 
     @property
     def model_file(self) -> str:
-        """Where the system is described."""
         return f"models/{self.model}.yaml"
 
     @property

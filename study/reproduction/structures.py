@@ -19,8 +19,8 @@ from study.records.excitation import Excitation, force
 from study.records.record import MOTIONS, Record, Sensor
 from study.reproduction.config import Name, rules
 from study.reproduction.settings import (
+    AllowedErrors,
     Band,
-    Limits,
     LocalPolynomialSettings,
     Names,
     Positive,
@@ -49,11 +49,9 @@ class MeasuredTolerances(Section):
     error: Positive
 
 
-class StructureTolerances(Section):
-    """What an estimate may be off, by its symbol: relative, absolute where the true value is zero."""
+class StructureTolerances(AllowedErrors):
+    """What an estimate may be off, by its symbol wherever it stands."""
 
-    relative: Limits
-    absolute: Limits
     measured: MeasuredTolerances
 
 
@@ -102,7 +100,6 @@ class StructureCase(TableRow):
 
     @property
     def model_file(self) -> str:
-        """Where the structure is described."""
         return f"models/{self.model}.yaml"
 
 

@@ -69,7 +69,6 @@ class Results:
     titles: Mapping[str, str] = field(default_factory=dict[str, str])  # of structures by case, in the order of the page
 
     def __getitem__(self, name: str) -> pd.DataFrame:
-        """One table."""
         return self.tables[name]
 
 

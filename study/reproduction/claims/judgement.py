@@ -29,7 +29,6 @@ class Condition:
 
     @property
     def reason(self) -> str:
-        """Why the condition is not met."""
         return self.why or f"{self.measured}, where the criterion is {self.criterion}"
 
 

@@ -102,7 +102,6 @@ class Statement(TableRow):
         return self
 
     def __str__(self) -> str:
-        """The number with its unit."""
         return "" if self.value is None else f"{self.value:.6g} {self.unit}".strip()
 
 
@@ -113,13 +112,11 @@ class Reported:
     statements: Mapping[str, Statement]
 
     def __getitem__(self, name: str) -> Statement:
-        """One statement."""
         if name not in self.statements:
             raise StudyError(f"config/reported.tsv has no row {name!r}")
         return self.statements[name]
 
     def value(self, name: str) -> float:
-        """The number of one statement."""
         value = self[name].value
         if value is None:
             raise StudyError(f"config/reported.tsv gives no value for {name!r}")
@@ -142,12 +139,10 @@ class Reported:
 
     @property
     def levels(self) -> list[float]:
-        """The input variances of Section 5.3."""
         return [self.value(f"levels_invariant.{name}") for name in INPUT_VARIANCES]
 
     @property
     def noises(self) -> list[float]:
-        """The noise levels of Section 5.4."""
         return [self.value(f"noise_random_only.{name}") for name in NOISES]
 
     def numbers(self, name: str) -> str:
