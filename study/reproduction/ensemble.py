@@ -100,7 +100,8 @@ def estimator_errors(found: pd.DataFrame) -> pd.DataFrame:
     Errors are relative where the true value is not zero (``kind``), otherwise in the parameter's own unit.
     ``median_error`` is the median over the seeds of the size of the error; a seed that gives no estimate is farther
     off than any other. ``standard_error`` is that of the median, whatever the distribution. ``gain`` is the median
-    error of MI/SO over this one. ``bias`` and ``scatter`` are mean and standard deviation of the signed error.
+    error of MI/SO over this one, nan where MI/SO gives nothing to compare with. ``bias`` and ``scatter`` are mean and
+    standard deviation of the signed error.
     ``found`` of ``seeds`` give an estimate, ``noted`` of them with a note, such as that the search did not converge.
     ``first_error`` is the median over the first ``FIRST`` seeds alone.
     """
@@ -119,7 +120,12 @@ def estimator_errors(found: pd.DataFrame) -> pd.DataFrame:
             "first_error": middle(np.abs(signed[group["seed"].isin(first)]), len(first))[0],
         }  # fmt: skip
         rows.append(row)
-    return with_gains(pd.DataFrame(rows, columns=ERROR_COLUMNS))
+    table, keys = pd.DataFrame(rows, columns=ERROR_COLUMNS), ["case", "parameter"]
+    basis = table[table["estimator"] == BASIS].set_index(keys)["median_error"]
+    own = table["median_error"].to_numpy(dtype=np.float64)
+    before = basis.reindex(pd.MultiIndex.from_frame(table[keys])).to_numpy(dtype=np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):  # two errors of nothing, or two that are boundless
+        return table.assign(gain=before / own)
 
 
 def differing_cases(own: pd.DataFrame, kept: pd.DataFrame) -> list[str]:
@@ -147,22 +153,6 @@ def middle(sizes: Floats, count: int) -> tuple[float, float]:
     below, above = max(math.floor(half - spread), 0), min(math.ceil(half + spread), count - 1)
     median = float(np.median(ranked))
     return median, 0.5 * float(ranked[above] - ranked[below]) if math.isfinite(median) else math.inf
-
-
-def with_gains(table: pd.DataFrame) -> pd.DataFrame:
-    """The table with ``gain`` filled in; nan where MI/SO gives nothing to compare with."""
-    keys = ["case", "parameter"]
-    basis = table[table["estimator"] == BASIS].set_index(keys)["median_error"]
-    own = table["median_error"].to_numpy(dtype=np.float64)
-    before = basis.reindex(pd.MultiIndex.from_frame(table[keys])).to_numpy(dtype=np.float64)
-    with np.errstate(divide="ignore", invalid="ignore"):  # two errors of nothing, or two that are boundless
-        return table.assign(gain=before / own)
-
-
-def by_case(table: pd.DataFrame) -> pd.DataFrame:
-    """By case and estimator, medians over the parameters with a true value other than zero: of errors and of gains."""
-    relative = table[table["kind"] == "relative"]
-    return relative.groupby(["case", "estimator"], sort=False)[["median_error", "gain"]].median().reset_index()
 
 
 def worst_bias(table: pd.DataFrame) -> pd.DataFrame:

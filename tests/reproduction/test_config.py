@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,14 +19,6 @@ from study.support.errors import StudyError
 
 ROOT = Path(__file__).parents[2]
 ROW = "duffing\tduffing\treport\t1.0\t0\t\t21\t22\t23\t24\t3\t\t\t\tDuffing system"
-
-
-@pytest.fixture
-def folder(tmp_path):
-    """A copy of config/ and models/, to be spoilt."""
-    shutil.copytree(ROOT / "config", tmp_path / "config")
-    shutil.copytree(ROOT / "models", tmp_path / "models")
-    return tmp_path / "config"
 
 
 def spoil(path, old, new):

@@ -4,31 +4,20 @@ import itertools
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from matplotlib import style
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgba
-from matplotlib.figure import Figure
 
-from study.figures import curves, frequency_response, page, styles
+from study.figures import frequency_response, page, styles
 from study.records.record import Record, write_csv
 from study.records.spectra import Segments
 from study.reproduction.study_figures import CaseFiles, draw_case, force_history
 from study.support.errors import StudyError
+from tests.reproduction.test_figures import SYSTEMS, coherence_table, one, response_table
 
 ROOT = Path(__file__).parents[2]
 SHEET = ROOT / "study" / "figures" / "study.mplstyle"
-FREQUENCY = np.arange(0.0, 12.5, 0.1)
-OMEGA = 2j * np.pi * FREQUENCY
-LINEAR = OMEGA**2 + 3.77 * OMEGA + 355.3
-SYSTEMS = {
-    "duffing": [("u", LINEAR), ("u**3", 2e7 + 0 * OMEGA)],
-    "duffing_van_der_pol": [("u", LINEAR), ("u**3", 2e7 + 2e6 / 3.0 * OMEGA)],
-    "mathieu": [("u", LINEAR), ("u*cos(2*pi*f_m*t)", 177.7 + 0 * OMEGA), ("u*sin(2*pi*f_m*t)", 0 * OMEGA)],
-    "plain": [("u", LINEAR)],
-}
-COLUMNS = ("frequency", "estimator", "input", "shape", "real", "imag", "standard_error", "exact_real", "exact_imag")
 SEGMENTS = Segments(256)
 KINDS = ("linear", "nonlinear", "coherence", "histogram")
 
@@ -37,37 +26,6 @@ KINDS = ("linear", "nonlinear", "coherence", "histogram")
 def _sheet():
     with style.context(SHEET):
         yield
-
-
-def response_table(system, spread=0.05, exact=True, estimators=("siso", "miso")):
-    rng = np.random.default_rng(8)
-    frames = []
-    for name in estimators:
-        for j, (shape, true) in enumerate(SYSTEMS[system][: 1 if name == "siso" else None]):
-            error = spread * np.maximum(np.abs(true), 50.0)
-            values = true + error * (rng.standard_normal((2, len(true))).T @ [1.0, 1j]) / np.sqrt(2.0)
-            known = true if exact else np.full_like(true, np.nan)
-            columns = (FREQUENCY, name, j + 1, shape, values.real, values.imag, error, known.real, known.imag)
-            frames.append(pd.DataFrame(dict(zip(COLUMNS, columns, strict=True))))
-    return pd.concat(frames)
-
-
-def coherence_table(system):
-    count = len(SYSTEMS[system])
-    frames = [
-        pd.DataFrame({"frequency": FREQUENCY, "estimator": "miso", "input": j + 1, "shape": shape,
-                      "terms": "linear_damping + van_der_pol_damping", "cumulative": (j + 1) / count})
-        for j, (shape, _) in enumerate(SYSTEMS[system])
-    ]  # fmt: skip
-    return pd.concat(frames)
-
-
-def one(system="duffing", number=1, **kwargs):
-    return curves.input_responses(response_table(system, **kwargs), 10.0)[number - 1]
-
-
-def axes():
-    return Figure().subplots()
 
 
 @pytest.fixture
