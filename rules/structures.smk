@@ -1,5 +1,5 @@
 # Structures of several coordinates: each case of config/structures.tsv in one job, and what is said of all of them.
-from study.reproduction.structures import load_structures
+from study.reproduction.structure_cases import load_structures
 
 with one_sentence():
     STRUCTURES = load_structures(Path("config"), list(STUDY.cases))

@@ -7,7 +7,7 @@ from study.equations.model_file import read_model
 from study.figures import page
 from study.records.record import write_csv
 from study.reproduction import structure_figures, structure_tables, tables
-from study.reproduction.structures import (
+from study.reproduction.structure_cases import (
     StructureCase,
     StructureSettings,
     identify_structure,

@@ -16,7 +16,7 @@ from study.identify.frequency_domain.inputs import Input
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments, cross_spectra
 from study.reproduction.claims.judgement import SEPARATOR, Condition, verdict
-from study.reproduction.structures import CaseResult, StructureCase, StructureSettings
+from study.reproduction.structure_cases import CaseResult, StructureCase, StructureSettings
 from study.reproduction.tables import (
     COHERENCE_COLUMNS,
     PARAMETER_COLUMNS,

@@ -8,6 +8,13 @@ import pandas as pd
 import pytest
 
 from study.equations.model_file import read_model
+from study.reproduction.structure_cases import (
+    assumed_structure,
+    identify_structure,
+    load_structures,
+    make_structure_record,
+    measured_model,
+)
 from study.reproduction.structure_figures import coherence_figure, connections_figure, modal_figure
 from study.reproduction.structure_tables import (
     modal_claims,
@@ -17,13 +24,6 @@ from study.reproduction.structure_tables import (
     structure_coherences,
     structure_parameters,
     structure_responses,
-)
-from study.reproduction.structures import (
-    assumed_structure,
-    identify_structure,
-    load_structures,
-    make_structure_record,
-    measured_model,
 )
 from study.reproduction.tables import judge_estimate
 from study.structure.measured_comparison import compare_measured

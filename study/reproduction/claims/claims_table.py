@@ -9,7 +9,7 @@ from study.reproduction.claims import dead_band, identification, levels, prelimi
 from study.reproduction.claims.conditions import stated
 from study.reproduction.claims.evidence import Evidence
 from study.reproduction.claims.judgement import Claim, Conditions, conclude
-from study.reproduction.claims.reported import INPUT_VARIANCES, LIMIT, NOISES, Reported
+from study.reproduction.claims.reported import INPUT_VARIANCES, LIMIT, NOISE_LEVELS, Reported
 
 MODULES = (simulation, preliminary_claims, identification, dead_band, levels)
 CLAIMS: dict[str, Conditions] = {name: found for section in MODULES for name, found in section.CLAIMS.items()}
@@ -33,7 +33,7 @@ LIMITS = """
 """
 NUMBERS = (
     *(f"table_1.{system}.{name}" for system, names in TABLE_1.items() for name in names.split()), *STATED.split(),
-    *(f"levels_invariant.{name}" for name in INPUT_VARIANCES), *(f"noise_random_only.{name}" for name in NOISES),
+    *(f"levels_invariant.{name}" for name in INPUT_VARIANCES), *(f"noise_random_only.{name}" for name in NOISE_LEVELS),
     *(LIMIT + name for name in LIMITS.split()),
 )  # fmt: skip
 

@@ -18,7 +18,7 @@ COMBINED = "duffing_van_der_pol"
 LINEAR_PARTS = ("m", "c", "k", "f_n", "zeta")
 PARAMETERS = (*LINEAR_PARTS, "k3", "c3", "k_m", "k_dead_band")
 INPUT_VARIANCES = ("lowest", "second", "third", "highest")  # input variances of Section 5.3
-NOISES = ("low", "middle", "high")  # of Section 5.4
+NOISE_LEVELS = ("low", "middle", "high")  # of Section 5.4
 LIMIT = "limit."  # begins the ids of what was chosen here, before looking, to judge the report's words by
 # What a condition in the column ``holds_if`` may say: its subject, then a verb, with what must follow, if anything.
 READERS = ("SI/SO", "MI/SO", "fitted", "hand-read")  # of parameters, whose names come after; fitted as SI/SO does
@@ -143,7 +143,7 @@ class Reported:
 
     @property
     def noises(self) -> list[float]:
-        return [self.value(f"noise_random_only.{name}") for name in NOISES]
+        return [self.value(f"noise_random_only.{name}") for name in NOISE_LEVELS]
 
     def numbers(self, name: str) -> str:
         """Every number of a claim, for the column ``reported``."""

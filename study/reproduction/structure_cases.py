@@ -31,8 +31,7 @@ from study.reproduction.settings import (
 from study.structure.action_reaction import JointEstimate, joint_estimate
 from study.structure.places import connections
 from study.structure.prepared_structure import prepare_structure
-from study.records.record import MOTIONS, Record, Sensor
-from study.reproduction.config import Name, rules
+from study.structure.reverse_system import ESTIMATORS, ReverseSystem, equations_of, reverse_system
 from study.support.config_files import Section, TableRow, Text, read_rows, read_yaml
 from study.support.errors import StudyError, at, expect
 
