@@ -22,7 +22,7 @@ for _case in STUDY.cases:
         benchmark:
             f"results/benchmarks/draw.{_case}.tsv"
         script:
-            "../scripts/draw_case.py"
+            "../scripts/draw.py"
 
     rule:
         name:

@@ -1,13 +1,14 @@
 # The report's claims, and the two studies that they rest on: the reading of "unit variance" and the
 # integrator's steps. All work on ensembles of their own seeds, not on results/<case>: they wait for no case, and what
 # takes longest begins first. What they do beside the simulations keeps one core busy, not two.
+from study.reproduction.claims import claims_table
 from study.reproduction.claims.reported import check_complete, check_systems, load_reported
 
 STATEMENTS = "config/reported.tsv"
 
 with one_sentence():
     _reported = load_reported(Path(STATEMENTS))
-    check_complete(_reported, Path(STATEMENTS))
+    check_complete(_reported, Path(STATEMENTS), claims_table.CLAIMS, claims_table.NUMBERS)
     check_systems(_reported, Path("models"))
 
 # The systems of Table 1: another model in the folder is none of the claims' business.
@@ -16,10 +17,7 @@ MODELS = sorted({f"models/{name.split('.')[1]}.yaml" for name in _reported.state
 with one_sentence():
     CLAIM_SETTINGS = STUDY.settings.claims.plain()
 WITHOUT_NOISE = {key: value for key, value in CLAIM_SETTINGS.items() if key != "noise_seed"}
-CLAIM_RESULTS = [
-    f"results/{name}"
-    for name in "excitation_reading.csv integrator_steps.csv integrator_steps.md claims.csv claims.md".split()
-]
+CLAIM_RESULTS = [f"results/{name}.csv" for name in ("excitation_reading", "integrator_steps", "claims")]
 
 
 rule excitation_reading:
@@ -55,7 +53,6 @@ rule integrator_steps:
             caption="captions/integrator_steps.rst",
             labels={"table": "Steps of the integrator", "as": "raw CSV"},
         ),
-        page="results/integrator_steps.md",
     params:
         models="models",
         settings=WITHOUT_NOISE,
@@ -79,7 +76,6 @@ rule claims:
             caption="captions/claims.rst",
             labels={"table": "Claims of the report", "as": "raw CSV"},
         ),
-        page="results/claims.md",
     params:
         models="models",
         settings=CLAIM_SETTINGS,

@@ -3,7 +3,7 @@ from study.identify.estimators import ESTIMATORS
 from study.support.workflow_step import rests_on
 
 # Touching study/identify/frequency_domain/conditioned.py re-runs identification and what follows, not simulation, though the two share
-# study/reproduction/make_record.py: what only identification uses is not followed from there.
+# study/reproduction/cases.py: what only identification uses is not followed from there.
 IDENTIFICATION_ONLY = ["study.identify.estimators", "study.identify.estimators.base", "study.records.spectra", "study.identify.frequency_domain.local_polynomial"]
 
 
@@ -20,13 +20,10 @@ def modules(script, **options):
 CODE = {
     "record": modules("make_record", without=IDENTIFICATION_ONLY),
     "identify": modules("identify", also=ESTIMATORS.values()),
-    "draw": modules("draw_case"),
-    "draw_estimators": modules("draw_estimators"),
+    "draw": modules("draw"),
     "monte_carlo": modules("monte_carlo", also=ESTIMATORS.values()),
-    "rates": modules("rates"),
     "join": modules("join"),
-    "table_page": modules("table_page"),
-    "summary": modules("summary"),
+    "pages": modules("pages"),
 }
 STYLE = "study/figures/study.mplstyle"
 ENDINGS = ("png", "svg")

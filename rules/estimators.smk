@@ -52,33 +52,35 @@ use rule rates as join_errors with:
 
 rule draw_estimators:
     input:
-        table="results/estimators.csv",
+        errors="results/estimators.csv",
         style=STYLE,
-        code=CODE["draw_estimators"],
+        code=CODE["draw"],
     output:
-        report(
-            "figures/estimators.png",
-            caption="captions/estimators.rst",
-            category="Figures",
-            subcategory="All cases",
-            labels={"figure": "not in the report", "shows": "errors of the estimators"},
-        ),
-        "figures/estimators.svg",
+        errors=[
+            report(
+                "figures/estimators.png",
+                caption="captions/estimators.rst",
+                category="Figures",
+                subcategory="All cases",
+                labels={"figure": "not in the report", "shows": "errors of the estimators"},
+            ),
+            "figures/estimators.svg",
+        ],
     params:
         cases=list(STUDY.cases),
     benchmark:
         "results/benchmarks/draw_estimators.tsv"
     script:
-        "../scripts/draw_estimators.py"
+        "../scripts/draw.py"
 
 
 use rule draw_estimators as draw_many_errors with:
     input:
-        table=f"results/{MANY}.csv",
+        errors=f"results/{MANY}.csv",
         style=STYLE,
-        code=CODE["draw_estimators"],
+        code=CODE["draw"],
     output:
-        pictures(MANY),
+        errors=pictures(MANY),
     benchmark:
         "results/benchmarks/draw_many_errors.tsv"
 

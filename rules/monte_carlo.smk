@@ -29,11 +29,11 @@ rule rates:
 
 rule monte_carlo:
     input:
-        table="results/monte_carlo.csv",
-        code=CODE["rates"],
+        monte_carlo="results/monte_carlo.csv",
+        code=CODE["pages"],
     output:
-        page="results/monte_carlo.md",
+        monte_carlo="results/monte_carlo.md",
     params:
         noise=STUDY.noise,
     script:
-        "../scripts/rates.py"
+        "../scripts/pages.py"

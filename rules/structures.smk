@@ -1,11 +1,10 @@
 # Structures of several coordinates: each case of config/structures.tsv in one job, and what is said of all of them.
-from study.structure import structure_study
+from study.reproduction.structure_cases import load_structures
 
 with one_sentence():
-    STRUCTURES = structure_study.load_structures(Path("config"), list(STUDY.cases))
+    STRUCTURES = load_structures(Path("config"), list(STUDY.cases))
 
 CODE["structure"] = rests_on(Path("scripts/structure_case.py"))
-CODE["structure_summary"] = rests_on(Path("scripts/structure_summary.py"))
 # What is made of a case: in reverse, equation by equation, or by its modes where the linear part is as measured.
 STRUCTURE_TABLES = {
     "": {
@@ -18,7 +17,7 @@ STRUCTURE_FIGURES = {
     "": {"connections": "A_j(f) of every connection", "coherence": "cumulative coherence of each equation"},
     "yes": {"measured": "coefficients and transfer functions line by line, the linear part as measured"},
 }
-STRUCTURE_RESULTS = [f"results/{name}" for name in ("structures.csv", "structure_claims.csv", "structures.md")]
+STRUCTURE_RESULTS = ["results/structures.csv", "results/structure_claims.csv"]
 STRUCTURE_TITLES = {case.case: case.title for case in STRUCTURES.cases.values()}
 # Of results/study.html, after those of the report's systems.
 STRUCTURE_PICTURES = [
@@ -46,11 +45,7 @@ for _name, _case in STRUCTURES.cases.items():
             code=CODE["structure"],
         output:
             **{kind: f"results/{_name}/{name}.csv" for kind, name in STRUCTURE_TABLES[_case.measured].items()},
-            **{
-                f"{kind}_{ending}": f"figures/{_name}_{kind}.{ending}"
-                for kind in STRUCTURE_FIGURES[_case.measured]
-                for ending in ENDINGS
-            },
+            **{f"draw_{kind}": pictures(f"{_name}_{kind}") for kind in STRUCTURE_FIGURES[_case.measured]},
         params:
             case=_case.plain(),
             settings=STRUCTURES.settings.plain(),
@@ -66,16 +61,17 @@ for _name, _case in STRUCTURES.cases.items():
             structure_products(_name),
 
 
-rule structures:
+use rule rates as structures with:
     input:
-        parameters=[f"results/{case}/parameters.csv" for case in STRUCTURES.cases],
-        claims=[f"results/{case}/claims.csv" for case in STRUCTURES.cases],
-        code=CODE["structure_summary"],
+        tables=[f"results/{case}/parameters.csv" for case in STRUCTURES.cases],
+        code=CODE["join"],
     output:
         table=STRUCTURE_RESULTS[0],
-        claims=STRUCTURE_RESULTS[1],
-        page=STRUCTURE_RESULTS[2],
-    params:
-        titles=STRUCTURE_TITLES,
-    script:
-        "../scripts/structure_summary.py"
+
+
+use rule rates as structure_claims with:
+    input:
+        tables=[f"results/{case}/claims.csv" for case in STRUCTURES.cases],
+        code=CODE["join"],
+    output:
+        table=STRUCTURE_RESULTS[1],

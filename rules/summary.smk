@@ -1,7 +1,8 @@
-# What all cases give together: one table of parameters, and the page that a reader opens first.
+# What all cases give together: one table of parameters, and the pages, of which a reader opens results/summary.md first.
 BENCHMARKS = [f"results/benchmarks/{stage}.{case}.tsv" for stage in ("record", "identify", "draw") for case in STUDY.cases]
 BENCHMARKS += [f"results/benchmarks/{rule}.tsv" for rule in ("excitation_reading", "integrator_steps", "claims", "estimator_errors")]
-PAGES = {
+# Tables that are pages of the workflow's report as they stand.
+TABLE_PAGES = {
     "claims": "Claims of the report",
     "parameters": "Parameters of all cases",
     "estimators": "Errors of the estimators",
@@ -14,8 +15,9 @@ PICTURES = [
     for case in STUDY.cases.values()
     for kind, stem in case.figures.items()
 ] + STRUCTURE_PICTURES
-SUMMARY_RESULTS = [f"results/{name}" for name in ("parameters.csv", "summary.md", "estimators.md", "study.html")]
-SUMMARY_RESULTS += [f"results/pages/{name}.html" for name in PAGES]
+DOCUMENTS = ("summary", "estimators", "claims", "structures", "integrator_steps")
+SUMMARY_RESULTS = [f"results/{name}" for name in ("parameters.csv", *(f"{name}.md" for name in DOCUMENTS), "study.html")]
+SUMMARY_RESULTS += [f"results/pages/{name}.html" for name in TABLE_PAGES]
 
 
 rule parameters:
@@ -37,20 +39,16 @@ rule parameters:
 
 rule summary:
     input:
-        parameters=[f"results/{case}/parameters.csv" for case in STUDY.cases],
-        claims="results/claims.csv",
-        reading="results/excitation_reading.csv",
-        errors="results/estimators.csv",
+        **{name: f"results/{name}.csv" for name in TABLE_PAGES},
+        case_parameters=[f"results/{case}/parameters.csv" for case in STUDY.cases],
         structures=STRUCTURE_RESULTS[0],
         structure_claims=STRUCTURE_RESULTS[1],
         benchmarks=BENCHMARKS,
         pictures=[picture["file"] for picture in PICTURES],
-        style="study/support/picture_page.css",
-        behaviour="study/support/picture_page.js",
-        code=CODE["summary"],
+        style=[f"study/support/picture_page.{ending}" for ending in ("css", "js")],
+        code=CODE["pages"],
     output:
-        page="results/summary.md",
-        estimators="results/estimators.md",
+        **{name: f"results/{name}.md" for name in DOCUMENTS},
         study="results/study.html",
         html=report(
             "results/pages/summary.html",
@@ -58,27 +56,20 @@ rule summary:
             category="Summary",
             labels={"page": "The report, run again"},
         ),
-    params:
-        told={"noise": STUDY.noise, "setting": STUDY.settings.excitations["report"].reading, "pictures": PICTURES, "structures": STRUCTURE_TITLES},
-    script:
-        "../scripts/summary.py"
-
-
-rule pages:
-    input:
-        tables=[f"results/{name}.csv" for name in PAGES],
-        code=CODE["table_page"],
-    output:
-        pages=[
-            report(
+        **{
+            f"{name}_table": report(
                 f"results/pages/{name}.html",
                 caption=f"captions/{name}.rst",
                 category="Tables",
                 labels={"table": title, "as": "page"},
             )
-            for name, title in PAGES.items()
-        ],
+            for name, title in TABLE_PAGES.items()
+        },
     params:
-        titles=PAGES,
+        noise=STUDY.noise,
+        setting=STUDY.settings.excitations["report"].reading,
+        pictures=PICTURES,
+        titles=STRUCTURE_TITLES,
+        tables=TABLE_PAGES,
     script:
-        "../scripts/table_page.py"
+        "../scripts/pages.py"

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from study.reproduction import error_pages
+from study.reproduction import study_pages
 from study.reproduction.config import load_config
 from study.support import document
 from study.support.errors import StudyError
@@ -18,10 +18,10 @@ def main(page: Path, table: Path, picture: Path, noise: dict[str, float]) -> Non
             raise StudyError(f"{path}: there is no such file; run 'snakemake -j2 estimators' first")
     errors = pd.read_csv(table)
     for mark, block in {
-        "sentences": document.Bullets(error_pages.error_sentences(errors, noise)),
-        "about": document.Text(error_pages.about(errors)),
-        "errors": error_pages.error_overview(errors),
-        "bias": error_pages.bias_overview(errors, noise),
+        "sentences": document.Bullets(study_pages.error_sentences(errors, noise)),
+        "about": document.Text(study_pages.about_errors(errors)),
+        "errors": study_pages.error_overview(errors),
+        "bias": study_pages.bias_overview(errors, noise),
     }.items():
         document.put(page, mark, [block])
     replace_file(page.with_suffix(".png"), picture.read_bytes())

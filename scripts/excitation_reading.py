@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from study.reproduction import tables
-from study.reproduction.claims import evidence, excitation_reading, reported
+from study.reproduction.claims import dead_band, evidence, reported
 from study.reproduction.settings import ClaimSettings
 from study.support.workflow_step import one_sentence
 
@@ -12,7 +12,7 @@ from study.support.workflow_step import one_sentence
 def main(models: str, statements: str, settings: dict[str, Any], output: str) -> None:
     found = evidence.Evidence(ClaimSettings.model_validate(settings), evidence.models_of(Path(models)), [])
     stated = reported.load_reported(Path(statements))
-    tables.write_table(excitation_reading.both_readings(found, stated), Path(output))
+    tables.write_table(dead_band.both_readings(found, stated), Path(output))
 
 
 if "snakemake" in globals():

@@ -41,7 +41,7 @@ from study.faults.fault import (
 )
 from study.faults.imposed import impose
 from study.figures import page
-from study.figures.sheet import in_style
+from study.figures.styles import in_style
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.prepared import prepare_record
 from study.records.record import Record

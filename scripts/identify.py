@@ -6,7 +6,7 @@ from pathlib import Path
 from study.equations.model_file import read_model
 from study.records.record import read_csv
 from study.reproduction import tables
-from study.reproduction.identify_case import identify_case
+from study.reproduction.cases import identify_case
 from study.reproduction.settings import IdentificationSettings
 from study.support.workflow_step import one_sentence
 

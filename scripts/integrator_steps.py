@@ -6,16 +6,15 @@ from typing import Any
 from study.identify.estimators.base import Settings
 from study.records.excitation import READINGS
 from study.reproduction import integrator_study, tables
-from study.reproduction.claims.common import SYSTEMS
 from study.reproduction.claims.evidence import Drive, models_of, record_settings
+from study.reproduction.claims.reported import SYSTEMS
 from study.reproduction.settings import ClaimSettings
-from study.support.files import replace_file
 from study.support.workflow_step import one_sentence
 
 SHARE = 5  # differences on the same forces scatter little: a fifth of the ensemble's seeds is plenty
 
 
-def main(models: str, settings: dict[str, Any], csv: str, page: str) -> None:
+def main(models: str, settings: dict[str, Any], output: str) -> None:
     told = ClaimSettings.model_validate(settings)
     first, count = told.ensembles.first_seed, max(2, told.ensembles.seeds // SHARE)
     record = record_settings(told, Drive(SYSTEMS[0]))
@@ -27,11 +26,10 @@ def main(models: str, settings: dict[str, Any], csv: str, page: str) -> None:
         {name: known[name] for name in SYSTEMS if name in known},
         record, Settings(told.segments.segments(), (low, high)), range(first, first + count), readings,
     )  # fmt: skip
-    tables.write_table(table, Path(csv))
-    replace_file(Path(page), integrator_study.integrator_page(table).encode())
+    tables.write_table(table, Path(output))
 
 
 if "snakemake" in globals():
     step = globals()["snakemake"]
     with one_sentence():
-        main(step.params.models, step.params.settings, step.output.csv, step.output.page)
+        main(step.params.models, step.params.settings, step.output.csv)

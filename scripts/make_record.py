@@ -4,7 +4,7 @@ from pathlib import Path
 
 from study.equations.model_file import read_model
 from study.records.record import write_csv
-from study.reproduction.make_record import make_record
+from study.reproduction.cases import make_record
 from study.reproduction.settings import RecordSettings
 from study.support.files import replacing
 from study.support.workflow_step import one_sentence

@@ -7,12 +7,12 @@ from pathlib import Path
 import pandas as pd
 
 from study.equations.model_file import read_model
-from study.reproduction import ensemble, estimator_errors, tables
+from study.reproduction import ensemble, tables
 from study.reproduction.settings import IdentificationSettings, RecordSettings
 from study.support.workflow_step import one_sentence
 
 EVERY = 100  # seeds between two signs of life
-JUDGED = {"rates": ensemble.tolerance_rates, "errors": estimator_errors.errors}
+JUDGED = {"rates": ensemble.tolerance_rates, "errors": ensemble.estimator_errors}
 
 
 def main(

@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from study.compare import history
-from study.reproduction import summary
+from study.reproduction import study_pages
 from study.support import document
 from study.support.errors import StudyError
 from study.support.workflow_step import one_sentence
@@ -31,7 +31,7 @@ def main(results: Path, readme: Path, docs: Path) -> None:
         raise StudyError(f"{claims}: there is no such file; run 'make study' first")
     table = pd.read_csv(claims, keep_default_na=False).set_index("id")
     for page, mark, names in ((docs / "reproduction.md", "numbers", SHOWN), (readme, "first", FIRST)):
-        document.put(page, mark, [summary.statements(table.loc[list(names)].reset_index())])
+        document.put(page, mark, [study_pages.statements(table.loc[list(names)].reset_index())])
     if (climbed := results / "silverbox" / "history.json").is_file():
         document.put(
             docs / "tool.md", "history", [errors_by_step(json.loads(climbed.read_text(encoding="utf-8"))["steps"])]

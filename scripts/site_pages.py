@@ -109,7 +109,7 @@ def picture(term: Term) -> bytes:
     """The force of a term as a PNG."""
     from matplotlib.figure import Figure
 
-    from study.figures.sheet import in_style
+    from study.figures.styles import in_style
 
     u, v, force = force_of(term)
     with in_style():

@@ -17,7 +17,7 @@ from study.compare.force_map import curve, surface
 from study.compare.loops import loops
 from study.figures import coherence, page
 from study.figures.curves import InputCoherence
-from study.figures.sheet import in_style
+from study.figures.styles import in_style
 from study.records.prepared import FORCE
 from study.support.numbers import percent
 

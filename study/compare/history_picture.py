@@ -12,7 +12,7 @@ from matplotlib.ticker import LogLocator
 
 from study.compare.history import label
 from study.figures import page
-from study.figures.sheet import in_style
+from study.figures.styles import in_style
 
 
 def errors_by_step(axes: Axes, steps: Sequence[dict[str, Any]]) -> Axes:

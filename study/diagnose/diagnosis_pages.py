@@ -6,7 +6,7 @@ from study.diagnose import diagnosis_pictures
 from study.diagnose.diagnosis_pictures import PicturedDiagnosis
 from study.diagnose.verdict import Diagnosis
 from study.figures import page
-from study.figures.sheet import in_style
+from study.figures.styles import in_style
 
 FOLLOWED = 3  # candidates whose coefficient is drawn along frequency and amplitude
 

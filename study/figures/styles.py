@@ -1,7 +1,18 @@
-"""One look for each estimator, the same in every figure: colour, dash and width, so that grey suffices."""
+"""The style sheet of every picture, and one look for each estimator: colour, dash and width, so that grey suffices."""
 
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
+
+from matplotlib import style
+
+SHEET = Path(__file__).with_name("study.mplstyle")
+
+
+def in_style() -> AbstractContextManager[None]:
+    """Matplotlib's settings within a block."""
+    return style.context(SHEET)
 
 
 @dataclass(frozen=True)

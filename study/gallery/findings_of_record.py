@@ -1,16 +1,61 @@
-"""What a climb left in its folder, read back: the ladder, the diagnoses at its foot and at its end, and pictures."""
+"""What the literature says of a record of the gallery, and what a climb left in its folder, read back."""
 
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Annotated, Any, Literal, cast
 
-from study.gallery.known import Published
-from study.support.errors import StudyError
+from pydantic import BeforeValidator, Field
+
+from study.support.config_files import TableRow, Text, read_rows
+from study.support.errors import StudyError, expect
 from study.support.files import read_text
 
 Fields = dict[str, Any]
 QUIET = 4  # a quarter of the windows of a decay, the quietest, gives the values at small amplitudes
+
+
+class Literature(TableRow):
+    """One row of ``config/literature.tsv``: an entry of the gallery."""
+
+    entry: Text
+    title: Text
+    test: Text  # what was done to the structure
+    source: Text  # whose record it is
+    known: Text  # of the structure, before anything is fitted here
+
+
+class Published(TableRow):
+    """One row of ``config/published.tsv``: a value that others give.
+
+    ``key`` names a coefficient as histories do, a quotient of two with a stroke between, or of a free decay
+    ``frequency`` or ``damping`` with ``.loudest``, ``.largest`` or ``.quiet``.
+    """
+
+    record: Text
+    step: Literal["given", "reached"]  # the model as it is given, or as the climb leaves it
+    key: Text
+    quantity: Text
+    unit: str
+    value: Annotated[
+        float, BeforeValidator(lambda cell: float(cell) if isinstance(cell, str) else cell), Field(allow_inf_nan=False)
+    ]
+    within: Text  # how near one may expect to come, and why
+
+
+def literature(folder: Path) -> dict[str, Literature]:
+    """The entries by name, in the order in which the page shows them; a ``StudyError`` names the first fault."""
+    path = folder / "literature.tsv"
+    rows = [row for _, row in read_rows(path, Literature)]
+    names = [row.entry for row in rows]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    expect(twice is None, f"{path}: the entry {twice!r} stands twice; expected each once")
+    return {row.entry: row for row in rows}
+
+
+def published(folder: Path) -> list[Published]:
+    """Values that others give."""
+    return [row for _, row in read_rows(folder / "published.tsv", Published)]
 
 
 @dataclass(frozen=True)
@@ -40,13 +85,7 @@ class Beside:
 
 
 def read_findings(folder: Path, record: str) -> RecordFindings:
-    """What the climb of a record left in ``folder``.
-
-    Raises
-    ------
-    StudyError
-        If a file is not there or is no JSON.
-    """
+    """What the climb of a record left in ``folder``; a ``StudyError`` names a file that is not there or is no JSON."""
     steps = _json(folder / "history.json")["steps"]
     diagnoses = sorted((folder / "climb").glob("step_*/diagnosis.json"), key=lambda p: int(p.parent.name[5:]))
     if not diagnoses:

@@ -1,14 +1,22 @@
-"""The gallery as one page for a browser, and as blocks of the documentation with a picture or two of each entry."""
+"""The gallery as one page for a browser, and as blocks of the documentation: words, tables and pictures of an entry."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from study.gallery import blocks
-from study.gallery.findings_of_record import Beside, RecordFindings, found_beside, read_findings
-from study.gallery.known import Literature, literature, published
+from study.compare import history
+from study.gallery.findings_of_record import (
+    Beside,
+    Fields,
+    Literature,
+    RecordFindings,
+    found_beside,
+    literature,
+    published,
+    read_findings,
+)
 from study.support import document
-from study.support.document import Block, Fold, Heading, Image, PageSection, Picture
+from study.support.document import Block, Fold, Heading, Image, PageSection, Picture, Text
 from study.support.numbers import percent
 
 TITLE = "Measured records"
@@ -31,6 +39,8 @@ KEPT = (
     "climb/step_0/constancy.png",
 )  # the first ...
 MOST = 2  # ... of these that there are stand in the documentation
+MISSING, NOTHING = "missing_effect", "nothing_missing"  # verdicts of diagnoses
+SHOWN = 5  # candidates
 
 
 @dataclass(frozen=True)
@@ -43,13 +53,7 @@ class Entry:
 
 
 def entries(config: Path, results: Path, records: Mapping[str, Sequence[str]]) -> list[Entry]:
-    """The entries of the gallery in the order of the literature, with the names of their records.
-
-    Raises
-    ------
-    StudyError
-        If a table has a fault, or a climb left no results.
-    """
+    """The entries of the gallery in the order of the literature, with the names of their records."""
     values = published(config)
     made: list[Entry] = []
     for name, known in literature(config).items():
@@ -58,6 +62,124 @@ def entries(config: Path, results: Path, records: Mapping[str, Sequence[str]]) -
         if found:
             made.append(Entry(known, found, own))
     return made
+
+
+# ---- an entry in words and tables
+
+
+def told(entry: Entry) -> list[Block]:
+    """What stands in the literature, what each of the records shows, and published values beside those found."""
+    known = entry.known
+    blocks: list[Block] = [Text(f"{known.test}. {known.source}"), Text(f"**In the literature.** {known.known}")]
+    for one in entry.found:
+        blocks += of_record(one, named=len(entry.found) > 1)
+    if entry.values:
+        blocks += [Text("**Published values beside those found.**"), beside_each_other(entry.values)]
+    return blocks
+
+
+def of_record(found: RecordFindings, named: bool) -> list[Block]:
+    """The ladder of one record: from the model as given to the one reached, and what is left of the response."""
+    begins = ", ".join(_spoken(name) for name in found.steps[0]["terms"])
+    name = f"**`{found.record}`.** " if named else ""
+    return [
+        Text(f"{name}The model is given as {begins}. **What is found.** {found.first['says']}"),
+        climb_block(found),
+        Text(f"**What is left.** {left(found)}"),
+    ]
+
+
+def climb_block(found: RecordFindings) -> Block:
+    """Every model of the climb with its held-out error."""
+    rows = [
+        ("as given" if number == 0 else _spoken(history.label(step)), percent(step["error"]["response"]),
+         _in_units(step), percent(step["noise_floor"]["response"]))
+        for number, step in enumerate(found.steps)
+    ]  # fmt: skip
+    return document.table(("model", "held-out error", "rms", "noise floor"), rows)
+
+
+def left(found: RecordFindings) -> str:
+    """What the model reached leaves, and whether that is noise."""
+    last, step = found.last, found.steps[-1]
+    size = f"{percent(step['error']['response'])} of the response"
+    floor = percent(step["noise_floor"]["response"])
+    if step["error"]["response"] >= 1.0:
+        return f"{size} (noise floor {floor}): more than the response itself, so the model predicts none of it."
+    if last["verdict"] == NOTHING:
+        return (
+            f"{size} (noise floor {floor}), which depends no more than chance has it on the motion or its past: noise, "
+            "as far as this record can say."
+        )
+    if last["verdict"] == MISSING:
+        return f"{size} (noise floor {floor}): no noise. {_still(found)}"
+    depends = percent(last["left"]) if last.get("left") else "much"
+    return (
+        f"{size} (noise floor {floor}): no noise, but nothing with a name either. General functions of the motion "
+        f"explain a part of it, {depends} of the response; no single candidate does."
+    )
+
+
+def _still(found: RecordFindings) -> str:
+    first = found.last["candidates"][0]
+    tied = [_effect(t) for t in first.get("tied_with", ())]
+    also = f", which the record cannot tell from {', '.join(tied)}," if tied else ""
+    return (
+        f"The diagnosis still names {_effect(first)}{also} and with it {percent(first['response_error'])} would be "
+        "left; the climb ends here."
+    )
+
+
+def candidates(found: RecordFindings) -> Block:
+    """The first candidates of the model as given."""
+    rows = [
+        (_effect(c), percent(c["explained"]), percent(c["response_error"]), _changes(c),
+         ", ".join(_effect(t) for t in c["tied_with"][:3]))
+        for c in found.first["candidates"][:SHOWN]
+    ]  # fmt: skip
+    return document.table(("candidate", "explains", "error with it", "its coefficient changes by", "tied with"), rows)
+
+
+def _changes(candidate: Fields) -> str:
+    changes: Mapping[str, float | None] = candidate.get("changes") or {}
+    known = [value for value in changes.values() if value is not None]
+    return percent(max(known)) if known else ""
+
+
+def beside_each_other(values: Sequence[Beside]) -> Block:
+    """Published values and those found."""
+    rows = [
+        (f"`{v.published.record}`, {v.published.quantity}", _number(v.published.value, v.published.unit),
+         "not in the model" if v.found is None else _number(v.found, v.published.unit),
+         "" if v.interval is None else f"{v.interval[0]:.4g} to {v.interval[1]:.4g}",
+         "" if v.found is None else f"{v.found / v.published.value - 1.0:+.1%}".replace("%", " %"), v.published.within)
+        for v in values
+    ]  # fmt: skip
+    return document.table(("", "published", "found", "95 % interval", "differs by", "to be expected"), rows)
+
+
+def _number(value: float, unit: str) -> str:
+    return f"{value:.4g} {unit}".strip()
+
+
+def _in_units(step: Fields) -> str:
+    return f"{step['rms']:.3g} {step['unit']}" if step["unit"] else ""
+
+
+def _effect(candidate: Fields | str) -> str:
+    """An effect, in a structure with its place."""
+    if isinstance(candidate, str):
+        return _spoken(candidate)
+    place = " and ".join(candidate.get("between", ()))
+    where = f" between {place}" if place else f" at {candidate['at']}" if "at" in candidate else ""
+    return _spoken(candidate["term"]) + where
+
+
+def _spoken(name: str) -> str:
+    return name.replace("_", " ")
+
+
+# ---- pages
 
 
 def gallery_page(shown: Sequence[Entry]) -> bytes:
@@ -85,13 +207,12 @@ def _added(found: RecordFindings) -> str:
 
 
 def _section(entry: Entry) -> PageSection:
-    told = blocks.told(entry.known, entry.found, entry.values)
-    folds = [Fold(f"{f.record}: the first candidates", (blocks.candidates(f),)) for f in entry.found]
+    folds = [Fold(f"{f.record}: the first candidates", (candidates(f),)) for f in entry.found]
     shown = "".join(
         (f"<h3>{f.record}</h3>" if len(entry.found) > 1 else "") + document.thumbnails(climb_pictures(f))
         for f in entry.found
     )
-    return PageSection(entry.known.entry, entry.known.title, document.fragment([*told, *folds]) + shown)
+    return PageSection(entry.known.entry, entry.known.title, document.fragment([*told(entry), *folds]) + shown)
 
 
 def climb_pictures(found: RecordFindings) -> list[Picture]:
@@ -118,7 +239,7 @@ def documented(shown: Sequence[Entry], folder: str) -> list[Block]:
     parts: list[Block] = [climb_overview(shown)]
     for entry in shown:
         parts.append(Heading(entry.known.title))
-        parts += blocks.told(entry.known, entry.found, entry.values)
+        parts += told(entry)
         first = entry.found[0]
         parts += [Image(PICTURES[name], f"{folder}/{picture_name(first, name)}") for name in kept(first)]
     return parts

@@ -42,7 +42,7 @@ def pairs_html(caption: str, pairs: Mapping[str, str]) -> str:
 @contextmanager
 def drawing_axes(ax: "Axes | None", rows: int = 1) -> "Generator[list[Axes]]":
     """The axes to draw on, in the project's style: those given, or those of a new figure of pyplot."""
-    from study.figures.sheet import in_style
+    from study.figures.styles import in_style
 
     with in_style():
         if ax is not None:

@@ -1,14 +1,33 @@
-"""The study's configuration: read, checked whole before any job starts, and handed out case by case."""
+"""The study's configuration: read, checked whole before any job starts, and handed out case by case.
 
-from collections.abc import Mapping
+What a value may be by itself, ``settings`` says; here, what the jobs ask beyond: none shall end in want of it. Each
+check raises a ``StudyError`` at the first fault, naming the value and what was expected.
+"""
+
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 from pydantic import BeforeValidator, Field
 
-from study.reproduction import case_names, preconditions
-from study.reproduction.settings import IdentificationSettings, Positive, RecordSettings, StudySettings
+from study.equations import terms
+from study.equations.model import Model, free, named_channels
+from study.equations.model_file import read_model
+from study.identify.estimators import ESTIMATORS
+from study.identify.estimators.base import true_parameters
+from study.records.excitation import READINGS, SETTINGS, theoretical_autospectrum
+from study.reproduction.settings import (
+    ExcitationSettings,
+    IdentificationSettings,
+    Positive,
+    RecordSettings,
+    Sampling,
+    StudySettings,
+    Tolerances,
+)
 from study.support.config_files import TableRow, Text, read_rows, read_yaml
 from study.support.errors import StudyError, at, expect
 
@@ -19,6 +38,12 @@ Name = Annotated[  # a dot elsewhere is that of a file or of a rule
     str, Field(pattern=r"^[a-z]([a-z0-9_]|(?<=[0-9])[.](?=[0-9]))*\Z", max_length=64, description=NAME)
 ]
 Number = Annotated[Annotated[int, Field(ge=1)] | None, BeforeValidator(lambda cell: cell or None)]
+RULE = re.compile(r"^\s*(?:use rule \w+ as|rule) (\w+)(?: with)?:", re.MULTILINE)
+JUDGED, KIND = "report", "gaussian_lowpass"  # the force that the claims judge, Section 2.1
+CURVES = ("siso", "miso", "local_polynomial", "instrumental", "output_error")  # have some of every case to be drawn
+LOOKED_AT = (2.0, 4.0)  # hertz: where the claims read single lines, the Dead-Band's and the Mathieu's
+LONGER, INPUTS = 4, 2  # the claims cut segments this many times as long too, and tell so many inputs apart in them
+LINES = 4  # of a segment, that the fit band spans at least
 
 
 class Case(TableRow):
@@ -42,7 +67,6 @@ class Case(TableRow):
 
     @property
     def model_file(self) -> str:
-        """Where the system is described."""
         return f"models/{self.model}.yaml"
 
     @property
@@ -80,17 +104,14 @@ class StudyConfig:
     def identification_settings(self, case: str, estimators: tuple[str, ...] = ()) -> IdentificationSettings:
         """What a case's identification depends on beside its record; other estimators than the study's if named."""
         shared, tolerances = self.settings, self.settings.tolerances
+        periods = shared.excitations[self.cases[case].excitation].periods or 1
         return IdentificationSettings(
             case=case, also_assumed=self.cases[case].also_assumed, estimators=estimators or shared.estimators,
             segments=shared.segments, fit_band=shared.fit_band, local_polynomial=shared.local_polynomial,
-            settle_periods=shared.settle_periods, period=self.period(case),
+            settle_periods=shared.settle_periods,
+            period=shared.sampling.samples // periods if periods > 1 else None,
             relative={**tolerances.relative, **tolerances.of_case.get(case, {})}, absolute=tolerances.absolute,
         )  # fmt: skip
-
-    def period(self, case: str) -> int | None:
-        """Samples in a period of a case's force, where it repeats."""
-        periods = self.settings.excitations[self.cases[case].excitation].periods or 1
-        return self.settings.sampling.samples // periods if periods > 1 else None
 
     def drawn(self, case: str) -> list[str]:
         """The estimators that a case's figures show."""
@@ -111,21 +132,85 @@ def load_config(folder: Path) -> StudyConfig:
     source, models = folder / "config.yaml", folder.parent / "models"
     settings = read_yaml(source, StudySettings)
     with at(source):
-        preconditions.check_settings(settings)
+        _check_settings(settings)
     cases: dict[str, Case] = {}
-    stems: dict[str, str] = {}
-    taken = case_names.taken(folder.parent, settings.estimator_errors.many)
+    stems: dict[str, str] = {}  # of figures, with whose each is
+    taken = dict.fromkeys(("benchmarks", f"estimators_{settings.estimator_errors.many}"), "a folder of results/")
+    taken |= dict.fromkeys(rules(folder.parent), "a rule")
     for where, case in read_rows(folder / "cases.tsv", Case):
         with at(where):
             expect(case.case not in cases, "the case stands twice; expected each name once")
-            name = taken.get(case.case)
-            expect(not name, f"{case.case!r} is the name of {name}; give the case another")
+            named = taken.get(case.case)
+            expect(not named, f"{case.case!r} is the name of {named}; give the case another")
             _check_case(case, settings, models, stems)
         cases[case.case] = case
     with at(source):
-        preconditions.check_tolerances(settings.tolerances, models, list(cases))
-        preconditions.check_claims(settings)
+        _check_tolerances(settings.tolerances, models, cases)
+        _check_claims(settings)
     return StudyConfig(settings, cases)
+
+
+def rules(project: Path) -> set[str]:
+    """Names of the rules of a folder's Snakefile and ``rules/``: no case's, for its target would be another's."""
+    files = [path for path in (project / "Snakefile", *project.glob("rules/*.smk")) if path.is_file()]
+    return {"all"}.union(*(RULE.findall(path.read_text(encoding="utf-8")) for path in files))
+
+
+# ---- settings
+
+
+def _check_settings(settings: StudySettings) -> None:
+    """Whether values fit together, and names are known."""
+    samples, dt, length = settings.sampling.samples, settings.sampling.dt, settings.segments.length
+    expect(
+        length <= samples,
+        f"segments.length is {length}, longer than the record of {samples} samples; expected that many or fewer",
+    )
+    (low, high), line = settings.fit_band, settings.resolution
+    band, width = list(settings.fit_band), 2 * settings.local_polynomial.half_width + 1
+    expect(low < high <= 0.5 / dt, f"fit_band is {band}; it must rise and end below {0.5 / dt:g} Hz")
+    expect(high - low >= LINES * line, f"fit_band is {band}; it must span four lines of {line:g} Hz or more")
+    expect(
+        (high - low) * samples * dt >= width,
+        f"local_polynomial.half_width makes bands of {width} lines; fit_band {band} of {samples} samples holds fewer",
+    )
+    own, compared = settings.estimators, settings.estimator_errors.estimators
+    for name in (*own, *settings.monte_carlo.estimators, *compared):
+        expect(name in ESTIMATORS, f"there is no estimator {name!r}; known are {', '.join(ESTIMATORS)}")
+    expect("miso" in own, "estimators lacks 'miso', whose coherences are drawn of every case")
+    expect("miso" in compared, "estimator_errors.estimators lacks 'miso', which the others are compared with")
+    for kind, names in (("without_noise", settings.drawn.without_noise), ("with_noise", settings.drawn.with_noise)):
+        for name in names:
+            expect(name in own, f"drawn.{kind} names {name!r}, which is not among the estimators")
+        without = f"drawn.{kind} is [{', '.join(names)}], of which none has curves of every case"
+        expect(set(names) & set(CURVES), f"{without}; one of {', '.join(CURVES)} is needed")
+    for name, excitation in settings.excitations.items():
+        place, known = f"excitations.{name}", ("kind", "seed", "periods", *SETTINGS[excitation.kind])
+        for key in excitation.plain():
+            nothing = f"{place} has {key}, which means nothing to a {excitation.kind}; it may have {', '.join(known)}"
+            expect(key in known, nothing)
+        expect(excitation.seed is not None, f"{place}: 'seed' is missing; expected a whole number of 0 or more")
+        with at(place):
+            _check_force(excitation, settings.sampling)
+
+
+def _check_force(excitation: ExcitationSettings, sampling: Sampling) -> None:
+    """Whether there is such a force at this sampling, by its spectrum."""
+    theoretical_autospectrum(excitation.at_level(1.0), np.zeros(1), sampling.samples, sampling.dt)
+
+
+def _check_reached(excitation: ExcitationSettings, settings: StudySettings) -> None:
+    """Whether a force reaches over the lines that parameters are fitted to: beyond it there is only leakage."""
+    force, high, line = excitation.at_level(1.0), settings.fit_band[1], settings.resolution
+    begun = f"fit_band of config.yaml is {list(settings.fit_band)}; the excitation"
+    expect(high <= force.highest, f"{begun} has nothing above {force.highest:g} Hz, where the band must end or before")
+    expect(
+        high - force.lowest >= LINES * line,
+        f"{begun} begins at {force.lowest:g} Hz, and four lines of {line:g} Hz or more must lie above",
+    )
+
+
+# ---- cases
 
 
 def _check_case(case: Case, settings: StudySettings, models: Path, taken: dict[str, str]) -> None:
@@ -137,9 +222,14 @@ def _check_case(case: Case, settings: StudySettings, models: Path, taken: dict[s
     if excitation is None:
         known = ", ".join(settings.excitations)
         raise StudyError(f"there is no excitation {case.excitation!r}; config.yaml names {known}")
-    model = preconditions.check_model(path, case.also_assumed, settings)
-    preconditions.check_periods(excitation, settings)
-    preconditions.check_reached(excitation, settings)
+    model = _checked_model(path, case.also_assumed, settings)
+    needed, periods = settings.settle_periods + 4, excitation.periods or 1
+    expect(
+        "errors_in_variables" not in settings.estimators or periods >= needed,
+        f"the excitation has {periods} period{'s' if periods > 1 else ''}; the estimator errors_in_variables needs "
+        f"settle_periods and four more, {needed}",
+    )
+    _check_reached(excitation, settings)
     for kind, stem in case.figures.items():
         expect(stem not in taken, f"{kind} is {getattr(case, kind)}, a number that {taken.get(stem)} has already")
         taken[stem] = f"{kind} of the case {case.case!r}"
@@ -150,4 +240,95 @@ def _check_case(case: Case, settings: StudySettings, models: Path, taken: dict[s
     expect(
         not case.pattern or (not model.states and model.numbers().get("k", 0.0) > 0.0),
         f"pattern is {case.pattern}; it needs a linear stiffness above zero and no term with a memory",
+    )
+
+
+def _checked_model(path: Path, also_assumed: str, settings: StudySettings) -> Model:
+    """A case's model, which can be simulated, and whose inputs the record can tell apart with a term more."""
+    from study.identify.frequency_domain.local_polynomial import LocalPolynomial
+
+    model = assumed = read_model(path)
+    with at(path):
+        model.numbers()
+        named_channels(model, ())
+    if also_assumed:
+        term = terms.get(also_assumed)
+        for needed in term.parameters:
+            raise StudyError(f"also_assumed {also_assumed!r} needs a value for {needed.name}; take a term without")
+        assumed = model.with_term(term)
+    inputs = len({c.shape for entry in assumed.terms for c in entry.term.components})
+    cut, samples = settings.segments.segments(), settings.sampling.samples
+    count, worth = cut.count(samples), cut.effective_averages(samples)
+    begun = f"segments of config.yaml cut the record into {count}"
+    expect(count > inputs, f"{begun}; {inputs} inputs need {inputs + 1} or more")
+    expect(
+        worth > inputs,
+        f"{begun} that are worth {worth:.3g} averages, as they overlap; {inputs} inputs need more than {inputs}: "
+        "expected shorter segments",
+    )
+    LocalPolynomial(**settings.local_polynomial.model_dump()).check(inputs)
+    return model
+
+
+def _check_tolerances(tolerances: Tolerances, models: Path, cases: Iterable[str]) -> None:
+    """Whether tolerances are of parameters that there are, and of cases or systems."""
+    systems = [path.stem for path in sorted(models.glob("*.yaml"))]
+    for name in tolerances.of_case:
+        neither = f"tolerances.of_case names {name!r}, which is neither a case nor a system"
+        expect(name in cases or name in systems, neither)
+    keys = [key for term in terms.LIBRARY.values() for key in free(term).keys]
+    keys += [key for name in systems for key in read_model(models / f"{name}.yaml").values]
+    known = sorted(true_parameters(dict.fromkeys(keys, 1.0)))  # as tables name them
+    groups = {"relative": tolerances.relative, "absolute": tolerances.absolute}
+    groups |= {f"of_case.{name}": own for name, own in tolerances.of_case.items()}
+    for group, names in groups.items():
+        for name in names:
+            unknown = f"tolerances.{group} names {name!r}, which is no parameter; known are {', '.join(known)}"
+            expect(name in known, unknown)
+
+
+# ---- claims
+
+
+def _check_claims(settings: StudySettings) -> None:
+    """Whether the claims can be judged under these settings."""
+    force = settings.excitations.get(JUDGED)
+    if force is None:
+        known = ", ".join(settings.excitations)
+        raise StudyError(f"excitations names {known}, not {JUDGED!r}; the claims judge a force of this name, a {KIND}")
+    place = f"excitations.{JUDGED}"
+    expect(
+        force.kind == KIND,
+        f"{place}.kind is {force.kind!r}; the claims judge a {KIND} there, "
+        "and a force of another kind needs a name of its own",
+    )
+    expect(
+        force.reading,
+        f"{place} has no reading, which the claims name; "
+        f"it may be {' or '.join(READINGS)}, what unit variance refers to",
+    )
+    for kind in SETTINGS:  # Section 6 holds for any spectrum: the claims put each in its place
+        with at(f"the claims put a {kind} in place of {place}"):
+            _check_force(force.model_copy(update={"kind": kind}), settings.sampling)
+    with at(place):
+        _check_reached(force, settings)
+    (low, high), (first, last) = settings.fit_band, LOOKED_AT
+    below = first - settings.resolution  # the lowest line has a neighbour
+    expect(
+        low <= below and high >= last,
+        f"fit_band is {list(settings.fit_band)}; the claims look at lines from {first:g} to {last:g} Hz, so that "
+        f"it must begin at {below:.4g} Hz or below and end at {last:g} Hz or above",
+    )
+    samples, length = settings.sampling.samples, settings.segments.length
+
+    def enough(length: int) -> bool:
+        cut = settings.segments.model_copy(update={"length": length}).segments(LONGER)
+        return samples >= cut.length and cut.effective_averages(samples) > INPUTS
+
+    shortest = 16  # by its bounds
+    right = next((n for k in range(1, length.bit_length()) if enough(n := length >> k) and n >= shortest), None)
+    expect(
+        enough(length),
+        f"segments.length is {length}; the claims cut segments of {LONGER} times that too, which a record of {samples} "
+        f"samples must hold for more than {INPUTS} averages: expected {right or 'a longer record'}",
     )

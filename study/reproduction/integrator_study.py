@@ -5,8 +5,7 @@ the MI/SO estimates is the integrator's doing alone, free of the leakage that bo
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,24 +14,16 @@ import pandas as pd
 from study.equations.model import Model
 from study.identify.estimators.base import Settings, true_parameters
 from study.identify.estimators.in_reverse import miso
+from study.reproduction.cases import make_record
 from study.reproduction.ensemble import threaded
-from study.reproduction.make_record import make_record
 from study.reproduction.settings import IntegratorSettings, RecordSettings
-from study.support.document import unpadded
 from study.support.errors import DivergenceError
-from study.support.numbers import percent
 
-Table = Mapping[str, Any]
+Estimates = Mapping[str, float]
 FINE = IntegratorSettings(method="rk4", steps_per_sample=16)
 STUDIED = [IntegratorSettings(method=m, steps_per_sample=s) for m in ("abm4", "rk4") for s in (1, 2, 4, 8)]
-
-
-@dataclass(frozen=True)
-class IntegratorRun:
-    """Parameters that one record gives, or the time at which it diverged."""
-
-    values: Mapping[str, float]
-    diverged: float | None = None
+NOTHING_FOUND = {"parameter": "", "true": math.nan, "fine": math.nan, "mean_error": math.nan,
+                 "standard_error": math.nan, "relative_error": math.nan}  # fmt: skip
 
 
 def integrator_study(
@@ -52,77 +43,45 @@ def integrator_study(
     """
     rows: list[dict[str, Any]] = []
     for name, model in models.items():
+        truth = true_parameters(model.values)
         for reading in readings:
             excitation = record.excitation.model_copy(update={"reading": reading})
             base = record.model_copy(update={"excitation": excitation})
-            fine = _runs(model, base, FINE, estimation, seeds)
+            fine, _ = _estimates(model, base, FINE, estimation, seeds)
             for integrator in STUDIED if reading == readings[0] else STUDIED[:1]:
-                runs = _runs(model, base, integrator, estimation, seeds)
+                found, lost = _estimates(model, base, integrator, estimation, seeds)
                 about = {"system": name, "reading": reading, **integrator.plain()}
-                rows += _rows(about, true_parameters(model.values), fine, runs, seeds)
+                counts = {"seeds": len(seeds), "diverged": len(lost), "diverged_seeds": ", ".join(lost)}
+                pairs = [pair for pair in zip(fine, found, strict=True) if all(pair)]
+                parts = [_errors(key, truth[key], pairs) for key in (pairs[0][0] if pairs else ()) if key in truth]
+                rows += [{**about, **part, **counts} for part in parts or [NOTHING_FOUND]]
     return pd.DataFrame(rows)
 
 
-def _runs(
-    model: Model, record: RecordSettings, integrator: IntegratorSettings, estimation: Settings, seeds: Iterable[int]
-) -> list[IntegratorRun]:
+def _estimates(
+    model: Model, record: RecordSettings, integrator: IntegratorSettings, estimation: Settings, seeds: Sequence[int]
+) -> tuple[list[Estimates], list[str]]:
+    """Parameters by seed, none where the run diverges, and which seeds those are, each with the time."""
     stepped = record.model_copy(update={"integrator": integrator})
 
-    def run(seed: int) -> IntegratorRun:
+    def run(seed: int) -> tuple[Estimates, str]:
         try:
             simulated = make_record(model, stepped, seed=seed)
         except DivergenceError as error:
-            return IntegratorRun({}, error.time)
-        return IntegratorRun({p.name: p.value for p in miso(model, simulated, estimation).parameters})
+            return {}, f"{seed} at {error.time:.4g} s"
+        return {p.name: p.value for p in miso(model, simulated, estimation).parameters}, ""
 
-    return threaded(run, list(seeds))
-
-
-def _rows(
-    about: Table, truth: Table, fine: list[IntegratorRun], runs: list[IntegratorRun], seeds: Sequence[int]
-) -> list[dict[str, Any]]:
-    lost = [f"{s} at {r.diverged:.4g} s" for s, r in zip(seeds, runs, strict=True) if r.diverged is not None]
-    kept = [(f.values, r.values) for f, r in zip(fine, runs, strict=True) if f.values and r.values]
-    names = [n for n in kept[0][0] if n in truth] if kept else []
-    nothing = dict.fromkeys(("true", "fine", "mean_error", "standard_error", "relative_error"), math.nan)
-    parts = [{"parameter": n, **_errors(n, truth[n], kept)} for n in names] or [{"parameter": "", **nothing}]
-    counts = {"seeds": len(seeds), "diverged": len(lost), "diverged_seeds": ", ".join(lost)}
-    return [{**about, **part, **counts} for part in parts]
+    runs = threaded(run, seeds)
+    return [values for values, _ in runs], [lost for _, lost in runs if lost]
 
 
-def _errors(name: str, true: float, kept: list[tuple[Mapping[str, float], Mapping[str, float]]]) -> dict[str, float]:
-    pairs = [(f[name], r[name]) for f, r in kept if name in f and name in r]
-    fine = np.array([f for f, _ in pairs])
-    error = np.array([r for _, r in pairs]) - fine
+def _errors(name: str, true: float, pairs: Sequence[tuple[Estimates, Estimates]]) -> dict[str, Any]:
+    both = [(fine[name], found[name]) for fine, found in pairs if name in fine and name in found]
+    fine = np.array([f for f, _ in both])
+    error = np.array([found for _, found in both]) - fine
     mean = float(np.mean(error))
     return {
-        "true": true, "fine": float(np.mean(fine)), "mean_error": mean,
+        "parameter": name, "true": true, "fine": float(np.mean(fine)), "mean_error": mean,
         "standard_error": float(np.std(error, ddof=1) / math.sqrt(len(error))) if len(error) > 1 else math.nan,
         "relative_error": mean / true if true != 0.0 else math.nan,
     }  # fmt: skip
-
-
-def integrator_page(table: pd.DataFrame) -> str:
-    """The table as a page: one block a system, relative errors in percent."""
-    parts = [
-        "# What the integrator's setting does to the recovered parameters",
-        "Mean error of each MI/SO estimate against the same records integrated finely "
-        f"({FINE.method}, {FINE.steps_per_sample} steps a sample), with its standard error; "
-        "relative in percent, in the parameter's own unit where the true value is zero. "
-        "The report's own setting is abm4 with one step a sample (Section 2.2).",
-    ]
-    for (system, reading), block in table.groupby(["system", "reading"], sort=False):
-        names = [str(n) for n in block["parameter"].unique() if n]
-        rows: list[list[object]] = []
-        for (method, steps), group in block.groupby(["method", "steps_per_sample"], sort=False):
-            errors = {str(row["parameter"]): _error(row) for _, row in group.iterrows()}
-            lost = f"{group['diverged'].iloc[0]} of {group['seeds'].iloc[0]}"
-            rows.append([method, steps, *(errors.get(n, "") for n in names), lost])
-        heading = ["integrator", "steps a sample", *names, "diverged"]
-        parts += [f"## {system}, unit variance {reading}", unpadded(heading, rows)]
-    return "\n\n".join(parts) + "\n"
-
-
-def _error(row: "pd.Series[Any]") -> str:
-    true, error, spread = abs(row["true"]), row["mean_error"], row["standard_error"]
-    return percent(error / true, "+.2g", spread / true) if true != 0.0 else f"{error:+.2g} +- {spread:.1g}"

@@ -10,15 +10,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.equations.equations_of_motion import acceleration_program
 from study.equations.model import Model
 from study.records.record import Record
+from study.support.arrays import Floats
 from study.support.errors import StudyError
 
-Floats = NDArray[np.float64]
 POINTS_A_CYCLE = 256
+GAPS = 120  # half widths tried between none and the largest displacement
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,38 @@ def natural_frequency(values: Mapping[str, float | None]) -> float:
     return math.sqrt(stiffness / mass) / (2.0 * math.pi)
 
 
-def mathieu_lines(natural: float, modulation: float) -> dict[str, float]:
+def mean_curve(record: Record, mass: float, *powers: int) -> list[float]:
+    """Least-squares coefficients of the restoring force on powers of the displacement."""
+    columns: Floats = np.column_stack([record["displacement"] ** power for power in powers])
+    scale: Floats = np.sqrt(np.mean(columns**2, axis=0))
+    scaled: Floats = columns / scale
+    solution: Floats = np.linalg.solve(scaled.T @ scaled, scaled.T @ restoring_force(record, mass)) / scale
+    return solution.tolist()
+
+
+def local_damping_ratio(record: Record, mass: float) -> float:
+    """Damping beyond 1.5 standard deviations of displacement over that within half of one."""
+    u, v = record["displacement"], record["velocity"]
+    a, b = mean_curve(record, mass, 1, 3)
+    rest, size = restoring_force(record, mass) - (a * u + b * u**3), np.abs(u) / np.std(u)
+    outer, inner = (float(np.sum(rest[k] * v[k]) / np.sum(v[k] ** 2)) for k in (size > 1.5, size < 0.5))
+    return outer / inner
+
+
+def read_dead_band(record: Record, mass: float) -> float:
+    """The gap that a pattern shows: force of a slope beyond +-u_g, none within, that fits it best."""
+    u, v = record["displacement"], record["velocity"]
+    rest = restoring_force(record, mass)
+    tried = np.linspace(0.0, float(np.max(np.abs(u))), GAPS + 1)[:-1]
+    left: list[float] = []
+    for gap in tried:
+        design = np.column_stack([u - np.clip(u, -gap, gap), v])
+        coefficients = np.linalg.solve(design.T @ design, design.T @ rest)
+        left.append(float(np.sum((rest - design @ coefficients) ** 2)))
+    return float(tried[int(np.argmin(left))])
+
+
+def mathieu_frequencies(natural: float, modulation: float) -> dict[str, float]:
     """Frequencies at which a Mathieu system's response is strong, by their formulas (Section 3.3).
 
     All are in hertz, as are f_n of the mean stiffness and the frequency f_m of the stiffness that are given.

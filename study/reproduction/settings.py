@@ -102,8 +102,15 @@ class DrawnEstimators(Section):
     with_noise: Names
 
 
-class Tolerances(Section):
-    """What an estimate may be off: relative, absolute where the true value is zero, and those of single cases."""
+class AllowedErrors(Section):
+    """What an estimate may be off by name: relative, absolute and in its own unit where the true value is zero."""
+
+    relative: Limits
+    absolute: Limits
+
+
+class Tolerances(AllowedErrors):
+    """Those of the study, and of single cases."""
 
     relative: Annotated[Limits, _with("m", "f_n", "k", "k3", "k_m", "k_dead_band", "u_g", "f_m", "c3", "c", "zeta")]
     absolute: Annotated[Limits, _with("k", "c", "k3", "phase")]
@@ -227,7 +234,7 @@ class RecordSettings(Section):
         return self.model_copy(update={"excitation": excitation, "noise_seed": None})
 
 
-class IdentificationSettings(Section):
+class IdentificationSettings(AllowedErrors):
     """What a case's identification depends on beside its record; ``period`` counts samples, if the force repeats."""
 
     case: str
@@ -238,5 +245,3 @@ class IdentificationSettings(Section):
     local_polynomial: LocalPolynomialSettings
     settle_periods: Seed
     period: Count | None = None
-    relative: Limits
-    absolute: Limits

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,7 +11,7 @@ import pandas as pd
 from study.equations.model import Model
 from study.identify.estimators.base import Identified, true_parameters
 from study.identify.frequency_domain.conditioned import MisoResult
-from study.reproduction.settings import IdentificationSettings
+from study.reproduction.settings import AllowedErrors, IdentificationSettings
 from study.support.files import replacing
 
 PARAMETER_COLUMNS = [
@@ -25,20 +25,6 @@ COHERENCE_COLUMNS = [
     "frequency", "estimator", "input", "shape", "terms", "ordinary", "partial", "contribution", "cumulative",
 ]  # fmt: skip
 NOISE_COLUMNS = ["frequency", "estimator", "noise"]
-
-
-class AllowedErrors(Protocol):
-    """What an estimate may be off by name: relative, absolute where the true value is zero."""
-
-    @property
-    def relative(self) -> Mapping[str, float]:
-        """Of the true value."""
-        ...
-
-    @property
-    def absolute(self) -> Mapping[str, float]:
-        """In the parameter's own unit."""
-        ...
 
 
 def parameter_table(

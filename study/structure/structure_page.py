@@ -16,7 +16,7 @@ from study.equations.place import Place
 from study.equations.place import place_in_words as placed
 from study.figures import page
 from study.figures.labels import term_names
-from study.figures.sheet import in_style
+from study.figures.styles import in_style
 from study.structure import structure_panels
 from study.structure.placed_ranking import PlacedRanked
 from study.structure.sketch import Sketch

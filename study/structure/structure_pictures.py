@@ -13,7 +13,7 @@ from study.diagnose import diagnosis_pages
 from study.diagnose.verdict import MISSING
 from study.equations.place import place_in_words
 from study.figures import page
-from study.figures.sheet import in_style
+from study.figures.styles import in_style
 from study.structure import structure_panels
 from study.structure.modes import Modes
 from study.structure.sketch import Sketch, sketch

@@ -106,12 +106,6 @@ def _markdown(block: Block) -> str:
             return tabulate(cells, headers=list(heading), tablefmt="pipe", disable_numparse=True)
 
 
-def unpadded(heading: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    """A table in Markdown whose columns are not aligned, for cells of several hundred characters."""
-    cells = [[str(cell).replace("|", "\\|") for cell in row] for row in (heading, ["---"] * len(heading), *rows)]
-    return "\n".join(f"| {' | '.join(row)} |" for row in cells)
-
-
 def put(path: Path, mark: str, blocks: Sequence[Block]) -> None:
     """Write blocks into a Markdown file, in place of what stands between ``<!-- mark -->`` and ``<!-- /mark -->``."""
     place = re.compile(rf"(<!-- {mark} -->\n).*?(<!-- /{mark} -->)", re.DOTALL)

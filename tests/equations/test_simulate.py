@@ -18,8 +18,8 @@ from study.identify.frequency_domain.conditioned import analyse
 from study.identify.frequency_domain.inputs import histories, reverse_inputs
 from study.records.excitation import Excitation, force
 from study.records.spectra import Segments, cross_spectra
+from study.reproduction.cases import make_record
 from study.reproduction.config import load_config
-from study.reproduction.make_record import make_record
 from study.support.errors import DivergenceError, StudyError
 
 ROOT = Path(__file__).parents[2]

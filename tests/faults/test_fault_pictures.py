@@ -10,7 +10,7 @@ from PIL import Image
 
 from study.faults.fault import CLIPPING, DRIFT, DROP_OUTS, FORCE_NOISE, GAIN_CHANGE, NAMES, SPIKES, Fault
 from study.faults.imposed import impose
-from study.figures.sheet import in_style
+from study.figures.styles import in_style
 
 ROOT = Path(__file__).parents[2]
 

@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 
 from study.commands import measurements
-from study.gallery import blocks, gallery_page, known
-from study.gallery.findings_of_record import found_beside, read_findings
-from study.gallery.known import Published
+from study.gallery import findings_of_record, gallery_page
+from study.gallery.findings_of_record import Published, found_beside, read_findings
 from study.support import document
 from study.support.errors import StudyError
 
@@ -58,7 +57,7 @@ def published(key, step="reached", value=50.0):
 
 
 def said(folder):
-    return document.markdown(blocks.of_record(read_findings(folder, "run"), named=True))
+    return document.markdown(gallery_page.of_record(read_findings(folder, "run"), named=True))
 
 
 def test_what_is_left_is_no_noise_where_the_last_verdict_says_so(folder):
@@ -87,7 +86,7 @@ def test_a_candidate_of_a_structure_has_a_place(folder):
     (folder / "climb/step_0/diagnosis.json").write_text(
         json.dumps(diagnosis("missing_effect", candidates=[placed | {"tied_with": tied}]))
     )
-    text = document.markdown([blocks.candidates(read_findings(folder, "run"))])
+    text = document.markdown([gallery_page.candidates(read_findings(folder, "run"))])
     assert "stop between ground and pitch" in text
     assert "dead band at pitch" in text
 
@@ -116,7 +115,7 @@ def test_values_beside_those_published(folder, key, at, found):
 
 def test_a_row_says_by_how_much_a_value_differs(folder):
     row = found_beside(published("kz", value=50.0), read_findings(folder, "run"))
-    table = blocks.beside_each_other([row, found_beside(published("k"), read_findings(folder, "run"))])
+    table = gallery_page.beside_each_other([row, found_beside(published("k"), read_findings(folder, "run"))])
     text = document.markdown([table])
     assert "+20.0 %" in text
     assert "59 to 61" in text
@@ -124,7 +123,9 @@ def test_a_row_says_by_how_much_a_value_differs(folder):
 
 
 def test_the_page_holds_its_pictures_and_asks_for_nothing(folder):
-    row = known.Literature(entry="damper", title="A <damper>", test="A test", source="Others", known="Much")
+    row = findings_of_record.Literature(
+        entry="damper", title="A <damper>", test="A test", source="Others", known="Much"
+    )
     entry = gallery_page.Entry(row, (read_findings(folder, "run"),), ())
     page = gallery_page.gallery_page([entry]).decode()
     assert page.count("data:image/png;base64,") == 1
@@ -141,5 +142,7 @@ def test_without_results_one_sentence(tmp_path):
 
 def test_every_entry_has_its_literature_and_every_value_its_record():
     rows = measurements.load_measurements(ROOT / "config")
-    assert list(known.literature(ROOT / "config")) == list(dict.fromkeys(row.entry for row in rows.values()))
-    assert {value.record for value in known.published(ROOT / "config")} <= set(rows)
+    assert list(findings_of_record.literature(ROOT / "config")) == list(
+        dict.fromkeys(row.entry for row in rows.values())
+    )
+    assert {value.record for value in findings_of_record.published(ROOT / "config")} <= set(rows)

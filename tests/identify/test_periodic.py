@@ -15,8 +15,8 @@ from study.identify.frequency_domain.periodic import Periods, fit_periodic, stea
 from study.records.excitation import Excitation, force
 from study.records.record import Record
 from study.records.spectra import Segments
+from study.reproduction.cases import identify_case
 from study.reproduction.config import load_config
-from study.reproduction.identify_case import identify_case
 from study.support.errors import StudyError
 
 BAND, SAMPLES, DT = (0.3, 10.0), 512, 0.02

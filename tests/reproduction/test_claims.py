@@ -14,14 +14,13 @@ from scipy.integrate import solve_ivp
 from study.equations.model_file import read_model
 from study.identify.estimators.base import Settings
 from study.records.record import Record
-from study.reproduction import config, integrator_study
+from study.reproduction import config, integrator_study, study_pages
 from study.reproduction.claims import (
     claims_table,
+    dead_band,
     evidence,
-    excitation_reading,
     judgement,
     levels,
-    noise_with_instruments,
     preliminary_claims,
     sample,
 )
@@ -29,8 +28,9 @@ from study.reproduction.claims import reported as stated
 from study.reproduction.claims.judgement import Condition
 from study.reproduction.claims.reported import Reported, Statement
 from study.reproduction.claims.sample import Sample, departure
-from study.reproduction.preliminary import model_restoring_force, natural_frequency
+from study.reproduction.preliminary import model_restoring_force, natural_frequency, read_dead_band
 from study.reproduction.settings import ClaimSettings, Ensembles
+from study.support import document
 
 ROOT = Path(__file__).parents[2]
 SEEDS = 6
@@ -140,8 +140,7 @@ def test_the_gaussian_is_refused_as_often_as_the_level_says(found: evidence.Evid
 
 @pytest.mark.long
 def test_every_statement_is_judged_once(judged: pd.DataFrame, report: Reported) -> None:
-    own = [s for s in report.statements if "." not in s]
-    assert list(judged["id"]) == own
+    assert list(judged["id"]) == [s for s in report.statements if "." not in s]
     assert len(judged) >= 30
     assert list(judged.columns) == ["id", "where", "claim", "reported", "measured", "criterion", "verdict", "why"]
 
@@ -180,7 +179,7 @@ def test_what_the_study_finds(judged: pd.DataFrame, name: str, said: str) -> Non
 
 
 def test_the_page_holds_every_row(judged: pd.DataFrame) -> None:
-    page = claims_table.claims_page(judged)
+    page = document.markdown(study_pages.titled("claims", study_pages.Results({"claims": judged}, {})))
     assert page.count("\n| [") == len(judged)
     assert page.count("<details>") == len(judged)
     beside = judged["where"].str.startswith(judgement.BESIDE)
@@ -223,7 +222,7 @@ def test_a_changed_coefficient_changes_the_verdicts(
 
 def test_a_changed_statement_changes_the_verdict(found: evidence.Evidence, report: Reported) -> None:
     rows = dict(report.statements)
-    rows["siso_stiffness"] = Statement(id="siso_stiffness", where="Section 5.2.2", what="k", value=400.0, unit="N/m")
+    rows["siso_stiffness"] = rows["siso_stiffness"].model_copy(update={"value": 400.0})
     assert claims_table.judge_claim("siso_stiffness", found, Reported(rows)).verdict == "not reproduced"
 
 
@@ -235,7 +234,7 @@ def test_the_same_evidence_twice(settings: ClaimSettings, found: evidence.Eviden
 
 def test_the_dead_band_is_read_from_its_pattern(found: evidence.Evidence) -> None:
     record = found.records(evidence.Drive("dead_band"))[0]
-    assert preliminary_claims.read_dead_band(record, 1.0) == pytest.approx(0.0025, rel=0.05)
+    assert read_dead_band(record, 1.0) == pytest.approx(0.0025, rel=0.05)
 
 
 @pytest.mark.parametrize("pace", [0.8, 1.25])
@@ -307,17 +306,17 @@ def test_instruments_are_judged_at_every_noise_by_their_own_bias(
         asked.append(noise)
         return {"m": Sample((-0.098, 0.0) if noise == 0.1 else (-0.01, 0.02)), "c": Sample((-0.2, 0.21))}
 
-    monkeypatch.setattr(noise_with_instruments, "relative_errors", off)
+    monkeypatch.setattr(levels, "relative_errors", off)
     claim = claims_table.judge_claim("noise_instruments", found, report)
     assert asked == [0.05, 0.1, 0.2]
     assert claim.verdict == "reproduced", "a bias below the limit, and scatter that explains it"
     assert "10 % noise: m -4.9 +- 4.9 %, c +0.5 +- 20 %" in claim.measured
-    assert not noise_with_instruments.small("m", Sample((-0.06, -0.06))).met
-    assert noise_with_instruments.small("m", Sample((-0.0101, -0.0099))).met
+    assert not levels.small("m", Sample((-0.06, -0.06)), 0.05).met
+    assert levels.small("m", Sample((-0.0101, -0.0099)), 0.05).met
 
 
 def test_raw_is_the_nearer_reading(found: evidence.Evidence, report: Reported) -> None:
-    rows = excitation_reading.both_readings(found, report)
+    rows = dead_band.both_readings(found, report)
     raw, filtered = ((rows["nearer"] == reading).sum() for reading in ("raw", "filtered"))
     assert raw > filtered
     stiffness = rows.iloc[0]
@@ -368,8 +367,9 @@ def test_diverged_runs_are_counted_by_name(steps: pd.DataFrame) -> None:
     named = rows["diverged_seeds"].iloc[0].split(", ")
     assert len(named) == rows["diverged"].iloc[0]
     assert all(" at " in n and n.endswith(" s") for n in named)
-    page = integrator_study.integrator_page(steps)
-    assert f"{rows['diverged'].iloc[0]} of {rows['seeds'].iloc[0]} |" in page
+    results = study_pages.Results({"integrator_steps": steps}, {})
+    page = document.markdown(study_pages.titled("integrator_steps", results))
+    assert f"| {rows['diverged'].iloc[0]} of {rows['seeds'].iloc[0]} " in page
 
 
 def test_a_white_spectrum_is_uniform_and_a_bump_is_seen() -> None:

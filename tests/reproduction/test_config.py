@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,20 +14,11 @@ from study.identify.estimators import ESTIMATORS, identify
 from study.identify.estimators.base import Settings
 from study.records.excitation import Excitation, force
 from study.records.spectra import Segments
-from study.reproduction.config import load_config
-from study.reproduction.preconditions import CURVES
+from study.reproduction.config import CURVES, load_config
 from study.support.errors import StudyError
 
 ROOT = Path(__file__).parents[2]
 ROW = "duffing\tduffing\treport\t1.0\t0\t\t21\t22\t23\t24\t3\t\t\t\tDuffing system"
-
-
-@pytest.fixture
-def folder(tmp_path):
-    """A copy of config/ and models/, to be spoilt."""
-    shutil.copytree(ROOT / "config", tmp_path / "config")
-    shutil.copytree(ROOT / "models", tmp_path / "models")
-    return tmp_path / "config"
 
 
 def spoil(path, old, new):

@@ -11,33 +11,9 @@ from study.reproduction.config import load_config
 from study.reproduction.settings import StudySettings
 from study.support.config_files import TableRow, read_rows, read_yaml
 from study.support.errors import StudyError
+from tests.reproduction.test_config import ROW, refused, spoil
 
 ROOT = Path(__file__).parents[2]
-ROW = "duffing\tduffing\treport\t1.0\t0\t\t21\t22\t23\t24\t3\t\t\t\tDuffing system"
-
-
-@pytest.fixture
-def folder(tmp_path):
-    """A copy of config/ and models/, to be spoilt."""
-    shutil.copytree(ROOT / "config", tmp_path / "config")
-    shutil.copytree(ROOT / "models", tmp_path / "models")
-    return tmp_path / "config"
-
-
-def spoil(path, old, new):
-    text = path.read_text()
-    assert old in text, f"{path.name} no longer holds {old!r}"
-    path.write_text(text.replace(old, new, 1))
-
-
-def refused(folder):
-    """The sentence."""
-    with pytest.raises(StudyError) as caught:
-        load_config(folder)
-    sentence = str(caught.value)
-    assert "\n" not in sentence
-    assert len(sentence) < 600
-    return sentence
 
 
 @pytest.mark.parametrize("name", ["all", "claims", "record", "draw_many_errors", "benchmarks", "estimators_200"])

@@ -8,9 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.reproduction import ensemble
+from study.reproduction import ensemble, study_pages
 from study.reproduction.config import load_config
 from study.reproduction.settings import IntegratorSettings
+from study.support import document
 
 CONFIG = load_config(Path(__file__).parents[2] / "config")
 
@@ -101,8 +102,13 @@ def test_page_names_what_is_met_too_seldom():
             ensemble.tolerance_rates(rows(True, False, parameter="c")),
         ]
     )
-    page = ensemble.ensemble_page(table, {"a": 0.0})
-    assert "1 of 2 MI/SO estimates of noise-free cases meet" in page
-    assert "- a: c in 50.0" in page
-    assert ": k in" not in page
-    assert "0 of 0" in ensemble.ensemble_page(table, {"a": 0.1}), "cases with noise are not judged"
+
+    def page(noise):
+        results = study_pages.Results({"monte_carlo": table}, {"a": noise})
+        return document.markdown(study_pages.titled("monte_carlo", results))
+
+    quiet = page(0.0)
+    assert "1 of 2 MI/SO estimates of noise-free cases meet" in quiet
+    assert "- a: c in 50.0" in quiet
+    assert ": k in" not in quiet
+    assert "0 of 0" in page(0.1), "cases with noise are not judged"

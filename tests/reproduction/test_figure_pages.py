@@ -4,31 +4,21 @@ import itertools
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from matplotlib import style
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgba
-from matplotlib.figure import Figure
 
-from study.figures import curves, frequency_response, page, styles
+from study.figures import frequency_response, page, styles
 from study.records.record import Record, write_csv
 from study.records.spectra import Segments
-from study.reproduction.pictures import identified_figures, preliminary_figures
+from study.reproduction.study_figures import CaseFiles, draw_case, force_history
 from study.support.errors import StudyError
+from tests.reproduction.test_figures import SYSTEMS, coherence_table, one, response_table
 
 ROOT = Path(__file__).parents[2]
 SHEET = ROOT / "study" / "figures" / "study.mplstyle"
-FREQUENCY = np.arange(0.0, 12.5, 0.1)
-OMEGA = 2j * np.pi * FREQUENCY
-LINEAR = OMEGA**2 + 3.77 * OMEGA + 355.3
-SYSTEMS = {
-    "duffing": [("u", LINEAR), ("u**3", 2e7 + 0 * OMEGA)],
-    "duffing_van_der_pol": [("u", LINEAR), ("u**3", 2e7 + 2e6 / 3.0 * OMEGA)],
-    "mathieu": [("u", LINEAR), ("u*cos(2*pi*f_m*t)", 177.7 + 0 * OMEGA), ("u*sin(2*pi*f_m*t)", 0 * OMEGA)],
-    "plain": [("u", LINEAR)],
-}
-COLUMNS = ("frequency", "estimator", "input", "shape", "real", "imag", "standard_error", "exact_real", "exact_imag")
+SEGMENTS = Segments(256)
 KINDS = ("linear", "nonlinear", "coherence", "histogram")
 
 
@@ -38,49 +28,18 @@ def _sheet():
         yield
 
 
-def response_table(system, spread=0.05, exact=True, estimators=("siso", "miso")):
-    rng = np.random.default_rng(8)
-    frames = []
-    for name in estimators:
-        for j, (shape, true) in enumerate(SYSTEMS[system][: 1 if name == "siso" else None]):
-            error = spread * np.maximum(np.abs(true), 50.0)
-            values = true + error * (rng.standard_normal((2, len(true))).T @ [1.0, 1j]) / np.sqrt(2.0)
-            known = true if exact else np.full_like(true, np.nan)
-            columns = (FREQUENCY, name, j + 1, shape, values.real, values.imag, error, known.real, known.imag)
-            frames.append(pd.DataFrame(dict(zip(COLUMNS, columns, strict=True))))
-    return pd.concat(frames)
-
-
-def coherence_table(system):
-    count = len(SYSTEMS[system])
-    frames = [
-        pd.DataFrame({"frequency": FREQUENCY, "estimator": "miso", "input": j + 1, "shape": shape,
-                      "terms": "linear_damping + van_der_pol_damping", "cumulative": (j + 1) / count})
-        for j, (shape, _) in enumerate(SYSTEMS[system])
-    ]  # fmt: skip
-    return pd.concat(frames)
-
-
-def one(system="duffing", number=1, **kwargs):
-    return curves.input_responses(response_table(system, **kwargs), 10.0)[number - 1]
-
-
-def axes():
-    return Figure().subplots()
-
-
 @pytest.fixture
 def products(tmp_path):
-    """Writes the three products of a case."""
+    """Writes the three products of a case; its model may be another."""
 
-    def write(system, **kwargs):
+    def write(system, title="", model="linear", segments=SEGMENTS, **kwargs):
         record, responses, coherences = (tmp_path / f"{n}.csv" for n in ("record", "responses", "coherences"))
         force, displacement = np.random.default_rng(2).standard_normal((2, 2048))
         channels = {"force": force, "displacement": 0.002 * displacement, "acceleration": force}
         write_csv(Record(0.02, channels), record)
         response_table(system, **kwargs).to_csv(responses, index=False)
         coherence_table(system).to_csv(coherences, index=False)
-        return record, responses, coherences
+        return CaseFiles(record, ROOT / "models" / f"{model}.yaml", responses, coherences, title, segments=segments)
 
     return write
 
@@ -130,7 +89,7 @@ def test_nothing_overlaps_on_any_page(products, system, kind, monkeypatch, tmp_p
     seen = []
     monkeypatch.setattr(page, "rendered", lambda figure, _: seen.append(figure) or b"")
     title = "Extreme Duffing-Van der Pol system, input variance 0.2"
-    identified_figures.draw_identified(*products(system), {kind: [tmp_path / "a.png"]}, title=title, style=SHEET)
+    draw_case(products(system, title), {kind: [tmp_path / "a.png"]}, SHEET)
     check_layout(seen[0])
 
 
@@ -138,10 +97,8 @@ def test_there_is_room_for_many_estimators(products, monkeypatch, tmp_path):
     seen = []
     monkeypatch.setattr(page, "rendered", lambda figure, _: seen.append(figure) or b"")
     names = (*styles.ESTIMATORS, "another_one")
-    paths = products("duffing_van_der_pol", spread=0.5, estimators=names)
-    identified_figures.draw_identified(
-        *paths, {k: [tmp_path / k] for k in ("linear", "nonlinear")}, title="Noise", style=SHEET
-    )
+    case = products("duffing_van_der_pol", "Noise", spread=0.5, estimators=names)
+    draw_case(case, {k: [tmp_path / k] for k in ("linear", "nonlinear")}, SHEET)
     for figure in seen:
         check_layout(figure)
     assert {"local polynomial", "95 % band"} <= {t.get_text() for t in seen[0].legends[0].get_texts()}
@@ -149,7 +106,7 @@ def test_there_is_room_for_many_estimators(products, monkeypatch, tmp_path):
 
 def test_draw_writes_each_kind_twice(products, tmp_path):
     outputs = {kind: [tmp_path / f"{kind}.{ending}" for ending in ("png", "svg")] for kind in KINDS}
-    identified_figures.draw_identified(*products("duffing"), outputs, title="Duffing system", style=SHEET)
+    draw_case(products("duffing", "Duffing system"), outputs, SHEET)
     for png, svg in outputs.values():
         assert png.read_bytes().startswith(b"\x89PNG")
         assert b"</svg>" in svg.read_bytes()
@@ -157,7 +114,7 @@ def test_draw_writes_each_kind_twice(products, tmp_path):
 
 def test_draw_refuses_an_unknown_kind(products, tmp_path):
     with pytest.raises(StudyError, match="no kind of figure 'other'; known are linear"):
-        identified_figures.draw_identified(*products("duffing"), {"other": [tmp_path / "a.png"]}, title="", style=SHEET)
+        draw_case(products("duffing"), {"other": [tmp_path / "a.png"]}, SHEET)
 
 
 @pytest.mark.parametrize(
@@ -166,23 +123,16 @@ def test_draw_refuses_an_unknown_kind(products, tmp_path):
      ("linear", "force_histogram")],
 )  # fmt: skip
 def test_preliminary_figures(products, tmp_path, system, kind, monkeypatch):
-    source = preliminary_figures.Source(products("plain")[0], ROOT / "models" / f"{system}.yaml", f"{system} system")
+    case = products("plain", f"{system} system", system)
     seen, real = [], page.rendered
     monkeypatch.setattr(page, "rendered", lambda figure, ending: seen.append(figure) or real(figure, ending))
     output = tmp_path / "a.svg"
-    preliminary_figures.draw_preliminary(source, {kind: [output]}, style=SHEET, segments=Segments(256))
+    draw_case(case, {kind: [output]}, SHEET)
     assert b"</svg>" in output.read_bytes()
     check_layout(seen[0])
 
 
 @pytest.mark.parametrize("length", [128, 256])
 def test_the_stretch_of_force_is_as_long_as_a_segment(products, length):
-    source = preliminary_figures.Source(products("plain")[0], ROOT / "models" / "linear.yaml", "")
-    figure = preliminary_figures.force_history(source, Segments(length))
+    figure = force_history(products("plain", segments=Segments(length)))
     assert len(figure.axes[0].lines[0].get_xdata()) == length
-
-
-def test_preliminary_refuses_an_unknown_kind(products, tmp_path):
-    source = preliminary_figures.Source(products("plain")[0], ROOT / "models" / "linear.yaml", "")
-    with pytest.raises(StudyError, match="no kind of figure 'other'; known are pattern"):
-        preliminary_figures.draw_preliminary(source, {"other": [tmp_path / "a.png"]}, style=SHEET, segments={})

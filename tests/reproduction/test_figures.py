@@ -14,7 +14,7 @@ from matplotlib.mathtext import MathTextParser
 from study.equations.terms import LIBRARY
 from study.figures import coherence, curves, frequency_response, labels, styles
 from study.records.record import SI_UNITS
-from study.reproduction.pictures import distribution, force_patterns
+from study.reproduction import study_figures
 from study.reproduction.preliminary import Pattern, histogram
 from study.support.errors import StudyError
 
@@ -273,7 +273,7 @@ def test_cumulative_coherence_names_what_each_curve_adds():
 
 def test_histogram_is_in_the_unit_of_its_axis():
     counts = histogram(0.002 * np.random.default_rng(1).standard_normal(4000))
-    panel = distribution.histogram_panel(axes(), counts, "displacement", "m")
+    panel = study_figures.histogram_panel(axes(), counts, "displacement", "m")
     assert panel.get_xlabel() == "displacement (mm)"
     bars = panel.patches[0].get_data()
     assert np.sum(bars.values * np.diff(bars.edges)) == pytest.approx(1.0)
@@ -286,7 +286,7 @@ def test_histogram_is_in_the_unit_of_its_axis():
 def test_patterns_share_their_scales():
     left, right = axes(), axes()
     grid = np.linspace(-1.0, 1.0, 9)
-    force_patterns.pattern_panels(left, right, Pattern(0.01 * grid, grid), Pattern(0.02 * grid, 3.0 * grid), SI_UNITS)
+    study_figures.pattern_panels(left, right, Pattern(0.01 * grid, grid), Pattern(0.02 * grid, 3.0 * grid), SI_UNITS)
     assert left.get_xlim() == right.get_xlim()
     assert left.get_ylim() == right.get_ylim()
     assert left.get_ylim()[1] > 3.0

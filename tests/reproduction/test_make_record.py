@@ -8,9 +8,8 @@ import pytest
 
 from study.identify.estimators import ESTIMATORS
 from study.reproduction import tables
+from study.reproduction.cases import assumed_model, estimator_settings, identify_case, make_record
 from study.reproduction.config import load_config
-from study.reproduction.identify_case import assumed_model, estimator_settings, identify_case
-from study.reproduction.make_record import make_record
 from study.support.errors import DivergenceError, StudyError
 
 CONFIG = load_config(Path(__file__).parents[2] / "config")

@@ -84,14 +84,14 @@ def test_the_harmonic_motion_beside_a_record_has_its_amplitude_and_the_natural_f
     ("natural", "modulation", "expected"), [(3.0, 1.0, (2.0, 3.0, 4.0)), (3.0, 5.0, (2.0, 3.0, 8.0))]
 )
 def test_mathieu_lines_are_those_of_section_3_3(natural, modulation, expected):
-    assert tuple(preliminary.mathieu_lines(natural, modulation).values()) == pytest.approx(expected)
+    assert tuple(preliminary.mathieu_frequencies(natural, modulation).values()) == pytest.approx(expected)
 
 
 def test_mathieu_response_is_strong_at_its_lines():
     record = response(read_model(MODELS / "mathieu.yaml").with_values({"c": 0.5, "km_cos": 80.0}), 65_536)
     frequency, density = autospectrum(record["displacement"], DT, Segments(1024))
     peaks = frequency[1:-1][(density[1:-1] > density[:-2]) & (density[1:-1] > density[2:])]
-    for line in preliminary.mathieu_lines(3.0, 1.0).values():
+    for line in preliminary.mathieu_frequencies(3.0, 1.0).values():
         assert np.abs(peaks - line).min() < 0.15
         beside = density[(np.abs(frequency - line) > 0.3) & (np.abs(frequency - line) < 0.6)]
         assert density[np.abs(frequency - line) < 0.15].max() > 2.0 * np.median(beside)

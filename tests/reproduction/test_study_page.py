@@ -6,12 +6,11 @@ from html.parser import HTMLParser
 import pandas as pd
 import pytest
 
-from study.reproduction import study_page, summary
-from study.reproduction.claims import claims_table
-from study.reproduction.claims.claim_pages import LONGEST, conditions, shortened
+from study.reproduction import study_pages
+from study.reproduction.study_pages import LONGEST, conditions, shortened
 from study.support import document
 from study.support.document import Picture
-from tests.reproduction.test_summary import CLAIMS, ERRORS, PARAMETERS, READING, STRUCTURES, TIMES
+from tests.reproduction.test_summary import CLAIMS, study
 
 PNG = bytes.fromhex("89504e470d0a1a0a") + b"picture"
 LONG = pd.DataFrame(
@@ -26,16 +25,13 @@ LONG = pd.DataFrame(
 
 @pytest.fixture
 def page():
-    claims = pd.concat([CLAIMS, LONG], ignore_index=True)
-    tables = summary.Tables(
-        PARAMETERS, claims, READING, ERRORS, TIMES, {"quiet": 0.0, "noisy": 0.05}, "raw", STRUCTURES
-    )
     pictures = [
         Picture("A <system>", "Figure 21", "its path", PNG),
         Picture("Another", "Figure 22", "its other path", PNG),
         Picture("A <system>", "Figure 23", "its coherence", PNG),
     ]
-    return study_page.study_page(tables, pictures).decode()
+    results = study(claims=pd.concat([CLAIMS, LONG], ignore_index=True))
+    return study_pages.study_page(results, pictures).decode()
 
 
 class Outline(HTMLParser):
@@ -72,7 +68,8 @@ def test_the_page_asks_for_nothing_from_anywhere(page):
 
 
 def test_a_claim_has_one_line_and_its_conditions_are_folded():
-    text = claims_table.claims_page(pd.concat([CLAIMS, LONG], ignore_index=True))
+    results = study(claims=pd.concat([CLAIMS, LONG], ignore_index=True))
+    text = document.markdown(study_pages.titled("claims", results))
     lines = [line for line in text.splitlines() if line.startswith("| [")]
     assert len(lines) == 4
     assert all(len(cell) <= LONGEST + 10 for line in lines for cell in line.split("|") if cell.strip())

@@ -10,8 +10,8 @@ import pytest
 from study.identify.estimators.base import Identified, Parameter
 from study.identify.frequency_domain.coefficients import Responses
 from study.reproduction import tables
+from study.reproduction.cases import identify_case
 from study.reproduction.config import load_config
-from study.reproduction.identify_case import identify_case
 from study.support.errors import StudyError
 
 CONFIG = load_config(Path(__file__).parents[2] / "config")

@@ -16,15 +16,13 @@ from study.identify.estimators.in_reverse import miso, read_curve, siso
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.records.record import Record
 from study.records.spectra import autospectrum
+from study.reproduction.cases import make_record
 from study.reproduction.claims.sample import Sample, average
 from study.reproduction.ensemble import NOISE_OFFSET, threaded
-from study.reproduction.make_record import make_record
 from study.reproduction.settings import ClaimSettings, RecordSettings
+from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
-Table = Mapping[str, Any]
 KEPT = 9  # ensembles of records held at a time: the seven systems and those being worked on
 
 
@@ -82,11 +80,9 @@ class Ensemble:
     seeds: tuple[Outcome, ...]
 
     def sample(self, number: Callable[[Outcome], float]) -> Sample:
-        """A number of each outcome."""
         return Sample(tuple(number(o) for o in self.seeds), number(self.own))
 
     def siso(self, name: str) -> Sample:
-        """A parameter fitted to the SI/SO curve."""
         return self.sample(lambda o: o.siso.values[name])
 
     def hand_read(self, name: str) -> Sample:
@@ -94,7 +90,6 @@ class Ensemble:
         return self.sample(lambda o: o.siso.read.get(name, np.nan))
 
     def miso(self, name: str) -> Sample:
-        """A parameter fitted to the MI/SO curves."""
         return self.sample(lambda o: o.miso.values[name])
 
     def lines(self, rows: Callable[[Outcome], Floats]) -> Floats:
@@ -109,11 +104,9 @@ class Ensemble:
 
     @property
     def frequency(self) -> Floats:
-        """Lines of the fit band in hertz."""
         return self.own.miso.frequency
 
     def between(self, low: float, high: float) -> NDArray[np.bool_]:
-        """Which lines lie from ``low`` to ``high`` hertz."""
         return (self.frequency >= low) & (self.frequency <= high)
 
     def linear_coherence(self, low: float = 0.0, high: float = np.inf) -> Sample:
@@ -133,7 +126,9 @@ class Evidence:
     ``results/integrator_steps.csv``.
     """
 
-    def __init__(self, settings: ClaimSettings, models: Mapping[str, Model], integrator_steps: Sequence[Table]) -> None:
+    def __init__(
+        self, settings: ClaimSettings, models: Mapping[str, Model], integrator_steps: Sequence[Mapping[str, Any]]
+    ) -> None:
         self.settings, self.models, self.integrator_steps = settings, models, integrator_steps
         first = settings.ensembles.first_seed
         self.seeds = range(first, first + settings.ensembles.seeds)
@@ -156,7 +151,6 @@ class Evidence:
         return tuple(threaded(lambda s: make_record(model, settings, seed=s[0], noise_seed=s[1]), streams))
 
     def ensemble(self, drive: Drive, assumed: Assumed = OWN_TERMS) -> Ensemble:
-        """The records of a drive, identified."""
         return self._ensembles(drive, assumed)
 
     def _identified(self, drive: Drive, assumed: Assumed) -> Ensemble:
@@ -169,7 +163,6 @@ class Evidence:
         return self.ensemble(Drive(system, level, noise))
 
     def each(self, drive: Drive, number: Callable[[Record], float]) -> Sample:
-        """A number of each record."""
         return Sample.own_first(threaded(number, self.records(drive)))
 
     def of_channel(self, system: str, number: Callable[[Floats], float], channel: str = "displacement") -> Sample:
@@ -204,7 +197,7 @@ class Evidence:
 
 
 def record_settings(settings: ClaimSettings, drive: Drive) -> RecordSettings:
-    """What ``study.reproduction.make_record.make_record`` expects, for a drive."""
+    """What ``study.reproduction.cases.make_record`` expects, for a drive."""
     return RecordSettings(
         case=drive.system, excitation=settings.excitation.model_copy(update=dict(drive.excitation)), level=drive.level,
         noise=drive.noise, noise_seed=settings.noise_seed if drive.noise > 0.0 else None, sampling=settings.sampling,

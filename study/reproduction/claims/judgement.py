@@ -29,7 +29,6 @@ class Condition:
 
     @property
     def reason(self) -> str:
-        """Why the condition is not met."""
         return self.why or f"{self.measured}, where the criterion is {self.criterion}"
 
 
@@ -50,34 +49,31 @@ class Claim:
 Conditions = Callable[[Evidence, Reported], Iterable[Condition]]
 
 
-def claims(*functions: Conditions, **short: Conditions) -> dict[str, Conditions]:
-    """Conditions of the claims of a section by the claim's id: a function's name, or a keyword for a short one."""
-    return {function.__name__: function for function in functions} | short
+def claims(*functions: Conditions) -> dict[str, Conditions]:
+    """Conditions of the claims of a section by the claim's id, the function's name."""
+    return {function.__name__: function for function in functions}
 
 
-def verdict(met: Sequence[bool]) -> str:
+def verdict(met: Sequence[bool], words: tuple[str, str, str] = (REPRODUCED, PARTLY, NOT_REPRODUCED)) -> str:
     """``reproduced`` if all hold, ``not reproduced`` if none does, else ``partly``."""
-    return REPRODUCED if all(met) else PARTLY if any(met) else NOT_REPRODUCED
+    return words[0 if all(met) else 1 if any(met) else 2]
 
 
 def conclude(reported: Reported, name: str, *conditions: Condition) -> Claim:
     """The claim of this id in ``reported.tsv`` with the verdict that its conditions give."""
     statement = reported[name]
     conditions = tuple(sorted(conditions, key=lambda c: c.met))  # what fails decides, and stands first
+    failed = [c for c in conditions if not c.met]
+    reasons = list(dict.fromkeys(c.reason for c in failed))
+    why = _joined(reasons)
+    if failed and failed[0].because:  # of many conditions with one cause the first: all stand under ``measured``
+        more = f" ({len(reasons) - 1} more like it)" if len(reasons) > 1 else ""
+        why = f"{reasons[0]}{more}: {failed[0].because}"
     return Claim(
         id=name, where=statement.where, claim=statement.what, reported=reported.numbers(name),
         measured=_joined(c.measured for c in conditions), criterion=_joined(c.criterion for c in conditions),
-        verdict=verdict([c.met for c in conditions]), why=_reasons([c for c in conditions if not c.met]),
+        verdict=verdict([c.met for c in conditions]), why=why,
     )  # fmt: skip
-
-
-def _reasons(failed: Sequence[Condition]) -> str:
-    """Why a claim fails; of many conditions with one cause the first, as all of them stand under ``measured``."""
-    reasons = list(dict.fromkeys(c.reason for c in failed))
-    if not failed or not failed[0].because:
-        return _joined(reasons)
-    more = f" ({len(reasons) - 1} more like it)" if len(reasons) > 1 else ""
-    return f"{reasons[0]}{more}: {failed[0].because}"
 
 
 def _joined(parts: Iterable[str]) -> str:
@@ -89,31 +85,35 @@ def explained(because: str, conditions: Iterable[Condition]) -> list[Condition]:
     return [replace(c, because=because) for c in conditions]
 
 
-def together(label: str, conditions: Sequence[Condition]) -> Condition:
+def together(label: str, conditions: Iterable[Condition]) -> Condition:
     """Several conditions on one thing as one, met when all are."""
-    failed = ", ".join(c.reason for c in conditions if not c.met)
+    all_of_them = list(conditions)
+    failed = ", ".join(c.reason for c in all_of_them if not c.met)
     return Condition(
-        f"{label}: {', '.join(c.criterion for c in conditions)}",
-        f"{label}: {', '.join(c.measured for c in conditions)}",
+        f"{label}: {', '.join(c.criterion for c in all_of_them)}",
+        f"{label}: {', '.join(c.measured for c in all_of_them)}",
         not failed,
         f"{label}: {failed}" if failed else "",
     )
 
 
+# ---- conditions on the mean over the seeds
+
+
 def within_share(label: str, sample: Sample, target: float, relative: float, why: str = "") -> Condition:
-    """The mean over the seeds lies within a share of a number."""
+    """It lies within a share of a number."""
     met = abs(sample.mean - target) <= relative * abs(target)
     return Condition(f"mean {label} within {percent(relative)} of {target:.6g}", f"{label} {sample}", met, why)
 
 
 def far(label: str, sample: Sample, target: float, relative: float, why: str = "") -> Condition:
-    """The mean over the seeds is off a number by more than a share of it."""
+    """It is off a number by more than a share of it."""
     met = abs(sample.mean - target) > relative * abs(target)
     return Condition(f"mean {label} more than {percent(relative)} off", f"{label} {sample}", met, why)
 
 
 def near(label: str, sample: Sample, target: float, distance: float, why: str = "") -> Condition:
-    """The mean over the seeds lies within a distance of a number."""
+    """It lies within a distance of a number."""
     met = abs(sample.mean - target) <= distance
     return Condition(f"mean {label} within {target:.6g} +- {distance:g}", f"{label} {sample}", met, why)
 
@@ -129,16 +129,16 @@ def one_record(label: str, sample: Sample, target: float, why: str = "") -> Cond
 
 
 def at_least(label: str, sample: Sample, bound: float, why: str = "") -> Condition:
-    """The mean over the seeds is not below a bound."""
+    """It is not below a bound."""
     return Condition(f"mean {label} at least {bound:g}", f"{label} {sample}", sample.mean >= bound, why)
 
 
 def at_most(label: str, sample: Sample, bound: float, why: str = "") -> Condition:
-    """The mean over the seeds is not above a bound."""
+    """It is not above a bound."""
     return Condition(f"mean {label} at most {bound:g}", f"{label} {sample}", sample.mean <= bound, why)
 
 
 def surely_above_zero(label: str, sample: Sample, why: str = "") -> Condition:
-    """The mean over the seeds is above zero by three of its standard errors."""
+    """It is above zero by three of its standard errors."""
     met = sample.mean > 3.0 * sample.error
     return Condition(f"mean {label} above zero by 3 standard errors", f"{label} {sample}", met, why)

@@ -2,60 +2,69 @@
 
 import difflib
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, NamedTuple, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from study.support.config_files import TableRow, Text, read_rows
-from study.support.errors import StudyError
+from study.support.errors import StudyError, expect
 
 MANY = 8  # numbers that still read well in one cell
+SYSTEMS = ("linear", "duffing", "van_der_pol", "duffing_van_der_pol", "mathieu", "dead_band", "extreme")
+COMBINED = "duffing_van_der_pol"
+LINEAR_PARTS = ("m", "c", "k", "f_n", "zeta")
+PARAMETERS = (*LINEAR_PARTS, "k3", "c3", "k_m", "k_dead_band")
+INPUT_VARIANCES = ("lowest", "second", "third", "highest")  # input variances of Section 5.3
+NOISE_LEVELS = ("low", "middle", "high")  # of Section 5.4
+LIMIT = "limit."  # begins the ids of what was chosen here, before looking, to judge the report's words by
+# What a condition in the column ``holds_if`` may say: its subject, then a verb, with what must follow, if anything.
+READERS = ("SI/SO", "MI/SO", "fitted", "hand-read")  # of parameters, whose names come after; fitted as SI/SO does
+MEASURES = (
+    "linear coherence", "multiple coherence", "slope", "mean slope", "cubic part of the mean",
+    "gap read off the pattern", "Gaussian", "histogram",
+)  # fmt: skip
+VERBS = {
+    "recovered": "", "near unity": "", "rises": "", "of one record": "", "within": "limit", "off by": "limit",
+    "refused at most": "limit", "refused at least": "limit", "at least": "limit", "less distorted than": "system",
+}  # fmt: skip
+CONDITION = re.compile(rf"(?P<subject>.+?) (?P<verb>{'|'.join(VERBS)})(?: (?P<argument>\S+))?")
 
 
-def _names(text: str) -> tuple[str, ...]:
-    return tuple(text.split())
+class Stated(NamedTuple):
+    """A condition in words."""
+
+    subject: str  # names of parameters, after their reader where it is not the study's own; or what is measured
+    verb: str
+    argument: str
 
 
-# Every row that the claims ask for, so that one deleted or misspelt is named before any job starts. A claim of your
-# own joins one of the two lists.
-WITH_A_VALUE = _names("""
-    table_1.m table_1.linear.k table_1.linear.c table_1.linear.f_n table_1.linear.zeta table_1.duffing.k
-    table_1.duffing.c table_1.duffing.f_n table_1.duffing.zeta table_1.duffing.k3 table_1.duffing.c3
-    table_1.van_der_pol.k table_1.van_der_pol.c table_1.van_der_pol.f_n table_1.van_der_pol.zeta
-    table_1.van_der_pol.k3 table_1.van_der_pol.c3 table_1.duffing_van_der_pol.k table_1.duffing_van_der_pol.c
-    table_1.duffing_van_der_pol.f_n table_1.duffing_van_der_pol.zeta table_1.duffing_van_der_pol.k3
-    table_1.duffing_van_der_pol.c3 table_1.mathieu.k table_1.mathieu.c table_1.mathieu.f_n table_1.mathieu.zeta
-    table_1.mathieu.k_m table_1.mathieu.f_m table_1.dead_band.k table_1.dead_band.c table_1.dead_band.f_n
-    table_1.dead_band.zeta table_1.dead_band.u_g table_1.extreme.k table_1.extreme.c table_1.extreme.f_n
-    table_1.extreme.zeta table_1.extreme.k3 table_1.extreme.c3 nyquist nyquist.dt lowpass below_10_hz error_free
-    dead_band_pattern mathieu_lines.f_n mathieu_lines.f_m mathieu_fast.f_m mathieu_fast.low mathieu_fast.middle
-    mathieu_fast.high averages resolution resolution.length resolution.seconds resolution.samples resolution.total
-    overlap exact_stiffness siso_stiffness siso_frequency duffing_cubic duffing_share van_der_pol_damping
-    van_der_pol_share mathieu_side_resonances.low mathieu_side_resonances.high mathieu_stiffness dead_band_stiffness
-    dead_band_error dead_band_error.low dead_band_error.high dead_band_share levels_invariant.lowest
-    levels_invariant.second levels_invariant.third levels_invariant.highest noise_random_only.low
-    noise_random_only.middle noise_random_only.high
-""")
-IN_WORDS = _names("""
-    system_stiffness_gap amplitude_nonlinear force_gaussian noise_uncorrelated table_1 linear_is_gaussian
-    nonlinear_is_not narrow_band harmonics oval_width oval_slope patterns_alike duffing_pattern van_der_pol_pattern
-    combined_pattern mathieu_pattern mathieu_lines mathieu_fast coherence_forms added_terms hanning linear_same
-    linear_coherence linear_leakage linear_histogram hand_read duffing_linear siso_wrong siso_varies duffing_coherence
-    duffing_histogram van_der_pol_linear van_der_pol_coherence van_der_pol_histogram combined_linear combined_cubic
-    combined_histogram combined_nearly_linear mathieu_third mathieu_side_resonances mathieu_siso_coherence
-    mathieu_linear mathieu_coherence mathieu_share mathieu_histogram dead_band_as_duffing dead_band_not_invariant
-    dead_band_linear dead_band_coherence dead_band_histogram linear_dominates extreme_siso extreme_linear
-    extreme_cubic levels_invariant levels_siso levels_similar levels_coherence noise_random_only noise_output
-    noise_random noise_linear noise_cubic noise_coherence noise_instruments conclusion_3 conclusion_4
-    conclusion_5_level conclusion_5_noise conclusion_6 conclusion_7
-""")
+def _stated(cell: object) -> object:
+    """The conditions of a cell, with semicolons between them."""
+    found: list[Stated] = []
+    for words in filter(None, map(str.strip, str(cell).split(";"))):
+        match = CONDITION.fullmatch(words)
+        if match is None or bool(match["argument"]) != bool(VERBS[match["verb"]]):
+            told = ", ".join(f"{verb} <{what}>" if what else verb for verb, what in VERBS.items())
+            raise ValueError(f"{words!r} is no condition; expected a subject and one of {told}")
+        subject, verb = match["subject"], match["verb"]
+        reader, _, names = ("", "", subject) if verb == "recovered" else subject.partition(" ")
+        parameters = PARAMETERS if reader in ("", "MI/SO") else LINEAR_PARTS
+        if reader in ("", *READERS) and (unknown := [name for name in names.split() if name not in parameters]):
+            raise ValueError(f"{words!r} names {unknown[0]!r}; expected some of {', '.join(parameters)}")
+        if reader not in ("", *READERS) and not subject.startswith(MEASURES):
+            raise ValueError(f"{words!r} is about nothing known; expected {', '.join((*READERS, *MEASURES))}")
+        found.append(Stated(subject, verb, match["argument"] or ""))
+    return tuple(found)
+
+
+Words = Annotated[tuple[str, ...], BeforeValidator(lambda cell: tuple(str(cell).split()))]
 
 
 class Statement(TableRow):
-    """One row: a statement, with its number where it has one."""
+    """One row: a statement, with its number where it has one, and its conditions where they need no code."""
 
     id: Annotated[
         str,
@@ -65,6 +74,10 @@ class Statement(TableRow):
     what: Text  # the statement in a sentence, or what the number is
     value: Annotated[float | None, BeforeValidator(lambda cell: None if cell == "" else cell)]  # the number
     unit: str  # its unit
+    systems: Words = ()  # of Table 1: each must meet the conditions, all of them together where there are several
+    levels: Words = ()  # likewise, of ``INPUT_VARIANCES``; at unit variance if there is none
+    holds_if: Annotated[tuple[Stated, ...], BeforeValidator(_stated)] = ()
+    why: str = ""  # the reason, in case a condition is not met
 
     @model_validator(mode="after")
     def _bounded(self) -> Self:
@@ -79,10 +92,16 @@ class Statement(TableRow):
             holds |= self.unit != "Hz" and not re.search("[.]zeta$|^averages$", self.id)
         if not holds:
             raise ValueError(f"value is {value:g}; expected {expected}")
+        for name, known in (
+            (n, k) for names, k in ((self.systems, SYSTEMS), (self.levels, INPUT_VARIANCES)) for n in names
+        ):
+            if name not in known:
+                raise ValueError(f"names {name!r}; expected some of {', '.join(known)}")
+        if bool(self.holds_if) != bool(self.systems):
+            raise ValueError("has conditions or systems without the other; expected both or neither")
         return self
 
     def __str__(self) -> str:
-        """The number with its unit."""
         return "" if self.value is None else f"{self.value:.6g} {self.unit}".strip()
 
 
@@ -93,25 +112,38 @@ class Reported:
     statements: Mapping[str, Statement]
 
     def __getitem__(self, name: str) -> Statement:
-        """One statement."""
         if name not in self.statements:
             raise StudyError(f"config/reported.tsv has no row {name!r}")
         return self.statements[name]
 
     def value(self, name: str) -> float:
-        """The number of one statement."""
         value = self[name].value
         if value is None:
             raise StudyError(f"config/reported.tsv gives no value for {name!r}")
         return value
 
+    def limit(self, name: str) -> float:
+        """What a word of the report is judged by: a row ``limit.<name>``, or a number in digits."""
+        return float(name) if re.fullmatch("[0-9.]+", name) else self.value(LIMIT + name)
+
     def table_1(self, system: str, name: str) -> float:
         """A parameter of a system by Table 1; zero where the system has no such term."""
         if name == "m":
             return self.value("table_1.m")
-        key = {"k_dead_band": "k"}.get(name, name)
-        row = self.statements.get(f"table_1.{system}.{key}")
+        row = self.statements.get(f"table_1.{system}.{'k' if name == 'k_dead_band' else name}")
         return 0.0 if row is None or row.value is None else row.value
+
+    def band(self, name: str) -> tuple[float, float]:
+        """A band of frequencies that the report names, in hertz."""
+        return self.value(f"{name}.low"), self.value(f"{name}.high")
+
+    @property
+    def levels(self) -> list[float]:
+        return [self.value(f"levels_invariant.{name}") for name in INPUT_VARIANCES]
+
+    @property
+    def noises(self) -> list[float]:
+        return [self.value(f"noise_random_only.{name}") for name in NOISE_LEVELS]
 
     def numbers(self, name: str) -> str:
         """Every number of a claim, for the column ``reported``."""
@@ -120,20 +152,37 @@ class Reported:
         return "as tabulated" if len(found) > MANY else ", ".join(found) or "as stated"
 
 
-def check_complete(reported: Reported, path: Path) -> None:
-    """Whether the rows are those that the claims ask for, ``WITH_A_VALUE`` and ``IN_WORDS``."""
-    known = [*WITH_A_VALUE, *IN_WORDS]
-    for name in reported.statements:
-        if name not in known:
+def load_reported(path: Path) -> Reported:
+    """Read and check the table."""
+    statements: dict[str, Statement] = {}
+    for _, statement in read_rows(path, Statement):
+        expect(
+            statement.id not in statements, f"{path}: the id {statement.id!r} stands twice; expected each once"
+        )  # fmt: skip
+        statements[statement.id] = statement
+    return Reported(statements)
+
+
+def check_complete(reported: Reported, path: Path, judged: Collection[str], numbers: Collection[str]) -> None:
+    """Whether the rows are what the claims ask for, so that one deleted or misspelt is named before any job starts.
+
+    ``judged`` are the claims whose conditions are in code, ``numbers`` the rows whose value that code reads.
+    """
+    limits = [f"{LIMIT}{s.argument}" for row in reported.statements.values() for s in row.holds_if
+              if VERBS[s.verb] == "limit" and not re.fullmatch("[0-9.]+", s.argument)]  # fmt: skip
+    known = [*judged, *numbers, *limits]
+    for name, row in reported.statements.items():
+        if name not in known and not row.holds_if:
             near = difflib.get_close_matches(name, known, n=1)
-            expected = f"{near[0]!r} is near it" if near else f"a new claim's row is listed in {__name__}"
+            expected = (
+                f"{near[0]!r} is near it" if near else "expected conditions in holds_if, or a function of that name"
+            )
             raise StudyError(f"{path}: no claim asks for {name!r}; {expected}")
     for name in known:
-        if name not in reported.statements:
-            raise StudyError(f"{path} has no row {name!r}, which the claims ask for")
-    for name in WITH_A_VALUE:
-        if reported[name].value is None:
-            raise StudyError(f"{path}: {name!r} has no value; expected the number that the report states")
+        expect(name in reported.statements, f"{path} has no row {name!r}, which the claims ask for")
+    for name in (*numbers, *limits):
+        given = reported[name].value is not None
+        expect(given, f"{path}: {name!r} has no value; expected the number that the report states")
 
 
 def check_systems(reported: Reported, models: Path) -> None:
@@ -143,13 +192,3 @@ def check_systems(reported: Reported, models: Path) -> None:
         system, _, parameter = rest.partition(".")
         if where == "table_1" and parameter and not (models / f"{system}.yaml").is_file():
             raise StudyError(f"config/reported.tsv: {name!r} names a system that is not in {models.name}/")
-
-
-def load_reported(path: Path) -> Reported:
-    """Read and check the table."""
-    statements: dict[str, Statement] = {}
-    for _, statement in read_rows(path, Statement):
-        if statement.id in statements:
-            raise StudyError(f"{path}: the id {statement.id!r} stands twice; expected each once")
-        statements[statement.id] = statement
-    return Reported(statements)

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.special import stdtrit
 
+from study.support.arrays import Floats
 from study.support.numbers import percent
 
-Floats = NDArray[np.float64]
 SIGNIFICANT = 1.96  # two-sided 5 % of the standard normal
 BY_CHANCE = 0.01  # how often one of all lines of a uniform spectrum may be refused
 GAUSSIAN_CENTRAL_SHARE = math.erf(0.5 / math.sqrt(2.0))  # of a Gaussian's values: within half a standard deviation
@@ -34,7 +34,6 @@ class Sample:
 
     @property
     def mean(self) -> float:
-        """Mean over the seeds."""
         return float(np.mean(self.values))
 
     @property
@@ -48,17 +47,14 @@ class Sample:
         return float(np.std(self.values, ddof=1))
 
     @property
-    def error(self) -> float:
-        """Standard error of the mean."""
+    def error(self) -> float:  # of the mean
         return self.scatter / math.sqrt(len(self.values))
 
     def __str__(self) -> str:
-        """Mean, standard error and the study's own record."""
         own = "" if self.own is None else f" (own record {self.own:.4g})"
         return f"{self.mean:.4g} +- {self.error:.2g}{own}"
 
     def scaled(self, factor: float) -> "Sample":
-        """Every value times a factor."""
         return Sample(tuple(factor * v for v in self.values), None if self.own is None else factor * self.own)
 
     def minus(self, other: "Sample") -> "Sample":
@@ -72,9 +68,9 @@ def average(values: Floats | NDArray[np.bool_] | Sequence[float]) -> float:
     return float(np.mean(np.asarray(values, dtype=np.float64)))
 
 
-def how_often(flags: Iterable[bool]) -> Sample:
-    """How often something holds."""
-    return Sample(tuple(float(flag) for flag in flags))
+def share_of_power(density: Floats, keep: NDArray[np.bool_]) -> Sample:
+    """Share of the power of each record's autospectrum, shape (records, lines), that lies in the kept lines."""
+    return Sample.own_first(float(np.sum(d[keep]) / np.sum(d)) for d in density)
 
 
 def relative_distance(curve: NDArray[np.complex128], exact: NDArray[np.complex128] | Floats) -> float:
@@ -134,7 +130,6 @@ class Departure:
     allowed: float  # standard errors that one of so many lines reaches by chance (Student, Bonferroni)
 
     def __str__(self) -> str:
-        """In words."""
         return f"the line furthest off departs by {percent(self.share, '.2g')}, {self.errors:.2g} standard errors"
 
     @property

@@ -1,37 +1,32 @@
 """Section 2 and Table 1: systems, force, integration, noise."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.equations.simulate import Integrator, simulate
 from study.identify.estimators.base import true_parameters
 from study.records.excitation import displacement_noise
 from study.records.spectra import autospectrum
-from study.reproduction.claims.common import COMBINED, SYSTEMS, TESTS_WRONG, refused
+from study.reproduction.claims.conditions import refused
 from study.reproduction.claims.evidence import Drive, Evidence
 from study.reproduction.claims.judgement import Condition, at_least, claims, explained
-from study.reproduction.claims.reported import Reported
-from study.reproduction.claims.response import share_of_power
+from study.reproduction.claims.reported import COMBINED, SYSTEMS, Reported
 from study.reproduction.claims.sample import (
     Sample,
     average,
     departure,
     gaussian_score,
-    how_often,
     is_gaussian,
     kurtosis,
+    share_of_power,
 )
 from study.reproduction.preliminary import model_restoring_force
+from study.support.arrays import Floats
 from study.support.numbers import percent
 
-Floats = NDArray[np.float64]
 LINEAR_IN_FORCE = ("linear", "mathieu")
-ERROR_FREE = 0.01  # "relatively error free": the integrator moves no parameter by more than this share
-ROUNDED = 0.005  # Table 1 rounds f_n and zeta to two digits
 
 
 def system_stiffness_gap(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
@@ -62,9 +57,9 @@ def amplitude_nonlinear(evidence: Evidence, _: Reported) -> Iterator[Condition]:
 
 def nyquist(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Half the sampling rate of the study and of the report."""
-    dt, stated, step = evidence.settings.sampling.dt, reported.value("nyquist"), reported.value("nyquist.dt")
-    highest = 0.5 / dt
-    yield Condition(f"1 / (2 dt) equals {stated:g} Hz", f"{highest:g} Hz", math.isclose(highest, stated, rel_tol=1e-9))
+    dt, highest, step = evidence.settings.sampling.dt, reported.value("nyquist"), reported.value("nyquist.dt")
+    own = 0.5 / dt
+    yield Condition(f"1 / (2 dt) equals {highest:g} Hz", f"{own:g} Hz", math.isclose(own, highest, rel_tol=1e-9))
     yield Condition(f"dt equals {step:g} s", f"{dt:g} s", math.isclose(dt, step, rel_tol=1e-9))
 
 
@@ -84,18 +79,19 @@ def lowpass(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     yield Condition(f"less than 1 % of the power above {cutoff:g} Hz", f"{above:.1g} of the power above", above < 0.01)
 
 
-def force_gaussian(evidence: Evidence, _: Reported) -> Iterator[Condition]:
+def force_gaussian(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Kurtosis of the force."""
     shape, score = (evidence.of_channel("linear", number, "force") for number in (kurtosis, gaussian_score))
     words = f"; own record {score.own:+.2g} standard errors from 3"
-    yield _rarely_refused(refused(evidence, "linear", "force"), f"kurtosis {shape}; ", words)
+    yield _rarely_refused(reported, refused(evidence, "linear", "force"), f"kurtosis {shape}; ", words)
 
 
-def _rarely_refused(refusals: Sample, before: str = "", after: str = "") -> Condition:
+def _rarely_refused(reported: Reported, refusals: Sample, before: str = "", after: str = "") -> Condition:
     """A Gaussian is refused hardly more often than the level of the test allows."""
+    most = reported.limit("tests_wrong")
     return Condition(
-        f"a 5 % test refuses a Gaussian for at most {TESTS_WRONG:g} of the records",
-        f"{before}refused {refusals.mean:.2g}{after}", refusals.mean <= TESTS_WRONG,
+        f"a 5 % test refuses a Gaussian for at most {most:g} of the records",
+        f"{before}refused {refusals.mean:.2g}{after}", refusals.mean <= most,
     )  # fmt: skip
 
 
@@ -108,46 +104,37 @@ def below_10_hz(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
         yield at_least(f"{system}: share of the displacement's power below {limit:g} Hz", below, 0.99)
 
 
-def error_free(evidence: Evidence, _: Reported) -> list[Condition]:
-    """What the integrator does alone, from ``results/integrator_steps.csv``."""
+def error_free(evidence: Evidence, reported: Reported) -> list[Condition]:
+    """What the integrator does alone, from ``results/integrator_steps.csv``.
+
+    A run that diverges fails, by either reading of unit variance; that all stay finite makes none free of error.
+    """
+    small, moved = reported.limit("error_free"), list[tuple[float, Condition]]()
     own = [r for r in evidence.integrator_steps if (r["method"], r["steps_per_sample"]) == ("abm4", 1)]
     reading = evidence.integrator_steps[0]["reading"]  # the study's own stands first
-    moved = [_moved([r for r in own if r["reading"] == reading], name) for name in ("k", "f_n", "m", "c", "zeta")]
-    conditions = [condition for _, condition in sorted(moved, key=lambda m: -m[0])]
+    for name in ("k", "f_n", "m", "c", "zeta"):
+        rows = [r for r in own if r["reading"] == reading and r["parameter"] == name]
+        worst = max((r for r in rows if math.isfinite(r["relative_error"])), key=lambda r: abs(r["relative_error"]))
+        error, spread = worst["relative_error"], worst["standard_error"] / abs(worst["true"])
+        text = f"{name} {percent(error, '+.3g', spread)} ({worst['system']})"
+        criterion = f"largest error of {name} over the systems at most {percent(small)}"
+        condition = Condition(criterion, text, abs(error) <= small, f"one step a sample moves {text}")
+        moved.append((abs(error), condition))
+    counts = {(r["system"], r["reading"]): f"{r['diverged']} of {r['seeds']}" for r in own if r["diverged"] > 0}
+    lost = [f"{count} runs of {system} diverge (unit variance {of})" for (system, of), count in counts.items()]
     return explained(
         "the integrator's amplitude and phase errors within the band act as mass and as negative damping, and only "
         "more steps a sample take them away",
-        [*conditions, *_diverged(own)],
+        [
+            *(condition for _, condition in sorted(moved, key=lambda m: -m[0])),
+            *(Condition("no run diverges", text, False, text) for text in lost),
+        ],
     )
-
-
-def _moved(rows: Sequence[Mapping[str, Any]], name: str) -> tuple[float, Condition]:
-    """The largest error that the integrator makes in a parameter of any system, and whether it is small."""
-    finite = [r for r in rows if r["parameter"] == name and math.isfinite(r["relative_error"])]
-    worst = max(finite, key=lambda r: abs(r["relative_error"]))
-    error, spread = worst["relative_error"], worst["standard_error"] / abs(worst["true"])
-    text = f"{name} {percent(error, '+.3g', spread)} ({worst['system']})"
-    return abs(error), Condition(
-        f"largest error of {name} over the systems at most {percent(ERROR_FREE)}",
-        text, abs(error) <= ERROR_FREE, f"one step a sample moves {text}",
-    )  # fmt: skip
-
-
-def _diverged(rows: Sequence[Mapping[str, Any]]) -> list[Condition]:
-    """A condition that fails for every system with runs that diverge, by either reading of unit variance.
-
-    There is none where all runs stay finite: that alone makes no run free of error.
-    """
-    counts = {(r["system"], r["reading"]): f"{r['diverged']} of {r['seeds']}" for r in rows if r["diverged"] > 0}
-    texts = [
-        f"{count} runs of {system} diverge (unit variance {reading})" for (system, reading), count in counts.items()
-    ]
-    return [Condition("no run diverges", text, False, text) for text in texts]
 
 
 def noise_uncorrelated(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Correlation of force and noise, whiteness and shape of the noise."""
-    records, fraction = evidence.records(Drive(COMBINED))[1:], reported.value("noise_random_only.middle")
+    records, fraction = evidence.records(Drive(COMBINED))[1:], reported.noises[1]
     noises = [displacement_noise(r["displacement"], fraction, s) for r, s in zip(records, evidence.seeds, strict=True)]
     pairs = list(zip(records, noises, strict=True))
     correlation = Sample(tuple(float(np.corrcoef(r["force"], n)[0, 1]) for r, n in pairs))
@@ -161,41 +148,37 @@ def noise_uncorrelated(evidence: Evidence, reported: Reported) -> Iterator[Condi
         f"no line of the spectrum off the mean by more than chance's {largest.allowed:.2g} standard errors",
         str(largest), largest.uniform,
     )  # fmt: skip
-    yield _rarely_refused(how_often(not is_gaussian(n) for n in noises))
+    yield _rarely_refused(reported, Sample(tuple(float(not is_gaussian(n)) for n in noises)))
 
 
 def table_1(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """The model files hold Table 1, and its f_n and zeta follow from its k and c."""
+    rounded = reported.limit("rounded")
     for system in SYSTEMS:
-        wrong = ", ".join(_wrong(true_parameters(evidence.model(Drive(system)).values), reported, system))
+        values, wrong = true_parameters(evidence.model(Drive(system)).values), list[str]()
+        for statement in reported.statements.values():
+            if statement.id.startswith(f"table_1.{system}.") and statement.value is not None:
+                name = statement.id.split(".")[-1]
+                value, rounding = values.get(name, 0.0), rounded if name in ("f_n", "zeta") else 1e-9
+                if not math.isclose(value, statement.value, rel_tol=rounding, abs_tol=1e-12):
+                    wrong.append(f"{name} {value:.6g} for {statement.value:.6g}")
+        said = ", ".join(wrong)
         yield Condition(
-            f"{system}: k, c and nonlinear parameters equal, f_n and zeta within {percent(ROUNDED)}",
-            f"{system}: {wrong or 'equal'}", not wrong, f"models/{system}.yaml differs from Table 1 in {wrong}",
+            f"{system}: k, c and nonlinear parameters equal, f_n and zeta within {percent(rounded)}",
+            f"{system}: {said or 'equal'}", not said, f"models/{system}.yaml differs from Table 1 in {said}",
         )  # fmt: skip
-
-
-def _wrong(values: Mapping[str, float], reported: Reported, system: str) -> list[str]:
-    """Which values of a model are not those of Table 1."""
-    wrong: list[str] = []
-    for statement in reported.statements.values():
-        if statement.id.startswith(f"table_1.{system}.") and statement.value is not None:
-            name = statement.id.split(".")[-1]
-            value, rounding = values.get(name, 0.0), ROUNDED if name in ("f_n", "zeta") else 1e-9
-            if not math.isclose(value, statement.value, rel_tol=rounding, abs_tol=1e-12):
-                wrong.append(f"{name} {value:.6g} for {statement.value:.6g}")
-    return wrong
 
 
 def exact_stiffness(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     """Section 5.2.1 names another exact stiffness than Table 1."""
-    stated, table = reported.value("exact_stiffness"), reported.table_1("linear", "k")
+    own, table = reported.value("exact_stiffness"), reported.table_1("linear", "k")
     model = evidence.model(Drive("linear")).values["k"] or 0.0
     modal = reported.table_1("linear", "m") * (2.0 * math.pi * reported.table_1("linear", "f_n")) ** 2
     yield Condition(
         "the exact stiffness equals that of Table 1 and of (2 pi f_n)^2 m to four digits",
         f"Table 1 {table:g}, (2 pi f_n)^2 m {modal:.1f}, model {model:g} N/m",
-        all(math.isclose(stated, x, rel_tol=1e-4) for x in (table, modal, model)),
-        f"Section 5.2.1 says {stated:g} where Table 1 says {table:g}, which (2 pi f_n)^2 m = {modal:.1f} confirms",
+        all(math.isclose(own, x, rel_tol=1e-4) for x in (table, modal, model)),
+        f"Section 5.2.1 says {own:g} where Table 1 says {table:g}, which (2 pi f_n)^2 m = {modal:.1f} confirms",
     )  # fmt: skip
 
 

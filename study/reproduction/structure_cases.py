@@ -1,4 +1,4 @@
-"""Structures in the study: ``config/structures.tsv`` and ``structures.yaml``, records, and what is found in them."""
+"""Structures of several coordinates in the study: their configuration, their records, and what is found in them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,11 +17,10 @@ from study.identify.estimators.base import Settings
 from study.identify.frequency_domain.local_polynomial import LocalPolynomial
 from study.records.excitation import Excitation, force
 from study.records.record import MOTIONS, Record, Sensor
-from study.reproduction.case_names import rules
-from study.reproduction.config import Name
+from study.reproduction.config import Name, rules
 from study.reproduction.settings import (
+    AllowedErrors,
     Band,
-    Limits,
     LocalPolynomialSettings,
     Names,
     Positive,
@@ -32,7 +31,7 @@ from study.reproduction.settings import (
 from study.structure.action_reaction import JointEstimate, joint_estimate
 from study.structure.places import connections
 from study.structure.prepared_structure import prepare_structure
-from study.structure.reverse_system import ESTIMATORS, Equation, ReverseSystem, equations_of, reverse_system
+from study.structure.reverse_system import ESTIMATORS, ReverseSystem, equations_of, reverse_system
 from study.support.config_files import Section, TableRow, Text, read_rows, read_yaml
 from study.support.errors import StudyError, at, expect
 
@@ -49,11 +48,9 @@ class MeasuredTolerances(Section):
     error: Positive
 
 
-class StructureTolerances(Section):
-    """What an estimate may be off, by its symbol: relative, absolute where the true value is zero."""
+class StructureTolerances(AllowedErrors):
+    """What an estimate may be off, by its symbol wherever it stands."""
 
-    relative: Limits
-    absolute: Limits
     measured: MeasuredTolerances
 
 
@@ -102,7 +99,6 @@ class StructureCase(TableRow):
 
     @property
     def model_file(self) -> str:
-        """Where the structure is described."""
         return f"models/{self.model}.yaml"
 
 
@@ -198,10 +194,9 @@ class StructureFindings:
 
 @dataclass(frozen=True, eq=False)
 class CaseResult:
-    """A case in reverse: the model that is assumed, its equations, and by estimator what is found."""
+    """A case in reverse: the model that is assumed, and by estimator what is found."""
 
     model: Model
-    equations: tuple[Equation, ...]
     found: Mapping[str, StructureFindings]
 
 
@@ -216,7 +211,7 @@ def identify_structure(model: Model, record: Record, case: StructureCase, settin
             found[name] = StructureFindings(system, joint_estimate(system))
         except StudyError as error:
             raise StudyError(f"{case.case}, {name}: {error}") from None
-    return CaseResult(assumed, equations, found)
+    return CaseResult(assumed, found)
 
 
 def measured_model(model: Model, sensors: Sequence[str]) -> Model:

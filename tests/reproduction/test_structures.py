@@ -8,20 +8,26 @@ import pandas as pd
 import pytest
 
 from study.equations.model_file import read_model
-from study.reproduction.tables import judge_estimate
-from study.structure.measured_comparison import compare_measured
-from study.structure.measured_tables import measured_figure, measured_parameters, measured_responses
-from study.structure.prepared_structure import prepare_structure
-from study.structure.reverse_figures import coherence_figure, connections_figure
-from study.structure.reverse_tables import structure_coherences, structure_parameters, structure_responses
-from study.structure.structure_claims import measured_claims, structure_claims
-from study.structure.structure_study import (
+from study.reproduction.structure_cases import (
     assumed_structure,
     identify_structure,
     load_structures,
     make_structure_record,
     measured_model,
 )
+from study.reproduction.structure_figures import coherence_figure, connections_figure, modal_figure
+from study.reproduction.structure_tables import (
+    modal_claims,
+    modal_parameters,
+    modal_responses,
+    structure_claims,
+    structure_coherences,
+    structure_parameters,
+    structure_responses,
+)
+from study.reproduction.tables import judge_estimate
+from study.structure.measured_comparison import compare_measured
+from study.structure.prepared_structure import prepare_structure
 from study.support.errors import StudyError
 
 ROOT = Path(__file__).parents[2]
@@ -51,7 +57,7 @@ def test_the_assumed_term_stands_at_every_connection_that_lacks_it(two_masses):
 
 def test_tables_hold_every_estimator_and_the_truth(two_masses):
     case, settings, _, result = two_masses
-    table = structure_parameters(case.case, result, settings.tolerances)
+    table = structure_parameters(case.case, result, settings)
     assert set(table["estimator"]) == set(settings.estimators)
     true = dict(zip(table["parameter"], table["true"], strict=True))
     assert true == {**result.model.values}
@@ -114,13 +120,13 @@ def test_the_beam_is_found_by_its_own_modes():
     assert [str(s) for s in record.sensors] == [f"{p} displacement" for p in case.sensors]
     assert model.values == {"k3[ground-p10]": None}
     comparison = compare_measured(model, prepare_structure(record, model))
-    (claim,) = measured_claims(case, structure, comparison, settings).to_dict("records")
+    (claim,) = modal_claims(case, structure, comparison, settings).to_dict("records")
     assert claim["verdict"] == "holds", claim["measured"]
-    table = measured_parameters(case, structure, comparison, settings)
+    table = modal_parameters(case, structure, comparison, settings)
     assert list(table["parameter"][:3]) == ["k3[ground-p10]", "f_n[1]", "zeta[1]"]
-    responses = measured_responses(case, structure, comparison, settings)
+    responses = modal_responses(case, structure, comparison, settings)
     linear = responses[(responses["estimator"] == "output_error") & (responses["place"] == "p10")]
     size = np.hypot(linear["exact_real"], linear["exact_imag"])
     off = np.hypot(linear["real"] - linear["exact_real"], linear["imag"] - linear["exact_imag"])
     assert np.sqrt(np.mean(off**2) / np.mean(size**2)) < 0.02
-    assert len(measured_figure(responses, case.title).axes) == 2 * 4
+    assert len(modal_figure(responses, case.title).axes) == 2 * 4

@@ -1,1 +1,0 @@
-"""Figures that the reproduction alone draws: Axes in, Axes out."""

@@ -1,0 +1,292 @@
+"""Tables of structures: as those of a single mass (``tables``), equation by equation or by modes; and what is claimed.
+
+Where nothing drives a coordinate, its A_j(f) are over the own mass; tables have them times the true one, in N.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from study.equations.mass_matrix import matrices
+from study.equations.model import Model
+from study.identify.frequency_domain.conditioned import MisoResult
+from study.identify.frequency_domain.inputs import Input
+from study.records.record import MOTIONS, Record, Sensor
+from study.records.spectra import Segments, cross_spectra
+from study.reproduction.claims.judgement import SEPARATOR, Condition, verdict
+from study.reproduction.structure_cases import CaseResult, StructureCase, StructureSettings
+from study.reproduction.tables import (
+    COHERENCE_COLUMNS,
+    PARAMETER_COLUMNS,
+    RESPONSE_COLUMNS,
+    judge_estimate,
+    stacked,
+)
+from study.structure.measured_comparison import MeasuredComparison
+from study.structure.measured_fit import MeasuredFit
+from study.structure.modes import modes_of
+from study.structure.places import transfer
+from study.structure.reverse_system import exact_responses
+from study.support.arrays import Complexes, Floats
+from study.support.numbers import percent
+
+WHERE = ["equation", "place"]  # what the tables of structures have beside
+REACTION_COLUMNS = ["case", "estimator", "parameter", "first", "second", "in_first", "in_second", "error", "p_value"]
+MODAL_COLUMNS = [
+    "quantity", "place", "unit", "frequency", "estimator", "real", "imag", "standard_error", "exact_real", "exact_imag",
+]  # fmt: skip
+BY_MODES = "output_error"  # the estimator of a linear part as measured
+LEAKED = 3  # lines of a window, next to the end of the band that is driven
+COEFFICIENT, TRANSFER = "coefficient", "transfer function"
+STATEMENTS = {
+    "transfer_functions": "SI/SO: one nonlinear connection changes the transfer function to every coordinate",
+    "placed": "MI/SO finds every coefficient, and nothing where nothing nonlinear is",
+    "measured": "The linear part as measured: modes of its own and the nonlinear terms run free as the structure does",
+    "reaction": "Two equations agree on what they share in MI/SO, and do not in SI/SO",
+}
+
+
+# ---- equation by equation
+
+
+def input_place(item: Input) -> str:
+    """Where an input acts: that of its coefficients, ``first-second``; several stand side by side."""
+    labels = [p.symbol[p.symbol.index("[") + 1 : -1] for p in item.parts]
+    return " and ".join(dict.fromkeys(labels))
+
+
+def structure_parameters(case: str, result: CaseResult, settings: StructureSettings) -> pd.DataFrame:
+    """Every coefficient of every estimator from all equations together, one row each."""
+    rows: list[tuple[Any, ...]] = []
+    for estimator, found in result.found.items():
+        for key in found.joint.estimate.symbols:
+            true, value = result.model.values[key] or 0.0, found.joint.estimate[key]
+            judged = judge_estimate(key[: key.index("[")], true, value, settings.tolerances).values()
+            rows.append((case, estimator, key, true, value, found.joint.estimate.error(key), *judged, ""))
+    return pd.DataFrame(rows, columns=PARAMETER_COLUMNS)
+
+
+def structure_reactions(case: str, result: CaseResult) -> pd.DataFrame:
+    """Every coefficient that stands in two equations, as each of them has it."""
+    rows = [
+        (case, estimator, r.key, *r.coordinates, *r.values, r.error, r.p_value)
+        for estimator, found in result.found.items()
+        for r in found.joint.reactions
+    ]
+    return pd.DataFrame(rows, columns=REACTION_COLUMNS)
+
+
+def structure_responses(result: CaseResult) -> pd.DataFrame:
+    """A_j(f) of every equation and estimator with its standard error and the exact function, in long form."""
+    values = {key: value for key, value in result.model.values.items() if value is not None}
+    parts: list[Sequence[Any]] = []
+    for estimator, found in result.found.items():
+        for own in found.system.results:
+            responses, scale = own.found.responses, 1.0 if own.mass is None else values[own.mass]
+            assert responses is not None, "estimators of structures have frequency response functions"
+            for j, (item, exact) in enumerate(zip(own.found.inputs, exact_responses(own, values), strict=True)):
+                value, error = responses.response[j] * scale, np.sqrt(responses.covariance[:, j, j].real) * scale
+                share: Floats | float = np.nan if own.independent is None else own.independent[:, j]
+                parts.append(
+                    (own.coordinate, input_place(item), responses.frequency, estimator, j + 1, item.shape, value.real,
+                     value.imag, error, exact.real * scale, exact.imag * scale, share)
+                )  # fmt: skip
+    return stacked([*WHERE, *RESPONSE_COLUMNS, "independent"], parts)
+
+
+def structure_coherences(result: CaseResult) -> pd.DataFrame:
+    """Ordinary, partial, nonlinear and cumulative coherence of each input of each equation, in long form."""
+
+    def words(name: str) -> str:  # of a placed term: cubic stiffness first-second
+        term, _, place = name.partition("[")
+        return f"{term.replace('_', ' ')} {place.rstrip(']')}"
+
+    parts: list[Sequence[Any]] = []
+    for estimator, found in result.found.items():
+        for own in found.system.results:
+            analysis = own.found.responses
+            if not isinstance(analysis, MisoResult):
+                continue
+            for j, item in enumerate(own.found.inputs):
+                parts.append(
+                    (own.coordinate, input_place(item), analysis.frequency, estimator, j + 1, item.shape,
+                     " + ".join(map(words, item.terms)), analysis.ordinary[j], analysis.partial[j],
+                     analysis.contribution[j], analysis.cumulative[j])
+                )  # fmt: skip
+    return stacked([*WHERE, *COHERENCE_COLUMNS], parts)
+
+
+# ---- the linear part as measured
+
+
+def modal_parameters(
+    case: StructureCase, truth: Model, comparison: MeasuredComparison, settings: StructureSettings
+) -> pd.DataFrame:  # fmt: skip
+    """Coefficients with their tolerance, then natural frequencies and damping ratios beside the exact ones."""
+    fit, modes, exact = comparison.fit, comparison.modes, modes_of(truth)
+    allowed, rows = settings.tolerances.measured.coefficient, list[tuple[Any, ...]]()
+    for key in comparison.model.values:
+        true, value = truth.numbers()[key], fit.values[key]
+        off = value / true - 1.0
+        rows.append((case.case, BY_MODES, key, true, value, fit.error(key), off, allowed, abs(off) <= allowed, ""))
+    for r, frequency in enumerate(modes.frequency.tolist()):
+        k = int(np.argmin(np.abs(exact.frequency - frequency)))
+        for name, true, found, error in (
+            ("f_n", exact.frequency[k], modes.frequency[r], modes.frequency_error[r]),
+            ("zeta", exact.damping[k], modes.damping[r], modes.damping_error[r]),
+        ):
+            off = float(found / true) - 1.0
+            told = (float(true), float(found), float(error), off)
+            rows.append((case.case, BY_MODES, f"{name}[{k + 1}]", *told, np.nan, "", ""))
+    return pd.DataFrame(rows, columns=PARAMETER_COLUMNS)
+
+
+def modal_responses(
+    case: StructureCase, truth: Model, comparison: MeasuredComparison, settings: StructureSettings
+) -> pd.DataFrame:  # fmt: skip
+    """Coefficients line by line, and transfer functions of the linear part: SI/SO, the modes', and the exact ones."""
+    parts: list[tuple[Any, ...]] = []
+    units = {
+        key: t.term.unit(s, "N", "m") for t in truth.terms for key, s in zip(t.symbols, t.term.symbols, strict=True)
+    }
+    for spectrum in comparison.spectra:
+        values, true = spectrum.values, truth.numbers()[spectrum.key]
+        parts.append(
+            (COEFFICIENT, spectrum.key, units[spectrum.key], spectrum.frequency, "instrumental", values.real,
+             values.imag, spectrum.error, true, 0.0)
+        )  # fmt: skip
+    prepared = comparison.prepared
+    (name, where), *_ = truth.forces
+    places = [s.coordinate for s in prepared.sensors]
+    f, found, exact = transfer_functions(
+        truth, prepared.record[name], prepared.measured.T, places, prepared.dt, settings.segments.segments()
+    )
+    inside = (f > 0.0) & (f < case.cutoff - LEAKED * f[1])
+    modal = modal_transfer(comparison.fit, places, where, f)
+    for k, place in enumerate(places):
+        for estimator, values in (("siso", found[:, k]), (BY_MODES, modal[:, k])):
+            own, true = values[inside], exact[inside, k]
+            parts.append(
+                (TRANSFER, place, "m/N", f[inside], estimator, own.real, own.imag, np.nan, true.real, true.imag)
+            )
+    return stacked(MODAL_COLUMNS, parts)
+
+
+def transfer_functions(
+    model: Model, force: Floats, motions: Iterable[Floats], places: Sequence[str], dt: float, cut: Segments
+) -> tuple[Floats, Complexes, Complexes]:
+    """Frequency, and from a structure's force to displacements: the best linear approximation, and the linear part's.
+
+    ``motions`` are the displacements at the places; shapes (lines,), (lines, places) and (lines, places).
+    """
+    (_, where), *_ = model.forces
+    sensors = tuple(Sensor(place, MOTIONS[0]) for place in places)
+    matrix = cross_spectra([force, *motions], dt, cut)
+    linear = transfer(matrices(model, model.numbers()), sensors, model.coordinates, dt, cut.length)
+    found = matrix.density[:, 0, 1:] / matrix.density[:, :1, 0].real
+    return matrix.frequency, found, linear[:, :, model.coordinates.index(where)]
+
+
+def modal_transfer(fit: MeasuredFit, places: Sequence[str], where: str, frequency: Floats) -> Complexes:
+    """Displacement at each place by a force at another, from the modes; shape (lines, places)."""
+    modal, n = fit.modal, fit.modal.modes
+    s = 2j * np.pi * frequency[:, None, None]
+    damping = np.zeros((n, n))
+    for (r, c), key in zip(modal.pairs, modal.damping, strict=True):
+        damping[r, c] = damping[c, r] = fit.values[key]
+    stiffness = np.diag([fit.values[key] for key in modal.stiffness])
+    push = np.array([fit.values[key] for key in modal.shape(where)])
+    moved = np.linalg.solve(s**2 * np.eye(n) + s * damping + stiffness, push[:, None])[:, :, 0]
+    felt = np.array([[fit.values[key] for key in modal.shape(place)] for place in places])
+    return np.asarray(moved @ felt.T, dtype=np.complex128)
+
+
+# ---- claims: SI/SO shows one nonlinear connection everywhere, MI/SO puts it where it is
+
+
+def structure_claims(
+    case: StructureCase, record: Record, result: CaseResult, settings: StructureSettings
+) -> pd.DataFrame:
+    """Every claim on a case, a row each: what must hold, what was measured, the verdict."""
+    return _judged(
+        case,
+        transfer_functions=_changed(result.model, record, settings),
+        placed=_placed(case, result, settings),
+        reaction=_reaction(result, settings),
+    )
+
+
+def modal_claims(
+    case: StructureCase, truth: Model, comparison: MeasuredComparison, settings: StructureSettings
+) -> pd.DataFrame:
+    """The same of a case whose linear part is as measured."""
+    return _judged(case, measured=_modal(case, truth, comparison, settings))
+
+
+def _judged(case: StructureCase, **claims: Iterable[Condition]) -> pd.DataFrame:
+    """The claims of ``STATEMENTS`` with their conditions."""
+    rows: list[dict[str, str]] = []
+    for name, conditions in claims.items():
+        held = list(conditions)
+        rows.append({
+            "case": case.case, "claim": STATEMENTS[name], "criterion": SEPARATOR.join(c.criterion for c in held),
+            "measured": SEPARATOR.join(c.measured for c in held),
+            "verdict": verdict([c.met for c in held], ("holds", "partly", "does not hold")),
+        })  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def _changed(model: Model, record: Record, settings: StructureSettings) -> Iterable[Condition]:
+    """The best linear approximation of every motion by the force against that of the structure's linear part."""
+    (name, _), *_ = model.forces
+    motions = [record[Sensor(c, MOTIONS[0])] for c in model.coordinates]
+    f, found, exact = transfer_functions(
+        model, record[name], motions, model.coordinates, record.dt, settings.segments.segments()
+    )
+    inside, limit = (f >= settings.fit_band[0]) & (f <= settings.fit_band[1]), settings.claims.changed
+    power = np.sum(np.abs(exact[inside]) ** 2, axis=0)
+    off = np.sqrt(np.sum(np.abs(found[inside] - exact[inside]) ** 2, axis=0) / power)
+    for place, share in zip(model.coordinates, off.tolist(), strict=True):
+        yield Condition(
+            f"transfer function to {place} off that of the linear part by {percent(limit)} or more",
+            f"{place} {percent(share)}", share >= limit,
+        )  # fmt: skip
+
+
+def _placed(case: StructureCase, result: CaseResult, settings: StructureSettings) -> Iterable[Condition]:
+    table = structure_parameters(case.case, result, settings)
+    for _, row in table[table["estimator"] == "miso"].iterrows():
+        true, value, allowed = (float(row[name]) for name in ("true", "estimate", "tolerance"))
+        criterion = f"within {percent(allowed)} of {true:.6g}" if true else f"within +-{allowed:g} of zero"
+        measured = percent(value / true - 1.0, "+.2g") if true else f"{value:+.2g}"
+        key, met = str(row["parameter"]), bool(row["within_tolerance"])
+        yield Condition(f"{key} {criterion}", f"{key} {measured}", met)
+
+
+def _reaction(result: CaseResult, settings: StructureSettings) -> Iterable[Condition]:
+    limit = settings.claims.by_chance
+    for name, label, sign in (("miso", "MI/SO", "at least"), ("siso", "SI/SO", "below")):
+        p = result.found[name].joint.least_p
+        yield Condition(
+            f"{label}: probability that chance makes the largest difference {sign} {limit:g}", f"{label} {p:.2g}",
+            (p >= limit) == (name == "miso"),
+        )  # fmt: skip
+
+
+def _modal(
+    case: StructureCase, truth: Model, comparison: MeasuredComparison, settings: StructureSettings
+) -> Iterable[Condition]:
+    allowed, fit = settings.tolerances.measured, comparison.fit
+    for key in comparison.model.values:
+        true = truth.numbers()[key]
+        off = fit.values[key] / true - 1.0
+        met = abs(off) <= allowed.coefficient
+        yield Condition(
+            f"{key} within {percent(allowed.coefficient)} of {true:.6g}", f"{key} {percent(off, '+.2g')}", met
+        )
+    noise = float(np.sqrt(case.noise / (1.0 + case.noise)))
+    error = comparison.prediction.error
+    criterion = f"error of the free run at most {allowed.error:g} times the noise of {percent(noise)}"
+    yield Condition(criterion, f"error {percent(error)}", error <= allowed.error * noise)
