@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from study.cli import main
+from study.equations.model_file import parse_model
+from study.equations.simulate import Integrator, simulate
 from study.records.excitation import Excitation, force
 from study.records.record import Sensor, record_of, write_csv
 
@@ -27,15 +29,13 @@ SAMPLES, DT = 2400, 0.02
 
 def motions(drive: np.ndarray, dt: float) -> np.ndarray:
     """Displacements of two masses on springs, shape (2, n)."""
-    from study.equations.model_file import parse_model
-    from study.structure.structure_simulation import simulate_structure
-
     values = iter((1.0, 0.6, 900.0, 700.0, 1.2, 0.8))
     text = "\n".join(
         line.replace("}", f", value: {next(values)}}}") if "{term" in line else line for line in MODEL.splitlines()
     )
     wanted = [Sensor(c, "displacement") for c in "ab"]
-    made = simulate_structure(parse_model(text, Path("pair.yaml")), {"shaker": drive}, dt, sensors=wanted)
+    model = parse_model(text, Path("pair.yaml"))
+    made = simulate(model, {"shaker": drive}, dt, Integrator("rk4"), sensors=wanted)
     return np.stack([made[s] for s in wanted])
 
 
