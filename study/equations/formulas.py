@@ -7,12 +7,14 @@ The text is parsed by Python's own parser and each part compared with a whitelis
 import ast
 import math
 from collections.abc import Mapping
+from threading import Lock
 
 from study.equations.graph import Graph, Op
 from study.support.errors import StudyError
 
 LONGEST = 300  # characters
 DEEPEST = 40
+ONE_AT_A_TIME = Lock()  # Python before 3.13 counts the depth of a tree that it makes for all threads together
 LARGEST_EXPONENT = 16.0
 
 FUNCTIONS = {  # with their numbers of arguments; a tangent is made of two others
@@ -34,7 +36,8 @@ def parse(text: str) -> ast.expr:
     if not text.isascii() or "\x00" in text:
         raise ExpressionError(f"the expression {text!r} has characters outside plain ASCII")
     try:
-        tree = ast.parse(text.strip(), mode="eval").body
+        with ONE_AT_A_TIME:
+            tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, MemoryError, RecursionError):
         raise ExpressionError(f"the expression {text!r} is not a formula such as 'u*abs(u) + 0.1*v**3'") from None
     deepest, level = 0, [tree]

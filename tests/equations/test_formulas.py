@@ -1,6 +1,9 @@
 """Formulas: what is on the whitelist agrees with NumPy, everything else is an ExpressionError."""
 
+import gc
+import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -152,3 +155,28 @@ def test_the_longest_formula_is_read_and_one_more_character_is_not() -> None:
 
 def test_names_lists_variables_not_functions() -> None:
     assert formulas.names("u*abs(v) + max(w, u_g)*pi") == ["u", "u_g", "v", "w"]
+
+
+def test_formulas_are_read_in_many_threads_while_others_collect_garbage():
+    """Without a lock Python before 3.13 says "AST constructor recursion depth mismatch" in one of a hundred of these."""
+
+    class Cycle:
+        def __init__(self) -> None:
+            self.me: object = self
+
+        def __del__(self) -> None:
+            sum(range(200))
+
+    def read(_: int) -> None:
+        Cycle()
+        formulas.parse("+".join(["u*max(u, 0.1)"] * 18))
+
+    threshold, interval = gc.get_threshold(), sys.getswitchinterval()
+    gc.set_threshold(5, 1, 1)
+    sys.setswitchinterval(1e-7)
+    try:
+        with ThreadPoolExecutor(8) as pool:
+            assert len(list(pool.map(read, range(4000)))) == 4000
+    finally:
+        gc.set_threshold(*threshold)
+        sys.setswitchinterval(interval)
