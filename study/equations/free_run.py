@@ -162,7 +162,8 @@ class FreeRun:
         """What is observed, and derivatives, into ``out``; ``states`` become those at which the next segments begin."""
         bounds = np.array(self.along(cuts), dtype=np.int64)
         starts = np.array([self.time(begin) for begin in bounds[:-1]])
-        failed = kernels.integrate(motion, starts, self.dt, self.steps, self.drive, bounds, states, out)
+        method = kernels.Method.SUMMED if motion.dofs else kernels.Method.ONE_BY_ONE  # as before, to the last bit
+        failed = kernels.integrate(motion, starts, self.dt, self.steps, self.drive, bounds, states, out, method)
         if failed >= 0:
             time = self.time(failed)
             raise DivergenceError(f"the free run diverged at t = {time:.4g} s", time)
