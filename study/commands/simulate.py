@@ -40,11 +40,11 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> None:
     from study.compare.history import path_of
+    from study.equations.linear_part import modes_of, modes_table
     from study.equations.model_file import read_model
     from study.equations.simulate import Integrator, simulate
     from study.records.excitation import Excitation, force
     from study.records.record import write_csv
-    from study.structure.modes import modes_of, modes_table
     from study.support.errors import at, expect
     from study.support.files import keep, replacing
 

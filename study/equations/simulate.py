@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from study.equations import kernels
-from study.equations.mass_matrix import checked_mass_matrix
+from study.equations.linear_part import checked_mass_matrix
 from study.equations.model import Model, named_channels
 from study.equations.motion_program import motion_program
 from study.records.interpolation import between_samples

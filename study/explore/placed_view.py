@@ -19,9 +19,9 @@ from study.explore.page_units import Scale, in_text, length, power, rate
 from study.explore.placed_session import PlacedStage
 from study.explore.placed_words import placed_words
 from study.figures.labels import power_of_ten
+from study.figures.sketch import Sketch
 from study.records.spectra import autospectrum
 from study.structure.connection_spectra import dynamic_stiffnesses, highest_frequency, missing_force_spectra
-from study.structure.sketch import Sketch
 from study.structure.structure_comparison import StructureComparison
 from study.structure.structure_pictures import close_by, sketch_of, sketch_of_diagnosis
 

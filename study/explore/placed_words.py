@@ -5,16 +5,15 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
+from study.equations.linear_part import Modes
 from study.equations.place import Place
 from study.equations.place import place_in_words as placed
 from study.explore.page_units import in_percent, in_sentence, in_text, with_error
 from study.explore.placed_session import PlacedStage
 from study.explore.words import HEAD, NOT_ASKED, UNKNOWN, VERDICTS, WAITING, bar, figure, gives, in_table, in_words
 from study.figures.labels import power_of_ten
-from study.structure.modes import Modes
+from study.figures.sketch import Sketch, svg
 from study.structure.placed_ranking import PlacedRanked
-from study.structure.sketch import Sketch
-from study.structure.sketch_svg import svg
 from study.structure.structure_comparison import PlacedCoefficient, StructureComparison, structure_in_words
 from study.structure.structure_leftover import explained_by_place
 from study.structure.structure_page import terms_there
@@ -138,7 +137,7 @@ def _tied(row: PlacedRanked) -> str:
 
 def _drawn_label(place: Place, stage: PlacedStage) -> str:
     """The label under which the sketch has a place, whichever end comes first."""
-    from study.structure.places import connections
+    from study.equations.linear_part import connections
 
     known = {p.path: p.label for p in connections(stage.comparison.model)}
     return known.get(place.path, place.label)

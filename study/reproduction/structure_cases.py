@@ -9,12 +9,15 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from study.equations.layout import LINEAR
+from study.equations.linear_part import connections
 from study.equations.model import Model, ModelTerm, free
 from study.equations.model_file import read_model
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
 from study.identify.estimators.base import Settings
+from study.identify.frequency_domain.action_reaction import JointEstimate, joint_estimate
 from study.identify.frequency_domain.local_polynomial import LocalPolynomial
+from study.identify.frequency_domain.reverse_system import ESTIMATORS, ReverseSystem, equations_of, reverse_system
 from study.records.excitation import Excitation, force
 from study.records.record import MOTIONS, Record, Sensor
 from study.reproduction.config import Name, rules
@@ -28,10 +31,7 @@ from study.reproduction.settings import (
     Seed,
     SegmentSettings,
 )
-from study.structure.action_reaction import JointEstimate, joint_estimate
-from study.structure.places import connections
 from study.structure.prepared_structure import prepare_structure
-from study.structure.reverse_system import ESTIMATORS, ReverseSystem, equations_of, reverse_system
 from study.support.config_files import Section, TableRow, Text, read_rows, read_yaml
 from study.support.errors import StudyError, at, expect
 

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from study.equations.mass_matrix import matrices
+from study.equations.linear_part import matrices, modes_of, transfer
 from study.equations.model import Model
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.identify.frequency_domain.inputs import Input
+from study.identify.frequency_domain.reverse_system import exact_responses
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments, cross_spectra
 from study.reproduction.claims.judgement import SEPARATOR, Condition, verdict
@@ -26,9 +27,6 @@ from study.reproduction.tables import (
 )
 from study.structure.measured_comparison import MeasuredComparison
 from study.structure.measured_fit import MeasuredFit
-from study.structure.modes import modes_of
-from study.structure.places import transfer
-from study.structure.reverse_system import exact_responses
 from study.support.arrays import Complexes, Floats
 from study.support.numbers import percent
 

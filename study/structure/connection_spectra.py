@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from study.compare.noise import segments_of
 from study.identify.frequency_domain import coefficients, conditioned
 from study.identify.frequency_domain.inputs import Input
+from study.identify.frequency_domain.reverse_system import Equation, equations_of
 from study.records import spectra
 from study.structure.missing_forces import MissingForces
-from study.structure.reverse_system import Equation, equations_of
 from study.structure.structure_comparison import StructureComparison
 from study.support.arrays import Floats
 from study.support.errors import StudyError

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from study.equations.mass_matrix import linear_keys, patterns
+from study.equations.linear_part import linear_keys, patterns
 from study.equations.model import Model
 from study.records.plan import FEWEST
 from study.records.prepared import Prepared

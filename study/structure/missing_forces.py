@@ -14,8 +14,9 @@ from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from study.compare.force_map import ForceCurve, curve
 from study.compare.noise import SIGNIFICANT
 from study.equations import kernels
+from study.equations.coefficient_units import units_at
 from study.equations.equations_of_motion import acceleration_program
-from study.equations.mass_matrix import checked_mass_matrix, matrices
+from study.equations.linear_part import alignment, checked_mass_matrix, connections, matrices, transfer
 from study.equations.model import Model, ModelTerm
 from study.equations.place import HERE, Place
 from study.identify.frequency_domain.inputs import Input, input_history, reverse_inputs
@@ -24,8 +25,6 @@ from study.records.completion import derivative
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments, autospectrum
-from study.structure.placed_units import units_at
-from study.structure.places import alignment, connections, transfer
 from study.structure.structure_prediction import StructurePrediction
 from study.support.arrays import Floats
 

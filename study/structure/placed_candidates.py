@@ -8,6 +8,7 @@ import numpy as np
 
 from study.equations import formulas, kernels
 from study.equations.graph import Graph, Program
+from study.equations.linear_part import connections
 from study.equations.model import Model, ModelTerm, free
 from study.equations.place import Place
 from study.equations.term import Term
@@ -16,7 +17,6 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import Prepared
 from study.structure.placed_search import PlacedBaseline, PlacedStart, placed_starts, with_placed_term
-from study.structure.places import connections
 from study.structure.structure_prediction import StructurePrediction, predict_structure
 from study.support.cores import cores
 from study.support.errors import StudyError

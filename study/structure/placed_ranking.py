@@ -10,6 +10,7 @@ import numpy as np
 from study.diagnose import ranked
 from study.diagnose.constancy import CoefficientCurve, along_amplitude, along_frequency, changes
 from study.diagnose.ranking import in_order
+from study.equations.coefficient_units import coefficient_unit
 from study.equations.model import ModelTerm
 from study.equations.term import Term
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -18,7 +19,6 @@ from study.identify.time_domain.weighted_fit import noise_left
 from study.records.outputs import Noise, Outputs
 from study.records.record import Record
 from study.structure.placed_candidates import PlacedCandidate, physical
-from study.structure.placed_units import coefficient_unit
 from study.structure.structure_prediction import StructurePrediction
 from study.support import statistics
 from study.support.arrays import Floats

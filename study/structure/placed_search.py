@@ -15,7 +15,7 @@ import numpy as np
 from scipy.fft import rfftfreq
 
 from study.equations.free_run import prepare
-from study.equations.mass_matrix import LINEAR, linear_keys, matrices, patterns
+from study.equations.linear_part import LINEAR, linear_keys, matrices, patterns, transfer
 from study.equations.model import Model, ModelTerm
 from study.equations.place import Place
 from study.equations.term import Term
@@ -25,10 +25,9 @@ from study.identify.time_domain.part_fit import fit_part, linearise
 from study.identify.time_domain.shape_search import MODULATION, values_to_try
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record, Sensor
+from study.records.spectra import StretchTransforms, stretch_transforms
 from study.structure.missing_forces import corrected_motion, placed_inputs, relative_record
 from study.structure.placed_lines import placed_modulation_lines, placed_residual_lines
-from study.structure.places import transfer
-from study.structure.stretch_transforms import StretchTransforms, stretch_transforms
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from study.equations.mass_matrix import check_held_masses
+from study.equations.linear_part import check_held_masses
 from study.equations.model import Model
 from study.records.plan import Span, compared_sensors, make_plan
 from study.records.prepared import Prepared, prepare_record

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from study.equations import model_file
+from study.equations.coefficient_units import coefficient_unit, parameter_units
+from study.equations.linear_part import Modes, modes_of, modes_table
 from study.equations.model import Model, ModelTerm
 from study.equations.place import HERE, Place, place_in_words
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -16,8 +18,6 @@ from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import Prepared
 from study.records.record import Record
 from study.structure.missing_forces import MissingForces, missing_forces
-from study.structure.modes import Modes, modes_of, modes_table
-from study.structure.placed_units import coefficient_unit, parameter_units
 from study.structure.structure_leftover import FamilyGain, explained_by_place, family_gains
 from study.structure.structure_prediction import StructurePrediction, predict_structure
 from study.structure.structure_start import first_fit

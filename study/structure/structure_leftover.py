@@ -12,12 +12,11 @@ from scipy.fft import next_fast_len
 
 from study.diagnose.dependence import DEGREE, TAUS, hysteretic, relaxed
 from study.equations.free_run import prepare
-from study.equations.mass_matrix import matrices
+from study.equations.linear_part import connections, matrices, transfer
 from study.equations.place import Place
 from study.records.record import MOTIONS, Sensor
+from study.records.spectra import stretch_transforms
 from study.structure.placed_lines import placed_modulation_lines, placed_residual_lines
-from study.structure.places import connections, transfer
-from study.structure.stretch_transforms import stretch_transforms
 from study.structure.structure_prediction import StructurePrediction
 from study.support import statistics
 from study.support.arrays import Complexes, Floats

@@ -16,11 +16,10 @@ from study.equations.place import Place
 from study.equations.place import place_in_words as placed
 from study.figures import page
 from study.figures.labels import term_names
+from study.figures.sketch import Sketch, svg
 from study.figures.styles import in_style
 from study.structure import structure_panels
 from study.structure.placed_ranking import PlacedRanked
-from study.structure.sketch import Sketch
-from study.structure.sketch_svg import svg
 from study.structure.structure_comparison import StructureComparison, structure_in_words
 from study.structure.structure_pictures import (
     modes,

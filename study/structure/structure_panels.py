@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from study.compare.panels import force_curve
+from study.equations.linear_part import Modes
 from study.figures.page import frame_cells
 from study.structure.missing_forces import MissingForces
-from study.structure.modes import Modes
 from study.structure.structure_prediction import StructurePrediction
 from study.support.numbers import percent
 

@@ -11,13 +11,13 @@ from matplotlib.figure import Figure
 from study.compare import panels
 from study.diagnose import diagnosis_pages
 from study.diagnose.verdict import MISSING
+from study.equations.linear_part import Modes
 from study.equations.place import place_in_words
 from study.figures import page
+from study.figures.sketch import Sketch, sketch
+from study.figures.sketch_drawing import structure_sketch
 from study.figures.styles import in_style
 from study.structure import structure_panels
-from study.structure.modes import Modes
-from study.structure.sketch import Sketch, sketch
-from study.structure.sketch_drawing import structure_sketch
 from study.structure.structure_comparison import StructureComparison
 from study.structure.structure_leftover import explained_by_place
 from study.structure.structure_prediction import StructurePrediction

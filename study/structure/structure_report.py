@@ -8,13 +8,13 @@ import numpy as np
 
 from study.diagnose.needless import needless_fields
 from study.diagnose.verdict import MISSING, NOTHING
+from study.equations.coefficient_units import parameter_units
+from study.equations.linear_part import modes_table
 from study.equations.place import place_in_words as placed
 from study.figures.labels import term_names
 from study.records.record import Sensor
-from study.structure.modes import modes_table
 from study.structure.placed_needless import PlacedNeedless
 from study.structure.placed_ranking import PlacedRanked
-from study.structure.placed_units import parameter_units
 from study.structure.structure_comparison import mode_rows, structure_document
 from study.structure.structure_verdict import StructureDiagnosis
 from study.support.numbers import percent

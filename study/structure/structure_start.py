@@ -6,22 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from study.equations.mass_matrix import linear_keys, loose_motions
+from study.equations.linear_part import linear_keys, loose_motions
 from study.equations.model import Model
+from study.identify.frequency_domain.linear_start import lumped_start
 from study.identify.time_domain.fit_model import rough_steps
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part
 from study.identify.time_domain.shooting import own_begins
 from study.records.prepared import Prepared
 from study.structure.free_decay import free_decay_start
-from study.structure.linear_start import structure_linear_start
 from study.support.errors import DivergenceError, expect
 
 
 def known_linear(model: Model, prepared: Prepared) -> dict[str, float]:
     """The linear terms of a structure: what it holds of them, and the best linear approximation of the rest."""
     held = {key: value for key, value in model.values.items() if value is not None}
-    start = free_decay_start if prepared.free else structure_linear_start
+    start = free_decay_start if prepared.free else lumped_start
     return {key: held[key] for key in linear_keys(model) if key in held} | start(model, prepared, held)
 
 

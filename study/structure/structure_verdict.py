@@ -8,11 +8,11 @@ import numpy as np
 
 from study.diagnose.credibility import credible
 from study.diagnose.verdict import MISSING, MOST, NOTHING, UNKNOWN
+from study.equations.linear_part import Modes, modes_of
 from study.equations.model import ModelTerm
 from study.equations.term import Term
 from study.identify.time_domain.part_fit import fit_part, linearise, uncertainty
 from study.identify.time_domain.weighted_fit import finished
-from study.structure.modes import Modes, modes_of
 from study.structure.placed_candidates import (
     candidate_entries,
     elsewhere,

@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 
+from study.equations.linear_part import connections, modes_of
 from study.equations.model import Model, ModelTerm, free
 from study.equations.place import GROUND, Place
 from study.equations.simulate import Integrator, simulate
@@ -13,9 +14,7 @@ from study.equations.terms import get
 from study.records.excitation import Excitation, force
 from study.records.record import MOTIONS, Record, Sensor
 from study.structure.missing_forces import relative_record
-from study.structure.modes import modes_of
 from study.structure.placed_candidates import external
-from study.structure.places import connections
 from study.support.arrays import Floats
 from study.support.errors import expect
 from study.trials.effects import Asked, Rig, Shares, Sizing, beyond_linear, drawn_effect, force_along, forgets

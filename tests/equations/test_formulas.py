@@ -158,7 +158,7 @@ def test_names_lists_variables_not_functions() -> None:
 
 
 def test_formulas_are_read_in_many_threads_while_others_collect_garbage():
-    """Without a lock Python before 3.13 says "AST constructor recursion depth mismatch" in one of a hundred of these."""
+    """Without a lock Python before 3.13 says "AST constructor recursion depth mismatch" to one of a hundred."""
 
     class Cycle:
         def __init__(self) -> None:

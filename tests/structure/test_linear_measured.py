@@ -7,6 +7,7 @@ import pytest
 
 from study.cli import main
 from study.compare import history
+from study.equations.linear_part import modes_of
 from study.equations.model_file import format_model, parse_model, read_model
 from study.equations.simulate import Integrator, simulate
 from study.identify.frequency_domain.subspace import observability
@@ -14,7 +15,6 @@ from study.records.excitation import Excitation, force
 from study.records.record import Record, Sensor, record_of, write_csv
 from study.structure.measured_comparison import compare_measured, measured_document, measured_says
 from study.structure.measured_fit import modal_run
-from study.structure.modes import modes_of
 from study.structure.prepared_structure import prepare_structure
 from study.support.errors import StudyError
 

@@ -10,13 +10,13 @@ from study.equations.model_file import parse_model
 from study.equations.simulate import Integrator, simulate
 from study.identify import estimators
 from study.identify.estimators.base import Settings
+from study.identify.frequency_domain.action_reaction import joint_estimate
 from study.identify.frequency_domain.local_polynomial import LocalPolynomial
+from study.identify.frequency_domain.reverse_system import equations_of, exact_responses, reverse_system
 from study.records.excitation import Excitation, force
 from study.records.record import Record, record_of
 from study.records.spectra import Segments
-from study.structure.action_reaction import joint_estimate
 from study.structure.prepared_structure import prepare_structure
-from study.structure.reverse_system import equations_of, exact_responses, reverse_system
 from study.support.errors import StudyError
 
 DT, SAMPLES = 0.02, 4096

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from study.equations.coefficient_units import coefficient_unit, parameter_units, units_at
 from study.equations.model import free
 from study.equations.place import Place
 from study.equations.terms import get
 from study.records.readers import read_record
 from study.records.record import Sensor, record_of, write_csv
-from study.structure.placed_units import coefficient_unit, parameter_units, units_at
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure, structure_summary
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from study.equations.mass_matrix import checked_mass_matrix
+from study.equations.linear_part import checked_mass_matrix
 from study.equations.model import free
 from study.equations.model_file import format_model, parse_model, read_model
 from study.equations.place import Place

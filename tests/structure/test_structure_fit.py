@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from study.equations.model import Model
-from study.structure.linear_start import structure_linear_start
+from study.identify.frequency_domain.linear_start import lumped_start
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure, structure_document
 from study.support.errors import StudyError
@@ -68,7 +68,7 @@ def test_linear_terms_come_from_frequency_responses(frame, record_of):
     linear = frame.without_term("cubic_stiffness[floor2-floor3]")
     free = linear.with_values(dict.fromkeys(linear.values, None))
     for without in ((), ("floor2",)):
-        start = structure_linear_start(free, prepare_structure(record_of(without=without), free), {})
+        start = lumped_start(free, prepare_structure(record_of(without=without), free), {})
         masses = [start[f"m[floor{i}]"] / frame.values[f"m[floor{i}]"] for i in (1, 2, 3)]
         assert np.max(np.abs(np.array(masses) - 1.0)) < 0.1
 

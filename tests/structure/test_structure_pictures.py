@@ -10,8 +10,8 @@ import pytest
 
 from study.cli import main
 from study.equations.model_file import format_model, parse_model, read_model
+from study.figures.sketch import GROUND_AT, sketch
 from study.records.record import write_csv
-from study.structure.sketch import GROUND_AT, sketch
 
 TREE = """
 name: tree

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from study.equations.mass_matrix import check_held_masses, loose_motions
+from study.equations.linear_part import check_held_masses, loose_motions
 from study.equations.model import free
 from study.equations.model_file import parse_model
 from study.equations.place import Place

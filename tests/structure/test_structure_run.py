@@ -8,13 +8,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from study.equations.free_run import prepare
+from study.equations.linear_part import modes_of
 from study.equations.model import Model, ModelTerm
 from study.equations.model_file import read_model
 from study.equations.place import HERE, Place
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
 from study.records.record import Sensor
-from study.structure.modes import modes_of
 
 ROOT = Path(__file__).parents[2]
 

@@ -10,8 +10,8 @@ import pytest
 from scipy.stats import binomtest
 
 from study.cli import main
+from study.equations.linear_part import modes_of
 from study.equations.model_file import read_model
-from study.structure.modes import modes_of
 from study.support.errors import StudyError
 from study.trials import HIDDEN, SHARE, make_trial, rates
 from study.trials.draw import STRUCTURE

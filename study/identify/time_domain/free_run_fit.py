@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.equations.free_run import FreeRun, prepare
-from study.equations.mass_matrix import is_positive
+from study.equations.linear_part import is_positive
 from study.equations.model import Model
 from study.identify.frequency_domain.coefficients import Estimate
 from study.records.outputs import DISPLACEMENT, Outputs

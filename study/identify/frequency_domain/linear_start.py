@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from study.equations.mass_matrix import linear_keys, loose_motions, matrices, patterns
+from study.equations.linear_part import linear_keys, loose_motions, matrices, patterns
 from study.equations.model import Model
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS
@@ -170,7 +170,7 @@ def _problem(model: Model, prepared: Prepared, held: Mapping[str, float]) -> tup
     ), free  # fmt: skip
 
 
-def structure_linear_start(model: Model, prepared: Prepared, held: Mapping[str, float]) -> dict[str, float]:
+def lumped_start(model: Model, prepared: Prepared, held: Mapping[str, float]) -> dict[str, float]:
     """Linear coefficients that are not held, from the frequency response functions of the fitting part.
 
     Raises

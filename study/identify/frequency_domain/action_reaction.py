@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from study.identify.frequency_domain.coefficients import Estimate
-from study.structure.reverse_system import ReverseSystem
+from study.identify.frequency_domain.reverse_system import ReverseSystem
 from study.support.arrays import Floats
 from study.support.errors import StudyError
 from study.support.levenberg_marquardt import Point, minimise, point_at

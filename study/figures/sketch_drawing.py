@@ -1,4 +1,4 @@
-"""The sketch of a structure as a picture: Axes in, Axes out."""
+"""The sketch of a model with several coordinates as a picture: Axes in, Axes out."""
 
 # Matplotlib leaves the **kwargs of its methods untyped.
 # pyright: reportUnknownMemberType=false
@@ -7,11 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.patches import FancyBboxPatch, PathPatch
 from matplotlib.path import Path
 
-from study.structure.sketch import BOX, GROUND_AT, HATCH, HIGH, SIDE, Box, Link, Sketch
+from study.figures.sketch import BOX, GROUND_AT, HATCH, HIGH, SEEN, SIDE, Box, Link, Sketch
 from study.support.numbers import percent
 
 GLOW = "C1"
-SEEN = 0.01  # share from which a connection's is written beside it
 
 
 def structure_sketch(axes: Axes, drawn: Sketch) -> Axes:

@@ -1,0 +1,301 @@
+"""The linear part of a model: its matrices, the paths from forces to sensors, its modes.
+
+Eigenvalues are those of ``(lambda^2 M + lambda C + K) psi = 0``, mode shapes those without damping. Errors follow from
+the covariance of the coefficients by the exact derivatives of eigenvalues and vectors (Fox and Kapoor, 1968).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import rfftfreq
+
+from study.equations import formulas
+from study.equations.equations_of_motion import mass_entries
+from study.equations.model import Model, ModelTerm
+from study.equations.place import GROUND, Place
+from study.records.record import MOTIONS, Sensor
+from study.support.arrays import Complexes, Floats
+from study.support.errors import StudyError
+
+LINEAR = {"linear_stiffness": 0, "linear_damping": 1, "inertia": 2}  # and the order of their derivative
+
+
+def linear_keys(model: Model) -> dict[str, int]:
+    """Keys of the linear terms of a structure, with the order of their derivative."""
+    return {entry.symbols[0]: LINEAR[entry.term.name] for entry in model.terms if entry.term.name in LINEAR}
+
+
+def patterns(model: Model) -> dict[str, Floats]:
+    """What a unit of each linear key adds to its matrix, shape (coordinates, coordinates)."""
+    n = len(model.coordinates)
+    found: dict[str, Floats] = {}
+    for i, j, weight, key in mass_entries(model):
+        found.setdefault(key, np.zeros((n, n)))[i, j] += weight
+    for entry in model.terms:
+        if entry.term.name in LINEAR and entry.term.name != "inertia":
+            e = np.array(entry.place.direction(model.coordinates))
+            found[entry.symbols[0]] = np.outer(e, e)
+    return found
+
+
+def matrices(model: Model, values: Mapping[str, float]) -> Floats:
+    """Stiffness, damping and mass matrix for values by key, shape (3, coordinates, coordinates)."""
+    n = len(model.coordinates)
+    total = np.zeros((3, n, n))
+    orders, own = linear_keys(model), patterns(model)
+    for key, order in orders.items():
+        total[order] += values[key] * own[key]
+    return total
+
+
+def checked_mass_matrix(model: Model) -> Floats:
+    """The mass matrix of a model whose values are known, shape (coordinates, coordinates).
+
+    Raises
+    ------
+    StudyError
+        If it is not positive definite: some motion would have no kinetic energy, or a negative one.
+    """
+    mass = matrices(model, model.numbers())[2]
+    _check_positive(model, mass)
+    return mass
+
+
+def is_positive(model: Model, values: Mapping[str, float]) -> bool:
+    """Whether every motion of a model has a kinetic energy, with these values in place of its own."""
+    known = {key: value for key, value in model.values.items() if value is not None}
+    lowest = np.linalg.eigvalsh(matrices(model, known | dict(values))[2])
+    return bool(lowest[0] > len(lowest) * np.finfo(float).eps * lowest[-1])
+
+
+def check_held_masses(model: Model) -> None:
+    """Refuse a mass matrix that no values of what is open could make positive definite.
+
+    The rows and columns of which all is given are a principal minor of it, positive definite as the whole is.
+    """
+    open_keys = [key for key, value in model.values.items() if value is None]
+    known = matrices(model, {key: value or 0.0 for key, value in model.values.items()})[2]
+    orders = linear_keys(model)
+    unknown = [np.any(p != 0.0, axis=0) for k, p in patterns(model).items() if k in open_keys and orders[k] == 2]
+    given = ~np.any(unknown, axis=0) if unknown else np.ones(len(model.coordinates), dtype=np.bool_)
+    if np.any(given):
+        _check_positive(model, known[np.ix_(given, given)])
+
+
+def _check_positive(model: Model, mass: Floats) -> None:
+    scale = np.sqrt(np.abs(np.diag(mass)))
+    lowest = float(np.min(np.linalg.eigvalsh(mass / np.maximum(np.outer(scale, scale), np.finfo(float).tiny))))
+    if lowest <= 1e-9 or np.any(np.diag(mass) <= 0.0):
+        rows = "; ".join(" ".join(f"{x:.4g}" for x in row) for row in mass)
+        raise StudyError(
+            f"the mass matrix of {model.name!r}, [{rows}], is not positive definite; expected masses above zero, and "
+            "couplings smaller than the root of the product of the two masses that they couple"
+        )
+
+
+def loose_motions(model: Model) -> int:
+    """In how many of its motions no spring, joint or anything else that feels a displacement ties a structure down."""
+    ties = [
+        np.array(entry.place.direction(model.coordinates))
+        for entry in model.terms
+        if any("u" in formulas.names(text) for text in _texts(entry))
+    ]
+    return len(model.coordinates) - (int(np.linalg.matrix_rank(np.stack(ties))) if ties else 0)
+
+
+def _texts(entry: ModelTerm) -> list[str]:
+    shapes = [component.shape for component in entry.term.components if component.order == 0]
+    return [*shapes, *([entry.term.state] if entry.term.state else [])]
+
+
+def connections(model: Model) -> tuple[Place, ...]:
+    """Every pair where an effect may be missing: between the ground and each coordinate, and between neighbours.
+
+    Neighbours are what a term of the model ties together. Two coordinates that inertia couples are motions of one body,
+    as heave and pitch: nothing lies between them.
+    """
+    found: dict[frozenset[str], Place] = {}
+    for entry in model.terms:
+        if entry.place.kind == "between":
+            found.setdefault(entry.place.path, entry.place)
+    for name in model.coordinates:
+        found.setdefault(frozenset((GROUND, name)), Place("between", (GROUND, name)))
+    return tuple(found.values())
+
+
+def transfer(linear: Floats, sensors: Sequence[Sensor], coordinates: Sequence[str], dt: float, size: int) -> Complexes:
+    """From a force on each coordinate to each sensor, shape (lines, sensors, coordinates).
+
+    ``linear`` holds stiffness, damping and mass matrix; the lines are those of a transform of ``size`` samples.
+    """
+    omega = np.asarray(2j * np.pi * rfftfreq(size, dt), dtype=np.complex128)
+    omega[0] = omega[1]  # a structure that nothing ties down has no response to a constant
+    stiffness, damping, mass = linear
+    dynamic = mass * omega[:, None, None] ** 2 + damping * omega[:, None, None] + stiffness
+    inverse = np.asarray(np.linalg.inv(dynamic), dtype=np.complex128)
+    rows = [list(coordinates).index(s.coordinate) for s in sensors]
+    order = np.stack([omega ** MOTIONS.index(s.motion) for s in sensors], axis=1)
+    return np.asarray(inverse[:, rows] * order[:, :, None], dtype=np.complex128)
+
+
+def alignment(paths: Complexes, residual: Complexes) -> float:
+    """Share of the residuals' power, shape (lines, sensors), that a single force along ``paths`` could make.
+
+    Any force: one number a line. With a single sensor every place explains all.
+    """
+    power = np.sum(np.abs(paths) ** 2, axis=1)
+    along = np.abs(np.sum(paths.conj() * residual, axis=1)) ** 2 / np.where(power > 0.0, power, np.inf)
+    total = float(np.sum(np.abs(residual) ** 2))
+    return float(np.sum(along)) / total if total > 0.0 else 0.0
+
+
+RIGID = 1e-6  # of the highest natural frequency: what is below is motion as a rigid body
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Modes of a structure, the slowest first; n coordinates.
+
+    Attributes
+    ----------
+    frequency, frequency_error : array, shape (n,)
+        Undamped natural frequencies in hertz, and their standard errors; zero for motion as a rigid body.
+    damping, damping_error : array, shape (n,)
+        Damping ratios; zero for motion as a rigid body.
+    shape, shape_error : array, shape (n, n)
+        Each row a mode shape, one at the coordinate that moves most.
+    """
+
+    frequency: Floats
+    frequency_error: Floats
+    damping: Floats
+    damping_error: Floats
+    shape: Floats
+    shape_error: Floats
+
+    @property
+    def rigid(self) -> int:
+        """How many modes are motion as a rigid body: nothing ties the structure down."""
+        return int(np.count_nonzero(self.frequency == 0.0))
+
+
+def modes_of(model: Model, keys: Sequence[str] = (), covariance: Floats | None = None) -> Modes:
+    """Modes of a structure whose values are all known.
+
+    Parameters
+    ----------
+    model : Model
+        Its linear terms count.
+    keys : sequence of str
+        What was estimated; everything else counts as exact.
+    covariance : array, shape (keys, keys)
+        Of these.
+
+    Raises
+    ------
+    StudyError
+        If the mass matrix is not positive definite.
+    """
+    checked_mass_matrix(model)
+    stiffness, damping, mass = matrices(model, model.numbers())
+    squares, shapes = _undamped(stiffness, mass)
+    omega = np.sqrt(np.maximum(squares, 0.0))
+    omega = np.where(omega > RIGID * np.max(omega), omega, 0.0)
+    roots = _roots(stiffness, damping, mass, omega)
+    orders, units = linear_keys(model), patterns(model)
+    covariance = np.zeros((len(keys), len(keys))) if covariance is None else covariance
+    n, p = len(omega), len(keys)
+    by_square, by_shape, by_ratio = np.zeros((p, n)), np.zeros((p, n, n)), np.zeros((p, n))
+    for i, key in enumerate(keys):
+        if key in orders:
+            by_square[i], by_shape[i] = _changes(units[key], orders[key], squares, shapes)
+            by_ratio[i] = _root_changes(units[key], orders[key], roots, damping, mass)
+    errors = [np.sqrt(np.maximum(np.einsum("p...,pq,q...->...", g, covariance, g), 0.0)) for g in (by_square, by_ratio)]
+    moving = omega > 0.0
+    shape, shape_error = _normalised(shapes, by_shape, covariance)
+    return Modes(
+        omega / (2.0 * np.pi), np.where(moving, errors[0] / (4.0 * np.pi * np.where(moving, omega, 1.0)), 0.0),
+        np.where(moving, -roots[0].real / np.abs(roots[0]), 0.0), np.where(moving, errors[1], 0.0), shape, shape_error,
+    )  # fmt: skip
+
+
+def _undamped(stiffness: Floats, mass: Floats) -> tuple[Floats, Floats]:
+    """Squares of the angular frequencies, and the shapes of unit modal mass in columns, the slowest first."""
+    half = np.linalg.inv(np.linalg.cholesky(mass))
+    squares, vectors = np.linalg.eigh(half @ stiffness @ half.T)
+    return squares, np.asarray(half.T @ vectors, dtype=np.float64)
+
+
+def _roots(stiffness: Floats, damping: Floats, mass: Floats, omega: Floats) -> tuple[Complexes, Complexes]:
+    """The eigenvalue of positive frequency nearest to each undamped mode, shape (n,), and its vectors in columns."""
+    n = len(mass)
+    inverse = np.linalg.inv(mass)
+    system = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ stiffness, -inverse @ damping]])
+    values, vectors = (np.asarray(x, dtype=np.complex128) for x in np.linalg.eig(system))
+    chosen: list[int] = []
+    for w in omega:
+        upper = np.where(values.imag >= 0.0, np.abs(values - 1j * w), np.inf)
+        upper[chosen] = np.inf
+        chosen.append(int(np.argmin(upper)))
+    picked = values[chosen]
+    return np.where(np.abs(picked) > 0.0, picked, 1.0), vectors[:n, chosen]
+
+
+def _changes(unit: Floats, order: int, squares: Floats, shapes: Floats) -> tuple[Floats, Floats]:
+    """Derivatives of squared frequencies and shapes by one key, shapes in columns: (n,) and (n, n)."""
+    if order == 1:
+        return np.zeros_like(squares), np.zeros_like(shapes)
+    weight = np.ones_like(squares) if order == 0 else -squares
+    product = shapes.T @ unit @ shapes  # j, i: of mode i, along mode j
+    gap = squares[None, :] - squares[:, None]
+    apart = np.abs(gap) > 1e-12 * np.max(np.abs(squares))
+    along = np.where(apart, product * weight[None, :] / np.where(apart, gap, 1.0), 0.0)
+    if order == 2:
+        along = along - 0.5 * np.diag(np.diag(product))
+    return np.diag(product) * weight, shapes @ along
+
+
+def _root_changes(
+    unit: Floats, order: int, roots: tuple[Complexes, Complexes], damping: Floats, mass: Floats
+) -> Floats:
+    """Derivatives of the damping ratios by one key, shape (n,)."""
+    values, vectors = roots
+    found = np.zeros(len(values))
+    for i, (root, psi) in enumerate(zip(values, vectors.T, strict=True)):
+        bottom = psi @ (2.0 * root * mass + damping) @ psi
+        moved = -(root**order) * (psi @ unit @ psi) / bottom if bottom != 0.0 else 0.0
+        size = abs(root)
+        found[i] = -moved.real / size + root.real * (root.conjugate() * moved).real / size**3
+    return found
+
+
+def _normalised(shapes: Floats, slopes: Floats, covariance: Floats) -> tuple[Floats, Floats]:
+    """Shapes in rows with one at the coordinate that moves most, and their standard errors."""
+    rows, errors = list[Floats](), list[Floats]()
+    for i, shape in enumerate(shapes.T):
+        top = int(np.argmax(np.abs(shape)))
+        row = shape / shape[top]
+        change = (slopes[:, :, i] - row * slopes[:, top, i][:, None]) / shape[top]
+        rows.append(row)
+        errors.append(np.sqrt(np.maximum(np.einsum("pn,pq,qn->n", change, covariance, change), 0.0)))
+    return np.stack(rows), np.stack(errors)
+
+
+def modes_table(modes: Modes, coordinates: Sequence[str]) -> str:
+    """The modes as a person reads them."""
+    from tabulate import tabulate
+
+    rows = [
+        [
+            str(i + 1), _with_error(modes.frequency[i], modes.frequency_error[i]),
+            _with_error(100.0 * modes.damping[i], 100.0 * modes.damping_error[i]),
+            *(_with_error(x, e) for x, e in zip(modes.shape[i], modes.shape_error[i], strict=True)),
+        ]
+        for i in range(len(modes.frequency))
+    ]  # fmt: skip
+    return tabulate(rows, ["mode", "Hz", "damping %", *coordinates], tablefmt="simple", disable_numparse=True)
+
+
+def _with_error(value: float, error: float) -> str:
+    return f"{value:.4g}" + (f" +- {error:.1g}" if error > 0.0 else "")
