@@ -12,6 +12,8 @@ of it is the force that this takes. With a measured linear part the columns of T
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 
+import numpy as np
+
 from study.equations import formulas
 from study.equations.graph import Graph, Program
 from study.equations.modal_keys import ModalKeys
@@ -116,12 +118,6 @@ class Equations:
                 pairs.append((key, unit_force(self.graph, component, names, rate)))
         return pairs, rate
 
-    @property
-    def forces_and_rates(self) -> list[int]:
-        """Of the terms on each coordinate, and of their own states."""
-        against, along, rates = self._terms
-        return [*against.values(), *along.values(), *rates]
-
     def reaction(self, coordinate: str) -> int:
         """Force that a prescribed motion of a coordinate takes."""
         against, along, _ = self._terms
@@ -196,14 +192,28 @@ def acceleration_program(model: Model, keys: Sequence[str] = ()) -> Program:
     return made.graph.program([node for row in rows for node in row]).with_inputs(model.numbers())
 
 
-def has_spring(model: Model) -> bool:
-    """Whether any force of a model depends on the displacement itself, and so brings its mass back or pushes it away.
+def loose_motions(model: Model) -> int:
+    """In how many of its motions no force at rest depends on where a model is, so that nothing ties it down.
 
-    What a term remembers of the motion is no spring: it gives way.
+    What a term remembers of the motion ties nothing: it gives way.
     """
-    made = Equations(model)
-    nodes, moved = made.forces_and_rates, [made.at(c, 0) for c in model.coordinates]
-    return any(made.graph.constant_value(made.graph.derivative(n, u)) != 0.0 for n in nodes for u in moved)
+    ties = [np.array(entry.place.direction(model.coordinates)) for entry in model.terms if _ties(entry)]
+    return len(model.coordinates) - (int(np.linalg.matrix_rank(np.stack(ties))) if ties else 0)
+
+
+def has_spring(model: Model) -> bool:
+    """Whether anything brings a model back, or pushes it away."""
+    return loose_motions(model) < len(model.coordinates)
+
+
+def _ties(entry: ModelTerm) -> bool:
+    """Whether the force of a term at rest depends on the displacement."""
+    graph, term = Graph(), entry.term
+    names = {n: graph.input(n) for n in ("u", "t", "z", *term.channels, *(p.name for p in term.parameters))}
+    names["v"] = graph.const(0.0)
+    rate = formulas.add_formula(graph, term.state, names) if term.state is not None else None
+    units = [unit_force(graph, c, names, rate) for c in term.components if c.order < 2]
+    return any(graph.constant_value(graph.derivative(unit, names["u"])) != 0.0 for unit in units)
 
 
 def channel_of(coordinate: str, motion: str) -> str:

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import rfftfreq
 
-from study.equations import formulas
 from study.equations.equations_of_motion import mass_entries
-from study.equations.model import Model, ModelTerm
+from study.equations.model import Model
 from study.equations.place import GROUND, Place
 from study.records.record import MOTIONS, Sensor
 from study.support.arrays import Complexes, Floats
@@ -92,21 +91,6 @@ def _check_positive(model: Model, mass: Floats) -> None:
             f"the mass matrix of {model.name!r}, [{rows}], is not positive definite; expected masses above zero, and "
             "couplings smaller than the root of the product of the two masses that they couple"
         )
-
-
-def loose_motions(model: Model) -> int:
-    """In how many of its motions no spring, joint or anything else that feels a displacement ties a structure down."""
-    ties = [
-        np.array(entry.place.direction(model.coordinates))
-        for entry in model.terms
-        if any("u" in formulas.names(text) for text in _texts(entry))
-    ]
-    return len(model.coordinates) - (int(np.linalg.matrix_rank(np.stack(ties))) if ties else 0)
-
-
-def _texts(entry: ModelTerm) -> list[str]:
-    shapes = [component.shape for component in entry.term.components if component.order == 0]
-    return [*shapes, *([entry.term.state] if entry.term.state else [])]
 
 
 def connections(model: Model) -> tuple[Place, ...]:

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from study.equations.linear_part import linear_keys, loose_motions
+from study.equations.equations_of_motion import loose_motions
+from study.equations.linear_part import linear_keys
 from study.equations.model import Model
 from study.identify.frequency_domain.linear_start import lumped_start
 from study.identify.time_domain.fit_model import rough_steps

@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from study.equations.linear_part import check_held_masses, loose_motions
+from study.equations.equations_of_motion import loose_motions
+from study.equations.linear_part import check_held_masses
 from study.equations.model import free
 from study.equations.model_file import parse_model
 from study.equations.place import Place
@@ -105,6 +106,8 @@ def test_a_mechanism_is_named_where_no_fit_begins():
     assert loose_motions(parse_model(HEAD + MASSES + BRANCHES + damped, HERE)) == 1
     slack = "  - {term: hysteresis, between: [ground, trunk], beta: 1.0, gamma: 0.0}\n"
     assert loose_motions(parse_model(HEAD + MASSES + BRANCHES + slack, HERE)) == 1, "its force follows the velocity"
+    swirl = "  - {term: van_der_pol_damping, between: [ground, trunk]}\n"
+    assert loose_motions(parse_model(HEAD + MASSES + BRANCHES + swirl, HERE)) == 1, "it vanishes at rest"
     open_values = loose.with_values(dict.fromkeys(loose.values))
     drive = force(Excitation(level=400.0, cutoff=12.5), 2000, 0.02, 1)
     free_body = simulate(loose, {"shaker": drive}, 0.02, Integrator("rk4", 8))

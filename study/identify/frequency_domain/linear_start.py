@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from study.equations.linear_part import linear_keys, loose_motions, matrices, patterns
+from study.equations.equations_of_motion import loose_motions
+from study.equations.linear_part import linear_keys, matrices, patterns
 from study.equations.model import Model
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS
