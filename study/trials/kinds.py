@@ -231,7 +231,8 @@ _ONE = tuple(n for n in HIDDEN if n not in TIMED and len(get(n).components) == 1
 POSSIBLE: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         # A decay swings at one frequency, at which a relaxation is damping and stiffness.
-        "free_decay": tuple(sorted({*_ONE} - {"relaxation"}, key=_ONE.index)), "blows": _ONE, "base": _ONE, "component": _ONE,
+        "free_decay": tuple(sorted({*_ONE} - {"relaxation"}, key=_ONE.index)),
+        "blows": _ONE, "base": _ONE, "component": _ONE,
         "axis": ("coulomb_friction", "constant_force", "quadratic_damping", "cubic_damping"),
     }
 )  # fmt: skip
