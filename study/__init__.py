@@ -33,20 +33,46 @@ __all__ = [
 ]  # fmt: skip
 
 
-class _Callable(ModuleType):
-    """A package that can be called as the function of its name: ``st.compare(fits)``."""
+class _Function:
+    """A function of the interface that a package is called after: ``st.compare(fits)``, and all that is below it."""
+
+    def __init__(self, package: ModuleType) -> None:
+        self.__dict__["_package"] = package
+
+    @property
+    def __wrapped__(self) -> Any:
+        name = self._package.__name__.rpartition(".")[2]
+        return getattr(import_module(_PLACES[name]), name)
+
+    @property
+    def __doc__(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return self.__wrapped__.__doc__
+
+    @property
+    def __signature__(self) -> Any:
+        from inspect import signature  # which would make every command begin later
+
+        return signature(self.__wrapped__)
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
-        name = self.__name__.rpartition(".")[2]
-        return getattr(import_module(_PLACES[name]), name)(*arguments, **options)
+        return self.__wrapped__(*arguments, **options)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._package, name)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        setattr(self._package, name, value)
+
+    def __repr__(self) -> str:
+        return f"<function {self._package.__name__}{self.__signature__}>"
 
 
 class _Study(ModuleType):
-    """The type of ``study`` itself: Python sets a package below as its attribute, and it is made callable then."""
+    """The type of ``study`` itself: Python sets a package below as its attribute, and a function takes its place."""
 
     def __setattr__(self, name: str, value: object) -> None:
         if name in _PACKAGES and isinstance(value, ModuleType):
-            value.__class__ = _Callable
+            value = _Function(value)
         super().__setattr__(name, value)
 
 
@@ -55,7 +81,8 @@ sys.modules[__name__].__class__ = _Study
 
 def __getattr__(name: str) -> Any:
     if name in _PACKAGES:
-        return import_module(f"study.{name}")
+        import_module(f"study.{name}")
+        return globals()[name]
     if name not in _PLACES:
         raise AttributeError(f"module 'study' has no attribute {name!r}; it offers {', '.join(sorted(_PLACES))}")
     return getattr(import_module(_PLACES[name]), name)

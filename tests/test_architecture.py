@@ -9,8 +9,8 @@ import pytest
 
 STUDY = Path(__file__).parents[1] / "study"
 FLOORS = (
-    "cli", "commands", "interface", "explore", "trials", "gallery", "reproduction", "structure", "diagnose", "faults",
-    "compare", "figures", "identify", "equations", "records", "support",
+    "cli", "commands", "interface", "explore", "trials", "gallery", "reproduction", "structure", "diagnose", "way_in",
+    "faults", "compare", "figures", "identify", "equations", "records", "support",
 )  # fmt: skip
 FILES = sorted(STUDY.rglob("*.py"))
 LOOSE = {"__init__", "__main__", "cli"}

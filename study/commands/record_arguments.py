@@ -5,7 +5,6 @@ import math
 import re
 from collections.abc import Generator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -174,8 +173,9 @@ def layout_of(arguments: argparse.Namespace, record: "Record") -> "Layout":
 
     alternate = arguments.judge == ALTERNATE
     fit, judge = _within(arguments.fit, record), None if alternate else _within(arguments.judge, record)
-    fit, judge = fit or _other(judge, record), judge or _other(fit, record)
-    return Layout(tuple(arguments.use), fit, judge, alternate, arguments.response, arguments.cutoff)
+    return Layout(
+        tuple(arguments.use), fit, judge, alternate, arguments.response, arguments.cutoff, arguments.as_sampled
+    )
 
 
 def accounted_together(
@@ -183,25 +183,16 @@ def accounted_together(
 ) -> "Accounted":
     """The comparison of a model with records that are made ready and corrected for faults of the measurement.
 
-    One model is fitted to all of them. ``options`` are those of :func:`study.faults.accounting.accounted`: estimator
-    and progress.
+    One model is fitted to all of them. ``options`` are the estimator and progress of
+    :func:`study.way_in.compare_records.compare_records`.
     """
-    from study.faults.instrument_settings import NOTHING_ASKED, settings_beside
-    from study.faults.kinds_of_tests import accounted_test
+    from study.faults.instrument_settings import settings_asked
+    from study.way_in.compare_records import compare_records
 
     with naming(path, arguments.model):
-        beside = settings_beside(path)
-        settings = NOTHING_ASKED if arguments.no_measurement else beside
-        layout = replace(layout_of(arguments, records[0]), as_sampled=arguments.as_sampled or beside.as_sampled)
-        return accounted_test(
-            records,
-            model,
-            layout,
-            absolute=arguments.absolute,
-            held=settings.held,
-            switched_off=settings.switched_off,
-            **options,
-        )
+        settings = settings_asked(path, False if arguments.no_measurement else None)
+        layout = layout_of(arguments, records[0])
+        return compare_records(records, model, layout, settings, absolute=arguments.absolute, **options)
 
 
 def separated_records(
@@ -236,11 +227,6 @@ def naming(record: Path, model: Path) -> Generator[None, None, None]:
 
 def _within(given: Span | None, record: "Record") -> tuple[int, int] | None:
     return None if given is None else (given[0], len(record) if given[1] is None else given[1])
-
-
-def _other(given: tuple[int, int] | None, record: "Record") -> tuple[int, int] | None:
-    """The longer of the parts before and after a range."""
-    return given and max(((given[1], len(record)), (0, given[0])), key=lambda part: part[1] - part[0])
 
 
 def out_folder(arguments: argparse.Namespace) -> Path:

@@ -44,7 +44,7 @@ def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[
             held = f"measurement holds {', '.join(beside.held)}, which is looked for in records of a single mass alone"
             expect(arguments.no_measurement or not beside.held, f"{held}; expected 'measurement: off'")
             layout = layout_of(arguments, record)
-            layout = replace(layout, as_sampled=arguments.as_sampled or beside.as_sampled)
+            layout = replace(layout, as_sampled=layout.as_sampled or beside.as_sampled)
             made.append(structure_ready(record, model, layout))
     return made
 

@@ -21,6 +21,24 @@ class FaultSettings:
 NOTHING_ASKED = FaultSettings(switched_off=NAMES)
 
 
+def settings_asked(record: Path | None, given: Mapping[str, float | None] | bool | None = None) -> FaultSettings:
+    """The settings for a record that was read from a file, or for one of none.
+
+    What is ``given`` comes before what stands beside the file: values by name of the fault, or False to look for none.
+    Whether all samples are used is told beside the file alone.
+
+    Raises
+    ------
+    StudyError
+        As :func:`settings_beside`, whatever is given.
+    """
+    beside = FaultSettings() if record is None else settings_beside(record)
+    if given is None or given is True:
+        return beside
+    asked = NOTHING_ASKED if given is False else settings_of(given)
+    return replace(asked, as_sampled=beside.as_sampled)
+
+
 def settings_beside(record: Path) -> FaultSettings:
     """The settings in the file that may stand beside a record, under ``measurement``.
 

@@ -31,7 +31,8 @@ class Record(records.Record):
     dt : float
         Sampling interval in seconds.
     channels : mapping of float64 arrays, shape (n,)
-        ``force``, and at least one of ``displacement``, ``velocity``, ``acceleration``; any further ones.
+        ``force``, and at least one of ``displacement``, ``velocity``, ``acceleration``; any further ones, such as
+        ``base_acceleration``. A force of zeros is a free decay, or a test on a moving base.
     units : mapping of str
         Unit of each channel.
     name : str
@@ -137,6 +138,7 @@ def read(
     period: int | None = None,
     accept_saturated: bool = False,
     accept_swapped: bool = False,
+    free: bool = False,
 ) -> Record:
     """Read a measured record: CSV and other text tables, MATLAB to 7.3, HDF5, UFF (dataset 58), or Parquet.
 
@@ -159,6 +161,8 @@ def read(
         Samples in a period of a periodic excitation.
     accept_saturated, accept_swapped : bool
         Take a channel that rests at its extreme, or force and response that seem exchanged, for what they are.
+    free : bool
+        A free decay: no force acts, and a column of it is left out.
 
     Returns
     -------
@@ -172,8 +176,9 @@ def read(
     from study.records.readers import ReadOptions, read_record
 
     options = ReadOptions(
-        dict(columns or {}), dict(units or {}), dt, fs, group, samples, period, accept_saturated, accept_swapped
-    )
+        dict(columns or {}), dict(units or {}), dt, fs, group, samples, period, accept_saturated, accept_swapped,
+        free=free,
+    )  # fmt: skip
     return Record.of(read_record(Path(path), options), Path(path))
 
 
@@ -188,6 +193,7 @@ def record(
     period: int | None = None,
     accept_saturated: bool = False,
     accept_swapped: bool = False,
+    free: bool = False,
 ) -> Record:
     """Make a record of arrays or of a table, with the checks that a file has to pass.
 
@@ -195,7 +201,7 @@ def record(
     ----------
     channels : mapping of arrays of shape (n,), or DataFrame
         Named as :func:`read` would find them in a file (``force``, ``displacement``, ...), or as ``columns`` says.
-    columns, units, fs, dt, period, accept_saturated, accept_swapped
+    columns, units, fs, dt, period, accept_saturated, accept_swapped, free
         As for :func:`read`.
     name : str
         What it is called in tables.
@@ -208,13 +214,13 @@ def record(
     from study.records.readers import ReadOptions
 
     options = ReadOptions(
-        dict(columns or {}), dict(units or {}), dt, fs, None, None, period, accept_saturated, accept_swapped
+        dict(columns or {}), dict(units or {}), dt, fs, None, None, period, accept_saturated, accept_swapped, free=free
     )
     return Record.of(_from_arrays({str(key): values for key, values in channels.items()}, name, options))
 
 
 def _from_arrays(arrays: Mapping[str, Any], name: str, options: "ReadOptions") -> records.Record:
-    from study.records.readers import Roles, suspect_swapped
+    from study.records.readers import Roles, not_swapped
     from study.records.readers.assemble import record_from
     from study.records.readers.table import Column, Table, split_unit
 
@@ -227,8 +233,4 @@ def _from_arrays(arrays: Mapping[str, Any], name: str, options: "ReadOptions") -
             )
         title, unit = split_unit(heading)
         columns.append(Column(title, array.astype(np.float64), unit))
-    made = record_from(Path(name), Table(tuple(columns)), options, Roles())
-    suspicion = None if options.accept_swapped else suspect_swapped(made)
-    if suspicion is not None:
-        raise StudyError(f"{name}: {suspicion}")
-    return made
+    return not_swapped(Path(name), record_from(Path(name), Table(tuple(columns)), options, Roles()), options)

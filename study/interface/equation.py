@@ -1,9 +1,9 @@
 """Models: equations of motion made of terms."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from study.equations import model as equations
 from study.equations import model_entry, model_file, terms
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from study.interface.fitted import Fit
+
+Samples = tuple[int, int | None]  # the first, and the one after the last
+Times = tuple[float, float | None]  # seconds
 
 
 def term(name: str, *, force: str | None = None, **values: float) -> ModelTerm:
@@ -129,9 +132,16 @@ class Model:
         Raises
         ------
         StudyError
-            If the file cannot be read or is no model, naming the file, the value and what was expected.
+            If the file cannot be read or is no model of a single mass, naming the file, the value and what was
+            expected.
         """
-        return cls.of(model_file.read_model(Path(path)))
+        made = model_file.read_model(Path(path))
+        expect(
+            not made.named,
+            f"{path}: this is a structure with the coordinates {', '.join(made.coordinates)}, which 'study compare', "
+            "'study diagnose' and 'study explore' take; expected a model of a single mass in a notebook",
+        )
+        return cls.of(made)
 
     def save(self, path: str | Path, *, values: bool = True) -> None:
         """Write a model file, with the values that are known or (``values=False``) without any.
@@ -200,19 +210,30 @@ class Model:
         return Model(*(t for t in self.equation.terms if t.name != name), name=self.name)
 
     def fit(
-        self, record: Record, *, fit: tuple[int, int] | None = None, judge: tuple[int, int] | None = None,
+        self, record: "Record | Sequence[Record]", *, fit: Samples | None = None,
+        judge: 'Samples | Literal["every-other-block"] | None' = None, use: Sequence[Times] = (),
         response: str | None = None, cutoff: float | None = None, estimator: str = "output_error",
         measurement: Mapping[str, float | None] | bool | None = None, as_sampled: bool = False,
+        absolute: bool = False, each_record: Sequence[str] = (),
     ) -> "Fit":  # fmt: skip
         """Fit what the model leaves open to one part of a record, and judge it on the other.
 
+        What kind of test it is follows from record and model, as on the command line: without a force it is a free
+        decay, with a channel such as ``base_acceleration`` one on a moving base, and of a model without inertia a
+        component test, whose force is predicted.
+
         Parameters
         ----------
-        record : Record
-            What was measured.
+        record : Record or sequence of Record
+            What was measured; to several, one model is fitted.
         fit, judge : pair of int, optional
-            First sample and the one after the last of the parts to fit and to judge; by default the halves, or the
-            longer of what one leaves of the record.
+            First sample and the one after the last (None: the end) of the parts to fit and to judge; by default the
+            halves, or the longer of what one leaves of the record. ``judge="every-other-block"`` fits and judges blocks
+            in turn, as is done by default of free decays, components, several stretches, and sweeps whose halves have
+            other frequencies.
+        use : sequence of pairs of float
+            Stretches in seconds of the record's time (None: its end) that alone are used, fitted and judged together,
+            such as those between blows.
         response : str, optional
             The measured motion that free runs are held against; the first of displacement, velocity, acceleration.
         cutoff : float, optional
@@ -225,17 +246,21 @@ class Model:
         as_sampled : bool
             Use all samples of a driven response, though its motion asks for fewer; they always are used of free
             decays, components, motions without a spring, and of stretches that are named.
+        absolute : bool
+            On a moving base, the response was measured absolutely: the base's motion is subtracted.
+        each_record : sequence of str
+            Terms or coefficients that may differ between the records: all others are shared (:meth:`Fit.by_record`).
 
         Raises
         ------
         StudyError
-            If the model cannot be fitted to the record.
+            If the model cannot be fitted to the record, or what is asked does not go together.
         """
         from study.interface.fitted import fitted
 
         return fitted(
-            self, record, fit=fit, judge=judge, response=response, cutoff=cutoff, estimator=estimator,
-            measurement=measurement, as_sampled=as_sampled,
+            self, record, fit=fit, judge=judge, use=use, response=response, cutoff=cutoff, estimator=estimator,
+            measurement=measurement, as_sampled=as_sampled, absolute=absolute, each_record=each_record,
         )  # fmt: skip
 
     def __repr__(self) -> str:

@@ -1,38 +1,38 @@
 """A model fitted to one part of a record and judged on the other."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from study.compare.comparison import Comparison, compare
+from study.compare.comparison import Comparison, compare, distinct
+from study.compare.each_record import Separate, levels_by_record, rows, separated
 from study.compare.fitted_coefficients import Coefficient
 from study.compare.residual_checks import ResidualChecks
 from study.compare.response_functions import ResponseFunctions
 from study.equations.model import ModelTerm
-from study.faults.accounting import accounted
 from study.faults.fault import Fault
-from study.faults.instrument_settings import NOTHING_ASKED, FaultSettings, settings_beside, settings_of
+from study.faults.instrument_settings import settings_asked
 from study.interface.data import Record
-from study.interface.equation import Model, term
+from study.interface.equation import Model, Samples, Times, term
 from study.interface.forces import Force, simulate
 from study.interface.pictures import FitPictures
 from study.interface.showing import Words, html_table
-from study.records.plan import make_plan
-from study.records.prepared import Prepared, prepare_record
-from study.records.record import MOTIONS
-from study.support.errors import StudyError, at, expect
+from study.records import record as measured
+from study.records.record_layout import Layout
+from study.support.errors import StudyError, expect
 from study.support.numbers import percent
+from study.support.yaml_text import shown
+from study.way_in.compare_records import compare_records
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from study.interface.found import Candidate, Diagnosis
     from study.interface.side_by_side import Across
-
-Span = tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -62,10 +62,13 @@ class Fit(FitPictures):
         Everything that was found, as the packages below hold it.
     faults : tuple of Fault
         Faults of the measurement that the record is corrected for.
+    separate : tuple of Separate
+        Coefficients that may differ between the records.
     """
 
     comparison: Comparison
     faults: tuple[Fault, ...] = ()
+    separate: tuple[Separate, ...] = ()
 
     @property
     def model(self) -> Model:
@@ -79,7 +82,7 @@ class Fit(FitPictures):
 
     @property
     def record(self) -> Record:
-        """The record as it was fitted: completed, in consistent units, corrected."""
+        """The record as it was fitted: completed, in consistent units, corrected; several strung together."""
         return Record.of(self.comparison.record)
 
     @property
@@ -159,6 +162,25 @@ class Fit(FitPictures):
         ]  # fmt: skip
         return pd.DataFrame(rows).set_index("key")
 
+    def by_record(self) -> "pd.DataFrame":
+        """The coefficients that may differ (``each_record``), one row a coefficient and record.
+
+        With the standard error, and the p value that it is the same in all of them (Wald, 1943).
+        """
+        import pandas as pd
+
+        records = list({id(s.source): s.source for s in self.comparison.record.stretches}.values())
+        fitted_keys = set(self.comparison.fit.keys)
+        kept = [s for s in self.separate if fitted_keys.issuperset((s.symbol, *s.differences))]
+        table = [
+            {"key": row["key"], "record": name, "value": value, "error": error, "unit": row["unit"],
+             "p_value": row["p_value"], "differs": row["differs"]}
+            for row in rows(levels_by_record(self.comparison, kept, records), records)
+            for name, value, error in zip(row["records"], row["value"], row["standard_error"], strict=True)
+        ]  # fmt: skip
+        columns = ["key", "record", "value", "error", "unit", "p_value", "differs"]
+        return pd.DataFrame(table, columns=columns).set_index(["key", "record"])
+
     def predict(self, force: "Force | Record | ArrayLike", *, initial: Sequence[float] = (0.0, 0.0)) -> Record:
         """The response of the fitted model to a force.
 
@@ -230,8 +252,15 @@ class Fit(FitPictures):
 
         return replace(self, comparison=compared_without(self.comparison, name))
 
-    def across(self, records: "Sequence[Record]") -> "Across":
+    def across(self, records: "Sequence[Record]", **options: Any) -> "Across":
         """The same model fitted to several records: do its coefficients move with the level?
+
+        Parameters
+        ----------
+        records : sequence of Record
+            Two or more.
+        **options
+            As for :meth:`Model.fit`, the same for all records.
 
         Raises
         ------
@@ -240,7 +269,7 @@ class Fit(FitPictures):
         """
         from study.interface.side_by_side import across
 
-        return across([self.given.fit(record) for record in records])
+        return across([self.given.fit(record, **options) for record in _records(records)])
 
     def page(self) -> bytes:
         """The page of ``study compare`` as one HTML file; a ``StudyError`` says what is to be installed for it."""
@@ -268,48 +297,58 @@ class Fit(FitPictures):
 
 
 def fitted(
-    model: Model, record: Record, *, fit: Span | None, judge: Span | None, response: str | None, cutoff: float | None,
-    estimator: str, measurement: Mapping[str, float | None] | bool | None, as_sampled: bool,
+    model: Model, record: Record | Sequence[Record], *, fit: Samples | None,
+    judge: Samples | Literal["every-other-block"] | None, use: Sequence[Times], response: str | None,
+    cutoff: float | None, estimator: str, measurement: Mapping[str, float | None] | bool | None, as_sampled: bool,
+    absolute: bool, each_record: Sequence[str],
 ) -> Fit:  # fmt: skip
     """What :meth:`Model.fit` does; its arguments."""
-    settings = _settings(record, measurement)
-    prepared = prepared_part(record, fit, judge, response, cutoff)
-    found = accounted(
-        model.equation,
-        prepared,
-        held=settings.held,
-        switched_off=settings.switched_off,
-        estimator=estimator,
-        as_sampled=as_sampled or settings.as_sampled,
-    )
-    return Fit(found.comparison, found.faults)
+    records, separate = _records(record), tuple[Separate, ...]()
+    settings = settings_asked(records[0].source, measurement)
+    expect(cutoff is None or 0.0 < cutoff < math.inf, f"cutoff is {cutoff!r}; expected a frequency above 0 Hz")
+    alternate = judge == "every-other-block"
+    layout = Layout(
+        tuple(_stretch(pair) for pair in use), _samples("fit", fit, records[0]),
+        None if alternate else _samples("judge", judge, records[0]), alternate, response, cutoff, as_sampled,
+    )  # fmt: skip
+    equation, asked = model.equation, list[measured.Record](distinct(records))
+    if each_record:
+        names = [each_record] if isinstance(each_record, str) else each_record
+        equation, asked, separate = separated(equation, asked, names)
+    found = compare_records(asked, equation, layout, settings, absolute=absolute, estimator=estimator)
+    return Fit(found.comparison, found.faults, separate)
 
 
-def prepared_part(
-    record: Record, fit: Span | None = None, judge: Span | None = None, response: str | None = None,
-    cutoff: float | None = None,
-) -> Prepared:  # fmt: skip
-    """A record made ready: its motions completed, and what to fit and to judge of it settled.
-
-    A part that is left out is the longer of what the other leaves.
-    """
-    parts = [fit, judge]
-    for place, other in ((0, judge), (1, fit)):
-        if parts[place] is None and other is not None:
-            parts[place] = max(((other[1], len(record)), (0, other[0])), key=lambda part: part[1] - part[0])
-    with at(record.name):
-        measured = ", ".join(motion for motion in MOTIONS if motion in record)
-        expect(response is None or response in record, f"no {response} was measured; expected one of {measured}")
-        plan = make_plan(record, parts[0], parts[1], response)
-    return prepare_record(record, plan, cutoff)
+def _records(given: object) -> list[Record]:
+    """One record, or several of a list or tuple."""
+    several = cast("Sequence[object]", given) if isinstance(given, list | tuple) else [given]
+    expect(several, "no record is given; expected one or more")
+    for one in several:
+        expect(
+            isinstance(one, measured.Record),
+            f"{shown(one)} is no record; expected what st.read or st.record gives, or a list of these",
+        )
+    return [Record.of(one) for one in several if isinstance(one, measured.Record)]
 
 
-def _settings(record: Record, measurement: Mapping[str, float | None] | bool | None) -> FaultSettings:
-    if measurement is None or measurement is True:
-        return settings_beside(record.source) if record.source is not None else FaultSettings()
-    if measurement is False:
-        return NOTHING_ASKED
-    try:
-        return settings_of(measurement)
-    except StudyError as error:
-        raise StudyError(f"measurement of {record.name}: {error}") from None
+def _samples(part: str, given: object, record: Record) -> tuple[int, int] | None:
+    """The samples of a part: a pair of whole numbers, the last of which may be left open."""
+    if given is None:
+        return None
+    match given:
+        case (int(first), int() | None as last):
+            return first, len(record) if last is None else last
+        case _:
+            turns = " or 'every-other-block'" if part == "judge" else ""
+            raise StudyError(f"{part} is {shown(given)}; expected a pair of samples such as (0, 4096){turns}")
+
+
+def _stretch(given: object) -> Times:
+    """A stretch to use: a pair of times, the last of which may be left open."""
+    match given:
+        case (int() | float() as first, int() | float() | None as last):
+            if math.isfinite(first) and (last is None or (math.isfinite(last) and last > first)):
+                return first, last
+        case _:
+            pass
+    raise StudyError(f"use names {shown(given)}; expected pairs of times in seconds such as [(2.0, 9.5)]")

@@ -8,7 +8,9 @@ from study.diagnose import diagnosis_report
 from study.diagnose import verdict as verdicts
 from study.diagnose.confirmed_faults import confirmed
 from study.diagnose.diagnosis_files import diagnosis_in_words
+from study.diagnose.force_between import diagnose_as_read
 from study.diagnose.ranked import Ranked
+from study.diagnose.user_candidates import check_on
 from study.equations import terms
 from study.faults.fault import Fault
 from study.interface.fitted import Fit
@@ -189,5 +191,6 @@ def diagnosed(fit: Fit, own: Mapping[str, str], without: Sequence[str]) -> Diagn
     for name in without:
         terms.get(name)
     extra = [terms.custom(name, formula) for name, formula in own.items()]
-    result = verdicts.diagnose(fit.comparison, extra=extra, without=tuple(without))
+    check_on(fit.comparison.record, extra)
+    result = diagnose_as_read(fit.comparison, extra=extra, without=tuple(without))
     return Diagnosis(result, confirmed(fit.faults, result), Words(diagnosis_in_words(result)))

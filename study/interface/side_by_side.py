@@ -16,6 +16,7 @@ from study.interface.showing import drawing_axes, html_table
 from study.support import statistics
 from study.support.errors import expect
 from study.support.numbers import percent
+from study.support.yaml_text import shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -148,8 +149,8 @@ class Ranking:
         return html_table("Models by held-out error", heads, rows)
 
 
-def compare(fits: Sequence[Fit]) -> Ranking:
-    """Fits by their held-out error, the best first.
+def compare(*fits: "Fit | Sequence[Fit]") -> Ranking:
+    """Fits by their held-out error, the best first: ``compare(one, other)``, or ``compare([one, other])``.
 
     Of those that were judged on the same samples as the first it is said which share of what they leave the first
     explains, with the standard error of that and the p value of one comparison.
@@ -157,10 +158,13 @@ def compare(fits: Sequence[Fit]) -> Ranking:
     Raises
     ------
     StudyError
-        If there are none.
+        If there are none, or one is no fit.
     """
-    expect(fits, "no fit is given; expected one or more")
-    ordered = sorted(fits, key=lambda fit: fit.error)
+    given = [fit for item in fits for fit in (item if isinstance(item, list | tuple) else [item])]
+    expect(given, "no fit is given; expected one or more")
+    for item in given:
+        expect(isinstance(item, Fit), f"{shown(item)} is no fit; expected what a model's fit(record) gives")
+    ordered = sorted((fit for fit in given if isinstance(fit, Fit)), key=lambda fit: fit.error)
     names = [fit.given.name for fit in ordered]
     common = set(ordered[0].given.terms).intersection(*(fit.given.terms for fit in ordered))
     return Ranking(tuple(_row(fit, ordered[0], _told_apart(fit, names, common)) for fit in ordered))

@@ -45,6 +45,14 @@ class Layout:
         """Whether samples are named."""
         return self.fit is not None or self.judge is not None
 
+    def settled(self, samples: int) -> "Layout":
+        """Where one part alone is named, the other is the longer of what that leaves before and behind it."""
+
+        def other(named: Span | None) -> Span | None:
+            return named and max(((named[1], samples), (0, named[0])), key=lambda part: part[1] - part[0])
+
+        return replace(self, fit=self.fit or other(self.judge), judge=self.judge or other(self.fit))
+
 
 @dataclass(frozen=True)
 class KindOfTest:
@@ -79,6 +87,7 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
     """
     kind, notes, every = kind or KindOfTest(), list[str](), 1
     _refuse_contradictions(records, layout, kind)
+    layout = layout.settled(len(records[0]))
     if kind.prescribed:
         readied = [with_prescribed_motion(record) for record in records]
         records, notes = [r for r, _ in readied], [note for _, said in readied for note in said]
@@ -126,6 +135,11 @@ def _refuse_contradictions(records: Sequence[Record], layout: Layout, kind: Kind
     expect(
         not (layout.explicit and (layout.use or layout.alternate)),
         "--use and --fit or --judge A:B exclude each other; expected '--judge every-other-block' beside --use",
+    )
+    expect(
+        not (layout.explicit and len(records) > 1),
+        f"{', '.join(record.name for record in records)}: --fit and --judge A:B name samples of one record; expected "
+        "'--judge every-other-block' of several, or --use",
     )
     asked = len(records) > 1 or layout.alternate or layout.use
     expect(

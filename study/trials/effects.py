@@ -11,7 +11,6 @@ from scipy.special import ndtri
 from study.equations.model import Model, ModelTerm, free
 from study.equations.term import ShapeParameter, Term
 from study.equations.terms import LIBRARY, get
-from study.faults.kinds_of_tests import made_ready
 from study.identify.frequency_domain.inputs import Input, input_history, reverse_inputs
 from study.identify.time_domain.part_fit import fit_part, linearise
 from study.records.record import MOTIONS, Record
@@ -20,6 +19,7 @@ from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares
 from study.support.thresholds import ALPHA
+from study.way_in.compare_records import made_ready
 
 LINEAR = ("inertia", "linear_damping", "linear_stiffness")  # what a linear model has: it cannot be hidden behind one
 HIDDEN = tuple(name for name in LIBRARY if name not in LINEAR)

@@ -13,7 +13,6 @@ from study.diagnose.credibility import credible
 from study.diagnose.verdict import MISSING, Diagnosis
 from study.equations.model import Model
 from study.faults.fault import Fault
-from study.faults.kinds_of_tests import accounted_test
 from study.identify.time_domain.fit_model import rough_steps
 from study.identify.time_domain.part_fit import fit_part
 from study.identify.time_domain.weighted_fit import finished
@@ -24,6 +23,7 @@ from study.structure.structure_verdict import StructureDiagnosis, diagnose_struc
 from study.support.errors import StudyError
 from study.trials.draw import Trial
 from study.trials.kept import Row
+from study.way_in.compare_records import compare_records
 
 Found = Mapping[str, Any]  # a fault of the measurement as diagnosis.json has it
 FAR_BEHIND = 20.0  # standard errors: rivals that are farther behind stand in no tie set
@@ -31,7 +31,7 @@ FAR_BEHIND = 20.0  # standard errors: rivals that are farther behind stand in no
 
 def compared(trial: Trial, model: Model) -> tuple[Comparison, tuple[Fault, ...]]:
     """The comparison that a diagnosis begins with, and the faults of the measurement that it accounts for."""
-    found = accounted_test([trial.record], model)
+    found = compare_records([trial.record], model)
     return found.comparison, found.faults
 
 

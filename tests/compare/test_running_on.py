@@ -8,9 +8,9 @@ from study.diagnose.adding import added
 from study.equations.model import Model, free
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import get
-from study.faults.kinds_of_tests import accounted_test
 from study.records.excitation import displacement_noise
 from study.records.record import Record
+from study.way_in.compare_records import compare_records
 
 
 @pytest.fixture(scope="module")
@@ -24,10 +24,10 @@ def hardening():
 
 def test_with_the_effect_that_was_missing_the_motion_runs_on(hardening):
     model, record = hardening
-    before = accounted_test([record], model).comparison
+    before = compare_records([record], model).comparison
     assert before.prepared.running_on is not None, "the linear model follows: the test asks nothing"
     after = added(before, get("cubic_stiffness"))
-    alone = accounted_test([record], model.with_term(free(get("cubic_stiffness")))).comparison
+    alone = compare_records([record], model.with_term(free(get("cubic_stiffness")))).comparison
     assert after.prepared.running_on is None
     assert len(after.prepared.record.stretches) == len(alone.prepared.record.stretches)
     assert after.prediction.error == pytest.approx(alone.prediction.error, rel=1e-3)
@@ -36,6 +36,6 @@ def test_with_the_effect_that_was_missing_the_motion_runs_on(hardening):
 
 def test_with_another_that_loses_it_too_it_does_not(hardening):
     model, record = hardening
-    before = accounted_test([record], model).comparison
+    before = compare_records([record], model).comparison
     after = added(before, get("quadratic_damping"))
     assert len(after.prepared.record.stretches) == len(before.prepared.record.stretches)

@@ -9,9 +9,9 @@ from study.equations.free_run import predict_response
 from study.equations.model import Model, free
 from study.equations.terms import get
 from study.faults.imposed import shifted
-from study.faults.kinds_of_tests import accounted_test
 from study.records.record import SI_UNITS, Record
 from study.trials import make_trial
+from study.way_in.compare_records import compare_records
 
 LOST = "loses the motion"
 
@@ -19,7 +19,7 @@ LOST = "loses the motion"
 def test_of_forms_that_are_one_force_the_simplest_comes_first():
     """Without noise: a contact never left, and a relaxation without end, make a constant force to the last digits."""
     trial = make_trial(620026, ("constant_force",), 0.0, test="component")
-    first = diagnose(accounted_test([trial.record], trial.believed).comparison).candidates[0]
+    first = diagnose(compare_records([trial.record], trial.believed).comparison).candidates[0]
     assert first.name == "constant_force"
     assert {"one_sided_contact", "relaxation"} & set(first.tied_with)
 
@@ -28,7 +28,7 @@ def test_of_forms_that_are_one_force_the_simplest_comes_first():
 def test_a_force_that_is_read_late_is_told_from_a_relaxation(hidden, late):
     trial = make_trial(9 if late else 14, hidden, 0.01, test="component")
     record = trial.record.with_channels({"force": shifted(trial.record["force"], late)})
-    diagnosis = diagnose(accounted_test([record], trial.believed).comparison)
+    diagnosis = diagnose(compare_records([record], trial.believed).comparison)
     assert diagnosis.candidates[0].name == "relaxation"
     found = late_force(diagnosis)
     assert (found is not None) == bool(late)
@@ -51,7 +51,7 @@ def quintic() -> tuple[Model, Record]:
 def test_a_strongly_hardening_decay_is_fitted_and_predicted_to_its_noise():
     """Its first samples tell the states with which the stretches begin too badly for a frequency that follows them."""
     model, record = quintic()
-    comparison = accounted_test([record], model.with_values(dict.fromkeys(model.values))).comparison
+    comparison = compare_records([record], model.with_values(dict.fromkeys(model.values))).comparison
     k5 = next(c for c in comparison.coefficients if c.key == "k5")
     assert comparison.prediction.error < 0.3
     assert k5.interval[0] < 3.4e12 < k5.interval[1]
@@ -62,7 +62,7 @@ def test_a_loud_noise_is_no_lost_motion_and_a_motion_out_of_step_is():
     linear = Model("linear", tuple(free(get(t.name)) for t in model.terms[:3]))
     u = predict_response(linear.with_values({"m": 1.0, "c": 0.14, "k": 480.0}), record, initial=(0.0035, 0.0))
     u = u + 0.5 * np.std(u) * np.random.default_rng(17).standard_normal(len(u))
-    comparison = accounted_test([record.with_channels({"displacement": u})], linear).comparison
+    comparison = compare_records([record.with_channels({"displacement": u})], linear).comparison
     assert comparison.prediction.error > 0.3
     assert not any(LOST in note for note in comparison.notes)
-    assert any(LOST in note for note in accounted_test([record], linear).comparison.notes)
+    assert any(LOST in note for note in compare_records([record], linear).comparison.notes)

@@ -20,9 +20,9 @@ from study.explore import check_plots, page_units, view, words
 from study.explore import session as sessions
 from study.explore.check_columns import DRIVEN, FREE, PRESCRIBED, kind_of
 from study.explore.saved import saved
-from study.faults.kinds_of_tests import accounted_test
 from study.records.record import Record
 from study.support.errors import StudyError
+from study.way_in.compare_records import compare_records
 
 DT, STIFFNESS, DAMPING = 0.005, 2000.0, 30.0
 
@@ -41,7 +41,7 @@ def begun(kind: str) -> sessions.Session:
             else trials.make_trial(4, ["dead_band"])
         )
         believed, record = trial.believed, trial.record.part(0, min(4000, len(trial.record)))
-    return sessions.begin_with(accounted_test([record], believed).comparison)
+    return sessions.begin_with(compare_records([record], believed).comparison)
 
 
 def _component() -> Record:

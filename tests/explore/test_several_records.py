@@ -24,9 +24,9 @@ from study.explore.by_record import Several, by_record, of_own
 from study.explore.desk import Desk
 from study.explore.live import AloneScene, Watcher
 from study.explore.saved import saved
-from study.faults.kinds_of_tests import accounted_test
 from study.records.excitation import Excitation, force
 from study.records.record import Record
+from study.way_in.compare_records import compare_records
 
 NAMES = ("low", "high")
 LEVELS = (0.1, 1.0)
@@ -50,9 +50,9 @@ def records() -> list[Record]:
 
 @pytest.fixture(scope="module")
 def begun(records: list[Record]) -> sessions.Session:
-    own = [accounted_test([record], BELIEVED).comparison for record in records]
+    own = [compare_records([record], BELIEVED).comparison for record in records]
     several = Several(tuple(c.prepared for c in own), tuple(records))
-    return sessions.begin_with(accounted_test(records, BELIEVED).comparison, several=several, known=of_own(own))
+    return sessions.begin_with(compare_records(records, BELIEVED).comparison, several=several, known=of_own(own))
 
 
 @pytest.fixture(scope="module")
@@ -205,7 +205,7 @@ def test_the_saved_page_turns_to_a_record_and_a_step(grown, tmp_path, page):
 
 def test_a_coefficient_may_differ_within_the_one_fit(records, monkeypatch):
     model, marked, separate = separated(BELIEVED, records, ["linear_stiffness"])
-    together = accounted_test(marked, model).comparison
+    together = compare_records(marked, model).comparison
     several = Several((), tuple(records), separate)
     session = sessions.begin_with(together, several=several, known=by_record(several, together))
     (level,) = session.now.by_record.levels

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from study.faults.kinds_of_tests import accounted_test
 from study.trials import make_trial
+from study.way_in.compare_records import compare_records
 
 
 @pytest.mark.parametrize("late", [0.0, 1.5])
@@ -13,6 +13,6 @@ def test_a_delay_of_the_response_to_a_moving_base_is_found_and_none_invented(lat
     u = trial.record["displacement"]
     lines = np.fft.rfft(u) * np.exp(-2j * np.pi * np.fft.rfftfreq(len(u)) * late)
     record = trial.record.with_channels({"displacement": np.fft.irfft(lines, len(u))})
-    faults = accounted_test([record], trial.believed).faults
+    faults = compare_records([record], trial.believed).faults
     assert [f.fault for f in faults] == (["delay"] if late else [])
     assert all(abs(f.value - late) < 4.0 * f.error for f in faults)

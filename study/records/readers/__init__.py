@@ -6,8 +6,6 @@ What a file is is told by its content first and its name second. Packages for a 
 import warnings
 from pathlib import Path
 
-import numpy as np
-
 from study.records.readers import hdf5, matlab, parquet, uff
 from study.records.readers.assemble import record_from
 from study.records.readers.options import ReadOptions, assignments, options_beside, read_options
@@ -19,7 +17,9 @@ from study.records.record import Record
 from study.support.errors import StudyError, expect
 from study.support.files import reason
 
-__all__ = ["ReadOptions", "Roles", "assignments", "read_options", "read_record", "read_table", "suspect_swapped"]
+__all__ = [
+    "ReadOptions", "Roles", "assignments", "not_swapped", "read_options", "read_record", "read_table", "suspect_swapped",
+]  # fmt: skip
 
 SINGLE_MASS = Roles()
 MAGIC = 1024  # bytes; MATLAB 7.3 begins its HDF5 part behind 512 of its own
@@ -61,12 +61,14 @@ def read_record(path: Path, mapping: ReadOptions | None = None, roles: Roles = S
     """
     path = Path(path)
     table, options = read_table(path, mapping)
-    record = record_from(path, table, options, roles)
-    one = len(roles.coordinates) == len(roles.forces) == 1  # of several nobody can say which should move as a mass does
-    unforced = not one or not np.any(record[roles.forces[0]])
-    suspicion = None if options.accept_swapped or unforced else suspect_swapped(record)
-    if suspicion is not None:
-        raise StudyError(f"{path}: {suspicion}")
+    return not_swapped(path, record_from(path, table, options, roles), options)
+
+
+def not_swapped(path: Path, record: Record, options: ReadOptions) -> Record:
+    """The record; a ``StudyError`` if its force and response seem exchanged, which the user may accept."""
+    one = len(record.coordinates) == len(record.forces) == 1  # of several nobody can say which moves as a mass does
+    suspicion = suspect_swapped(record) if one and not (options.accept_swapped or record.unforced) else None
+    expect(suspicion is None, f"{path}: {suspicion}")
     return record
 
 

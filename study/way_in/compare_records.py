@@ -1,18 +1,20 @@
 """Records of any kind of test compared with a model: what the test is decides how it is laid out and fitted.
 
 A model without inertia makes it a component test, no force a free decay, a measured base one on a moving base, and a
-model without a spring one that drifts. All take the same road from there on.
+model without a spring one that drifts. All take the same road from there on. Command line, notebook, page and trials
+all come in here.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
+from study.compare.by_estimator import FREE_RUN
 from study.compare.running_on import has_lost_its_way
 from study.equations.common_factor import per_unit_mass, with_known_mass
 from study.equations.equations_of_motion import has_spring
 from study.equations.model import Model
 from study.faults.accounting import Accounted, accounted
+from study.faults.instrument_settings import FaultSettings
 from study.records.driven_by_motion import on_a_moving_base, relative_to_base
 from study.records.prepared import Prepared
 from study.records.record import Record
@@ -52,21 +54,48 @@ def made_ready(
     return per_unit_mass(model, prepared) if prepared.free else (model, prepared)
 
 
-def accounted_test(
-    records: Sequence[Record], model: Model, layout: Layout | None = None, *, absolute: bool = False, **options: Any
+def compare_records(
+    records: Sequence[Record],
+    model: Model,
+    layout: Layout | None = None,
+    settings: FaultSettings | None = None,
+    *,
+    absolute: bool = False,
+    estimator: str = FREE_RUN,
+    progress: Callable[[str], None] | None = None,
 ) -> Accounted:
     """The comparison of a model with records of a test, faults of the measurement accounted for.
 
     Where the free run of the model loses the motion on its way through the parts of a decay, it begins anew in each, or
-    every few periods. Parameters are those of :func:`made_ready`, ``options`` those of
-    :func:`study.faults.accounting.accounted`; it raises as both do.
+    every few periods.
+
+    Parameters
+    ----------
+    records, model, layout, absolute
+        As for :func:`made_ready`.
+    settings : FaultSettings, optional
+        What the user says of the instruments; by default every fault is looked for.
+    estimator, progress
+        As for :func:`study.compare.comparison.compare`.
+
+    Raises
+    ------
+    StudyError
+        If the records, or the model and such a test, do not go together, or the model cannot be fitted.
     """
-    layout = layout or Layout()
+    layout, settings = layout or Layout(), settings or FaultSettings()
+    layout = replace(layout, as_sampled=layout.as_sampled or settings.as_sampled)
     model, prepared = made_ready(records, model, layout, absolute)
-    options["as_sampled"] = layout.as_sampled
-    found = accounted(model, prepared, **options)
+
+    def found_in(prepared: Prepared) -> Accounted:
+        return accounted(
+            model, prepared, held=settings.held, switched_off=settings.switched_off, estimator=estimator,
+            progress=progress, as_sampled=layout.as_sampled,
+        )  # fmt: skip
+
+    found = found_in(prepared)
     if runs_on(prepared):
         anew = apart(prepared)
         while has_lost_its_way(found.comparison.prediction) and (shorter := next(anew, None)) is not None:
-            found = accounted(model, shorter, **options)
+            found = found_in(shorter)
     return found
