@@ -269,7 +269,7 @@ class Fit(FitPictures):
         """
         from study.interface.side_by_side import across
 
-        return across([self.given.fit(record, **options) for record in _records(records)])
+        return across([self.given.fit(record, **options) for record in records_of(records)])
 
     def page(self) -> bytes:
         """The page of ``study compare`` as one HTML file; a ``StudyError`` says what is to be installed for it."""
@@ -303,7 +303,7 @@ def fitted(
     absolute: bool, each_record: Sequence[str],
 ) -> Fit:  # fmt: skip
     """What :meth:`Model.fit` does; its arguments."""
-    records, separate = _records(record), tuple[Separate, ...]()
+    records, separate = records_of(record), tuple[Separate, ...]()
     settings = settings_asked(records[0].source, measurement)
     expect(cutoff is None or 0.0 < cutoff < math.inf, f"cutoff is {cutoff!r}; expected a frequency above 0 Hz")
     alternate = judge == "every-other-block"
@@ -316,11 +316,13 @@ def fitted(
         names = [each_record] if isinstance(each_record, str) else each_record
         equation, asked, separate = separated(equation, asked, names)
     found = compare_records(asked, equation, layout, settings, absolute=absolute, estimator=estimator)
-    return Fit(found.comparison, found.faults, separate)
+    prepared = found.comparison.prepared
+    of_all = replace(prepared.record, name=", ".join(one.name for one in asked))
+    return Fit(replace(found.comparison, prepared=replace(prepared, record=of_all)), found.faults, separate)
 
 
-def _records(given: object) -> list[Record]:
-    """One record, or several of a list or tuple."""
+def records_of(given: object) -> list[Record]:
+    """The one record that is given, or those of a list; a ``StudyError`` where it is none."""
     several = cast("Sequence[object]", given) if isinstance(given, list | tuple) else [given]
     expect(several, "no record is given; expected one or more")
     for one in several:

@@ -15,10 +15,12 @@ from study.identify.estimators.base import Identified, Settings
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.interface.data import Record
 from study.interface.equation import Model
+from study.interface.fitted import records_of
 from study.interface.showing import drawing_axes, html_table
 from study.records.prepared import prepare_record
 from study.records.spectra import Segments
 from study.support.errors import StudyError, expect
+from study.way_in.compare_records import driven_alike
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -177,7 +179,7 @@ class Identification:
 
 def identify(
     record: Record, model: Model, estimator: str = "miso", *, band: tuple[float, float] | None = None,
-    segment: int | None = None,
+    segment: int | None = None, absolute: bool = False,
 ) -> Identification:  # fmt: skip
     """A_j(f) of every input of the reverse system, and the model's coefficients, from the whole record.
 
@@ -194,16 +196,22 @@ def identify(
         Lines in hertz that the parameters are fitted to; by default those in which force and motion are heard.
     segment : int, optional
         Samples of Welch's segments.
+    absolute : bool
+        On a moving base, the response was measured absolutely.
 
     Raises
     ------
     StudyError
-        If there is no such estimator, or it cannot work with this model or record.
+        If there is no such estimator, it cannot work with this model or record, or no force acts.
     """
-    prepared = prepare_record(record)
+    given = records_of(record)
+    expect(len(given) == 1, f"{len(given)} records are given; expected one, as frequency response functions are of one")
+    equation, (driven,), _ = driven_alike(given, model.equation, absolute)
+    expect(not driven.unforced, f"{driven.name}: no force acts; expected a driven record, or a fit of this one")
+    prepared = prepare_record(driven)
     part = prepared.record.part(*prepared.inner((0, len(record))))
     cut = segments_of(len(part)) if segment is None else Segments(length=segment)
     followed = followed_band(part, prepared.band, cut)
     lines = band or followed
-    found = estimators.identify(estimator, model.equation, part, Settings(cut, lines))
+    found = estimators.identify(estimator, equation, part, Settings(cut, lines))
     return Identification(found, estimator, Record.of(part), lines, max(followed[1], lines[1]))

@@ -42,16 +42,27 @@ def made_ready(
     StudyError
         If the records, or the model and such a test, do not go together.
     """
+    model, records, said = driven_alike(records, model, absolute)
+    prescribed = "inertia" not in model
+    drifts = not prescribed and not has_spring(model)
+    prepared = laid_out(records, layout, KindOfTest(prescribed, drifts))
+    prepared = replace(prepared, notes=(*said, *prepared.notes))
+    return per_unit_mass(model, prepared) if prepared.free else (model, prepared)
+
+
+def driven_alike(
+    records: Sequence[Record], model: Model, absolute: bool = False
+) -> tuple[Model, list[Record], tuple[str, ...]]:
+    """Records on a moving base with the force of that, the model with the mass it takes as known, and what to say.
+
+    All other records are as they were. Raises as :func:`made_ready`.
+    """
     based = [on_a_moving_base(record) for record in records]
     if any(based):
         model = with_known_mass(model)
     mass = None if model.values.get("m") == 1.0 else model.values.get("m")
     moved = [relative_to_base(r, mass, absolute) if b else (r, ()) for r, b in zip(records, based, strict=True)]
-    prescribed = "inertia" not in model
-    drifts = not prescribed and not has_spring(model)
-    prepared = laid_out([record for record, _ in moved], layout, KindOfTest(prescribed, drifts))
-    prepared = replace(prepared, notes=(*(note for _, said in moved for note in said), *prepared.notes))
-    return per_unit_mass(model, prepared) if prepared.free else (model, prepared)
+    return model, [record for record, _ in moved], tuple(note for _, said in moved for note in said)
 
 
 def compare_records(

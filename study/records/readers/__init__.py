@@ -18,7 +18,8 @@ from study.support.errors import StudyError, expect
 from study.support.files import reason
 
 __all__ = [
-    "ReadOptions", "Roles", "assignments", "not_swapped", "read_options", "read_record", "read_table", "suspect_swapped",
+    "ReadOptions", "Roles", "assignments", "not_swapped", "read_options", "read_record", "read_table",
+    "suspect_swapped",
 ]  # fmt: skip
 
 SINGLE_MASS = Roles()
