@@ -39,7 +39,7 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.diagnose.user_candidates import own_candidates
     from study.equations import terms
     from study.equations.model_file import read_model
-    from study.faults.instrument_settings import settings_beside
+    from study.faults.fault import settings_beside
     from study.support.errors import expect
     from study.support.files import write_files
 
