@@ -9,7 +9,7 @@ from study.compare.by_estimator import FREE_RUN
 from study.compare.comparison import Comparison, compare
 from study.equations.model import Model
 from study.faults.correction import corrected, fault_columns, unit_of
-from study.faults.fault import DELAY, DRIFT, FORCE_NOISE, NAMES, OFFSET, Fault
+from study.faults.fault import DELAY, DRIFT, FAULTS, FORCE_NOISE, OFFSET, Fault
 from study.faults.force_noise import force_noise
 from study.faults.leftover import amounts_on_both, leaves_less, leftover
 from study.faults.search import Refined, SearchEnd, first_faults, refined, search_faults, searched_part
@@ -74,7 +74,7 @@ def accounted(
         If the model cannot be fitted.
     """
     known = dict(held or {})
-    asked = tuple(name for name in NAMES if name not in switched_off and name not in known)
+    asked = tuple(name for name in FAULTS if name not in switched_off and name not in known)
     # A record shows faults by what it leaves of a driven response; they pass through no joint of stretches.
     if asked and (prepared.record.stretches or prepared.free or prepared.response == FORCE):
         asked, prepared = (), replace(prepared, notes=(*prepared.notes, NOT_ASKED))
@@ -90,8 +90,11 @@ def accounted(
     lost = has_lost_the_motion(fit, fewer)
     told = tuple(name for name in asked if not (lost and name in OF_THE_MOTION))
     end = search_faults(prepared, fit if fewer is first else _on_all(fit, first), faults, told)
-    for begin in _begins(first, fit, asked):
-        end = _beneath(begin, model, prepared, faults, asked, end)
+    beneath = slow_response(first, len(asked)) if DRIFT in asked else None
+    if beneath is None and OFFSET in asked and (not fit.converged or has_lost_the_motion(fit, first)):
+        beneath = mean_response(first)
+    if beneath is not None:
+        end = _beneath(beneath, model, prepared, faults, asked, end)
     if DELAY in asked and DELAY not in [fault.fault for fault in end.faults]:
         late = _late_response(model, prepared, fit, faults, needed)
         if late is not None:
@@ -104,24 +107,16 @@ def accounted(
     return _compared(model, kept, end.faults, best, estimator, progress)
 
 
-def _begins(prepared: Prepared, fit: FreeRunFit, asked: Sequence[str]) -> list[Fault]:
-    """What may lie beneath the motion and lead its fit astray: the slowest lines, and its mean where a fit is lost."""
-    slow = slow_response(prepared, len(asked)) if DRIFT in asked else None
-    astray = not fit.converged or has_lost_the_motion(fit, prepared)
-    mean = [mean_response(prepared)] if astray and OFFSET in asked else []
-    return mean if slow is None else [slow]
-
-
 def _beneath(
     begin: Fault, model: Model, prepared: Prepared, faults: Sequence[Fault], asked: Sequence[str],
     plain: SearchEnd,
 ) -> SearchEnd:  # fmt: skip
     """The better end of two searches for faults: the plain one, and one that a drift or an offset cannot lead astray.
 
-    The second begins with the model fitted to the response without what may lie beneath it.
+    The second begins with the model fitted to the response without what may lie beneath it (``begin``): its slowest
+    lines, or its mean where a fit is lost.
     """
-    if begin.waveform is None:
-        return plain
+    assert begin.waveform is not None
     beneath = corrected(prepared, (*faults, begin))
     try:
         begun = fit_model(model, beneath)
@@ -176,9 +171,9 @@ def _begun_late(
 
     A delay takes a part of what any missing effect leaves: it has to leave less beside the effects too.
     """
-    without = leftover(plain.fit, corrected(prepared, plain.faults))
-    following = _on_all(fit, corrected(prepared, (*faults, late)))
-    left = leftover(following, corrected(prepared, (*faults, late)))
+    without, less_late = leftover(plain.fit, corrected(prepared, plain.faults)), corrected(prepared, (*faults, late))
+    following = _on_all(fit, less_late)
+    left = leftover(following, less_late)
     if left is None:
         return plain
     explained = math.nan if without is None else gain(without.residual[1], left.residual[1]).explained
@@ -228,5 +223,5 @@ def still_seen(faults: Sequence[Fault], fit: FreeRunFit, prepared: Prepared) -> 
     What passes through the structure may be a force that the model lacked.
     """
     left = leftover(fit, prepared) if any(fault.fault == FORCE_NOISE for fault in faults) else None
-    gone = left is not None and force_noise(left, len(NAMES)) is None
+    gone = left is not None and force_noise(left, len(FAULTS)) is None
     return tuple(fault for fault in faults if not (gone and fault.fault == FORCE_NOISE))

@@ -19,7 +19,6 @@ from study.support.arrays import Bools, Floats
 
 FIRST = 0.02  # of the motion's own frequency: the cut-off at which a high-pass is first looked for
 BESIDE = 2  # samples on either side of lost ones that a channel which is moved in time loses too
-ADJUSTABLE = (DELAY, GAIN_CHANGE, OFFSET, HIGH_PASS)
 
 
 def unit_of(fault: str, response_unit: str) -> str:
@@ -81,14 +80,14 @@ def corrected(prepared: Prepared, faults: Sequence[Fault]) -> Prepared:
     record, response = prepared.record, prepared.response
     masks = [fault.lost for fault in wanted if fault.lost is not None]
     lost = np.any(masks, axis=0) if masks else None
-    values = record[response] if lost is None else bridged(record[response], lost)
+    values = record[response] if lost is None else _bridged(record[response], lost)
     for fault in wanted:
         if fault.waveform is not None and fault.fault != HIGH_PASS:
             values = values - fault.waveform
     for name in (OFFSET, GAIN_CHANGE, HIGH_PASS, DELAY):
         for fault in wanted:
             if fault.fault == name:
-                values = without_fault(name, values, fault.value, prepared.dt)
+                values = _without_fault(name, values, fault.value, prepared.dt)
                 if fault.waveform is not None:
                     values = values - fault.waveform
     late = sum(abs(fault.value) for fault in wanted if fault.fault == DELAY)
@@ -99,7 +98,7 @@ def corrected(prepared: Prepared, faults: Sequence[Fault]) -> Prepared:
     return replace(prepare_record(raw, prepared.plan, prepared.low or None), notes=prepared.notes, lost=lost)
 
 
-def without_fault(fault: str, values: Floats, value: float, dt: float) -> Floats:
+def _without_fault(fault: str, values: Floats, value: float, dt: float) -> Floats:
     """A channel without the fault, shape (n,)."""
     if fault == OFFSET:
         return values - value
@@ -112,7 +111,7 @@ def without_fault(fault: str, values: Floats, value: float, dt: float) -> Floats
     return np.cumsum((1.0 + half) * centred + (half - 1.0) * np.concatenate([[0.0], centred[:-1]]))
 
 
-def bridged(values: Floats, lost: Bools) -> Floats:
+def _bridged(values: Floats, lost: Bools) -> Floats:
     """A channel with a cubic through the neighbours where samples are lost, shape (n,).
 
     It is for what is computed from the channel beside a free run; no free run is held against these samples.

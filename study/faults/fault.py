@@ -13,7 +13,7 @@ from study.support.errors import at, expect
 OFFSET, DRIFT, HUM, DELAY, HIGH_PASS = "offset", "drift", "hum", "delay", "high_pass"
 SPIKES, DROP_OUTS, CLIPPING = "spikes", "drop_outs", "clipping"
 CONVERTER_STEPS, GAIN_CHANGE, FORCE_NOISE = "converter_steps", "gain_change", "force_noise"
-NAMES = (
+FAULTS = (
     OFFSET, DRIFT, HUM, DELAY, HIGH_PASS, SPIKES, DROP_OUTS, CLIPPING, CONVERTER_STEPS, GAIN_CHANGE, FORCE_NOISE,
 )  # fmt: skip
 HOLDABLE = (OFFSET, DELAY, HIGH_PASS, GAIN_CHANGE)  # faults that one number describes: a user may know it
@@ -24,7 +24,7 @@ NAMED_ALONE = (CONVERTER_STEPS, FORCE_NOISE)  # there is nothing that would undo
 class Fault:
     """One fault; n samples of the record."""
 
-    fault: str  # one of ``NAMES``
+    fault: str  # one of ``FAULTS``
     channel: str  # the channel that has it
     value: float  # its size, in ``unit``; what that measures is told where it is put on (study/faults/imposed.py)
     error: float = 0.0  # standard error of that; 0 where it is counted and not estimated, or held by the user
@@ -64,11 +64,6 @@ def fault_fields(fault: Fault) -> dict[str, Any]:
         "unit": fault.unit, "explained": fault.explained, "corrected": fault.corrected,
         "rivals": list(fault.rivals), "says": fault.says,
     }  # fmt: skip
-
-
-def faults_in_words(faults: tuple[Fault, ...]) -> str:
-    """All faults in sentences; empty without any."""
-    return " ".join(fault.says for fault in faults)
 
 
 def _what_follows(fault: Fault) -> str:
@@ -138,7 +133,7 @@ class FaultSettings:
     as_sampled: bool = False
 
 
-NOTHING_ASKED = FaultSettings(switched_off=NAMES)
+NOTHING_ASKED = FaultSettings(switched_off=FAULTS)
 
 
 def settings_asked(record: Path | None, given: Mapping[str, float | None] | bool | None = None) -> FaultSettings:
@@ -180,7 +175,7 @@ def settings_beside(record: Path) -> FaultSettings:
 def settings_of(given: Mapping[str, float | None]) -> FaultSettings:
     """Settings from values by name of the fault; None for a fault that is not looked for."""
     for name, value in given.items():
-        expect(name in NAMES, f"measurement names {name!r}; expected one of {', '.join(NAMES)}")
+        expect(name in FAULTS, f"measurement names {name!r}; expected one of {', '.join(FAULTS)}")
         known = value is None or name in HOLDABLE
         expect(known, f"{name} is held at {value}; expected 'off', or a number for one of {', '.join(HOLDABLE)}")
         expect(name != "high_pass" or value is None or value > 0.0, f"high_pass is {value}; expected a cut-off above 0")

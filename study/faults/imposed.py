@@ -5,6 +5,21 @@ from typing import Any
 
 import numpy as np
 
+from study.faults.fault import (
+    CLIPPING,
+    CONVERTER_STEPS,
+    DELAY,
+    DRIFT,
+    DROP_OUTS,
+    FAULTS,
+    FORCE_NOISE,
+    GAIN_CHANGE,
+    HIGH_PASS,
+    HUM,
+    OFFSET,
+    SPIKES,
+)  # fmt: skip
+from study.records.prepared import FORCE
 from study.records.record import Record
 from study.support.arrays import Floats
 from study.support.errors import expect
@@ -19,23 +34,8 @@ EXTENSION = 64  # samples by which a channel is continued before it is moved
 def impose(record: Record, response: str, fault: str, rng: np.random.Generator) -> tuple[Record, dict[str, Any]]:
     """A record with one fault on its force or response, of a size drawn from the generator.
 
-    Parameters
-    ----------
-    record : Record
-        Force and the measured motion.
-    response : str
-        That motion.
-    fault : str
-        One of ``FAULTS``.
-    rng : Generator
-        Draws the size, and whatever else the fault leaves open.
-
-    Returns
-    -------
-    Record
-        The same with the fault.
-    dict
-        ``fault``, ``channel``, ``value``, ``unit`` as the search for faults gives them: what it should find.
+    What is known of it is given as the search for faults gives it: ``fault``, ``channel``, ``value`` and ``unit`` are
+    what it should find. ``response`` is the measured motion, and ``fault`` one of ``FAULTS``.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def impose(record: Record, response: str, fault: str, rng: np.random.Generator) 
         If there is no such fault.
     """
     expect(fault in FAULTS, f"there is no fault {fault!r}; expected one of {', '.join(FAULTS)}")
-    channel = "force" if fault == "force_noise" else response
+    channel = FORCE if fault == FORCE_NOISE else response
     faulty, value, unit = _MAKERS[fault](record[channel], record.dt, rng)
     known = {"fault": fault, "channel": channel, "value": value, "unit": unit or record.units.get(channel, "")}
     return record.with_channels({channel: faulty}), known
@@ -165,8 +165,7 @@ def _either(rng: np.random.Generator) -> float:
 
 
 _MAKERS: dict[str, Callable[[Floats, float, np.random.Generator], Imposed]] = {
-    "offset": _offset, "drift": _drift, "hum": _hum, "delay": _delay, "high_pass": _high_pass, "spikes": _spikes,
-    "drop_outs": _drop_outs, "clipping": _clipping, "converter_steps": _converter_steps, "gain_change": _gain_change,
-    "force_noise": _force_noise,
+    OFFSET: _offset, DRIFT: _drift, HUM: _hum, DELAY: _delay, HIGH_PASS: _high_pass, SPIKES: _spikes,
+    DROP_OUTS: _drop_outs, CLIPPING: _clipping, CONVERTER_STEPS: _converter_steps, GAIN_CHANGE: _gain_change,
+    FORCE_NOISE: _force_noise,
 }  # fmt: skip
-FAULTS = tuple(_MAKERS)

@@ -3,7 +3,6 @@
 A fault or an effect gets no more than the model's own coefficients and initial state could not take.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -246,27 +245,28 @@ def missing(left: FittedResidual) -> FittedResidual | None:
     except StudyError:
         return None
 
-    def begun(term: Term) -> list[shape_search.Start]:
-        return shape_search.shape_starts(term, base, look)
-
-    def fitted(start: tuple[Term, list[shape_search.Start]]) -> FittedResidual | None:
+    def fitted(term: Term) -> FittedResidual | None:
         try:
-            near = with_term(base.fit, free(start[0]), base, look)
+            near = with_term(base.fit, free(term), base, look)
             initial = np.atleast_2d(near.initial)[:1] if near.first == prepared.plan.fit[0] else None
-            return leftover(fit_part(
+            fit = fit_part(
                 near.model, prepared, base.fit.held, steps=near.steps_per_sample, max_iterations=RUNS, initial=initial
-            ), prepared)  # fmt: skip
+            )
         except StudyError:
             return None
+        return leftover(fit, prepared)
 
-    begins = side_by_side(begun, terms, lambda term: term.effort)
+    begins = side_by_side(lambda term: shape_search.shape_starts(term, base, look), terms, lambda term: term.effort)
     starts = [(term, found) for term, found in zip(terms, begins, strict=True) if found]
-    promising = sorted(starts, key=lambda s: -s[1][0].share)[:FITTED]
-    tried = [t for t in side_by_side(fitted, promising, lambda s: s[0].effort) if t is not None]
+    promising = [term for term, _ in sorted(starts, key=lambda s: -s[1][0].share)[:FITTED]]
+    tried = [t for t in side_by_side(fitted, promising, lambda term: term.effort) if t is not None]
     for group in ([t for t in tried if not unphysical(t, left)], tried):
-        best = _simplest_of_the_best(group)
-        if best is not None and leaves_less(left, best, len(terms)):
-            return best
+        if group:  # of those that chance may make worse than the best, the one with the fewest unknowns
+            best = min(group, key=lambda t: float(np.sum(t.residual[1] ** 2)))
+            level = [t for t in group if t is best or worse(t.residual[1], best.residual[1]) < CHANCE]
+            simplest = min(level, key=lambda t: (len(t.fit.keys), t is not best))
+            if leaves_less(left, simplest, len(terms)):
+                return simplest
     return None
 
 
@@ -279,12 +279,3 @@ def unphysical(more: FittedResidual, left: FittedResidual) -> bool:
     """Whether any of these is fitted outside of what makes it physical."""
     model, names = more.fit.model, effects_beside(more, left)
     return any(e.term.physical(model.values) for e in model.terms if e.name in names)
-
-
-def _simplest_of_the_best(tried: Sequence[FittedResidual]) -> FittedResidual | None:
-    """Of those that are not worse than the best by what chance makes of it, the one with the fewest unknowns."""
-    best = min(tried, key=lambda t: float(np.sum(t.residual[1] ** 2)), default=None)
-    if best is None:
-        return None
-    level = [t for t in tried if t is best or worse(t.residual[1], best.residual[1]) < CHANCE]
-    return min(level, key=lambda t: (len(t.fit.keys), t is not best))

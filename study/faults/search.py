@@ -12,8 +12,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtr
 
-from study.faults.correction import ADJUSTABLE, corrected, fault_columns, sensible, unit_of
-from study.faults.fault import CLIPPING, DELAY, DRIFT, DROP_OUTS, FORCE_NOISE, HIGH_PASS, HUM, OFFSET, SPIKES, Fault
+from study.faults.correction import corrected, fault_columns, sensible, unit_of
+from study.faults.fault import (
+    CLIPPING,
+    DELAY,
+    DRIFT,
+    DROP_OUTS,
+    FORCE_NOISE,
+    HIGH_PASS,
+    HOLDABLE,
+    HUM,
+    OFFSET,
+    SPIKES,
+    Fault,
+)  # fmt: skip
 from study.faults.force_noise import force_noise
 from study.faults.leftover import (
     PERIODS,
@@ -61,9 +73,9 @@ class SearchStage:
         """The effects that the record asks for."""
         return effects_beside(self.rich, self.left)
 
-    def without(self, *faults: Fault) -> "SearchStage | None":
-        """The stage with these faults corrected; None where a model does not run any more."""
-        known = (*(f for f in self.faults if f.fault not in [g.fault for g in faults if f.fault == SPIKES]), *faults)
+    def without(self, fault: Fault) -> "SearchStage | None":
+        """The stage with one fault more corrected, or all spikes; None where a model does not run any more."""
+        known = (*(f for f in self.faults if not f.fault == fault.fault == SPIKES), fault)
         prepared = corrected(self.given, known)
         left, rich = (left_again(one, prepared) for one in (self.left, self.rich))
         if left is None or rich is None:
@@ -114,35 +126,29 @@ def search_faults(
     corrected. Of a long record, faults that compete with physics are looked for in a stretch of either part; the
     others everywhere.
     """
-    nothing = SearchEnd(tuple(faults), fit, fit)
     look = searched_part(given)
-    if look is given:
-        stage = _searched(given, fit, fit, faults, asked)
-        return nothing if stage is None else SearchEnd(stage.faults, stage.left.fit, stage.rich.fit)
-    near = refitted(fit, corrected(look, faults))
-    part = None if near is None else _searched(look, near, near, faults, asked)
-    if part is None:
-        return nothing
-    known = tuple(f for f in part.faults if f.fault not in PLAIN)
-    left, rich = (refitted(one.fit, corrected(given, known)) for one in (part.left, part.rich))
-    plain = tuple(name for name in asked if name in PLAIN)
-    stage = None if left is None or rich is None else _searched(given, left, rich, known, plain)
+    near = fit if look is given else refitted(fit, corrected(look, faults))
+    stage = None if near is None else _searched(look, near, near, faults, asked)
+    if stage is not None and look is not given:
+        known = tuple(f for f in stage.faults if f.fault not in PLAIN)
+        left, rich = (refitted(one.fit, corrected(given, known)) for one in (stage.left, stage.rich))
+        plain = tuple(name for name in asked if name in PLAIN)
+        stage = None if left is None or rich is None else _searched(given, left, rich, known, plain)
+        stage = None if stage is None else _values_again(stage)
     if stage is None:
-        return nothing
-    stage = _values_again(stage)
+        return SearchEnd(tuple(faults), fit, fit)
     return SearchEnd(stage.faults, stage.left.fit, stage.rich.fit)
 
 
 def _values_again(stage: SearchStage) -> SearchStage:
     """The stage with the values of its faults found again, beside the effects and the other faults known by now."""
     for fault in stage.faults:
-        if fault.fault in ADJUSTABLE and fault.corrected and not fault.held:
+        if fault.fault in HOLDABLE and fault.corrected and not fault.held:
             others = tuple(f for f in stage.faults if f is not fault)
             again = refined(fault.fault, stage.given, others, stage.rich, fault.value)
-            following = None if again is None else replace(stage, faults=others).without(
-                replace(again.fault, explained=fault.explained)
-            )  # fmt: skip
-            stage = following or stage
+            if again is not None:
+                known = replace(again.fault, explained=fault.explained)
+                stage = replace(stage, faults=others).without(known) or stage
     return stage
 
 
@@ -155,22 +161,17 @@ def _searched(
     more = left if rich is fit else leftover(rich, prepared)
     if left is None or more is None:
         return None
-    stage = _beyond_the_limits(SearchStage(given, tuple(faults), left, more))
+    stage = SearchStage(given, tuple(faults), left, more)
+    if any(f.fault == CLIPPING for f in faults):  # noise may have kept samples within a limit that clips
+        wider = tuple(widened(f, given, left) if f.fault == CLIPPING else f for f in faults)
+        again = left_again(left, corrected(given, wider))
+        stage = stage if again is None else SearchStage(given, wider, again, again)
     for _ in range(ROUNDS):
         following = _next(stage, asked)
         if following is None:
             break
         stage = following
     return _needed(stage, len(asked), [fault.fault for fault in faults])
-
-
-def _beyond_the_limits(stage: SearchStage) -> SearchStage:
-    """Without the samples near a limit that clips, which noise may have kept within it."""
-    faults = [widened(f, stage.given, stage.left) if f.fault == CLIPPING else f for f in stage.faults]
-    if not any(f.fault == CLIPPING for f in faults):
-        return stage
-    left = left_again(stage.left, corrected(stage.given, faults))
-    return stage if left is None else SearchStage(stage.given, tuple(faults), left, left)
 
 
 def _next(stage: SearchStage, asked: Sequence[str]) -> SearchStage | None:
@@ -185,37 +186,28 @@ def _next(stage: SearchStage, asked: Sequence[str]) -> SearchStage | None:
 
 def _plain(stage: SearchStage, names: Sequence[str], asked: int) -> SearchStage | None:
     """One fault more of those that no physics imitates: drop-outs, spikes, drift, and hum of the mains."""
-    if DROP_OUTS in names:
-        fault = drop_outs(stage.rich, asked)
-        if fault is not None:
-            return stage.without(fault)
-    if SPIKES in names:
-        fault = spikes(stage.rich, asked)
+    for name, looked_for in ((DROP_OUTS, drop_outs), (SPIKES, spikes), (DRIFT, drift)):
+        fault = looked_for(stage.rich, asked) if name in names else None
         if fault is not None:
             return stage.without(_merged(stage.faults, fault))
-    if DRIFT in names:
-        fault = drift(stage.rich, asked)
-        if fault is not None:
-            return stage.without(fault)
     fault = hum(stage.rich, asked) if HUM in names else None
     if fault is not None and is_of_the_mains(fault.frequency, stage.left):
         return stage.without(fault)
     return None
 
 
-def _merged(faults: Sequence[Fault], spike: Fault) -> Fault:
-    """All spikes as one fault."""
-    before = next((f for f in faults if f.fault == SPIKES), None)
-    if before is None or before.lost is None or spike.lost is None:
-        return spike
-    lost = before.lost | spike.lost
-    error = float(np.hypot(before.error, spike.error))
-    return replace(before, value=before.value + spike.value, error=error, lost=lost)
+def _merged(faults: Sequence[Fault], more: Fault) -> Fault:
+    """A fault with what was found of it before: spikes hide smaller ones."""
+    before = next((f for f in faults if f.fault == more.fault == SPIKES), None)
+    if before is None or before.lost is None or more.lost is None:
+        return more
+    error = float(np.hypot(before.error, more.error))
+    return replace(before, value=before.value + more.value, error=error, lost=before.lost | more.lost)
 
 
 def _contested(stage: SearchStage, names: Sequence[str], asked: int) -> SearchStage | None:
     """One fault more of those that have a look-alike in the library, or one effect more that the record asks for."""
-    name = _best(stage.rich, [n for n in names if n in (*ADJUSTABLE, HUM)], asked)
+    name = _best(stage.rich, [n for n in names if n in (*HOLDABLE, HUM)], asked)
     one = None if name is None else refined(name, stage.given, stage.faults, stage.rich)
     if one is not None and one.fault.error > 0.0:  # chance alone may give such a value, so many having been asked for
         t = abs(one.fault.value) / one.fault.error
@@ -314,7 +306,7 @@ def _beyond_reason(stage: SearchStage, effect: FittedResidual) -> bool:
 def _needed(stage: SearchStage, asked: int, begun: Sequence[str]) -> SearchStage:
     """Without the faults that the effects found after them have made needless; ``begun`` were known from the start."""
     for fault in stage.faults:
-        if fault.fault in (*ADJUSTABLE, DRIFT) and fault.corrected and not fault.held:
+        if fault.fault in (*HOLDABLE, DRIFT) and fault.corrected and not fault.held:
             others = tuple(f for f in stage.faults if f is not fault)
             prepared = corrected(stage.given, others)
             left, rich = (left_again(one, prepared) for one in (stage.left, stage.rich))
@@ -322,17 +314,16 @@ def _needed(stage: SearchStage, asked: int, begun: Sequence[str]) -> SearchStage
                 continue
             # Where a model loses the motion without a correction, what a little of the fault would do tells nothing.
             lost = fault.fault in begun and is_poor(rich.fit, prepared.fitted) and leaves_less(rich, stage.rich, asked)
-            if not (lost or _still_there(fault, rich, asked)):
+            if lost:
+                continue
+            if fault.fault == DRIFT:
+                seen = drift(rich, asked) is not None
+            else:
+                needed = share(rich, fault_columns(fault.fault, rich), leading=True)
+                seen = needed is not None and needed.significant(asked)
+            if not seen:
                 stage = SearchStage(stage.given, others, left, rich)
     return stage
-
-
-def _still_there(fault: Fault, rich: FittedResidual, asked: int) -> bool:
-    """Whether the record shows a fault beside all effects that it asks for."""
-    if fault.fault == DRIFT:
-        return drift(rich, asked) is not None
-    needed = share(rich, fault_columns(fault.fault, rich), leading=True)
-    return needed is not None and needed.significant(asked)
 
 
 def refined(

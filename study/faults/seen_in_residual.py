@@ -112,7 +112,7 @@ def _p_value(lines: Floats, first: int, last: int, beside: int) -> float:
 
 def hum(left: FittedResidual, asked: int) -> Fault | None:
     """The strongest line of the residual, None where none stands out of its neighbours by more than chance."""
-    frequency = strongest_line(left, ALPHA / asked)
+    frequency = _strongest_line(left, ALPHA / asked)
     if frequency is None:
         return None
     frequency = _refined(frequency, left)
@@ -146,7 +146,7 @@ def line(frequency: float, left: FittedResidual) -> Columns:
     return first, second
 
 
-def strongest_line(left: FittedResidual, level: float) -> float | None:
+def _strongest_line(left: FittedResidual, level: float) -> float | None:
     """Frequency in hertz of the line that stands highest over its neighbours, by the F test of all lines."""
     residual = left.both
     n = len(residual)
@@ -182,9 +182,9 @@ def spikes(left: FittedResidual, asked: int) -> Fault | None:
     """Spikes on both parts of the record, None without any."""
     record, prepared = left.prepared.record, left.prepared
     lost = np.zeros(len(record), dtype=bool)
-    for span, residual, reversed_ in zip(left.spans, left.residual, reversals(left), strict=True):
+    for span, residual, reversed_ in zip(left.spans, left.residual, _reversals(left), strict=True):
         known = (prepared.known(np.ones(len(residual)), span) > 0.0) & ~reversed_
-        lost[slice(*span)] = isolated(residual, known, ALPHA / asked)
+        lost[slice(*span)] = _isolated(residual, known, ALPHA / asked)
     if not np.any(lost):
         return None
     power, places = left.both**2, np.concatenate(left.samples)
@@ -197,7 +197,7 @@ def spikes(left: FittedResidual, asked: int) -> Fault | None:
     return Fault(SPIKES, prepared.response, count, error, "1", explained, lost=beside)
 
 
-def reversals(left: FittedResidual) -> tuple[Bools, Bools]:
+def _reversals(left: FittedResidual) -> tuple[Bools, Bools]:
     """Samples beside which dry friction makes the acceleration jump, on both parts; none of another response.
 
     An error of the model moves such a jump past a sample, which then stands alone as a spike does.
@@ -215,7 +215,7 @@ def _turning(velocity: Floats) -> Bools:
     return np.concatenate([turns, [False]]) | np.concatenate([[False], turns])
 
 
-def isolated(residual: Floats, known: Bools, level: float) -> Bools:
+def _isolated(residual: Floats, known: Bools, level: float) -> Bools:
     """Samples that differ from the mean of their neighbours by more than chance, and stand alone with it, shape (n,).
 
     The bend ``r_i - (r_(i-1) + r_(i+1)) / 2`` of a sample is compared with the bends near it, and with those of the
