@@ -25,7 +25,7 @@ HARMONICS = tuple(sorted(n * mains for n in range(1, 7) for mains in (50.0, 60.0
 WANDER = 1e-3  # share by which the mains' frequency wanders
 BESIDE = 24  # lines on either side that a line is held against
 NEAREST = 3  # of them, left out: a line between two shows in its neighbours
-SLOW = 12  # lines from zero that are drift, not hum
+DRIFTING = 12  # lines from zero that are drift, not hum
 NEIGHBOURS = 8  # samples on either side that tell how much a sample differs from its own two neighbours
 ROUNDS = 4  # of looking again beside what was found: a spike hides a smaller one near it
 
@@ -158,7 +158,7 @@ def _strongest_line(left: FittedResidual, level: float) -> float | None:
     count = np.convolve(np.ones_like(power), kernel, "same")
     level_beside = np.convolve(power, kernel, "same") / count
     ratio = power / np.maximum(level_beside, np.finfo(float).tiny)
-    ratio[:SLOW] = 0.0
+    ratio[:DRIFTING] = 0.0
     ratio[-2:] = 0.0
     best = int(np.argmax(ratio))
     # A taper lets neighbours share power: of the lines beside, about half are independent.
