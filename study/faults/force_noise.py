@@ -103,7 +103,7 @@ def _passed(left: FittedResidual, memory: float, size: float) -> Floats | None:
         noisy = replace(left.prepared, record=record.with_channels({FORCE: record[FORCE] + size * noise}))
         with suppress(DivergenceError):
             fitted = run_of(left.fit, noisy).respond({}, left.fit.initial)[0][:, 0]
-            judged = replace(run, prepared=noisy).motion(noisy.response)
+            judged = replace(run, prepared=noisy).motions()[:, 0]
             power = _periodogram((np.concatenate([fitted, judged]) - quiet) / size)
             return np.log(power) if np.all(power > 0.0) else None
         return None

@@ -5,20 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from study.faults.fault import (
-    CLIPPING,
-    CONVERTER_STEPS,
-    DELAY,
-    DRIFT,
-    DROP_OUTS,
-    FAULTS,
-    FORCE_NOISE,
-    GAIN_CHANGE,
-    HIGH_PASS,
-    HUM,
-    OFFSET,
-    SPIKES,
-)  # fmt: skip
+from study.faults.fault import FAULTS, FORCE_NOISE
 from study.records.prepared import FORCE
 from study.records.record import Record
 from study.support.arrays import Floats
@@ -165,7 +152,7 @@ def _either(rng: np.random.Generator) -> float:
 
 
 _MAKERS: dict[str, Callable[[Floats, float, np.random.Generator], Imposed]] = {
-    OFFSET: _offset, DRIFT: _drift, HUM: _hum, DELAY: _delay, HIGH_PASS: _high_pass, SPIKES: _spikes,
-    DROP_OUTS: _drop_outs, CLIPPING: _clipping, CONVERTER_STEPS: _converter_steps, GAIN_CHANGE: _gain_change,
-    FORCE_NOISE: _force_noise,
+    "offset": _offset, "drift": _drift, "hum": _hum, "delay": _delay, "high_pass": _high_pass, "spikes": _spikes,
+    "drop_outs": _drop_outs, "clipping": _clipping, "converter_steps": _converter_steps, "gain_change": _gain_change,
+    "force_noise": _force_noise,
 }  # fmt: skip

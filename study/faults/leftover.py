@@ -26,7 +26,7 @@ from study.support.thresholds import ALPHA, BLOCKS, TOLERANCE
 
 Columns = tuple[Floats, Floats]  # on the fitting and on the judging part, shapes (n, k) and (m, k)
 INDISTINCT = 1e-5  # share of a column's length that the model's own coefficients leave of it
-PERIODS, SHORT, LONG = 100.0, 2048, 8192  # of the motion in a search, and in samples no fewer and no more than these
+SHORT, LONG = 2048, 8192  # samples in which effects are searched for, at least and at most
 FITTED = 3  # effects of the largest linear share that are fitted
 CHANCE = 2.0  # standard errors by which one effect may leave more than another and be as good
 RUNS = 20  # free runs of such a fit
@@ -237,7 +237,7 @@ def missing(left: FittedResidual) -> FittedResidual | None:
     One outside of what makes it physical, which is another effect or a fault in disguise, only where no other does.
     """
     prepared, fit = left.prepared, left.fit
-    look = prepared.shortened(int(np.clip(prepared.samples_in(PERIODS), SHORT, LONG)))
+    look = prepared.shortened(int(np.clip(prepared.samples_in(shape_search.PERIODS), SHORT, LONG)))
     terms = effects_but(fit.model)
     try:
         near = fit if look is prepared else fit_part(fit.model, look, fit.held, steps=fit.steps_per_sample)

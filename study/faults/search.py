@@ -28,7 +28,6 @@ from study.faults.fault import (
 )  # fmt: skip
 from study.faults.force_noise import force_noise
 from study.faults.leftover import (
-    PERIODS,
     FittedResidual,
     amounts_on_both,
     asks_for_more,
@@ -43,6 +42,7 @@ from study.faults.leftover import (
 )
 from study.faults.seen_in_residual import drift, hum, is_of_the_mains, line, slow_part, spikes
 from study.faults.spotted import drop_outs, spotted, widened
+from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.settling import settled
 from study.identify.time_domain.stretch_states import is_poor
@@ -114,7 +114,7 @@ def first_faults(prepared: Prepared, held: Mapping[str, float], asked: Sequence[
 
 def searched_part(given: Prepared) -> Prepared:
     """As much of either part of a record as a search for faults that compete with physics takes."""
-    return limited(given, int(np.clip(given.samples_in(PERIODS), SHORT, LONG)))
+    return limited(given, int(np.clip(given.samples_in(shape_search.PERIODS), SHORT, LONG)))
 
 
 def search_faults(
