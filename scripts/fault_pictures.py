@@ -30,11 +30,11 @@ from study.faults.fault import (
     DELAY,
     DRIFT,
     DROP_OUTS,
+    FAULTS,
     FORCE_NOISE,
     GAIN_CHANGE,
     HIGH_PASS,
     HUM,
-    NAMES,
     OFFSET,
     SPIKES,
     Fault,
@@ -202,7 +202,7 @@ def small(data: bytes) -> bytes:
     return target.getvalue()
 
 
-def main(models: Path, folder: Path, faults: Sequence[str] = NAMES) -> None:
+def main(models: Path, folder: Path, faults: Sequence[str] = FAULTS) -> None:
     systems = {name: read_model(models / f"{name}.yaml") for name in (SYSTEM, LINEAR)}
     folder.mkdir(parents=True, exist_ok=True)
     with in_style():

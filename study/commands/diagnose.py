@@ -39,7 +39,7 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.diagnose.user_candidates import own_candidates
     from study.equations import terms
     from study.equations.model_file import read_model
-    from study.faults.instrument_settings import settings_beside
+    from study.faults.fault import settings_beside
     from study.support.errors import expect
     from study.support.files import write_files
 
@@ -77,7 +77,6 @@ def _diagnosed(
     from study.diagnose.force_between import diagnose_as_read
     from study.diagnose.needless import needless
     from study.diagnose.user_candidates import check_on, unfitted
-    from study.faults.fault import faults_in_words
 
     name = ", ".join(record.name for record in records)
     with progress(" candidates", name=name) as step:
@@ -98,7 +97,7 @@ def _diagnosed(
         print(f"\nCoefficients of the model as it was given, by record:\n{each_record.record_table(levels, records)}")
     print("\n" + words)
     if faults:
-        print("\n" + faults_in_words(faults))
+        print("\n" + " ".join(fault.says for fault in faults))
     if unneeded:
         print(f"\n{unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
     return diagnosis_files(diagnosis, words, unneeded, faults, untried, each_record.rows(levels, records))

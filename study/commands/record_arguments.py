@@ -186,7 +186,7 @@ def accounted_together(
     One model is fitted to all of them. ``options`` are the estimator and progress of
     :func:`study.way_in.compare_records.compare_records`.
     """
-    from study.faults.instrument_settings import settings_asked
+    from study.faults.fault import settings_asked
     from study.way_in.compare_records import compare_records
 
     with naming(path, arguments.model):

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[Prepared]":
     """The records that were named, made ready; options that nothing does with several coordinates are refused."""
-    from study.faults.instrument_settings import settings_beside
+    from study.faults.fault import settings_beside
     from study.structure.prepared_structure import structure_ready
     from study.support.errors import at, expect
 

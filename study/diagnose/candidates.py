@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from study.compare.prediction import Prediction, predict
 from study.equations.model import ModelTerm, free
-from study.equations.terms import LIBRARY, Term
+from study.equations.terms import Term, effects_but
 from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.shape_search import Baseline
@@ -18,7 +18,6 @@ from study.support.cores import side_by_side
 from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
-NEVER_CANDIDATES = ("inertia",)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +36,7 @@ class FittedCandidate:
 
 def candidate_terms(base: Baseline, extra: Sequence[Term] = (), without: Sequence[str] = ()) -> list[Term]:
     """The library's terms and the user's own that are not in the model already."""
-    known = [t for t in LIBRARY.values() if t.name not in NEVER_CANDIDATES]
-    return [t for t in (*known, *extra) if t.name not in base.fit.model and t.name not in without]
+    return [t for t in effects_but(base.fit.model, extra) if t.name not in without]
 
 
 def try_all(

@@ -46,7 +46,7 @@ def late_force(diagnosis: Diagnosis) -> Fault | None:
     held = held_out(fit, prediction, linearise(fit, prepared), prepared)
     if gain.p_value * (len(rows) + 1) >= ALPHA or _behind(held, fit, rows[0].held_out, rows[0].fit):
         return None
-    return Fault(DELAY, FORCE, delay, error, "samples", gain.explained).with_rivals(rows[0].name)
+    return Fault(DELAY, FORCE, delay, error, "samples", gain.explained, rivals=(rows[0].name,))
 
 
 def _moved(fit: FreeRunFit, prepared: Prepared) -> tuple[float, float, FreeRunFit, Prepared]:

@@ -30,7 +30,6 @@ from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE, UNSTEADY
 
 Floats = NDArray[np.float64]
 MISSING, NOTHING, UNKNOWN = "missing_effect", "nothing_missing", "unknown_effect"
-PERIODS = 100.0  # of the motion that a search uses, at least
 SHORT, LONG = 2048, 16384  # samples: it uses half of the fitting part if that is more, within these limits
 SETTLED = 4  # of the candidates, the best: fitted on the whole fitting part and with enough steps
 MOST = 0.5  # of what is unexplained: what an effect of a component, or of a decay, explains that is named first
@@ -79,7 +78,7 @@ def search_part(prepared: Prepared) -> Prepared:
     if prepared.record.stretches:  # what is loud and what is quiet lie in stretches of their own
         return prepared.shortened(LONG)
     first, last = prepared.plan.fit
-    wanted = max((last - first) // 2, prepared.samples_in(PERIODS))
+    wanted = max((last - first) // 2, prepared.samples_in(shape_search.PERIODS))
     look = prepared.shortened(int(np.clip(wanted, SHORT, LONG)))
     return look if look.spread > 0.5 * prepared.spread else prepared.shortened(LONG)
 

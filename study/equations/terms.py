@@ -9,7 +9,7 @@ its shape parameters are searched, how a trial draws it and when it is physical:
 To add an effect, add one entry to ``LIBRARY`` and one row to the parametrised tests.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Container, Iterable
 from difflib import get_close_matches
 
 import numpy as np
@@ -214,6 +214,11 @@ def get(name: str) -> Term:
         hint = f"; did you mean {near[0]!r}?" if near else f"; known are {', '.join(LIBRARY)}"
         raise StudyError(f"there is no term {name!r}{hint}")
     return LIBRARY[name]
+
+
+def effects_but(known: Container[str], extra: Iterable[Term] = ()) -> list[Term]:
+    """The library's effects and these more, without those of known names; inertia is none that could be missing."""
+    return [t for t in (*LIBRARY.values(), *extra) if t.name not in known and t.name != "inertia"]
 
 
 def find_terms(word: str) -> tuple[Term, ...]:

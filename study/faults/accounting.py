@@ -8,20 +8,17 @@ from typing import Literal
 from study.compare.by_estimator import FREE_RUN
 from study.compare.comparison import Comparison, compare
 from study.equations.model import Model
-from study.faults.correction import corrected
-from study.faults.drift import mean_response, slow_response
-from study.faults.fault import DELAY, DRIFT, FORCE_NOISE, OFFSET, Fault
+from study.faults.correction import corrected, fault_columns, unit_of
+from study.faults.fault import DELAY, DRIFT, FAULTS, FORCE_NOISE, OFFSET, Fault
 from study.faults.force_noise import force_noise
-from study.faults.imposed import FAULTS
-from study.faults.late_response import late_response
-from study.faults.leftover import leaves_less, leftover
-from study.faults.physics import on_all
-from study.faults.search import first_faults, search_faults
-from study.faults.stage import SearchEnd
+from study.faults.leftover import amounts_on_both, leaves_less, leftover
+from study.faults.search import Refined, SearchEnd, first_faults, refined, search_faults, searched_part
+from study.faults.seen_in_residual import mean_response, slow_response
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.motion_start import has_lost_the_motion
+from study.identify.time_domain.motion_start import delay_along_the_motion, has_lost_the_motion
 from study.identify.time_domain.settling import settled
+from study.identify.time_domain.stretch_states import is_poor
 from study.records.prepared import FORCE, Prepared
 from study.records.sampling_rate import too_coarse, without_spare_samples
 from study.support.errors import StudyError
@@ -78,11 +75,12 @@ def accounted(
     """
     known = dict(held or {})
     asked = tuple(name for name in FAULTS if name not in switched_off and name not in known)
-    if asked and not _may_be_asked(prepared):
+    # A record shows faults by what it leaves of a driven response; they pass through no joint of stretches.
+    if asked and (prepared.record.stretches or prepared.free or prepared.response == FORCE):
         asked, prepared = (), replace(prepared, notes=(*prepared.notes, NOT_ASKED))
     coarse = too_coarse(prepared)
     prepared = replace(prepared, notes=(*prepared.notes, coarse)) if coarse else prepared
-    needed = _all_samples if as_sampled else without_spare_samples
+    needed: Callable[[Prepared], Prepared] = (lambda whole: whole) if as_sampled else without_spare_samples
     faults = first_faults(prepared, known, asked)
     first = corrected(prepared, faults)
     fewer = needed(first)
@@ -91,27 +89,22 @@ def accounted(
     fit = fit_model(model, fewer)
     lost = has_lost_the_motion(fit, fewer)
     told = tuple(name for name in asked if not (lost and name in OF_THE_MOTION))
-    end = search_faults(prepared, fit if fewer is first else on_all(fit, first), faults, told)
-    for begin in _begins(first, fit, asked):
-        end = _beneath(begin, model, prepared, faults, asked, end)
+    end = search_faults(prepared, fit if fewer is first else _on_all(fit, first), faults, told)
+    beneath = slow_response(first, len(asked)) if DRIFT in asked else None
+    if beneath is None and OFFSET in asked and (not fit.converged or has_lost_the_motion(fit, first)):
+        beneath = mean_response(first)
+    if beneath is not None:
+        end = _beneath(beneath, model, prepared, faults, asked, end)
     if DELAY in asked and DELAY not in [fault.fault for fault in end.faults]:
-        late = late_response(model, prepared, fit, faults, needed)
+        late = _late_response(model, prepared, fit, faults, needed)
         if late is not None:
             end = _begun_late(late.fault, late.left.fit, prepared, faults, asked, end)
     if end.faults == faults:
         return _compared(model, fewer, end.faults, fit, estimator, progress)
     final = corrected(prepared, end.faults)
     kept = needed(final)
-    best = _fitted(model, kept, end.fit if kept is final else on_all(end.fit, kept))
+    best = _fitted(model, kept, end.fit if kept is final else _on_all(end.fit, kept))
     return _compared(model, kept, end.faults, best, estimator, progress)
-
-
-def _begins(prepared: Prepared, fit: FreeRunFit, asked: Sequence[str]) -> list[Fault]:
-    """What may lie beneath the motion and lead its fit astray: the slowest lines, and its mean where a fit is lost."""
-    slow = slow_response(prepared, len(asked)) if DRIFT in asked else None
-    astray = not fit.converged or has_lost_the_motion(fit, prepared)
-    mean = [mean_response(prepared)] if astray and OFFSET in asked else []
-    return mean if slow is None else [slow]
 
 
 def _beneath(
@@ -120,10 +113,10 @@ def _beneath(
 ) -> SearchEnd:  # fmt: skip
     """The better end of two searches for faults: the plain one, and one that a drift or an offset cannot lead astray.
 
-    The second begins with the model fitted to the response without what may lie beneath it.
+    The second begins with the model fitted to the response without what may lie beneath it (``begin``): its slowest
+    lines, or its mean where a fit is lost.
     """
-    if begin.waveform is None:
-        return plain
+    assert begin.waveform is not None
     beneath = corrected(prepared, (*faults, begin))
     try:
         begun = fit_model(model, beneath)
@@ -137,6 +130,40 @@ def _beneath(
     return other if begun_with and _leaves_less(prepared, plain, other, "fit") else plain
 
 
+def _late_response(
+    model: Model, prepared: Prepared, fit: FreeRunFit, faults: Sequence[Fault],
+    needed: Callable[[Prepared], Prepared],
+) -> Refined | None:  # fmt: skip
+    """A delay with which a model that had lost the motion follows it; None where it follows no better.
+
+    ``fit`` is the model fitted without a delay to the record that is corrected for ``faults``, ``needed`` gives the
+    samples that a fit asks for.
+    """
+    plain = corrected(prepared, faults)
+    if not is_poor(fit, needed(plain).fitted):
+        return None
+    try:
+        late = delay_along_the_motion(fit.model, plain)
+        if not abs(late) > 0.0:
+            return None
+        begin = Fault(DELAY, prepared.response, late, unit=unit_of(DELAY, ""))
+        begun = fit_model(model, needed(corrected(prepared, (*faults, begin))))
+        follows = fit.restarts or begun.rms < fit.rms  # segments follow anything, with states of their own
+        if begun.restarts or not follows:
+            return None
+        look = searched_part(prepared)
+        late_too = corrected(look, (*faults, begin))
+        left = leftover(_on_all(begun, late_too), late_too)
+        if left is None:
+            return None
+        covariance = amounts_on_both(left, fault_columns(DELAY, left, begin.value))[1]
+        error = math.hypot(math.sqrt(max(float(covariance[0, 0]), 0.0)), TOLERANCE * begin.value)
+        right = Refined(replace(begin, error=error), left)  # where the search begins may be the very value
+        return refined(DELAY, look, faults, left, begin.value) or right
+    except StudyError:
+        return None
+
+
 def _begun_late(
     late: Fault, fit: FreeRunFit, prepared: Prepared, faults: Sequence[Fault], asked: Sequence[str], plain: SearchEnd
 ) -> SearchEnd:
@@ -144,9 +171,9 @@ def _begun_late(
 
     A delay takes a part of what any missing effect leaves: it has to leave less beside the effects too.
     """
-    without = leftover(plain.fit, corrected(prepared, plain.faults))
-    following = on_all(fit, corrected(prepared, (*faults, late)))
-    left = leftover(following, corrected(prepared, (*faults, late)))
+    without, less_late = leftover(plain.fit, corrected(prepared, plain.faults)), corrected(prepared, (*faults, late))
+    following = _on_all(fit, less_late)
+    left = leftover(following, less_late)
     if left is None:
         return plain
     explained = math.nan if without is None else gain(without.residual[1], left.residual[1]).explained
@@ -162,13 +189,11 @@ def _leaves_less(prepared: Prepared, plain: SearchEnd, other: SearchEnd, which: 
     return after is not None and (before is None or leaves_less(before, after, 1))
 
 
-def _all_samples(prepared: Prepared) -> Prepared:
-    return prepared
-
-
-def _may_be_asked(prepared: Prepared) -> bool:
-    """Whether a record shows faults by what it leaves of a driven response; they pass through no joint of stretches."""
-    return not (prepared.record.stretches or prepared.free or prepared.response == FORCE)
+def _on_all(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
+    """A fit to a record with other samples of the same motion, from the values where it stands."""
+    values = fit.model.numbers()
+    again = fit_model(fit.model.with_values(dict.fromkeys(fit.keys)), prepared, {key: values[key] for key in fit.keys})
+    return replace(again, elsewhere=())
 
 
 def _fitted(model: Model, prepared: Prepared, near: FreeRunFit) -> FreeRunFit:

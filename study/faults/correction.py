@@ -1,18 +1,71 @@
-"""A record without the faults that were found: the channel as it would have been, and which samples say nothing."""
+"""Faults that one number describes, and a record without the faults that were found.
 
-from collections.abc import Sequence
+How the response changes with such a number, how a channel is rid of it, and which samples say nothing.
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from study.faults.adjustable import without_fault
 from study.faults.fault import DELAY, GAIN_CHANGE, HIGH_PASS, OFFSET, Fault
+from study.faults.imposed import high_passed, shifted
+from study.faults.leftover import Columns, FittedResidual
+from study.records.completion import derivative
 from study.records.prepared import Prepared, prepare_record
-from study.records.record import MOTIONS, Record
-from study.support.arrays import Floats
+from study.records.record import Record
+from study.records.states import angular_rate
+from study.support.arrays import Bools, Floats
 
+FIRST = 0.02  # of the motion's own frequency: the cut-off at which a high-pass is first looked for
 BESIDE = 2  # samples on either side of lost ones that a channel which is moved in time loses too
+
+
+def unit_of(fault: str, response_unit: str) -> str:
+    """Unit of a fault's value."""
+    return {DELAY: "samples", GAIN_CHANGE: "1", HIGH_PASS: "Hz"}.get(fault, response_unit)
+
+
+def fault_columns(fault: str, left: FittedResidual, value: float = 0.0) -> Columns:
+    """Derivative of the response by the fault's value on both parts, shapes (n, k) and (m, k); the first column.
+
+    Others stand for what is not known of the channel at its first sample. ``value`` is what the record has been
+    corrected for already.
+    """
+    fitted, judged = left.predicted
+    dt = left.prepared.dt
+    if fault == OFFSET:
+        return np.ones((len(fitted), 1)), np.ones((len(judged), 1))
+    if fault == GAIN_CHANGE:
+        last = max(len(left.prepared.record) - 1, 1)
+        first, second = left.samples
+        return (fitted * first / last)[:, None], (judged * second / last)[:, None]
+    if fault == DELAY:
+        return _along(left, lambda motion: -dt * derivative(motion, dt, 1))
+    cutoff = value or FIRST * angular_rate(fitted, dt) / (2.0 * np.pi)
+    fall = np.exp(-2.0 * np.pi * cutoff * dt * np.arange(len(fitted)))
+    first, second = _along(left, lambda motion: (high_passed(motion, cutoff, dt) - motion) / cutoff)
+    return np.column_stack([first, fall]), np.column_stack([second, np.zeros(len(judged))])
+
+
+def _along(left: FittedResidual, change: Callable[[Floats], Floats]) -> Columns:
+    """A linear change of the predicted response, along both parts at once where they follow each other."""
+    fitted, judged = left.predicted
+    if left.spans[0][1] != left.spans[1][0]:
+        return change(fitted)[:, None], change(judged)[:, None]
+    both = change(np.concatenate([fitted, judged]))[:, None]
+    return both[: len(fitted)], both[len(fitted) :]
+
+
+def sensible(fault: str, value: float, left: FittedResidual) -> bool:
+    """Whether a value is one that the fault can have: a gain stays positive, a cut-off lies below half the rate."""
+    if fault == GAIN_CHANGE:
+        return -0.9 < value < 9.0
+    if fault == HIGH_PASS:
+        return 0.0 < value < 0.25 / left.prepared.dt
+    if fault == DELAY:
+        return abs(value) < 0.05 * len(left.residual[0])
+    return True
 
 
 def corrected(prepared: Prepared, faults: Sequence[Fault]) -> Prepared:
@@ -24,35 +77,41 @@ def corrected(prepared: Prepared, faults: Sequence[Fault]) -> Prepared:
     wanted = [fault for fault in faults if fault.corrected]
     if not wanted:
         return prepared
-    response, lost = prepared.response, _lost(wanted)
-    values = prepared.record[response]
-    values = values if lost is None else bridged(values, lost)
+    record, response = prepared.record, prepared.response
+    masks = [fault.lost for fault in wanted if fault.lost is not None]
+    lost = np.any(masks, axis=0) if masks else None
+    values = record[response] if lost is None else _bridged(record[response], lost)
     for fault in wanted:
         if fault.waveform is not None and fault.fault != HIGH_PASS:
             values = values - fault.waveform
     for name in (OFFSET, GAIN_CHANGE, HIGH_PASS, DELAY):
         for fault in wanted:
             if fault.fault == name:
-                values = without_fault(name, values, fault.value, prepared.dt)
+                values = _without_fault(name, values, fault.value, prepared.dt)
                 if fault.waveform is not None:
                     values = values - fault.waveform
     late = sum(abs(fault.value) for fault in wanted if fault.fault == DELAY)
     if late and lost is not None:
-        lost = _wider(lost, int(np.ceil(late)) + BESIDE)
-    return replace(_with_response(prepared, values), lost=lost)
+        lost = np.convolve(lost, np.ones(2 * (int(np.ceil(late)) + BESIDE) + 1), "same") > 0.5
+    channels = {name: c for name, c in record.channels.items() if name not in record.computed}
+    raw = Record(record.dt, {**channels, response: values}, record.units, record.name, record.start, record.period)
+    return replace(prepare_record(raw, prepared.plan, prepared.low or None), notes=prepared.notes, lost=lost)
 
 
-def _lost(faults: Sequence[Fault]) -> NDArray[np.bool_] | None:
-    """Samples that any fault spoils."""
-    masks = [fault.lost for fault in faults if fault.lost is not None]
-    return np.any(masks, axis=0) if masks else None
+def _without_fault(fault: str, values: Floats, value: float, dt: float) -> Floats:
+    """A channel without the fault, shape (n,)."""
+    if fault == OFFSET:
+        return values - value
+    if fault == GAIN_CHANGE:
+        return values / (1.0 + value * np.arange(len(values)) / max(len(values) - 1, 1))
+    if fault == DELAY:
+        return shifted(values, -value)
+    half = np.pi * value * dt
+    centred = values - np.mean(values)
+    return np.cumsum((1.0 + half) * centred + (half - 1.0) * np.concatenate([[0.0], centred[:-1]]))
 
 
-def _wider(lost: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
-    return np.convolve(lost, np.ones(2 * reach + 1), "same") > 0.5
-
-
-def bridged(values: Floats, lost: NDArray[np.bool_]) -> Floats:
+def _bridged(values: Floats, lost: Bools) -> Floats:
     """A channel with a cubic through the neighbours where samples are lost, shape (n,).
 
     It is for what is computed from the channel beside a free run; no free run is held against these samples.
@@ -64,20 +123,8 @@ def bridged(values: Floats, lost: NDArray[np.bool_]) -> Floats:
         return values
     filled = values.copy()
     inside = np.flatnonzero(lost)
-    limits = float(np.min(values[known])), float(np.max(values[known]))
-    reach = limits[1] - limits[0]
+    low, high = float(np.min(values[known])), float(np.max(values[known]))
+    reach = high - low
     spline = np.asarray(CubicSpline(known, values[known])(inside), dtype=np.float64)
-    filled[inside] = np.clip(spline, limits[0] - 0.5 * reach, limits[1] + 0.5 * reach)
+    filled[inside] = np.clip(spline, low - 0.5 * reach, high + 0.5 * reach)
     return filled
-
-
-def _with_response(prepared: Prepared, values: Floats) -> Prepared:
-    """The record with another measured response, and the motions that follow from it."""
-    record = prepared.record
-    computed = [m for m in MOTIONS if m in prepared.record.computed]
-    channels = {name: c for name, c in record.channels.items() if name not in computed}
-    raw = Record(
-        record.dt, {**channels, prepared.response: values}, record.units, record.name, record.start, record.period
-    )
-    again = prepare_record(raw, prepared.plan, prepared.low or None)
-    return replace(again, notes=prepared.notes)

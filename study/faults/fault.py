@@ -1,19 +1,19 @@
-"""A fault of the measurement: what it is, how large, and what it says to an engineer."""
+"""A fault of the measurement: what it is, what it says to an engineer, and what the user knows of the instruments."""
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from study.support.arrays import Floats
+from study.records.readers.options import options_beside, read_options
+from study.support.arrays import Bools, Floats
+from study.support.errors import at, expect
 
 OFFSET, DRIFT, HUM, DELAY, HIGH_PASS = "offset", "drift", "hum", "delay", "high_pass"
 SPIKES, DROP_OUTS, CLIPPING = "spikes", "drop_outs", "clipping"
 CONVERTER_STEPS, GAIN_CHANGE, FORCE_NOISE = "converter_steps", "gain_change", "force_noise"
-NAMES = (
+FAULTS = (
     OFFSET, DRIFT, HUM, DELAY, HIGH_PASS, SPIKES, DROP_OUTS, CLIPPING, CONVERTER_STEPS, GAIN_CHANGE, FORCE_NOISE,
 )  # fmt: skip
 HOLDABLE = (OFFSET, DELAY, HIGH_PASS, GAIN_CHANGE)  # faults that one number describes: a user may know it
@@ -22,45 +22,19 @@ NAMED_ALONE = (CONVERTER_STEPS, FORCE_NOISE)  # there is nothing that would undo
 
 @dataclass(frozen=True, eq=False)
 class Fault:
-    """One fault; n samples of the record.
+    """One fault; n samples of the record."""
 
-    Attributes
-    ----------
-    fault : str
-        One of ``NAMES``.
-    channel : str
-        The channel that has it.
-    value : float
-        Its size, in ``unit``; what that measures is told in ``MEANING``.
-    error : float
-        Standard error of the value; 0 where it is counted and not estimated, or held by the user.
-    unit : str
-        Unit of the value.
-    explained : float
-        Share of the unexplained power that it explains on the judging part; nan where that was not asked.
-    waveform : array, shape (n,), optional
-        What is added to the channel, where that is neither a constant nor a filter.
-    lost : bool array, shape (n,), optional
-        Samples that say nothing.
-    frequency : float
-        In hertz, of a line; nan of others.
-    rivals : tuple of str
-        Effects of the library that do what it does on this record: it is then mentioned, and not corrected.
-    held : bool
-        Whether the user gave the value.
-    """
-
-    fault: str
-    channel: str
-    value: float
-    error: float = 0.0
+    fault: str  # one of ``FAULTS``
+    channel: str  # the channel that has it
+    value: float  # its size, in ``unit``; what that measures is told where it is put on (study/faults/imposed.py)
+    error: float = 0.0  # standard error of that; 0 where it is counted and not estimated, or held by the user
     unit: str = ""
-    explained: float = math.nan
-    waveform: Floats | None = None
-    lost: NDArray[np.bool_] | None = None
-    frequency: float = math.nan
-    rivals: tuple[str, ...] = ()
-    held: bool = False
+    explained: float = math.nan  # share of the unexplained power of the judging part; nan where that was not asked
+    waveform: Floats | None = None  # what is added to the channel, where that is neither a constant nor a filter; (n,)
+    lost: Bools | None = None  # samples that say nothing; shape (n,)
+    frequency: float = math.nan  # in hertz, of a line; nan of others
+    rivals: tuple[str, ...] = ()  # effects that do as much on this record: it is mentioned then, and not corrected
+    held: bool = False  # whether the user gave the value
 
     @property
     def corrected(self) -> bool:
@@ -82,10 +56,6 @@ class Fault:
         """The same as a part of a sentence."""
         return f"{_SENTENCES[self.fault](self)}{_what_follows(self)}"
 
-    def with_rivals(self, *names: str) -> "Fault":
-        """The same as one of several explanations that this record cannot tell apart."""
-        return replace(self, rivals=names)
-
 
 def fault_fields(fault: Fault) -> dict[str, Any]:
     """A fault as ``diagnosis.json`` holds it."""
@@ -94,11 +64,6 @@ def fault_fields(fault: Fault) -> dict[str, Any]:
         "unit": fault.unit, "explained": fault.explained, "corrected": fault.corrected,
         "rivals": list(fault.rivals), "says": fault.says,
     }  # fmt: skip
-
-
-def faults_in_words(faults: tuple[Fault, ...]) -> str:
-    """All faults in sentences; empty without any."""
-    return " ".join(fault.says for fault in faults)
 
 
 def _what_follows(fault: Fault) -> str:
@@ -157,16 +122,63 @@ _SENTENCES: Mapping[str, Callable[[Fault], str]] = {
     GAIN_CHANGE: _gain,
     FORCE_NOISE: lambda f: f"noise of about {_amount(f)} (rms) lies on the measured force",
 }
-MEANING = {
-    OFFSET: "what is added to every sample",
-    DRIFT: "rms of what is slower than the structure",
-    HUM: "amplitude of a line that the structure does not pass on",
-    DELAY: "samples by which the response is read after the force",
-    HIGH_PASS: "cut-off in hertz of a coupling of first order",
-    SPIKES: "share of the samples",
-    DROP_OUTS: "share of the samples",
-    CLIPPING: "largest value that is shown, away from the middle of the range",
-    CONVERTER_STEPS: "distance of neighbouring values",
-    GAIN_CHANGE: "change of the gain from the first sample, where it is one, to the last",
-    FORCE_NOISE: "rms of the noise up to half the sampling rate",
-}
+
+
+@dataclass(frozen=True)
+class FaultSettings:
+    """Faults with a value that is known, faults that are not looked for, and whether all samples are used."""
+
+    held: Mapping[str, float] = field(default_factory=dict[str, float])
+    switched_off: tuple[str, ...] = ()
+    as_sampled: bool = False
+
+
+NOTHING_ASKED = FaultSettings(switched_off=FAULTS)
+
+
+def settings_asked(record: Path | None, given: Mapping[str, float | None] | bool | None = None) -> FaultSettings:
+    """The settings for a record that was read from a file, or for one of none.
+
+    What is ``given`` comes before what stands beside the file: values by name of the fault, or False to look for none.
+    Whether all samples are used is told beside the file alone.
+
+    Raises
+    ------
+    StudyError
+        As :func:`settings_beside`, whatever is given.
+    """
+    beside = FaultSettings() if record is None else settings_beside(record)
+    if given is None or given is True:
+        return beside
+    asked = NOTHING_ASKED if given is False else settings_of(given)
+    return replace(asked, as_sampled=beside.as_sampled)
+
+
+def settings_beside(record: Path) -> FaultSettings:
+    """The settings in the file that may stand beside a record, under ``measurement``.
+
+    Raises
+    ------
+    StudyError
+        If it names a fault that is not known, or holds one at a value that one number does not describe.
+    """
+    path = options_beside(record)
+    if not path.is_file():
+        return FaultSettings()
+    options = read_options(path)
+    with at(path):
+        asked = settings_of(options.measurement) if options.measurement else FaultSettings()
+    asked = NOTHING_ASKED if options.measurement == {} else asked
+    return replace(asked, as_sampled=options.as_sampled)
+
+
+def settings_of(given: Mapping[str, float | None]) -> FaultSettings:
+    """Settings from values by name of the fault; None for a fault that is not looked for."""
+    for name, value in given.items():
+        expect(name in FAULTS, f"measurement names {name!r}; expected one of {', '.join(FAULTS)}")
+        known = value is None or name in HOLDABLE
+        expect(known, f"{name} is held at {value}; expected 'off', or a number for one of {', '.join(HOLDABLE)}")
+        expect(name != "high_pass" or value is None or value > 0.0, f"high_pass is {value}; expected a cut-off above 0")
+        expect(name != "gain_change" or value is None or value > -1.0, f"gain_change is {value}; expected it above -1")
+    held = {name: value for name, value in given.items() if value is not None and value != 0.0}
+    return FaultSettings(held, tuple(name for name in given if name not in held))

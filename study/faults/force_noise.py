@@ -13,7 +13,7 @@ from scipy.fft import irfft, rfft, rfftfreq
 from study.faults.fault import FORCE_NOISE, Fault
 from study.faults.leftover import FittedResidual
 from study.identify.time_domain.part_fit import run_of
-from study.records.prepared import FORCE, Prepared
+from study.records.prepared import FORCE
 from study.support.arrays import Floats
 from study.support.cores import side_by_side
 from study.support.errors import DivergenceError
@@ -57,7 +57,7 @@ def force_noise(left: FittedResidual, asked: int, repeats: int = REPEATS) -> Fau
 
     With fewer ``repeats`` its size and colour are those of the first runs.
     """
-    residual = np.concatenate(left.residual)
+    residual = left.both
     power = _periodogram(residual)
     turn = 2.0 * np.pi * np.asarray(rfftfreq(len(residual)))[1:-1]
     on_response = min(_likely(power, _first_order(memory, turn)).cost for memory in MEMORIES)
@@ -76,20 +76,15 @@ def force_noise(left: FittedResidual, asked: int, repeats: int = REPEATS) -> Fau
             break
     if not found:
         return None
-    value, error = _rms(found)
-    unit = left.prepared.record.units.get("force", "")
-    explained = min(found, key=lambda noise: noise.cost).power / float(np.mean(residual**2))
-    return Fault(FORCE_NOISE, "force", value, error, unit, min(explained, 1.0))
-
-
-def _rms(found: list[_Noise]) -> tuple[float, float]:
-    """Rms of the noise and its standard error, over all colours by how likely each is."""
-    costs = KEPT * np.array([noise.cost for noise in found])
+    costs = KEPT * np.array([noise.cost for noise in found])  # the rms is that of all colours by how likely each is
     weights = np.exp(np.min(costs) - costs)
     weights /= float(np.sum(weights))
     sizes, errors = np.array([noise.rms for noise in found]), np.array([noise.error_of_rms for noise in found])
     value = float(weights @ sizes)
-    return value, float(np.sqrt(weights @ (np.where(weights > 1e-6, errors, 0.0) ** 2 + (sizes - value) ** 2)))
+    error = float(np.sqrt(weights @ (np.where(weights > 1e-6, errors, 0.0) ** 2 + (sizes - value) ** 2)))
+    explained = min(found, key=lambda noise: noise.cost).power / float(np.mean(residual**2))
+    unit = left.prepared.record.units.get(FORCE, "")
+    return Fault(FORCE_NOISE, FORCE, value, error, unit, min(explained, 1.0))
 
 
 def _passed(left: FittedResidual, memory: float, size: float) -> Floats | None:
@@ -100,14 +95,16 @@ def _passed(left: FittedResidual, memory: float, size: float) -> Floats | None:
     that noise lets escape, or does not move at all, are left out; None where these are all.
     """
     rng, record = np.random.default_rng(0), left.prepared.record
-    quiet = np.concatenate(left.predicted)
+    run, quiet = left.run, np.concatenate(left.predicted)
     colour = np.sqrt(_first_order(memory, 2.0 * np.pi * np.asarray(rfftfreq(len(record)))))
 
     def logarithm(white: Floats) -> Floats | None:
         noise = np.asarray(irfft(np.asarray(rfft(white)) * colour, len(record)))
-        noisy = record.with_channels({FORCE: record[FORCE] + size * noise})
+        noisy = replace(left.prepared, record=record.with_channels({FORCE: record[FORCE] + size * noise}))
         with suppress(DivergenceError):
-            power = _periodogram((_response(left, replace(left.prepared, record=noisy)) - quiet) / size)
+            fitted = run_of(left.fit, noisy).respond({}, left.fit.initial)[0][:, 0]
+            judged = replace(run, prepared=noisy).motions()[:, 0]
+            power = _periodogram((np.concatenate([fitted, judged]) - quiet) / size)
             return np.log(power) if np.all(power > 0.0) else None
         return None
 
@@ -131,13 +128,6 @@ def _periodogram(values: Floats) -> Floats:
     bell[:edge] = 0.5 - 0.5 * np.cos(np.pi * (np.arange(edge) + 0.5) / edge)
     bell[n - edge :] = bell[edge - 1 :: -1]
     return np.abs(np.asarray(rfft(values * bell)))[1:-1] ** 2 / float(np.sum(bell**2))
-
-
-def _response(left: FittedResidual, prepared: Prepared) -> Floats:
-    """Response of the fitted model on both parts of a record, shape (n + m,)."""
-    fitted = run_of(left.fit, prepared).respond({}, left.fit.initial)[0][:, 0]
-    assert left.prediction.run is not None, "what does not run leaves nothing to look at"
-    return np.concatenate([fitted, replace(left.prediction.run, prepared=prepared).motion(prepared.response)])
 
 
 def _likely(power: Floats, shape: Floats) -> _Noise:

@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from study.faults.fault import FAULTS, FORCE_NOISE
+from study.records.prepared import FORCE
 from study.records.record import Record
 from study.support.arrays import Floats
 from study.support.errors import expect
@@ -19,23 +21,8 @@ EXTENSION = 64  # samples by which a channel is continued before it is moved
 def impose(record: Record, response: str, fault: str, rng: np.random.Generator) -> tuple[Record, dict[str, Any]]:
     """A record with one fault on its force or response, of a size drawn from the generator.
 
-    Parameters
-    ----------
-    record : Record
-        Force and the measured motion.
-    response : str
-        That motion.
-    fault : str
-        One of ``FAULTS``.
-    rng : Generator
-        Draws the size, and whatever else the fault leaves open.
-
-    Returns
-    -------
-    Record
-        The same with the fault.
-    dict
-        ``fault``, ``channel``, ``value``, ``unit`` as the search for faults gives them: what it should find.
+    What is known of it is given as the search for faults gives it: ``fault``, ``channel``, ``value`` and ``unit`` are
+    what it should find. ``response`` is the measured motion, and ``fault`` one of ``FAULTS``.
 
     Raises
     ------
@@ -43,7 +30,7 @@ def impose(record: Record, response: str, fault: str, rng: np.random.Generator) 
         If there is no such fault.
     """
     expect(fault in FAULTS, f"there is no fault {fault!r}; expected one of {', '.join(FAULTS)}")
-    channel = "force" if fault == "force_noise" else response
+    channel = FORCE if fault == FORCE_NOISE else response
     faulty, value, unit = _MAKERS[fault](record[channel], record.dt, rng)
     known = {"fault": fault, "channel": channel, "value": value, "unit": unit or record.units.get(channel, "")}
     return record.with_channels({channel: faulty}), known
@@ -169,4 +156,3 @@ _MAKERS: dict[str, Callable[[Floats, float, np.random.Generator], Imposed]] = {
     "drop_outs": _drop_outs, "clipping": _clipping, "converter_steps": _converter_steps, "gain_change": _gain_change,
     "force_noise": _force_noise,
 }  # fmt: skip
-FAULTS = tuple(_MAKERS)

@@ -1,21 +1,35 @@
-"""What a fitted model leaves of the response, beside all that its own coefficients and initial state could take."""
+"""What a fitted model leaves of the response, and what a fault or an effect of the library would explain of it.
 
-from dataclasses import dataclass
+A fault or an effect gets no more than the model's own coefficients and initial state could not take.
+"""
+
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.special import fdtrc
 
 from study.compare.prediction import Prediction, predict
+from study.equations.model import ModelTerm, free
+from study.equations.terms import LIBRARY, Term, effects_but
+from study.identify.time_domain import shape_search
+from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.part_fit import linearise, run_of
+from study.identify.time_domain.part_fit import JudgingRun, fit_part, linearise, run_of
 from study.records.prepared import Prepared
-from study.support.arrays import Floats
+from study.support.arrays import Floats, Ints
+from study.support.cores import side_by_side
+from study.support.errors import StudyError
 from study.support.least_squares import least_squares
-from study.support.statistics import Gain, clustered_covariance, gain, gain_beside
+from study.support.statistics import Gain, clustered_covariance, gain, gain_beside, worse
 from study.support.thresholds import ALPHA, BLOCKS, TOLERANCE
 
+Columns = tuple[Floats, Floats]  # on the fitting and on the judging part, shapes (n, k) and (m, k)
 INDISTINCT = 1e-5  # share of a column's length that the model's own coefficients leave of it
+SHORT, LONG = 2048, 8192  # samples in which effects are searched for, at least and at most
+FITTED = 3  # effects of the largest linear share that are fitted
+CHANCE = 2.0  # standard errors by which one effect may leave more than another and be as good
+RUNS = 20  # free runs of such a fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,22 +38,28 @@ class FittedResidual:
 
     fit: FreeRunFit
     prediction: Prediction
-    prepared: Prepared
+
+    @property
+    def prepared(self) -> Prepared:
+        """The record and its parts."""
+        return self.prediction.prepared
+
+    @property
+    def run(self) -> JudgingRun:
+        """The free run along the judging part."""
+        assert self.prediction.run is not None, "what does not run leaves nothing to look at"
+        return self.prediction.run
 
     @cached_property
-    def own(self) -> tuple[Floats, Floats]:
+    def own(self) -> Columns:
         """Derivatives of the response by the keys and initial states, shapes (n, p + 2) and (m, p + 2).
 
         Where the judging part has an initial state of its own it is known there: its columns are zero.
         """
-        run = self.prediction.run
-        fitted = linearise(self.fit, self.prepared)
-        judged = np.zeros((len(self.prediction.measured), fitted.shape[1]))
-        if run is not None:
-            judged[:] = run.derivatives(self.fit)
-            if run.first != self.fit.first:
-                judged[:, len(self.fit.keys) :] = 0.0
-        return fitted, judged
+        judged = np.array(self.run.derivatives(self.fit), order="C")
+        if self.run.first != self.fit.first:
+            judged[:, len(self.fit.keys) :] = 0.0
+        return linearise(self.fit, self.prepared), judged
 
     @cached_property
     def predicted(self) -> tuple[Floats, Floats]:
@@ -52,29 +72,77 @@ class FittedResidual:
         """Measured less predicted response on both parts."""
         return self.fit.residual, self.prediction.difference
 
+    @property
+    def both(self) -> Floats:
+        """The same strung together, shape (n + m,)."""
+        return np.concatenate(self.residual)
+
     @cached_property
     def beside_own(self) -> Floats:
         """Residual of the judging part beside what the model's own coefficients, fitted to both parts, take, (m,).
 
         A change of the prediction is held against this (``study.support.statistics.gain_beside``).
         """
-        design = np.vstack(self.own)
-        return self.residual[1] - self.own[1] @ least_squares(design, np.concatenate(self.residual), 1e-9)
+        return self.residual[1] - self.own[1] @ least_squares(np.vstack(self.own), self.both, 1e-9)
 
     @property
-    def samples(self) -> tuple[Floats, Floats]:
+    def spans(self) -> tuple[tuple[int, int], tuple[int, int]]:
+        """First sample of each part in the record, and the one after its last."""
+        return self.fit.span, self.prepared.plan.judge
+
+    @property
+    def samples(self) -> tuple[Ints, Ints]:
         """Places of both parts in the record."""
-        spans = (self.fit.span, self.prepared.plan.judge)
-        return np.arange(*spans[0], dtype=np.float64), np.arange(*spans[1], dtype=np.float64)
+        return np.arange(*self.spans[0], dtype=np.int64), np.arange(*self.spans[1], dtype=np.int64)
 
     @property
     def size(self) -> float:
         """Rms of the measured response on the judging part."""
         return self.prediction.size
 
-    def known(self, columns: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    @property
+    def unit(self) -> str:
+        """Unit of the response."""
+        return self.prepared.record.units.get(self.prepared.response, "")
+
+    @property
+    def relative_power(self) -> float:
+        """Power of what is left over that of the response: a correction of the gain scales both."""
+        measured = self.prepared.fitted, self.prepared.judged
+        return sum(float(np.sum(r**2)) / float(np.sum(m**2)) for r, m in zip(self.residual, measured, strict=True))
+
+    def known(self, columns: Columns) -> Columns:
         """Columns on both parts, zero where samples are lost."""
-        return self.prepared.known(columns[0], self.fit.span), self.prepared.known(columns[1], self.prepared.plan.judge)
+        return self.prepared.known(columns[0], self.spans[0]), self.prepared.known(columns[1], self.spans[1])
+
+
+def leftover(fit: FreeRunFit, prepared: Prepared) -> FittedResidual | None:
+    """What a fit leaves; None where its free run is no smooth function of its coefficients, or none at all."""
+    if fit.restarts:
+        return None
+    prediction = predict(fit, prepared)
+    return None if prediction.diverged else FittedResidual(fit, prediction)
+
+
+def refitted(fit: FreeRunFit, prepared: Prepared, without: str = "") -> FreeRunFit | None:
+    """A fit again, to a record that was corrected or without an effect, from where it stands; None where that fails."""
+    if fit.restarts:
+        return None
+    model, anew = fit.model, fit.first != prepared.plan.fit[0]
+    if without:
+        model, anew = model.without_term(without), anew or LIBRARY[without].state is not None
+    held = [key for key in fit.held if key in model.values]
+    initial = None if anew else np.atleast_2d(fit.initial)
+    try:
+        return fit_part(model, prepared, held, steps=fit.steps_per_sample, initial=initial)
+    except StudyError:
+        return None
+
+
+def left_again(left: FittedResidual, prepared: Prepared, without: str = "") -> FittedResidual | None:
+    """What the model leaves that is fitted so again."""
+    fit = refitted(left.fit, prepared, without)
+    return None if fit is None else leftover(fit, prepared)
 
 
 @dataclass(frozen=True)
@@ -85,9 +153,8 @@ class Share:
     covariance: Floats  # shape (k, k), clustered
     p_value: float  # of such amounts, or the first of them, if they were zero
     gain: Gain  # on the judging part, of the amounts of the fitting part
-    power: (
-        float  # mean square on both parts of what the amounts from both add beside the model's own, over the response's
-    )
+    # Mean square on both parts of what the amounts from both add beside the model's own, over that of the response.
+    power: float
 
     def significant(self, asked: int) -> bool:
         """Whether that is no chance, of so many that were asked for, and more than integration resolves."""
@@ -95,15 +162,7 @@ class Share:
         return p_value * asked < ALPHA and self.power > TOLERANCE**2
 
 
-def leftover(fit: FreeRunFit, prepared: Prepared) -> FittedResidual | None:
-    """What a fit leaves; None where its free run is no smooth function of its coefficients, or none at all."""
-    if fit.restarts:
-        return None
-    prediction = predict(fit, prepared)
-    return None if prediction.diverged else FittedResidual(fit, prediction, prepared)
-
-
-def share(left: FittedResidual, columns: tuple[Floats, Floats], leading: bool = False) -> Share | None:
+def share(left: FittedResidual, columns: Columns, leading: bool = False) -> Share | None:
     """Joint regression of the residual on the model's own sensitivities and more columns.
 
     ``columns`` are those of a fault or an effect on both parts, shapes (n, k) and (m, k). They get only what the
@@ -120,21 +179,16 @@ def share(left: FittedResidual, columns: tuple[Floats, Floats], leading: bool = 
     both = np.vstack(left.own)
     apart = np.vstack([fitted, judged]) - both @ _taken(both, np.vstack([fitted, judged]))
     power = float(np.mean((apart @ whole) ** 2)) / left.size**2
-    tested = slice(1) if leading else slice(None)
-    return Share(whole, covariance, _p_value(whole[tested], covariance[tested, tested]),
-                 gain_beside(left.residual[1], change, left.beside_own), power)  # fmt: skip
+    count = 1 if leading else len(whole)
+    wald = float(whole[:count] @ np.linalg.pinv(covariance[:count, :count], hermitian=True) @ whole[:count])
+    freedom = 2 * BLOCKS - count  # the covariance rests on blocks: the test is Hotelling's, as these are few
+    p_value = float(fdtrc(count, freedom, wald * freedom / (count * (2 * BLOCKS - 1))))
+    return Share(whole, covariance, p_value, gain_beside(left.residual[1], change, left.beside_own), power)
 
 
 def _taken(own: Floats, columns: Floats) -> Floats:
     """Amounts of the model's own sensitivities that come nearest to each column, shape (p, k)."""
     return np.column_stack([least_squares(own, column, 1e-9) for column in columns.T])
-
-
-def _p_value(amounts: Floats, covariance: Floats) -> float:
-    """Wald's test of amounts whose covariance rests on blocks: Hotelling's, as these are few."""
-    count, freedom = len(amounts), 2 * BLOCKS - 1
-    wald = float(amounts @ np.linalg.pinv(covariance, hermitian=True) @ amounts)
-    return float(fdtrc(count, freedom - count + 1, wald * (freedom - count + 1) / (count * freedom)))
 
 
 def leaves_less(before: FittedResidual, after: FittedResidual, asked: int) -> bool:
@@ -144,11 +198,84 @@ def leaves_less(before: FittedResidual, after: FittedResidual, asked: int) -> bo
     return held_out.p_value * asked < ALPHA and power > TOLERANCE**2
 
 
-def amounts_on_both(left: FittedResidual, columns: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+def amounts_on_both(left: FittedResidual, columns: Columns) -> tuple[Floats, Floats]:
     """Amounts of the columns, shape (k,), and their clustered covariance, from both parts of the record together."""
     fitted, judged = left.known(columns)
     count = fitted.shape[1]
     design = np.vstack([np.hstack([left.own[0], fitted]), np.hstack([left.own[1], judged])])
-    residual = np.concatenate(left.residual)
-    amounts = least_squares(design, residual, 1e-9)
-    return amounts[-count:], clustered_covariance(design, residual - design @ amounts)[-count:, -count:]
+    amounts = least_squares(design, left.both, 1e-9)
+    return amounts[-count:], clustered_covariance(design, left.both - design @ amounts)[-count:, -count:]
+
+
+def asks_for_more(left: FittedResidual) -> bool:
+    """Whether any effect of the library explains a part of what is left, as far as small amounts of it show.
+
+    One free run with the sensitivities of all effects without shape parameters; where that fails nothing is ruled out.
+    """
+    fit, model, keys = left.fit, left.fit.model, list[str]()
+    for term in effects_but(model):
+        if not term.parameters:
+            model = model.with_term(ModelTerm(term, (0.0,) * len(term.components), ()))
+            keys += term.symbols
+    if not keys:
+        return True
+    extended = replace(fit, model=model, keys=tuple(keys), values=np.zeros(len(keys)))
+    try:
+        fitted = run_of(extended, left.prepared, keys).respond(dict.fromkeys(keys, 0.0), fit.initial, 0)[1][:, 0]
+        judged = left.run.derivatives(extended)[:, : len(keys)]
+    except StudyError:
+        return True
+    if not (np.all(np.isfinite(fitted)) and np.all(np.isfinite(judged))):
+        return True
+    found = [share(left, (fitted[:, [i]], judged[:, [i]])) for i in range(len(keys))]
+    return any(f is not None and f.significant(len(found)) for f in found)
+
+
+def missing(left: FittedResidual) -> FittedResidual | None:
+    """What is left beside the effect that explains most; None if none explains any of it.
+
+    One outside of what makes it physical, which is another effect or a fault in disguise, only where no other does.
+    """
+    prepared, fit = left.prepared, left.fit
+    look = prepared.shortened(int(np.clip(prepared.samples_in(shape_search.PERIODS), SHORT, LONG)))
+    terms = effects_but(fit.model)
+    try:
+        near = fit if look is prepared else fit_part(fit.model, look, fit.held, steps=fit.steps_per_sample)
+        base = shape_search.baseline(near, look)
+    except StudyError:
+        return None
+
+    def fitted(term: Term) -> FittedResidual | None:
+        try:
+            near = with_term(base.fit, free(term), base, look)
+            initial = np.atleast_2d(near.initial)[:1] if near.first == prepared.plan.fit[0] else None
+            fit = fit_part(
+                near.model, prepared, base.fit.held, steps=near.steps_per_sample, max_iterations=RUNS, initial=initial
+            )
+        except StudyError:
+            return None
+        return leftover(fit, prepared)
+
+    begins = side_by_side(lambda term: shape_search.shape_starts(term, base, look), terms, lambda term: term.effort)
+    starts = [(term, found) for term, found in zip(terms, begins, strict=True) if found]
+    promising = [term for term, _ in sorted(starts, key=lambda s: -s[1][0].share)[:FITTED]]
+    tried = [t for t in side_by_side(fitted, promising, lambda term: term.effort) if t is not None]
+    for group in ([t for t in tried if not unphysical(t, left)], tried):
+        if group:  # of those that chance may make worse than the best, the one with the fewest unknowns
+            best = min(group, key=lambda t: float(np.sum(t.residual[1] ** 2)))
+            level = [t for t in group if t is best or worse(t.residual[1], best.residual[1]) < CHANCE]
+            simplest = min(level, key=lambda t: (len(t.fit.keys), t is not best))
+            if leaves_less(left, simplest, len(terms)):
+                return simplest
+    return None
+
+
+def effects_beside(more: FittedResidual, left: FittedResidual) -> list[str]:
+    """Names of the effects that a fuller model has beside those of a plainer one."""
+    return [e.name for e in more.fit.model.terms if e.name not in left.fit.model]
+
+
+def unphysical(more: FittedResidual, left: FittedResidual) -> bool:
+    """Whether any of these is fitted outside of what makes it physical."""
+    model, names = more.fit.model, effects_beside(more, left)
+    return any(e.term.physical(model.values) for e in model.terms if e.name in names)

@@ -1,46 +1,120 @@
 """The search for faults of the measurement, beside the model and beside whatever physics the record asks for.
 
 A fault with a look-alike in the library is believed if it is needed beside the effects that the record asks for; where
-these do all that it does, and it does all that they do, the record cannot tell, and that is said.
+these do all that it does, and it does all that they do, the record cannot tell, and that is said. The value of one that
+a single number describes is found together with the model's own coefficients.
 """
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtr
 
-from study.faults import adjustable, physics
-from study.faults.correction import corrected
-from study.faults.drift import drift
-from study.faults.fault import CLIPPING, DRIFT, DROP_OUTS, FORCE_NOISE, HUM, OFFSET, SPIKES, Fault
+from study.faults.correction import corrected, fault_columns, sensible, unit_of
+from study.faults.fault import (
+    CLIPPING,
+    DELAY,
+    DRIFT,
+    DROP_OUTS,
+    FORCE_NOISE,
+    HIGH_PASS,
+    HOLDABLE,
+    HUM,
+    OFFSET,
+    SPIKES,
+    Fault,
+)  # fmt: skip
 from study.faults.force_noise import force_noise
-from study.faults.hum import hum, is_of_the_mains, line
-from study.faults.leftover import FittedResidual, leaves_less, leftover, share
-from study.faults.refinement import Refined, refined, relative_power
-from study.faults.spikes import spikes
+from study.faults.leftover import (
+    FittedResidual,
+    amounts_on_both,
+    asks_for_more,
+    effects_beside,
+    leaves_less,
+    left_again,
+    leftover,
+    missing,
+    refitted,
+    share,
+    unphysical,
+)
+from study.faults.seen_in_residual import drift, hum, is_of_the_mains, line, slow_part, spikes
 from study.faults.spotted import drop_outs, spotted, widened
-from study.faults.stage import SearchEnd, SearchStage, fitted_again, searched_part
+from study.identify.time_domain import shape_search
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.settling import settled
 from study.identify.time_domain.stretch_states import is_poor
-from study.records.prepared import Prepared
-from study.support.arrays import Floats
+from study.records.prepared import Prepared, limited
 from study.support.statistics import gain
-from study.support.thresholds import ALPHA
+from study.support.thresholds import ALPHA, TOLERANCE
 
+SHORT, LONG = 8192, 16384  # samples of either part in which faults compete with physics
 ROUNDS = 12  # faults and effects looked for one after the other
 PLAIN = (DRIFT, SPIKES, DROP_OUTS)  # which no physics imitates
 EFFECTS = 3  # of the library that are added before a fault is believed
+STEPS = 8  # of Gauss and Newton
+FAR_APART = (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)  # samples
+NEAR = 0.05  # standard errors: as near the value as the search has to come
+
+
+@dataclass(frozen=True, eq=False)
+class SearchStage:
+    """Where a search stands: the record as given, the faults found, and the model fitted to the corrected record."""
+
+    given: Prepared
+    faults: tuple[Fault, ...]
+    left: FittedResidual  # of the model
+    rich: FittedResidual  # of the model and the effects that the record asks for
+
+    @property
+    def effects(self) -> list[str]:
+        """The effects that the record asks for."""
+        return effects_beside(self.rich, self.left)
+
+    def without(self, fault: Fault) -> "SearchStage | None":
+        """The stage with one fault more corrected, or all spikes; None where a model does not run any more."""
+        known = (*(f for f in self.faults if not f.fault == fault.fault == SPIKES), fault)
+        prepared = corrected(self.given, known)
+        left, rich = (left_again(one, prepared) for one in (self.left, self.rich))
+        if left is None or rich is None:
+            return None
+        for name in reversed(effects_beside(rich, left)):  # those that the corrected record no longer asks for go
+            fewer = left_again(rich, prepared, without=name)
+            if fewer is not None and not leaves_less(fewer, rich, 1):
+                rich = fewer
+        return SearchStage(self.given, known, left, rich if effects_beside(rich, left) else left)
+
+
+@dataclass(frozen=True, eq=False)
+class SearchEnd:
+    """Where a search for faults has ended."""
+
+    faults: tuple[Fault, ...]  # those that were known and those that were found
+    fit: FreeRunFit  # the model fitted to the corrected record; it searches no further than from where it began
+    rich: FreeRunFit  # the model with the effects that the record asks for beside the faults
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """A fault with its value, and what the model leaves of the record that is corrected for it."""
+
+    fault: Fault
+    left: FittedResidual
 
 
 def first_faults(prepared: Prepared, held: Mapping[str, float], asked: Sequence[str]) -> tuple[Fault, ...]:
     """Faults that the user gave values of, and those that the response shows by itself."""
     name = prepared.response
     unit = prepared.record.units.get(name, "")
-    given = [Fault(f, name, v, unit=adjustable.unit(f, unit), held=True) for f, v in held.items()]
+    given = [Fault(f, name, v, unit=unit_of(f, unit), held=True) for f, v in held.items()]
     return (*given, *spotted(prepared, asked))
+
+
+def searched_part(given: Prepared) -> Prepared:
+    """As much of either part of a record as a search for faults that compete with physics takes."""
+    return limited(given, int(np.clip(given.samples_in(shape_search.PERIODS), SHORT, LONG)))
 
 
 def search_faults(
@@ -52,35 +126,29 @@ def search_faults(
     corrected. Of a long record, faults that compete with physics are looked for in a stretch of either part; the
     others everywhere.
     """
-    nothing = SearchEnd(tuple(faults), fit, fit)
     look = searched_part(given)
-    if look is given:
-        stage = _searched(given, fit, fit, faults, asked)
-        return nothing if stage is None else SearchEnd(stage.faults, stage.left.fit, stage.rich.fit)
-    near = physics.refitted(fit, corrected(look, faults))
-    part = None if near is None else _searched(look, near, near, faults, asked)
-    if part is None:
-        return nothing
-    known = tuple(f for f in part.faults if f.fault not in PLAIN)
-    left, rich = (physics.refitted(one.fit, corrected(given, known)) for one in (part.left, part.rich))
-    plain = tuple(name for name in asked if name in PLAIN)
-    stage = None if left is None or rich is None else _searched(given, left, rich, known, plain)
+    near = fit if look is given else refitted(fit, corrected(look, faults))
+    stage = None if near is None else _searched(look, near, near, faults, asked)
+    if stage is not None and look is not given:
+        known = tuple(f for f in stage.faults if f.fault not in PLAIN)
+        left, rich = (refitted(one.fit, corrected(given, known)) for one in (stage.left, stage.rich))
+        plain = tuple(name for name in asked if name in PLAIN)
+        stage = None if left is None or rich is None else _searched(given, left, rich, known, plain)
+        stage = None if stage is None else _values_again(stage)
     if stage is None:
-        return nothing
-    stage = _values_again(stage)
+        return SearchEnd(tuple(faults), fit, fit)
     return SearchEnd(stage.faults, stage.left.fit, stage.rich.fit)
 
 
 def _values_again(stage: SearchStage) -> SearchStage:
     """The stage with the values of its faults found again, beside the effects and the other faults known by now."""
     for fault in stage.faults:
-        if fault.fault in adjustable.ADJUSTABLE and fault.corrected and not fault.held:
+        if fault.fault in HOLDABLE and fault.corrected and not fault.held:
             others = tuple(f for f in stage.faults if f is not fault)
             again = refined(fault.fault, stage.given, others, stage.rich, fault.value)
-            following = None if again is None else replace(stage, faults=others).without(
-                replace(again.fault, explained=fault.explained)
-            )  # fmt: skip
-            stage = following or stage
+            if again is not None:
+                known = replace(again.fault, explained=fault.explained)
+                stage = replace(stage, faults=others).without(known) or stage
     return stage
 
 
@@ -93,22 +161,17 @@ def _searched(
     more = left if rich is fit else leftover(rich, prepared)
     if left is None or more is None:
         return None
-    stage = _beyond_the_limits(SearchStage(given, tuple(faults), left, more))
+    stage = SearchStage(given, tuple(faults), left, more)
+    if any(f.fault == CLIPPING for f in faults):  # noise may have kept samples within a limit that clips
+        wider = tuple(widened(f, given, left) if f.fault == CLIPPING else f for f in faults)
+        again = left_again(left, corrected(given, wider))
+        stage = stage if again is None else SearchStage(given, wider, again, again)
     for _ in range(ROUNDS):
         following = _next(stage, asked)
         if following is None:
             break
         stage = following
     return _needed(stage, len(asked), [fault.fault for fault in faults])
-
-
-def _beyond_the_limits(stage: SearchStage) -> SearchStage:
-    """Without the samples near a limit that clips, which noise may have kept within it."""
-    faults = [widened(f, stage.given, stage.left) if f.fault == CLIPPING else f for f in stage.faults]
-    if not any(f.fault == CLIPPING for f in faults):
-        return stage
-    left = fitted_again(stage.left, corrected(stage.given, faults))
-    return stage if left is None else SearchStage(stage.given, tuple(faults), left, left)
 
 
 def _next(stage: SearchStage, asked: Sequence[str]) -> SearchStage | None:
@@ -123,60 +186,51 @@ def _next(stage: SearchStage, asked: Sequence[str]) -> SearchStage | None:
 
 def _plain(stage: SearchStage, names: Sequence[str], asked: int) -> SearchStage | None:
     """One fault more of those that no physics imitates: drop-outs, spikes, drift, and hum of the mains."""
-    if DROP_OUTS in names:
-        fault = drop_outs(stage.rich, asked)
-        if fault is not None:
-            return stage.without(fault)
-    if SPIKES in names:
-        fault = spikes(stage.rich, asked)
+    for name, looked_for in ((DROP_OUTS, drop_outs), (SPIKES, spikes), (DRIFT, drift)):
+        fault = looked_for(stage.rich, asked) if name in names else None
         if fault is not None:
             return stage.without(_merged(stage.faults, fault))
-    if DRIFT in names:
-        fault = drift(stage.rich, asked)
-        if fault is not None:
-            return stage.without(fault)
     fault = hum(stage.rich, asked) if HUM in names else None
     if fault is not None and is_of_the_mains(fault.frequency, stage.left):
         return stage.without(fault)
     return None
 
 
-def _merged(faults: Sequence[Fault], spike: Fault) -> Fault:
-    """All spikes as one fault."""
-    before = next((f for f in faults if f.fault == SPIKES), None)
-    if before is None or before.lost is None or spike.lost is None:
-        return spike
-    lost = before.lost | spike.lost
-    error = float(np.hypot(before.error, spike.error))
-    return replace(before, value=before.value + spike.value, error=error, lost=lost)
+def _merged(faults: Sequence[Fault], more: Fault) -> Fault:
+    """A fault with what was found of it before: spikes hide smaller ones."""
+    before = next((f for f in faults if f.fault == more.fault == SPIKES), None)
+    if before is None or before.lost is None or more.lost is None:
+        return more
+    error = float(np.hypot(before.error, more.error))
+    return replace(before, value=before.value + more.value, error=error, lost=before.lost | more.lost)
 
 
 def _contested(stage: SearchStage, names: Sequence[str], asked: int) -> SearchStage | None:
     """One fault more of those that have a look-alike in the library, or one effect more that the record asks for."""
-    name = _best(stage.rich, [n for n in names if n in (*adjustable.ADJUSTABLE, HUM)], asked)
+    name = _best(stage.rich, [n for n in names if n in (*HOLDABLE, HUM)], asked)
     one = None if name is None else refined(name, stage.given, stage.faults, stage.rich)
-    one = None if one is None or _may_be_none(one.fault, asked) else one
-    effect = _effect(stage, one)
+    if one is not None and one.fault.error > 0.0:  # chance alone may give such a value, so many having been asked for
+        t = abs(one.fault.value) / one.fault.error
+        one = None if 2.0 * float(ndtr(-t)) * asked >= ALPHA else one
+    effect = None
+    if len(stage.effects) < EFFECTS and (one is not None or asks_for_more(stage.rich)):
+        effect = missing(stage.rich)
     if one is None:
         return _noisy_force(stage, names, asked) if effect is None else _beside(effect, stage)
     if effect is None:
         return _accepted(stage, one)
-    fault_needed = share(effect, _columns(one.fault, effect), leading=one.fault.fault != HUM)
-    needed = fault_needed is not None and fault_needed.significant(asked), _needs(one, effect)
+    hums = one.fault.fault == HUM
+    columns = line(one.fault.frequency, effect) if hums else fault_columns(one.fault.fault, effect)
+    fault_needed, both = share(effect, columns, leading=not hums), left_again(effect, one.left.prepared)
+    needed = (
+        fault_needed is not None and fault_needed.significant(asked),
+        both is not None and leaves_less(one.left, both, 1),
+    )
     if needed == (False, False):
         return _tied(stage, one, effect)
-    if needed == (False, True) or (all(needed) and relative_power(effect) < relative_power(one.left)):
+    if needed == (False, True) or (all(needed) and effect.relative_power < one.left.relative_power):
         return _beside(effect, stage)
     return _accepted(stage, one)
-
-
-def _no_effect(effect: FittedResidual, stage: SearchStage) -> bool:
-    """Whether what the record asks for most lies outside of what makes it physical."""
-    return physics.unphysical(effect.fit, _added(effect, stage))
-
-
-def _added(effect: FittedResidual, stage: SearchStage) -> list[str]:
-    return [e.name for e in effect.fit.model.terms if e.name not in stage.rich.fit.model]
 
 
 def _noisy_force(stage: SearchStage, names: Sequence[str], asked: int) -> SearchStage | None:
@@ -188,24 +242,8 @@ def _noisy_force(stage: SearchStage, names: Sequence[str], asked: int) -> Search
     noise = None if left is None else force_noise(left, asked)
     if noise is None:
         return None
-    effect = physics.missing(stage.rich) if len(stage.effects) < EFFECTS else None
+    effect = missing(stage.rich) if len(stage.effects) < EFFECTS else None
     return replace(stage, faults=(*stage.faults, noise)) if effect is None else _beside(effect, stage)
-
-
-def _may_be_none(fault: Fault, asked: int) -> bool:
-    """Whether chance alone gives such a value, so many faults having been asked for; from the whole record."""
-    return fault.error > 0.0 and 2.0 * float(ndtr(-abs(fault.value) / fault.error)) * asked >= ALPHA
-
-
-def _effect(stage: SearchStage, one: Refined | None) -> FittedResidual | None:
-    """The effect that the record asks for most beside those that it has asked for already."""
-    if len(stage.effects) >= EFFECTS or (one is None and not physics.asks_for_more(stage.rich)):
-        return None
-    return physics.missing(stage.rich)
-
-
-def _columns(fault: Fault, left: FittedResidual) -> tuple[Floats, Floats]:
-    return line(fault.frequency, left) if fault.fault == HUM else adjustable.fault_columns(fault.fault, left)
 
 
 def _best(left: FittedResidual, names: Sequence[str], asked: int) -> str | None:
@@ -217,8 +255,8 @@ def _best(left: FittedResidual, names: Sequence[str], asked: int) -> str | None:
             if fault is not None:
                 power[name] = fault.explained * float(np.mean(left.residual[1] ** 2)) / left.size**2
             continue
-        found = share(left, adjustable.fault_columns(name, left), leading=True)
-        if found is not None and found.significant(asked) and adjustable.sensible(name, float(found.amounts[0]), left):
+        found = share(left, fault_columns(name, left), leading=True)
+        if found is not None and found.significant(asked) and sensible(name, float(found.amounts[0]), left):
             power[name] = found.power
     return max(power, key=lambda name: power[name], default=None)
 
@@ -249,19 +287,12 @@ def _tied(stage: SearchStage, one: Refined, effect: FittedResidual) -> SearchSta
 
     Not so beside an effect that is none, as a Maxwell element of negative stiffness, which hastens what is late.
     """
-    names = _added(effect, stage)
-    if _no_effect(effect, stage) or (one.fault.fault == HUM and _beyond_reason(stage, effect)):
+    if unphysical(effect, stage.rich) or (one.fault.fault == HUM and _beyond_reason(stage, effect)):
         return _accepted(stage, one)
     if one.fault.fault == OFFSET and any(f.fault == DRIFT for f in stage.faults):
         return _accepted(stage, one)  # a channel that drifts has no zero of its own
-    fault = _explaining(one.fault, stage.rich, one.left).with_rivals(*names)
+    fault = replace(_explaining(one.fault, stage.rich, one.left), rivals=tuple(effects_beside(effect, stage.rich)))
     return replace(stage, faults=(*stage.faults, fault), rich=effect)
-
-
-def _needs(one: Refined, effect: FittedResidual) -> bool:
-    """Whether the effect explains anything beside the corrected fault."""
-    both = fitted_again(effect, one.left.prepared)
-    return both is not None and leaves_less(one.left, both, 1)
 
 
 def _beyond_reason(stage: SearchStage, effect: FittedResidual) -> bool:
@@ -275,26 +306,82 @@ def _beyond_reason(stage: SearchStage, effect: FittedResidual) -> bool:
 def _needed(stage: SearchStage, asked: int, begun: Sequence[str]) -> SearchStage:
     """Without the faults that the effects found after them have made needless; ``begun`` were known from the start."""
     for fault in stage.faults:
-        if fault.fault in (*adjustable.ADJUSTABLE, DRIFT) and fault.corrected and not fault.held:
+        if fault.fault in (*HOLDABLE, DRIFT) and fault.corrected and not fault.held:
             others = tuple(f for f in stage.faults if f is not fault)
             prepared = corrected(stage.given, others)
-            left, rich = (fitted_again(one, prepared) for one in (stage.left, stage.rich))
+            left, rich = (left_again(one, prepared) for one in (stage.left, stage.rich))
             if left is None or rich is None:
                 continue
-            lost = fault.fault in begun and _loses_its_way(rich, stage.rich, asked)
-            if not (lost or _still_there(fault, rich, asked)):
+            # Where a model loses the motion without a correction, what a little of the fault would do tells nothing.
+            lost = fault.fault in begun and is_poor(rich.fit, prepared.fitted) and leaves_less(rich, stage.rich, asked)
+            if lost:
+                continue
+            if fault.fault == DRIFT:
+                seen = drift(rich, asked) is not None
+            else:
+                needed = share(rich, fault_columns(fault.fault, rich), leading=True)
+                seen = needed is not None and needed.significant(asked)
+            if not seen:
                 stage = SearchStage(stage.given, others, left, rich)
     return stage
 
 
-def _loses_its_way(without: FittedResidual, with_it: FittedResidual, asked: int) -> bool:
-    """Whether a model loses the motion without a correction: what a little of the fault would do tells nothing then."""
-    return is_poor(without.fit, without.prepared.fitted) and leaves_less(without, with_it, asked)
+def refined(
+    name: str, given: Prepared, faults: Sequence[Fault], left: FittedResidual, value: float = 0.0
+) -> Refined | None:  # fmt: skip
+    """Search a fault's value by correcting the record, fitting the model again and correcting what is left of it.
+
+    ``faults`` are those that ``left`` is corrected for already, besides this one with ``value``. None where the search
+    leaves what is sensible, or the model does not run.
+    """
+    if name == HUM:
+        line = hum(left, 1)
+        return None if line is None else _corrected(line, given, faults, left)
+    before = left
+    if name == DELAY and value == 0.0:
+        value, left = _coarse(given, faults, left)
+    for _ in range(STEPS):
+        amounts, covariance = amounts_on_both(left, fault_columns(name, left, value))
+        step, error = float(amounts[0]), math.sqrt(max(float(covariance[0, 0]), 0.0))
+        value += step
+        if not sensible(name, value, left):
+            return None
+        one = _corrected(Fault(name, given.response, value, error, unit_of(name, left.unit)), given, faults, left)
+        if one is None:
+            return None
+        left = one.left
+        if abs(step) <= NEAR * error:
+            break
+    if left.relative_power >= before.relative_power:
+        return None
+    explained = gain(before.residual[1], left.residual[1]).explained
+    found = one.fault  # pyright: ignore[reportPossiblyUnboundVariable]
+    error = math.hypot(found.error, TOLERANCE * found.value)  # the model and its integration are no nearer than that
+    return Refined(replace(found, explained=explained, error=error), left)
 
 
-def _still_there(fault: Fault, rich: FittedResidual, asked: int) -> bool:
-    """Whether the record shows a fault beside all effects that it asks for."""
-    if fault.fault == DRIFT:
-        return drift(rich, asked) is not None
-    needed = share(rich, adjustable.fault_columns(fault.fault, rich), leading=True)
-    return needed is not None and needed.significant(asked)
+def _coarse(given: Prepared, faults: Sequence[Fault], left: FittedResidual) -> tuple[float, FittedResidual]:
+    """Where the search for a delay begins: at zero, or at the best of some whole samples if it is more than a part.
+
+    A model that is fitted to a record late by a good part of a period finds a minimum of its own.
+    """
+    step = float(amounts_on_both(left, fault_columns(DELAY, left))[0][0])
+    best = 0.0, left
+    for late in FAR_APART if abs(step) > 0.5 else ():
+        tried = left_again(left, corrected(given, (*faults, Fault(DELAY, given.response, late))))
+        if tried is not None and tried.relative_power < best[1].relative_power:
+            best = late, tried
+    return best
+
+
+def _corrected(fault: Fault, given: Prepared, faults: Sequence[Fault], left: FittedResidual) -> Refined | None:
+    """A fault of this value, and what the model leaves when it is corrected."""
+    again = left_again(left, corrected(given, (*faults, fault)))
+    if again is None or fault.fault != HIGH_PASS:
+        return None if again is None else Refined(fault, again)
+    # What a coupling has taken away below its cut-off cannot come back: only noise would.
+    length = len(given.record) * given.dt
+    slow = slow_part(again, int(np.ceil(2.0 * fault.value * length)))
+    whole = replace(fault, waveform=slow + float(np.mean(again.both)))
+    final = left_again(again, corrected(given, (*faults, whole)))
+    return None if final is None else Refined(whole, final)

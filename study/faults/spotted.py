@@ -9,14 +9,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import fdtrc
 
 from study.faults.fault import CLIPPING, CONVERTER_STEPS, DROP_OUTS, Fault
 from study.faults.leftover import FittedResidual
 from study.records.plan import moving
 from study.records.prepared import Prepared
-from study.support.arrays import Floats, Ints
+from study.support.arrays import Bools, Floats, Ints
 from study.support.thresholds import ALPHA, TOLERANCE
 
 REPEATED = 0.5  # of the samples of a channel: whose values recur so often comes in steps
@@ -35,7 +34,9 @@ def spotted(prepared: Prepared, asked: Sequence[str]) -> tuple[Fault, ...]:
         found.append(Fault(CONVERTER_STEPS, name, step, unit=unit))
     clipped = at_the_limits(values, step)
     if clipped is not None and CLIPPING in asked:
-        found.append(Fault(CLIPPING, name, _limit(values, clipped), unit=unit, lost=clipped))
+        shown = np.unique(values[clipped])  # of a channel clipped on both sides the value is half its range
+        limit = float(0.5 * (shown[-1] - shown[0])) if len(shown) > 1 else abs(float(shown[0]))
+        found.append(Fault(CLIPPING, name, limit, unit=unit, lost=clipped))
     return tuple(found)
 
 
@@ -53,7 +54,7 @@ def converter_step(values: Floats) -> float | None:
     return float(np.sum(inner) / np.sum(np.round(counts)))
 
 
-def at_the_limits(values: Floats, step: float | None) -> NDArray[np.bool_] | None:
+def at_the_limits(values: Floats, step: float | None) -> Bools | None:
     """Samples at the largest or smallest value, where these recur in a row as values of a motion do not.
 
     A smooth motion in steps rests at an extreme for a while too: there a limit counts that is reached, in runs, more
@@ -65,26 +66,18 @@ def at_the_limits(values: Floats, step: float | None) -> NDArray[np.bool_] | Non
     return np.any(reached, axis=0) if reached else None
 
 
-def _recurs(values: Floats, mask: NDArray[np.bool_], limit: float, step: float | None) -> bool:
+def _recurs(values: Floats, mask: Bools, limit: float, step: float | None) -> bool:
     count, runs = int(np.count_nonzero(mask)), _runs(mask)
-    if _switches(values) or count < 4 or len(runs) < 2 or (count == len(runs) and _repeats(runs)):
+    if len(np.unique(values[:4096])) <= 3 or count < 4 or len(runs) < 2:  # with so few values it switches
         return False
+    apart = np.diff([first for first, _ in runs])
+    if count == len(runs) and int(np.gcd.reduce(apart)) == int(np.min(apart)):
+        return False  # at multiples of one time, as the one largest value of a repeated motion is
     if step is None:
         return True
     inward = limit + step if limit < float(np.mean(values)) else limit - step
     beside = int(np.count_nonzero(np.abs(values - inward) < 0.25 * step))
     return count > beside + 5.0 * math.sqrt(beside + count)
-
-
-def _repeats(runs: Sequence[tuple[int, int]]) -> bool:
-    """Whether runs follow each other at multiples of one time, as the one largest value of a repeated motion does."""
-    apart = np.diff([first for first, _ in runs])
-    return int(np.gcd.reduce(apart)) == int(np.min(apart))
-
-
-def _switches(values: Floats) -> bool:
-    """Whether a channel has three values or fewer, as one that switches."""
-    return len(np.unique(values[:4096])) <= 3
 
 
 def drop_outs(left: FittedResidual, asked: int) -> Fault | None:
@@ -97,39 +90,31 @@ def drop_outs(left: FittedResidual, asked: int) -> Fault | None:
     prepared, values = left.prepared, left.prepared.record[left.prepared.response]
     if converter_step(values) is not None:
         return None
-    places = np.concatenate(left.samples).astype(np.int64)
-    used = np.zeros(len(values), dtype=np.bool_)
+    places = np.concatenate(left.samples)
+    used = np.zeros(len(values), dtype=bool)
     used[places] = True
     begun, over = moving(values)
     used[: begun + 1], used[over:] = False, False  # at rest before or behind
     mask, runs = _standing(values)
     mask &= used
-    power = np.concatenate(left.residual) ** 2
+    power = left.both**2
     if not 0.0 < float(np.mean(mask[places])) < STANDING:
         return None
-    noisy = _noise(np.concatenate(left.residual)) > TOLERANCE * left.size
-    if _at_rest(prepared.response, values[mask]):
+    noisy = _noise(left.both) > TOLERANCE * left.size
+    if prepared.response != "displacement" and not np.any(values[mask]):  # what a system that friction holds shows
         mask = _moving(mask, places, power, ALPHA / (asked * runs), noisy)
     there = mask[places]
     if not np.any(there):
         return None
     elsewhere = float(np.mean(power[~there]))
-    if (
-        not noisy
-        and elsewhere > 0.0
-        and float(fdtrc(runs, len(power), np.mean(power[there]) / elsewhere)) * asked >= ALPHA
-    ):
+    ratio = np.mean(power[there]) / elsewhere if elsewhere > 0.0 else np.inf
+    if not noisy and float(fdtrc(runs, len(power), ratio)) * asked >= ALPHA:
         return None
     explained = float(np.sum(power[there]) / np.sum(power))
     return Fault(DROP_OUTS, prepared.response, float(np.mean(there)), unit="1", explained=explained, lost=mask)
 
 
-def _at_rest(response: str, standing: Floats) -> bool:
-    """Whether a channel stands at what it shows of a system that friction holds."""
-    return response != "displacement" and not np.any(standing)
-
-
-def _moving(mask: NDArray[np.bool_], places: Ints, power: Floats, level: float, noisy: bool) -> NDArray[np.bool_]:
+def _moving(mask: Bools, places: Ints, power: Floats, level: float, noisy: bool) -> Bools:
     """The runs of a mask in which more is left than elsewhere, by the F test of each as a single number, shape (n,).
 
     All of them, if there is any, where noise lies on the channel: what is at rest under noise does not stand still.
@@ -145,9 +130,9 @@ def _moving(mask: NDArray[np.bool_], places: Ints, power: Floats, level: float, 
     return kept
 
 
-def _standing(values: Floats) -> tuple[NDArray[np.bool_], int]:
+def _standing(values: Floats) -> tuple[Bools, int]:
     """Samples in runs of ``RUN`` or more of the same value, away from the extremes, and the number of runs."""
-    mask, count = np.zeros(len(values), dtype=np.bool_), 0
+    mask, count = np.zeros(len(values), dtype=bool), 0
     limits = float(np.min(values)), float(np.max(values))
     for first, last in _runs(np.diff(values) == 0.0):
         if last - first + 1 >= RUN and values[first] not in limits:
@@ -167,12 +152,12 @@ def widened(fault: Fault, given: Prepared, left: FittedResidual) -> Fault:
     clipped = at_the_limits(values, converter_step(values))
     if clipped is None:
         return fault
-    prepared, lost = left.prepared, clipped.copy()
+    lost = clipped.copy()
     # Either is the noise and more: what is left by edges of what is lost, and the measured motion by its own bends.
-    margin = MARGIN * min(_noise(np.concatenate(left.residual)), _noise(values))
+    margin = MARGIN * min(_noise(left.both), _noise(values))
     for limit in np.unique(values[clipped]).tolist():
         sign = 1.0 if limit > float(np.mean(values)) else -1.0
-        for span, predicted in zip((left.fit.span, prepared.plan.judge), left.predicted, strict=True):
+        for span, predicted in zip(left.spans, left.predicted, strict=True):
             near = sign * (values[slice(*span)] - limit) > -3.0 * margin
             lost[slice(*span)] |= near & (sign * (predicted - limit) > -margin)
     return replace(fault, lost=lost)
@@ -185,13 +170,7 @@ def _noise(residual: Floats) -> float:
     return 1.4826 * float(np.median(np.abs(bend))) / math.sqrt(924.0) if len(bend) else 0.0
 
 
-def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _runs(mask: Bools) -> list[tuple[int, int]]:
     """First sample and the one after the last of each run."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
-
-
-def _limit(values: Floats, clipped: NDArray[np.bool_]) -> float:
-    """Half the range of a channel clipped on both sides, or the one limit."""
-    shown = np.unique(values[clipped])
-    return float(0.5 * (shown[-1] - shown[0])) if len(shown) > 1 else abs(float(shown[0]))

@@ -14,8 +14,7 @@ from study.compare.fitted_coefficients import Coefficient
 from study.compare.residual_checks import ResidualChecks
 from study.compare.response_functions import ResponseFunctions
 from study.equations.model import ModelTerm
-from study.faults.fault import Fault
-from study.faults.instrument_settings import settings_asked
+from study.faults.fault import Fault, settings_asked
 from study.interface.data import Record
 from study.interface.equation import Model, Samples, Times, term
 from study.interface.forces import Force, simulate

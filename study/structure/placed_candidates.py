@@ -12,7 +12,7 @@ from study.equations.linear_part import connections
 from study.equations.model import Model, ModelTerm, free
 from study.equations.place import Place
 from study.equations.term import Term
-from study.equations.terms import LIBRARY
+from study.equations.terms import effects_but
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import Prepared
@@ -21,7 +21,6 @@ from study.structure.structure_prediction import StructurePrediction, predict_st
 from study.support.cores import cores
 from study.support.errors import StudyError
 
-NEVER_CANDIDATES = ("inertia",)
 FITTED = 12  # candidates that promise most, whatever they are: fitted in free run ...
 AT_EACH_PLACE = 2  # ... with so many at each place that explain this share of what the best explains ...
 PROMISING = 0.3
@@ -89,9 +88,8 @@ def candidate_entries(model: Model, extra: Sequence[Term] = (), without: Sequenc
     What depends on the sign of the motion alone, a stop on one side, is tried on either side of its place.
     """
     known = {(t.term.name, t.place.path) for t in model.terms}
-    effects = [t for t in (*LIBRARY.values(), *extra) if t.name not in (*NEVER_CANDIDATES, *without)]
     found: list[ModelTerm] = []
-    for term in effects:
+    for term in effects_but(without, extra):
         places = [Place("at", (c,)) for c in model.coordinates] if external(term) else connections(model)
         sided = not external(term) and one_sided(term)
         for place in places:

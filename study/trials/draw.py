@@ -10,7 +10,8 @@ import numpy as np
 
 from study.equations.model import Model, ModelTerm
 from study.equations.terms import get
-from study.faults.imposed import FAULTS, impose
+from study.faults.fault import FAULTS
+from study.faults.imposed import impose
 from study.records.record import MOTIONS, Record
 from study.support.errors import DivergenceError, StudyError, expect
 from study.trials.driven import LABORATORIES, REPORT_LIKE, driven_rig
@@ -94,7 +95,7 @@ def make_trial(
     """A trial of this seed; what is given is not drawn.
 
     No effect is hidden with an empty sequence; ``noise`` is a mean square over that of the response, ``response`` is
-    ``displacement``, ``velocity`` or ``acceleration``. ``fault`` is one of ``study.faults.imposed.FAULTS``, ``any`` for
+    ``displacement``, ``velocity`` or ``acceleration``. ``fault`` is one of ``study.faults.fault.FAULTS``, ``any`` for
     one that is drawn in half of the trials, or ``none``; it comes last and has a stream of its own: the trial without
     it is the same record before the fault. ``test`` is one of ``FAMILIES``; a ``structure`` has so many
     ``coordinates``.

@@ -17,8 +17,7 @@ import numpy as np
 from study.diagnose.adding import added
 from study.diagnose.confirmed_faults import confirmed
 from study.diagnose.verdict import NOTHING, diagnose
-from study.faults.fault import fault_fields
-from study.faults.imposed import FAULTS
+from study.faults.fault import FAULTS, fault_fields
 from study.records.record import MOTIONS
 from study.reproduction.settings import TrialSettings
 from study.support.errors import StudyError

@@ -14,7 +14,7 @@ from study.equations.common_factor import per_unit_mass, with_known_mass
 from study.equations.equations_of_motion import has_spring
 from study.equations.model import Model
 from study.faults.accounting import Accounted, accounted
-from study.faults.instrument_settings import FaultSettings
+from study.faults.fault import FaultSettings
 from study.records.driven_by_motion import on_a_moving_base, relative_to_base
 from study.records.prepared import Prepared
 from study.records.record import Record

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from study.faults.fault import CLIPPING, DRIFT, DROP_OUTS, FORCE_NOISE, GAIN_CHANGE, NAMES, SPIKES, Fault
+from study.faults.fault import CLIPPING, DRIFT, DROP_OUTS, FAULTS, FORCE_NOISE, GAIN_CHANGE, SPIKES, Fault
 from study.faults.imposed import impose
 from study.figures.styles import in_style
 
@@ -47,7 +47,7 @@ def faulty(clean):
     return make
 
 
-@pytest.mark.parametrize("fault", NAMES)
+@pytest.mark.parametrize("fault", FAULTS)
 def test_every_fault_is_drawn_where_it_is_seen(fault, faulty):
     one = faulty(fault)
     first, last = script.shown_samples(one)
@@ -95,7 +95,7 @@ def test_the_script_writes_a_picture_and_says_what_was_found(tmp_path, capsys):
     assert capsys.readouterr().out.startswith("clipping: The displacement is clipped at ")
 
 
-@pytest.mark.parametrize("fault", NAMES)
+@pytest.mark.parametrize("fault", FAULTS)
 def test_the_text_shows_every_picture(fault):
     text = (ROOT / "docs" / "tool.md").read_text(encoding="utf-8")
     assert f"](faults/{fault}.png)" in text

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from study.faults.imposed import FAULTS, high_passed, impose, shifted
+from study.faults.fault import FAULTS
+from study.faults.imposed import high_passed, impose, shifted
 from study.faults.spotted import at_the_limits
 from study.support.errors import StudyError
 from study.trials.draw import make_trial

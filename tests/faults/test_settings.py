@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from study import cli
+from study.faults.fault import NOTHING_ASKED, settings_beside
 from study.faults.imposed import impose
-from study.faults.instrument_settings import NOTHING_ASKED, settings_beside
 from study.records.record import write_csv
 from study.trials.draw import make_trial
 

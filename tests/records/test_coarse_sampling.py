@@ -7,7 +7,7 @@ from study.equations.free_run import predict_response
 from study.equations.model import Model, free
 from study.equations.terms import get
 from study.faults.accounting import accounted
-from study.faults.fault import NAMES
+from study.faults.fault import FAULTS
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.prepared import prepare_record
 from study.records.record import SI_UNITS, Record
@@ -47,5 +47,5 @@ def test_noise_alone_is_no_motion_that_is_too_fast():
 
 
 def test_it_stands_in_the_notes_of_a_comparison():
-    found = accounted(LINEAR, sampled(3.3), switched_off=NAMES).comparison
+    found = accounted(LINEAR, sampled(3.3), switched_off=FAULTS).comparison
     assert any("sampled too coarsely" in note for note in found.notes)

@@ -9,7 +9,7 @@ from study.equations.free_run import predict_response
 from study.equations.model import Model, free
 from study.equations.terms import get
 from study.faults.accounting import accounted
-from study.faults.fault import NAMES
+from study.faults.fault import FAULTS
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.prepared import prepare_record
 from study.records.record import SI_UNITS, Record
@@ -38,7 +38,9 @@ def test_coefficients_and_their_errors_are_those_of_all_samples(term, values):
     model = believed(term)
     truth = model.with_values(VALUES | values)
     prepared = prepare_record(measured(truth, "displacement", 1e-4))
-    every, some = (accounted(model, prepared, switched_off=NAMES, as_sampled=all_).comparison for all_ in (True, False))
+    every, some = (
+        accounted(model, prepared, switched_off=FAULTS, as_sampled=all_).comparison for all_ in (True, False)
+    )
     assert every.prepared.every == 1
     assert some.prepared.every >= 5
     assert some.spans == every.spans == ((0, SAMPLES // 2), (SAMPLES // 2, SAMPLES))

@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import binomtest
 
 from study.diagnose.verdict import diagnose
-from study.faults.imposed import FAULTS
+from study.faults.fault import FAULTS
 from study.reproduction.config import load_config
 from study.reproduction.settings import TrialSettings
 from study.support.errors import StudyError

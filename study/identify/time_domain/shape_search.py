@@ -24,6 +24,7 @@ from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 
+PERIODS = 100.0  # of the motion that a search for effects uses, at least
 SEARCHED = 4096  # samples that a search for open shape parameters looks at, if they show anything
 PEAKS = 6  # lines of a spectrum that are tried as the frequency of a periodic effect
 SHARP = (15.0, 40.0, 100.0, 250.0)  # per amplitude: loops that close within a small part of a stroke
