@@ -137,7 +137,7 @@ def _response(left: FittedResidual, prepared: Prepared) -> Floats:
     """Response of the fitted model on both parts of a record, shape (n + m,)."""
     fitted = run_of(left.fit, prepared).respond({}, left.fit.initial)[0][:, 0]
     assert left.prediction.run is not None, "what does not run leaves nothing to look at"
-    return np.concatenate([fitted, replace(left.prediction.run, prepared=prepared).motion(prepared.response)])
+    return np.concatenate([fitted, replace(left.prediction.run, prepared=prepared).motions()[:, 0]])
 
 
 def _likely(power: Floats, shape: Floats) -> _Noise:

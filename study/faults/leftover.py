@@ -34,7 +34,7 @@ class FittedResidual:
         """
         run = self.prediction.run
         fitted = linearise(self.fit, self.prepared)
-        judged = np.zeros((len(self.prediction.measured), fitted.shape[1]))
+        judged = np.zeros((len(self.prediction.residual), fitted.shape[1]))
         if run is not None:
             judged[:] = run.derivatives(self.fit)
             if run.first != self.fit.first:
@@ -45,12 +45,12 @@ class FittedResidual:
     def predicted(self) -> tuple[Floats, Floats]:
         """Response of the free run on both parts: free of noise."""
         fitted = run_of(self.fit, self.prepared).respond({}, self.fit.initial)[0][:, 0]
-        return fitted, self.prediction.predicted
+        return fitted, self.prediction.of(0).predicted
 
     @property
     def residual(self) -> tuple[Floats, Floats]:
         """Measured less predicted response on both parts."""
-        return self.fit.residual, self.prediction.difference
+        return self.fit.residual, self.prediction.of(0).difference
 
     @cached_property
     def beside_own(self) -> Floats:
@@ -70,7 +70,7 @@ class FittedResidual:
     @property
     def size(self) -> float:
         """Rms of the measured response on the judging part."""
-        return self.prediction.size
+        return self.prediction.of(0).size
 
     def known(self, columns: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
         """Columns on both parts, zero where samples are lost."""
