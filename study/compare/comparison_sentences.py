@@ -11,7 +11,7 @@ from study.compare.growth import Growth, Growths
 from study.compare.noise import SCATTER
 from study.support.numbers import by_chance, percent
 
-NEGLIGIBLE = 2e-3  # of the rms response: structure below this is no evidence that something is missing
+NEGLIGIBLE = 2e-3  # of the rms response: what stands above the noise by less is no evidence that something is missing
 CHANCE = 0.01  # p value below which a change along the record is no chance
 TOLD_APART = 2.0  # standard errors by which the best way must explain more than another
 EXPLAINS = 0.5  # of what stands above the noise: what a power must explain to be named

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 AVERAGES = 8  # segments without overlap, at least
 LONGEST = 1024  # samples in a segment
 SAME = 1e-3  # rms by which the force of two periods may differ, over its own
-SIGNIFICANT = 5.0  # standard errors by which structure must stand above the noise
+SIGNIFICANT = 5.0  # standard errors by which a residual must stand above the noise
 WHITE, SCATTER, EXACT = "quietest bands of the residual", "scatter between periods", "error of the integration"
 
 

@@ -41,7 +41,7 @@ class StructureDiagnosis:
     comparison: StructureComparison  # the structure as it was given
     candidates: tuple[PlacedRanked, ...]  # best first
     asked: int  # effects times places
-    left: float  # rms of the structure that remains beside the best explanation, over the rms response
+    left: float  # rms of what remains above the noise beside the best explanation, over the rms response
     families: tuple[FamilyGain, ...]  # for an unknown effect: what general shapes at each place explain, best first
 
     @cached_property
