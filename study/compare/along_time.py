@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from study.compare.prediction import Prediction
+from study.compare.prediction import Prediction, SensorPrediction
 
 Floats = NDArray[np.float64]
 STRETCHES = 6
@@ -43,7 +43,8 @@ def along_time(prediction: Prediction) -> AlongTime:
     The logarithm of the residual's power in blocks is explained by that of the response (and its square)
     and then by the stretch as well; an F test says whether the second step brings more than chance would.
     """
-    residual, response = prediction.residual, prediction.measured - float(np.mean(prediction.measured))
+    seen = prediction.of(0)
+    residual, response = seen.residual, seen.measured - float(np.mean(seen.measured))
     count = _blocks(residual)
     e, y = _log_powers(residual, count), _log_powers(response, count)
     group = np.arange(count) * STRETCHES // count
@@ -59,7 +60,7 @@ def along_time(prediction: Prediction) -> AlongTime:
         ratio = (sum_plain - sum_full) / (STRETCHES - 1) / (sum_full / freedom)
         p_value = float(np.asarray(fdtrc(STRETCHES - 1, freedom, ratio), dtype=np.float64))
     growth, growth_error = _slope(level, e)
-    rows = tuple(_stretch(prediction, residual, response, k, np.exp(e - usual), group) for k in range(STRETCHES))
+    rows = tuple(_stretch(seen, residual, response, k, np.exp(e - usual), group) for k in range(STRETCHES))
     together = 1.0 - _regress(np.concatenate([plain[:, :1], stretch], axis=1), level)[1] / max(
         float(level @ level), 1e-300
     )
@@ -96,14 +97,14 @@ def _slope(x: Floats, y: Floats) -> tuple[float, float]:
 
 
 def _stretch(
-    prediction: Prediction, residual: Floats, response: Floats, k: int, ratios: Floats, group: NDArray[np.int64]
+    seen: SensorPrediction, residual: Floats, response: Floats, k: int, ratios: Floats, group: NDArray[np.int64]
 ) -> JudgedStretch:
     bounds = np.linspace(0, len(residual), STRETCHES + 1).round().astype(int)
     first, last = int(bounds[k]), int(bounds[k + 1])
-    begin = float(prediction.time[first])
+    begin = float(seen.time[first])
     return JudgedStretch(
-        begin, begin + (last - first) * prediction.dt,
-        float(np.sqrt(np.mean(residual[first:last] ** 2))) / prediction.size,
-        float(np.sqrt(np.mean(response[first:last] ** 2))) / prediction.size,
+        begin, begin + (last - first) * seen.dt,
+        float(np.sqrt(np.mean(residual[first:last] ** 2))) / seen.size,
+        float(np.sqrt(np.mean(response[first:last] ** 2))) / seen.size,
         float(np.exp(np.mean(np.log(ratios[group == k])))),
     )  # fmt: skip

@@ -122,7 +122,7 @@ def _judged(
     in_reverse: Callable[[Model, Prediction], ForceError] = force_error, report: Progress = lambda _: None,
 ) -> dict[str, Any]:  # fmt: skip
     """The fields of a comparison that say how good a fit is on the judging part, and where it fails."""
-    noise = prediction.noise
+    noise = prediction.of(0).noise
     report("force")
     force = in_reverse(fit.model, prediction)
     report("where it fails")

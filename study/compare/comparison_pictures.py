@@ -56,14 +56,14 @@ def level_pictures(moving: Sequence[Level], force_unit: str) -> dict[str, bytes]
 
 def response_figure(comparison: Comparison) -> Figure:
     """Measured and predicted response, their difference, and a close-up where that is largest."""
-    prediction, unit = comparison.prediction, comparison.record.units.get(comparison.plan.response, "")
-    about = f"error {percent(prediction.error)} of the rms response, noise floor {percent(prediction.floor)}"
+    prediction, unit = comparison.prediction.of(0), comparison.record.units.get(comparison.plan.response, "")
+    about = f"error {percent(prediction.error)} of the rms response, noise floor {percent(comparison.prediction.floor)}"
     figure, axes = page.empty_page(
         f"{comparison.record.name}: {comparison.plan.response}", f"model {comparison.model.name}; {about}",
         rows=3, width=WIDE, panel=1.8, legend_rows=2, share=False,
     )  # fmt: skip
     panels.response_panel(axes[0], prediction.time, prediction.measured, prediction.predicted, unit)
-    panels.residual(axes[1], prediction.time, prediction.residual, comparison.prediction.noise.rms, unit)
+    panels.residual(axes[1], prediction.time, prediction.residual, prediction.noise.rms, unit)
     near = prediction.closeup
     panels.response_panel(axes[2], prediction.time[near], prediction.measured[near], prediction.predicted[near], unit)
     page.letter(axes, ("all that was predicted", "the difference", "close-up of (a) where the difference is largest"))

@@ -52,7 +52,7 @@ def _mean(values: Sequence[float], key: str) -> float:
 
 
 def _of_record(comparison: Comparison) -> Row:
-    prediction = comparison.prediction
+    prediction, seen = comparison.prediction, comparison.prediction.of(0)
     return {
         "record": comparison.record.name,
         "model": {"name": comparison.model.name, "equation": comparison.model.equation(), "terms": [
@@ -60,14 +60,14 @@ def _of_record(comparison: Comparison) -> Row:
         "error": {"force": comparison.force.total, "response": comparison.prediction.error},
         "noise_floor": {
             "force": comparison.force.noise_total, "response": prediction.floor,
-            "response_error": prediction.noise.error / prediction.size, "from": prediction.noise.source,
+            "response_error": seen.noise.error / seen.size, "from": seen.noise.source,
         },
         "rms": {
-            "response_error": prediction.error * prediction.size, "response": prediction.size,
+            "response_error": seen.error * seen.size, "response": seen.size,
             "unit": comparison.record.units.get(comparison.plan.response, ""),
         },
         "error_of_fitted_coefficients": {"force": comparison.force.parametric_total},
-        "above_noise": {"response": prediction.structure, "standard_errors": prediction.noise.significance},
+        "above_noise": {"response": prediction.above_noise, "standard_errors": seen.noise.significance},
         "coefficients": [coefficient_row(c) for c in comparison.coefficients],
         "fit": {
             "samples": list(comparison.spans[0]), "judged": list(comparison.spans[1]),
@@ -135,7 +135,7 @@ def history_step(comparison: Comparison, added: str | None = None, dropped: str 
         "terms": [t.name for t in comparison.model.terms], "added": added, "dropped": dropped,
         "record": comparison.record.name,
         "error": {"force": None if math.isnan(force) else force, "response": comparison.prediction.error},
-        "rms": float(comparison.prediction.error * comparison.prediction.size),
+        "rms": float(comparison.prediction.error * comparison.prediction.of(0).size),
         "unit": comparison.record.units.get(comparison.plan.response, ""),
         "noise_floor": {"response": comparison.prediction.floor},
         "converged": comparison.fit.converged, "coefficients": [coefficient_row(c) for c in comparison.coefficients],
@@ -186,7 +186,7 @@ def _summary(comparison: Comparison) -> pd.DataFrame:
     prediction = comparison.prediction
     row = {
         "model": comparison.model.name, "response_error": prediction.error, "response_noise_floor": prediction.floor,
-        "response_above_noise": prediction.structure, "force_error": comparison.force.total,
+        "response_above_noise": prediction.above_noise, "force_error": comparison.force.total,
         "force_error_of_fitted_coefficients": comparison.force.parametric_total,
         "force_noise_floor": comparison.force.noise_total, "rms_force": comparison.level,
         "time_p_value": comparison.time.p_value, "converged": comparison.fit.converged,
@@ -214,7 +214,7 @@ def _force_error(comparison: Comparison) -> pd.DataFrame:
 
 
 def _response_spectrum(comparison: Comparison) -> pd.DataFrame:
-    noise = comparison.prediction.noise
+    noise = comparison.prediction.of(0).noise
     return pd.DataFrame({"frequency": noise.frequency, "difference": noise.residual, "noise": noise.density})
 
 
@@ -266,7 +266,7 @@ def footnotes(notes: Sequence[str]) -> str:
 
 def _in_units(comparison: Comparison) -> str:
     unit = comparison.record.units.get(comparison.plan.response, "")
-    return f"{comparison.prediction.error * comparison.prediction.size:.3g} {unit}".strip()
+    return f"{comparison.prediction.error * comparison.prediction.of(0).size:.3g} {unit}".strip()
 
 
 def _headline(comparison: Comparison) -> str:

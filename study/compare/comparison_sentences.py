@@ -11,7 +11,7 @@ from study.compare.growth import Growth, Growths
 from study.compare.noise import SCATTER
 from study.support.numbers import by_chance, percent
 
-NEGLIGIBLE = 2e-3  # of the rms response: structure below this is no evidence that something is missing
+NEGLIGIBLE = 2e-3  # of the rms response: what stands above the noise by less is no evidence that something is missing
 CHANCE = 0.01  # p value below which a change along the record is no chance
 TOLD_APART = 2.0  # standard errors by which the best way must explain more than another
 EXPLAINS = 0.5  # of what stands above the noise: what a power must explain to be named
@@ -31,7 +31,7 @@ def comparison_in_words(comparison: Comparison, diagnosed: bool = False) -> str:
     sentences = [_how_good(comparison, diagnosed)]
     if comparison.prediction.error >= HOPELESS:
         sentences.append(_least(comparison))
-    elif comparison.prediction.structure > NEGLIGIBLE:
+    elif comparison.prediction.above_noise > NEGLIGIBLE:
         sentences.append(_where(comparison))
     if not comparison.fit.converged:
         sentences.append(
@@ -64,13 +64,13 @@ def _how_good(comparison: Comparison, diagnosed: bool) -> str:
             f"{start}, {like} without any motion would: it cannot follow this record, and its fitted coefficients "
             "mean nothing"
         )
-    if comparison.prediction.noise.alone:
-        source = " (from the scatter between periods)" if comparison.prediction.noise.source == SCATTER else ""
+    if comparison.prediction.of(0).noise.alone:
+        source = " (from the scatter between periods)" if comparison.prediction.of(0).noise.source == SCATTER else ""
         doubt = "" if source or diagnosed else "; 'study diagnose' looks closer"
         return f"{start}, and that is noise{source}: nothing stands above the noise floor of {floor}{doubt}"
-    if comparison.prediction.structure <= NEGLIGIBLE:
+    if comparison.prediction.above_noise <= NEGLIGIBLE:
         return (
-            f"{start}; what stands above the noise floor of {floor} is {percent(comparison.prediction.structure)} of "
+            f"{start}; what stands above the noise floor of {floor} is {percent(comparison.prediction.above_noise)} of "
             "the response, too little to call anything missing"
         )
     return f"{start}, where noise alone would leave {floor}"
@@ -159,7 +159,7 @@ def says_of_all(comparisons: Sequence[Comparison], moving: Sequence[Level]) -> s
     """The same of several records: the worst of them, and whether the coefficients move between levels."""
     if len(comparisons) == 1:
         return comparison_in_words(comparisons[0])
-    worst = max(comparisons, key=lambda c: c.prediction.structure)
+    worst = max(comparisons, key=lambda c: c.prediction.above_noise)
     moved = [level for level in moving if level.moves]
     names = ", ".join(f"{level.key} by {percent(level.change)}" for level in moved)
     levels = f"coefficients move with the level: {names}" if moved else "no coefficient moves with the level"

@@ -56,7 +56,7 @@ class Decays:
 def decays_of(comparison: Comparison) -> Decays | None:
     """Those of a comparison; None where it is no free decay, or too short a one."""
     prepared = comparison.prediction.prepared
-    return decays(comparison.fit, prepared, comparison.prediction.noise.rms) if prepared.free else None
+    return decays(comparison.fit, prepared, comparison.prediction.of(0).noise.rms) if prepared.free else None
 
 
 def decays(fit: FreeRunFit, prepared: Prepared, floor: float) -> Decays | None:

@@ -72,7 +72,7 @@ class ForceError:
 
 def force_error(model: Model, prediction: Prediction) -> ForceError:
     """Judge a fitted model in reverse on the judging part; a ``StudyError`` if it is too short for the inputs."""
-    prepared, noise = prediction.prepared, prediction.noise
+    prepared, noise = prediction.prepared, prediction.of(0).noise
     record, (first, last) = prepared.record, prepared.inner(prepared.plan.judge)
     inputs = reverse_inputs(model)
     if prepared.free or not np.any(record["force"][first:last]):  # the inertia force is what the others balance

@@ -46,7 +46,7 @@ def _points(axis: panels.Axes, found: Decay, what: str) -> None:
 
 def loops_figure(comparison: Comparison, found: Loops) -> Figure:
     """Force over displacement and over velocity, measured and predicted, and the energy that each cycle takes."""
-    record, prediction = comparison.record, comparison.prediction
+    record, prediction = comparison.record, comparison.prediction.of(0)
     part = record.part(*comparison.plan.judge)
     units = {name: dimensions.pretty(record.units.get(name, "")) for name in ("force", "displacement", "velocity")}
     figure, axes = page.empty_page(

@@ -41,7 +41,7 @@ def local_force_error(model: Model, prediction: Prediction) -> ForceError:
     StudyError
         If the judging part is too short for two bands.
     """
-    prepared, noise = prediction.prepared, prediction.noise
+    prepared, noise = prediction.prepared, prediction.of(0).noise
     record, inputs = prepared.record.part(*prepared.inner(prepared.plan.judge)), reverse_inputs(model)
     lines = transform([*histories(inputs, record), record["force"]], record.dt)
     local = LocalPolynomial(DEGREE, ((DEGREE + 1) * (len(inputs) + 1) + SPARE) // 2)

@@ -22,7 +22,7 @@ class Loops:
 
 def loops(prediction: Prediction) -> Loops:
     """Cycles that lie within a stretch of the record, with the energy that each dissipates."""
-    prepared = prediction.prepared
+    prepared, seen = prediction.prepared, prediction.of(0)
     part = prepared.record.part(*prepared.plan.judge)
     u, joints = part["displacement"], set(part.joints)
     above = u - np.mean(u) > 0.0
@@ -33,7 +33,7 @@ def loops(prediction: Prediction) -> Loops:
         if stroke < SMALL * largest or any(first < joint <= last for joint in joints):
             continue
         cycle = slice(first, last + 1)
-        measured, predicted = (_energy(f[cycle], u[cycle]) for f in (prediction.measured, prediction.predicted))
+        measured, predicted = (_energy(f[cycle], u[cycle]) for f in (seen.measured, seen.predicted))
         rows.append((stroke, measured, predicted))
     return Loops(*np.array(rows).reshape(-1, 3).T)
 

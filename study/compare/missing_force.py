@@ -24,7 +24,7 @@ from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.identify.frequency_domain.starting_values import oscillator
 from study.records.completion import SETTLED, derivative
 from study.records.prepared import FORCE, Prepared
-from study.records.record import MOTIONS, Record
+from study.records.record import ALONE, MOTIONS, Record, Sensor
 
 Floats = NDArray[np.float64]
 CLEAR = 3.0  # standard errors by which the residual must stand above the noise, for a line to be used
@@ -61,7 +61,7 @@ def missing_force(model: Model, keys: Sequence[str], prediction: Prediction) -> 
     """The missing force on the judging part. Every value of the model is known; ``keys`` are what was fitted of it."""
     if prediction.prepared.response == FORCE:
         return _along_a_known_motion(keys, prediction)
-    noise, prepared = prediction.noise, prediction.prepared
+    noise, prepared = prediction.of(0).noise, prediction.prepared
     gate = lines_above_noise(noise, prepared.band[0])
     motion = _motion(prediction, gate, noise.frequency)
     part = prepared.record.part(*prepared.plan.judge)
@@ -77,12 +77,12 @@ def missing_force(model: Model, keys: Sequence[str], prediction: Prediction) -> 
 
 def _along_a_known_motion(keys: Sequence[str], prediction: Prediction) -> MissingForce:
     """The same where the motion is prescribed: what is left of the measured force, at all frequencies."""
-    noise, prepared, run = prediction.noise, prediction.prepared, prediction.run
+    seen, prepared, run = prediction.of(0), prediction.prepared, prediction.run
     part = prepared.record.part(*prepared.plan.judge)
     free = np.zeros((len(part), len(keys))) if run is None else run.derivatives(run.fit)[:, : len(keys)]
-    lines = np.ones(len(noise.frequency), dtype=np.bool_)
+    noise, lines = seen.noise, np.ones(len(seen.noise.frequency), dtype=np.bool_)
     return MissingForce(
-        displacement=part["displacement"], velocity=part["velocity"], force=prediction.difference, free=free,
+        displacement=part["displacement"], velocity=part["velocity"], force=seen.difference, free=free,
         gate=lines, weight=np.ones(len(lines)), frequency=noise.frequency, noise=noise.rms**2, dt=prediction.dt, edge=0,
     )  # fmt: skip
 
@@ -109,12 +109,14 @@ def _motion(prediction: Prediction, gate: NDArray[np.bool_], frequency: Floats) 
     The difference is integrated before it is gated: a gate blurs the ends, which an integration would blow up.
     """
     parts: list[Floats] = []
+    seen, prepared = prediction.of(0).difference, prediction.prepared
     for row in range(3):
-        order = row - prediction.row
-        low = prediction.prepared.band[0] if order < 0 else 0.0
-        moved = derivative(prediction.difference, prediction.dt, order, low) if order else prediction.difference
-        parts.append(_filtered(moved, prediction.dt, frequency, gate.astype(np.float64)))
-    return prediction.motion + np.stack(parts)
+        order = row - MOTIONS.index(prepared.response)
+        low = prepared.band[0] if order < 0 else 0.0
+        moved = derivative(seen, prepared.dt, order, low) if order else seen
+        parts.append(_filtered(moved, prepared.dt, frequency, gate.astype(np.float64)))
+    free = prediction.motions([Sensor(ALONE, motion) for motion in MOTIONS])
+    return np.ascontiguousarray(free.T) + np.stack(parts)
 
 
 def unbalanced_force(model: Model, keys: Sequence[str], record: Record) -> Floats:

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from study.records import noise_floor
 from study.records.prepared import Prepared
+from study.records.record import Sensor
 from study.records.spectra import Segments, autospectrum
 
 Floats = NDArray[np.float64]
 AVERAGES = 8  # segments without overlap, at least
 LONGEST = 1024  # samples in a segment
 SAME = 1e-3  # rms by which the force of two periods may differ, over its own
-SIGNIFICANT = 5.0  # standard errors by which structure must stand above the noise
+SIGNIFICANT = 5.0  # standard errors by which a residual must stand above the noise
 WHITE, SCATTER, EXACT = "quietest bands of the residual", "scatter between periods", "error of the integration"
 
 
@@ -47,8 +48,10 @@ def segments_of(samples: int) -> Segments:
     return Segments(length=max(32, min(LONGEST, 2 ** int(np.log2(max(samples // AVERAGES, 32))))))
 
 
-def noise_of(difference: Floats, residual: Floats, prepared: Prepared, numerical: float) -> Noise:
-    """Noise of the response on the judging part.
+def noise_of(
+    difference: Floats, residual: Floats, prepared: Prepared, sensor: Sensor, numerical: float
+) -> Noise:  # fmt: skip
+    """Noise of the response at a sensor on the judging part.
 
     ``difference`` is the measured minus the predicted response, ``residual`` the same without what lies below the
     frequencies that are judged; shape (samples to judge,). ``prepared`` is the whole record, whose ``period`` is made
@@ -65,7 +68,7 @@ def noise_of(difference: Floats, residual: Floats, prepared: Prepared, numerical
         frequency, np.full_like(frequency, white), density, floor.noise, 0.5 * floor.noise / np.sqrt(quiet),
         floor.excess, floor.significance, averages, WHITE,
     )  # fmt: skip
-    scatter = _between_periods(prepared)
+    scatter = _between_periods(prepared, sensor)
     if scatter is not None:
         noise = _with_density(noise, autospectrum(scatter, dt, cut)[1], low, len(difference), len(scatter))
     if noise.rms < numerical:
@@ -74,7 +77,7 @@ def noise_of(difference: Floats, residual: Floats, prepared: Prepared, numerical
     return replace(noise, rms=min(noise.rms, float(np.sqrt(np.mean(residual**2)))))
 
 
-def _between_periods(prepared: Prepared) -> Floats | None:
+def _between_periods(prepared: Prepared, sensor: Sensor) -> Floats | None:
     """Differences of the response between neighbouring periods with the variance of the noise, strung together.
 
     Periods are counted back from the end of the judging part, where the motion has settled; the whole
@@ -86,9 +89,11 @@ def _between_periods(prepared: Prepared) -> Floats | None:
         return None
     count = min(last // period, 6)
     first = last - count * period
-    force = record["force"][first:last].reshape(count, period)
-    motion = record[prepared.response][first:last].reshape(count, period)
-    alike = np.sqrt(np.mean(np.diff(force, axis=0) ** 2, axis=1)) < SAME * float(np.std(force))
+    motion = record[sensor][first:last].reshape(count, period)
+    alike = np.ones(count - 1, dtype=np.bool_)
+    for name in record.forces:
+        force = record[name][first:last].reshape(count, period)
+        alike &= np.sqrt(np.mean(np.diff(force, axis=0) ** 2, axis=1)) < SAME * float(np.std(force))
     settled = np.diff(motion, axis=0)[alike] / np.sqrt(2.0)
     if not len(settled):
         return None

@@ -49,13 +49,13 @@ def response_functions(prediction: Prediction) -> ResponseFunctions:
     StudyError
         If the record is of free decays, which nothing drives.
     """
-    prepared = prediction.prepared
+    prepared, seen = prediction.prepared, prediction.of(0)
     name = prepared.record.name
     expect(not prepared.free, f"{name}: no force acts; expected a driven record for a frequency response function")
     drive = prepared.record[drive_of(prepared)][slice(*prepared.plan.judge)]
     cut = segments_of(len(drive))
-    measured = cross_spectra([drive, prediction.measured], prediction.dt, cut)
-    predicted = cross_spectra([drive, prediction.predicted], prediction.dt, cut)
+    measured = cross_spectra([drive, seen.measured], prediction.dt, cut)
+    predicted = cross_spectra([drive, seen.predicted], prediction.dt, cut)
     power = measured.density[:, 0, 0].real
     kept = (measured.frequency > 0.0) & (power > LOUD * np.max(power))
     (h, coherence), (model, of_model) = _h1(measured), _h1(predicted)

@@ -77,7 +77,7 @@ def held_out(fit: FreeRunFit, prediction: Prediction, jacobian: Floats, prepared
     except DivergenceError:
         return HeldOut(prediction.residual, nothing)
     own = len(fit.keys)
-    step = least_squares(there, prediction.difference)[:own]
+    step = least_squares(there, prepared.outputs.stacked(prediction.misfit))[:own]
     other = fit.residual - jacobian[:, :own] @ step
     begin = jacobian[:, own:]  # the initial state is no part of what is predicted
     back = prediction.above(other - begin @ least_squares(begin, other))

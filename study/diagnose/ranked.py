@@ -55,7 +55,7 @@ class Ranked:
     @property
     def numerical(self) -> float:
         """Rms error of the integration itself; of a force that takes none, that of finding a least sum of squares."""
-        return max(self.prediction.numerical, ROUNDED * self.prediction.size)
+        return max(float(self.prediction.numerical[0]), ROUNDED * self.prediction.of(0).size)
 
     @property
     def response_error(self) -> float:

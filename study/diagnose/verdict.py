@@ -43,7 +43,7 @@ class Diagnosis:
     verdict: str  # ``missing_effect``, ``nothing_missing`` or ``unknown_effect``
     comparison: Comparison  # the model as it was given, with its fit, its error and its noise floor
     candidates: tuple[Ranked, ...]  # best first
-    left: float  # rms of the structure that remains beside the best explanation, over the rms response
+    left: float  # rms of what remains above the noise beside the best explanation, over the rms response
     pair: tuple[str, ...]  # two effects that explain together what none does alone; empty otherwise
     families: dict[str, float]  # for an unknown effect: held-out share that functions of displacement, ... explain
 
@@ -171,7 +171,7 @@ def _explaining_pair(rows: list[Ranked], base: Baseline, prepared: Prepared) -> 
 
 
 def _explains(pair: Pair, rows: list[Ranked], prepared: Prepared) -> bool:
-    """Whether a pair leaves no structure, does more than the first alone, and neither coefficient moves."""
+    """Whether a pair leaves nothing but noise, does more than the first alone, and neither coefficient moves."""
     prediction = pair.prediction
     more = statistics.gain(rows[0].residual, prediction.residual).p_value * len(rows) < ALPHA
     if not more or _left(pair.fit, prediction) > GOOD:

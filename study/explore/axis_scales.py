@@ -28,7 +28,7 @@ class Scales:
 
 def scales_of(comparison: Comparison) -> Scales:
     """Units in which the numbers of a comparison are easy to read."""
-    units, lacking, prediction = comparison.record.units, comparison.missing_force, comparison.prediction
+    units, lacking, prediction = comparison.record.units, comparison.missing_force, comparison.prediction.of(0)
     motion = rate if comparison.plan.response != "displacement" else length
     unit = units.get(comparison.plan.response, "")
     least = least_force(comparison)

@@ -59,5 +59,5 @@ def by_record(several: Several, together: Comparison) -> ByRecord:
 
 def worst(each: Sequence[Comparison]) -> int:
     """The place of the record of which the model misses most; 0 of one record, which has no comparison of its own."""
-    missed = [comparison.prediction.structure for comparison in each]
+    missed = [comparison.prediction.above_noise for comparison in each]
     return missed.index(max(missed)) if missed else 0

@@ -49,10 +49,10 @@ def _decay(comparison: Comparison, scales: Scales) -> dict[str, Columns]:
 
 def _loops(comparison: Comparison, scales: Scales) -> dict[str, Columns]:
     """Force, measured and predicted, beside the motion that was prescribed; and what each cycle takes of energy."""
-    prediction, prepared = comparison.prediction, comparison.prepared
+    prediction, prepared = comparison.prediction.of(0), comparison.prepared
     part = prepared.record.part(*prepared.plan.judge)
     some = slice(None, None, -(-len(part) // (2 * BUCKETS)))  # dots: a loop is as well seen in every second of them
-    found = loops(prediction)
+    found = loops(comparison.prediction)
     energy = scales.response.factor * scales.displacement.factor
     return {
         "loops": {

@@ -23,7 +23,7 @@ from study.figures.sketch import Sketch
 from study.records.spectra import autospectrum
 from study.structure.connection_spectra import dynamic_stiffnesses, highest_frequency, missing_force_spectra
 from study.structure.structure_comparison import StructureComparison
-from study.structure.structure_pictures import close_by, sketch_of, sketch_of_diagnosis
+from study.structure.structure_pictures import sketch_of, sketch_of_diagnosis
 
 NINETY_FIVE = 1.96  # standard errors to each side
 
@@ -134,10 +134,10 @@ def _motions(comparison: StructureComparison, close: bool = False) -> Columns:
 
     def parts() -> Iterator[tuple[str, Mapping[str, Floats]]]:
         for i, sensor in enumerate(prediction.prepared.sensors):
-            near = close_by(prediction, i) if close else slice(None)
+            near = prediction.of(i).closeup if close else slice(None)
             motions = {
                 "measured": prediction.measured[near, i], "predicted": prediction.predicted[near, i],
-                "difference": prediction.residual[near, i],
+                "difference": prediction.misfit[near, i],
             }  # fmt: skip
             factor = _motion_scale(comparison, i).factor
             shown = {name: decimate.extremes(x) / factor for name, x in motions.items()}
@@ -152,7 +152,7 @@ def _spectra(comparison: StructureComparison) -> Columns:
 
     def parts() -> Iterator[tuple[str, Mapping[str, Floats]]]:
         for i, sensor in enumerate(prediction.prepared.sensors):
-            left, dt = prediction.residual[:, i] / prediction.size[i], prediction.prepared.dt
+            left, dt = prediction.misfit[:, i] / prediction.size[i], prediction.prepared.dt
             f, density = autospectrum(left, dt, segments_of(len(left)))
             inside = (f > 0.0) & (f <= highest_frequency(comparison))
             noise = prediction.floors[i] / np.sqrt(0.5 / dt)
@@ -165,7 +165,7 @@ def _spectra(comparison: StructureComparison) -> Columns:
 def _checks(comparison: StructureComparison) -> dict[str, Columns]:
     """Autocorrelation and distribution of every sensor's residual; all have as many samples, so one band is for all."""
     prediction = comparison.prediction
-    found = [by_itself(own_checks(x, prediction.prepared.dt)) for x in prediction.residual.T]
+    found = [by_itself(own_checks(x, prediction.prepared.dt)) for x in prediction.misfit.T]
 
     def parts(source: str) -> Iterator[tuple[str, Mapping[str, Floats]]]:
         for sensor, columns in zip(prediction.prepared.sensors, found, strict=True):

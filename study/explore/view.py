@@ -85,7 +85,7 @@ def _small(columns: Columns) -> Columns:
 
 def over_time(comparison: Comparison, scales: Scales, span: tuple[float, float] | None = None) -> Columns:
     """Measured and predicted response and their difference, over a span of time in seconds or all that is judged."""
-    judged, part = comparison.prediction, stretch(comparison, span)
+    judged, part = comparison.prediction.of(0), stretch(comparison, span)
     shown = decimate.times(judged.time[part])
     places = decimate.gaps(judged.time[part], shown, judged.dt)
     lines = {
@@ -100,7 +100,8 @@ def over_time(comparison: Comparison, scales: Scales, span: tuple[float, float] 
 
 def _close(comparison: Comparison, scales: Scales) -> Columns:
     """Every sample of the stretch where the model misses most."""
-    judged, near, factor = comparison.prediction, comparison.prediction.closeup, scales.response.factor
+    judged, factor = comparison.prediction.of(0), scales.response.factor
+    near = judged.closeup
     return {"t": judged.time[near], "measured": judged.measured[near] / factor,
             "predicted": judged.predicted[near] / factor}  # fmt: skip
 
@@ -116,7 +117,7 @@ def stretch(comparison: Comparison, span: tuple[float, float] | None) -> slice:
 
 def _noise(comparison: Comparison, scales: Scales) -> Columns:
     """Twice the rms of the noise to either side, as two horizontal lines."""
-    level = 2.0 * comparison.prediction.noise.rms / scales.difference.factor
+    level = 2.0 * comparison.prediction.of(0).noise.rms / scales.difference.factor
     ends = [float(comparison.prediction.time[0]), float(comparison.prediction.time[-1])]
     return {"t": [ends, ends], "level": [[level, level], [-level, -level]]}
 
@@ -152,7 +153,7 @@ def _coherence(comparison: Comparison) -> Columns:
 
 
 def _spectrum(comparison: Comparison, scales: Scales) -> Columns:
-    noise, factor = comparison.prediction.noise, scales.difference.factor
+    noise, factor = comparison.prediction.of(0).noise, scales.difference.factor
     keep = heard(comparison, noise.frequency)
     densities = {"difference": noise.residual, "noise": noise.density}
     return {"f": noise.frequency[keep]} | {name: np.sqrt(d[keep]) / factor for name, d in densities.items()}

@@ -53,7 +53,7 @@ def words(stage: Stage, rows: Sequence[Ranked], step: int, live: bool, force_uni
         "equation": equation(stage),
         "equation-values": equation(stage, values=True),
         "notes": escape(in_sentence("; ".join(comparison.notes))),
-        "only-noise": ONLY_NOISE if comparison.prediction.noise.alone else "",
+        "only-noise": ONLY_NOISE if comparison.prediction.of(0).noise.alone else "",
         "plane-hint": hint(comparison),
         "step": escape(name(stage, step)),
         "force-unit": escape(in_text(force_unit)),
@@ -91,7 +91,7 @@ def equation(stage: Stage, values: bool = False) -> str:
 
 
 def _figures(comparison: Comparison) -> str:
-    size = comparison.prediction.error * comparison.prediction.size
+    size = comparison.prediction.error * comparison.prediction.of(0).size
     scaled = length if comparison.plan.response == "displacement" else rate
     shown = scaled(comparison.record.units.get(comparison.plan.response, ""), size)
     fit = in_percent(1.0 - comparison.prediction.error)

@@ -65,12 +65,12 @@ class FittedResidual:
     def predicted(self) -> tuple[Floats, Floats]:
         """Response of the free run on both parts: free of noise."""
         fitted = run_of(self.fit, self.prepared).respond({}, self.fit.initial)[0][:, 0]
-        return fitted, self.prediction.predicted
+        return fitted, self.prediction.of(0).predicted
 
     @property
     def residual(self) -> tuple[Floats, Floats]:
         """Measured less predicted response on both parts."""
-        return self.fit.residual, self.prediction.difference
+        return self.fit.residual, self.prediction.of(0).difference
 
     @property
     def both(self) -> Floats:
@@ -98,7 +98,7 @@ class FittedResidual:
     @property
     def size(self) -> float:
         """Rms of the measured response on the judging part."""
-        return self.prediction.size
+        return self.prediction.of(0).size
 
     @property
     def unit(self) -> str:

@@ -23,7 +23,7 @@ class FitPictures:
         """Measured and predicted response of the judging part, or some cycles where the model misses most."""
         from study.compare.panels import response_panel
 
-        prediction = self.comparison.prediction
+        prediction = self.comparison.prediction.of(0)
         part = prediction.closeup if closeup else slice(None)
         with drawing_axes(ax) as (axes,):
             response_panel(
@@ -37,7 +37,7 @@ class FitPictures:
         """What the model misses of the judging part, beside twice the noise floor."""
         from study.compare.panels import residual
 
-        prediction = self.comparison.prediction
+        prediction = self.comparison.prediction.of(0)
         with drawing_axes(ax) as (axes,):
             residual(axes, prediction.time, prediction.residual, prediction.noise.rms, self._unit())
             axes.legend(loc="upper right")

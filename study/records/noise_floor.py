@@ -1,7 +1,7 @@
-"""How much of a residual is noise, and how much has structure?
+"""How much of a residual is noise, and how much stands above it?
 
 Sensor noise is assumed to be white: its density is that of the quietest bands of the residual's
-autospectrum. The excess in other bands is structure that a better model could explain.
+autospectrum. The excess in other bands is systematic: a better model could explain it.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ QUIET = 5  # bands, the quietest, that give the floor
 
 @dataclass(frozen=True)
 class Floor:
-    """Noise and structure in a residual.
+    """Noise, and what stands above it, in a residual.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Floor:
 
 
 def floor(residual: Floats, dt: float, low: float = 0.0) -> Floor:
-    """Split a residual into noise floor and structure, both above the frequency ``low`` (hertz)."""
+    """Split a residual into noise floor and what stands above it, both above the frequency ``low`` (hertz)."""
     length = max(32, min(1024, 2 ** int(np.log2(len(residual) / 8))))
     segments = Segments(length=length)
     frequency, density = autospectrum(residual, dt, segments)

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from study.compare.prediction import Prediction
 from study.equations import model_file
 from study.equations.model import Model, ModelTerm
 from study.equations.place import place_in_words
 from study.records.prepared import Prepared
 from study.structure.measured_fit import MeasuredFit, fit_measured, fit_with_term
-from study.structure.measured_prediction import MeasuredPrediction, predict_measured
+from study.structure.measured_prediction import predict_measured
 from study.structure.measured_screening import screened_by_lines
 from study.structure.measured_spectra import CoefficientSpectrum, coefficient_spectra
 from study.support.arrays import Floats
@@ -51,7 +52,7 @@ class MeasuredComparison:
     prepared: Prepared
     fit: MeasuredFit
     modes: MeasuredModes
-    prediction: MeasuredPrediction
+    prediction: Prediction
     spectra: tuple[CoefficientSpectrum, ...]
     notes: tuple[str, ...]
 
@@ -233,7 +234,7 @@ def measured_step(
     return {
         "terms": [t.name for t in comparison.model.terms], "added": added, "dropped": dropped,
         "record": comparison.prepared.record.name, "error": {"force": None, "response": prediction.error},
-        "rms": float(np.sqrt(np.mean(prediction.residual**2))), "unit": "",
+        "rms": float(np.sqrt(np.mean(prediction.misfit**2))), "unit": "",
         "noise_floor": {"response": prediction.floor}, "converged": comparison.fit.converged,
         "coefficients": document["coefficients"],
     }  # fmt: skip

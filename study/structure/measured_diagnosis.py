@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from study.compare.prediction import Prediction
 from study.diagnose import ranked
 from study.diagnose.credibility import credible
 from study.diagnose.ranking import in_order
@@ -21,7 +22,7 @@ from study.identify.time_domain.weighted_fit import noise_left
 from study.records import noise_floor
 from study.structure.measured_comparison import MeasuredComparison
 from study.structure.measured_fit import MeasuredFit, fit_with_term, modal_run
-from study.structure.measured_prediction import MeasuredPrediction, predict_measured
+from study.structure.measured_prediction import predict_measured
 from study.structure.measured_screening import Screened, measured_entries, screened_by_lines
 from study.structure.measured_spectra import CoefficientSpectrum, coefficient_spectra
 from study.structure.placed_candidates import physical
@@ -42,7 +43,7 @@ class MeasuredRanked:
 
     entry: ModelTerm  # the effect and its place
     fit: MeasuredFit
-    prediction: MeasuredPrediction
+    prediction: Prediction
     gain: Gain
     coefficient: float
     error: float
@@ -66,7 +67,7 @@ class MeasuredRanked:
     @property
     def residual(self) -> Floats:
         """Held-out residual in shares of the sensors' sizes, those of one time side by side."""
-        return (self.prediction.residual / self.prediction.size).ravel()
+        return self.prediction.relative_residual
 
     @property
     def numerical(self) -> float:
@@ -157,7 +158,7 @@ def _tried(item: Screened, comparison: MeasuredComparison) -> MeasuredRanked | N
         return None
     estimates = np.array([fit.values[key] for key in fit.keys])
     coefficient, error, parameters, errors = ranked.amount(item.entry, fit.keys, estimates, fit.covariance)
-    gain = statistics.gain((before.residual / before.size).ravel(), (prediction.residual / before.size).ravel())
+    gain = statistics.gain(before.relative_residual, prediction.relative_residual)
     return MeasuredRanked(
         item.entry, fit, prediction, gain, coefficient, error, parameters, errors, _spectra(fit, item, comparison)
     )
@@ -179,14 +180,12 @@ def _ranked(rows: list[MeasuredRanked], comparison: MeasuredComparison, asked: i
     outputs = comparison.prepared.outputs
     noise = noise_left(outputs.stacked(best.fit.residual), len(outputs))
 
-    def whitened(values: Floats) -> Floats:
-        return outputs.whitened(outputs.stacked(values), noise)
-
-    white = {r.name: whitened(r.prediction.residual) for r in rows}
-    own, columns = whitened(comparison.prediction.residual), whitened(_derivatives(comparison))
+    white = {r.name: outputs.whitened(r.prediction.residual, noise) for r in rows}
+    own = outputs.whitened(comparison.prediction.residual, noise)
+    columns = outputs.whitened(outputs.stacked(_derivatives(comparison)), noise)
     nothing = np.zeros(0)
     test = HeldOutTest(outputs, noise, (own, nothing), (orthonormal(columns), np.zeros((0, 0))))
-    chances = [test.p_value((outputs.stacked(r.prediction.residual), nothing), searched=True) for r in rows]
+    chances = [test.p_value((r.prediction.residual, nothing), searched=True) for r in rows]
     rows = [replace(r, p_value=min(1.0, asked * chance)) for r, chance in zip(rows, chances, strict=True)]
     return [replace(r, distance=away, tied_with=tied) for r, away, tied in in_order(rows, white, asked)]
 
@@ -213,12 +212,12 @@ def _decide(rows: list[MeasuredRanked], comparison: MeasuredComparison, asked: i
     return MeasuredDiagnosis(MISSING if enough else UNKNOWN, comparison, ordered, asked, left)
 
 
-def rms_above_noise(prediction: MeasuredPrediction) -> float:
+def rms_above_noise(prediction: Prediction) -> float:
     """Rms over that of the motion of what stands above white noise at any sensor, beyond chance; zero if nothing does.
 
     What no model could explain is white here; a mode that the fit has not is above it as well.
     """
-    floors = [noise_floor.floor(x, prediction.prepared.dt) for x in prediction.residual.T]
+    floors = [noise_floor.floor(x, prediction.prepared.dt) for x in prediction.misfit.T]
     excess = [max(f.excess, 0.0) / s**2 if f.significance > K else 0.0
               for f, s in zip(floors, prediction.size, strict=True)]  # fmt: skip
     return float(np.sqrt(np.mean(excess)))

@@ -13,6 +13,7 @@ from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from study.compare.force_map import ForceCurve, curve
 from study.compare.noise import SIGNIFICANT
+from study.compare.prediction import Prediction
 from study.equations import kernels
 from study.equations.coefficient_units import units_at
 from study.equations.equations_of_motion import acceleration_program
@@ -25,7 +26,6 @@ from study.records.completion import derivative
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments, autospectrum
-from study.structure.structure_prediction import StructurePrediction
 from study.support.arrays import Floats
 
 CLEAR = 3.0  # standard errors by which the difference must stand above the noise, for a line to be used
@@ -89,11 +89,10 @@ class MissingForces:
         return float(np.sum(self.rms**2)) / power if power > 0.0 else 0.0
 
 
-def missing_forces(prediction: StructurePrediction) -> MissingForces:
+def missing_forces(model: Model, prediction: Prediction) -> MissingForces:
     """What each equation of a fitted structure leaves on the judging part."""
-    model = prediction.fit.model
     measured = [s.coordinate for s in prediction.prepared.sensors]
-    motion = gated_motion(prediction)
+    motion = gated_motion(model, prediction)
     residual, inertia = unbalanced_forces(model, motion, prediction)
     rows = [model.coordinates.index(c) for c in measured]
     inner = slice(len(residual) // MARGIN, len(residual) - len(residual) // MARGIN)
@@ -108,16 +107,14 @@ def missing_forces(prediction: StructurePrediction) -> MissingForces:
     )  # fmt: skip
 
 
-def gated_motion(prediction: StructurePrediction) -> Floats:
+def gated_motion(model: Model, prediction: Prediction) -> Floats:
     """Displacement, velocity and acceleration of all coordinates on the judging part, shape (3, samples, coordinates).
 
     The free run's, and of those that are measured, what stands above the noise of the difference besides.
     """
-    coordinates = prediction.fit.model.coordinates
-    wanted = tuple(Sensor(c, m) for m in MOTIONS for c in coordinates)
-    samples = len(prediction.measured)
-    free = np.zeros((samples, len(wanted))) if prediction.diverged else prediction.motion(wanted)
-    return corrected_motion(free, prediction.residual, prediction.prepared, coordinates, prediction.prepared.plan.judge)
+    prepared, coordinates = prediction.prepared, model.coordinates
+    free = prediction.motions([Sensor(c, m) for m in MOTIONS for c in coordinates])
+    return corrected_motion(free, prediction.misfit, prepared, coordinates, prepared.plan.judge)
 
 
 def corrected_motion(
@@ -175,7 +172,7 @@ def in_band(values: Floats, dt: float, frequency: Floats, gate: Floats) -> Float
     return np.asarray(irfft(lines * weight, size), dtype=np.float64)[: len(values)]
 
 
-def unbalanced_forces(model: Model, motion: Floats, prediction: StructurePrediction) -> tuple[Floats, Floats]:
+def unbalanced_forces(model: Model, motion: Floats, prediction: Prediction) -> tuple[Floats, Floats]:
     """What the equations leave along a motion, and the forces of inertia, each of shape (samples, coordinates)."""
     prepared = prediction.prepared
     part = slice(*prepared.plan.judge)
@@ -218,9 +215,9 @@ def _shares(residual: Floats) -> Floats:
     return (2.0 * between + np.diag(alone)) / total
 
 
-def _aligned(model: Model, prediction: StructurePrediction) -> tuple[tuple[Place, float], ...]:
+def _aligned(model: Model, prediction: Prediction) -> tuple[tuple[Place, float], ...]:
     prepared = prediction.prepared
-    seen = np.stack([_above_noise(x, prepared.dt, prepared.band[0]) for x in prediction.residual.T], axis=1)
+    seen = np.stack([_above_noise(x, prepared.dt, prepared.band[0]) for x in prediction.misfit.T], axis=1)
     if not np.any(seen):
         return ()
     size = next_fast_len(2 * len(seen), real=True)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from study.compare.prediction import Prediction, predict
 from study.equations import formulas, kernels
 from study.equations.graph import Graph, Program
 from study.equations.linear_part import connections
@@ -17,7 +18,6 @@ from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import Prepared
 from study.structure.placed_search import PlacedBaseline, PlacedStart, placed_starts, with_placed_term
-from study.structure.structure_prediction import StructurePrediction, predict_structure
 from study.support.cores import cores
 from study.support.errors import StudyError
 
@@ -36,7 +36,7 @@ class PlacedCandidate:
 
     entry: ModelTerm  # the effect and its place
     fit: FreeRunFit
-    prediction: StructurePrediction
+    prediction: Prediction
 
     @property
     def unphysical(self) -> str:
@@ -159,7 +159,7 @@ def try_placed(
             fit = with_placed_term(base.fit, entry, base.prepared, base, points)
         except StudyError:
             return None
-        prediction = predict_structure(fit, base.prepared)
+        prediction = predict(fit, base.prepared)
         return None if prediction.diverged else PlacedCandidate(entry, fit, prediction)
 
     done: list[PlacedCandidate] = []
@@ -188,7 +188,7 @@ def with_best_placed_settled(tried: Sequence[PlacedCandidate], prepared: Prepare
             fit = finished(candidate.fit, prepared)
         except StudyError:
             return candidate
-        prediction = predict_structure(fit, prepared)
+        prediction = predict(fit, prepared)
         return candidate if prediction.diverged else PlacedCandidate(candidate.entry, fit, prediction)
 
     with ThreadPoolExecutor(cores()) as pool:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from study.compare.prediction import Prediction, predict
 from study.diagnose.credibility import certain
 from study.diagnose.needless import DOUBLED, is_open, relative_interval, sentence
 from study.equations.layout import check
@@ -22,7 +23,6 @@ from study.records.prepared import Prepared
 from study.structure.placed_ranking import held_out_parts, held_out_test
 from study.structure.placed_search import grown_states
 from study.structure.structure_comparison import StructureComparison
-from study.structure.structure_prediction import StructurePrediction, predict_structure
 from study.support.arrays import Floats
 from study.support.cores import cores
 from study.support.errors import StudyError
@@ -40,7 +40,7 @@ class PlacedNeedless:
     error_without: float  # the same without the term, and without those named before it
     p_value: float  # of what the term gains, if it gains nothing; the number of terms asked for accounted for
     fit: FreeRunFit  # the model without it
-    prediction: StructurePrediction  # of that
+    prediction: Prediction  # of that
 
     @property
     def name(self) -> str:
@@ -75,7 +75,7 @@ def placed_needless(comparison: StructureComparison) -> tuple[PlacedNeedless, ..
 
 
 def _each_alone(
-    terms: Sequence[ModelTerm], fit: FreeRunFit, prediction: StructurePrediction, prepared: Prepared,
+    terms: Sequence[ModelTerm], fit: FreeRunFit, prediction: Prediction, prepared: Prepared,
     asked: int,
 ) -> list[PlacedNeedless]:  # fmt: skip
     """Those of the terms that this model does not need, each for itself, of so many that were asked for."""
@@ -94,7 +94,7 @@ def _each_alone(
         rest = _without(fit, entry, start, prepared)
         if rest is None:
             return None
-        without = predict_structure(rest, prepared)
+        without = predict(rest, prepared)
         noise = noise_left(fit.residual, len(fit.outputs))
         chance = held_out_test(rest, without, noise).p_value(parts, bool(entry.term.parameters))
         if without.diverged or certain(without, prediction, sized, min(1.0, asked * chance)):

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from study.compare.prediction import Prediction
 from study.diagnose import ranked
 from study.diagnose.constancy import CoefficientCurve, along_amplitude, along_frequency, changes
 from study.diagnose.ranking import in_order
@@ -19,7 +20,6 @@ from study.identify.time_domain.weighted_fit import noise_left
 from study.records.outputs import Noise, Outputs
 from study.records.record import Record
 from study.structure.placed_candidates import PlacedCandidate, physical
-from study.structure.structure_prediction import StructurePrediction
 from study.support import statistics
 from study.support.arrays import Floats
 from study.support.cores import cores
@@ -36,7 +36,7 @@ class PlacedRanked:
 
     entry: ModelTerm  # the effect and its place
     fit: FreeRunFit
-    prediction: StructurePrediction
+    prediction: Prediction
     gain: Gain  # what it explains of the held-out residual
     coefficient: float  # its size: the amplitude, for an effect of any phase
     error: float  # standard error of that
@@ -77,7 +77,7 @@ class PlacedRanked:
     @property
     def residual(self) -> Floats:
         """Held-out residual in shares of the sensors' sizes, those of one time side by side."""
-        return (self.prediction.residual / self.prediction.size).ravel()
+        return self.prediction.relative_residual
 
     @property
     def numerical(self) -> float:
@@ -110,7 +110,7 @@ class PlacedRanked:
 
 
 def rank_placed(
-    candidates: Sequence[PlacedCandidate], fit: FreeRunFit, before: StructurePrediction, asked: int
+    candidates: Sequence[PlacedCandidate], fit: FreeRunFit, before: Prediction, asked: int
 ) -> list[PlacedRanked]:
     """Candidates by what they leave of samples that they were not fitted to; ``fit`` is that without any of them."""
     if not candidates:
@@ -160,12 +160,12 @@ class HeldOutTest:
         return statistics.gain(np.concatenate(before), np.concatenate(after), evenly=self.anew).p_value
 
 
-def held_out_test(fit: FreeRunFit, before: StructurePrediction, noise: Noise) -> HeldOutTest:
+def held_out_test(fit: FreeRunFit, before: Prediction, noise: Noise) -> HeldOutTest:
     """The test of whatever a fitted structure lacks, in noise as the best candidate leaves it."""
     jacobian, outputs = linearise(fit, before.prepared), before.prepared.outputs
     parts = held_out_parts(fit, before, jacobian, before.prepared.plan.fit)
     try:
-        columns = [before.derivatives(fit), jacobian] if not before.diverged else []
+        columns = [] if before.run is None else [before.run.derivatives(fit), jacobian]
     except DivergenceError:
         columns = []
     bases = [orthonormal(outputs.whitened(x, noise)) for x in columns] or [np.zeros((len(p), 0)) for p in parts]
@@ -181,35 +181,35 @@ def orthonormal(columns: Floats) -> Floats:
 
 
 def held_out_parts(
-    fit: FreeRunFit, prediction: StructurePrediction, jacobian: Floats, fitted: tuple[int, int]
+    fit: FreeRunFit, prediction: Prediction, jacobian: Floats, fitted: tuple[int, int]
 ) -> tuple[Floats, Floats]:
     """Stacked residual of the judging part by the fitting part's coefficients, and the other way round.
 
     The other way (``diagnose.held_out``) takes one step of Gauss and Newton by the judging part's derivatives; it is
     empty where that cannot be, or the fit is of another part than ``fitted``, as that of a search is.
     """
-    judged, nothing = prediction.prepared.outputs.stacked(prediction.residual), np.zeros(0)
-    if prediction.diverged or not fit.keys or fit.span != fitted:
+    judged, nothing = prediction.residual, np.zeros(0)
+    if prediction.run is None or not fit.keys or fit.span != fitted:
         return judged, nothing
     try:
-        there = prediction.derivatives(fit)
+        there = prediction.run.derivatives(fit)
     except DivergenceError:
         return judged, nothing
     own = len(fit.keys)
-    other = fit.residual - jacobian[:, :own] @ least_squares(there, judged)[:own]
-    return judged, other - jacobian[:, own:] @ least_squares(jacobian[:, own:], other)
+    misfit = prediction.prepared.outputs.stacked(prediction.misfit)
+    other = fit.residual - jacobian[:, :own] @ least_squares(there, misfit)[:own]
+    return judged, prediction.above(other - jacobian[:, own:] @ least_squares(jacobian[:, own:], other))
 
 
-def _examined(candidate: PlacedCandidate, before: StructurePrediction) -> PlacedRanked:
+def _examined(candidate: PlacedCandidate, before: Prediction) -> PlacedRanked:
     fit, prepared = candidate.fit, candidate.prediction.prepared
     jacobian = linearise(fit, prepared)
     covariance = uncertainty(fit, prepared, jacobian)
     coefficient, error, parameters, errors = ranked.amount(candidate.entry, fit.keys, fit.values, covariance)
     flatness, steadiness = _curves(fit, candidate.entry, prepared.dt, jacobian)
-    size = before.size
     return PlacedRanked(
         candidate.entry, fit, candidate.prediction,
-        statistics.gain((before.residual / size).ravel(), (candidate.prediction.residual / size).ravel()),
+        statistics.gain(before.relative_residual, candidate.prediction.relative_residual),
         coefficient, error, parameters, errors, flatness, steadiness,
         held_out_parts(fit, candidate.prediction, jacobian, before.prepared.plan.fit),
     )  # fmt: skip

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from study.compare.prediction import Prediction, predict
 from study.equations import model_file
 from study.equations.coefficient_units import coefficient_unit, parameter_units
 from study.equations.linear_part import Modes, modes_of, modes_table
@@ -19,7 +20,6 @@ from study.records.prepared import Prepared
 from study.records.record import Record
 from study.structure.missing_forces import MissingForces, missing_forces
 from study.structure.structure_leftover import FamilyGain, explained_by_place, family_gains
-from study.structure.structure_prediction import StructurePrediction, predict_structure
 from study.structure.structure_start import first_fit
 from study.support.arrays import Floats
 from study.support.errors import expect
@@ -52,7 +52,7 @@ class StructureComparison:
     fit: FreeRunFit
     covariance: Floats  # of the estimates; shape (keys, keys)
     coefficients: tuple[PlacedCoefficient, ...]
-    prediction: StructurePrediction
+    prediction: Prediction
     modes: Modes
     forces: MissingForces  # what each coordinate's equation leaves, and between which places
     notes: tuple[str, ...]
@@ -60,7 +60,7 @@ class StructureComparison:
     @cached_property
     def leftovers(self) -> tuple[FamilyGain, ...]:
         """What general shapes of the motion at each place explain of what is left, held out; asked for when shown."""
-        return tuple(family_gains(self.prediction))
+        return tuple(family_gains(self.fit, self.prediction))
 
 
 def compare_structure(
@@ -86,7 +86,7 @@ def compare_structure(
         fit = finished(first_fit(model, prepared), prepared)
     covariance = uncertainty(fit, prepared, linearise(fit, prepared))[: len(fit.keys), : len(fit.keys)]
     report("free run")
-    prediction = predict_structure(fit, prepared)
+    prediction = predict(fit, prepared)
     report("where it fails")
     modes = modes_of(fit.model, fit.keys, covariance)
     notes = [*prepared.notes]
@@ -96,7 +96,7 @@ def compare_structure(
         notes.append(f"this record cannot tell apart, or does not show, {', '.join(fit.undecided)}")
     return StructureComparison(
         model, prepared, fit, covariance, _coefficients(fit, covariance, prepared.record), prediction, modes,
-        missing_forces(prediction), tuple(notes),
+        missing_forces(fit.model, prediction), tuple(notes),
     )  # fmt: skip
 
 
@@ -244,7 +244,7 @@ def structure_history_step(
         "terms": [t.name for t in comparison.model.terms], "added": added, "dropped": dropped,
         "record": prediction.prepared.record.name,
         "error": {"force": comparison.forces.share, "response": prediction.error},
-        "rms": float(np.sqrt(np.mean(prediction.residual**2))), "unit": "",
+        "rms": float(np.sqrt(np.mean(prediction.misfit**2))), "unit": "",
         "noise_floor": {"response": prediction.floor}, "converged": comparison.fit.converged,
         "coefficients": [placed_coefficient_row(c) for c in comparison.coefficients],
     }  # fmt: skip

@@ -10,14 +10,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.fft import next_fast_len
 
+from study.compare.prediction import Prediction
 from study.diagnose.dependence import DEGREE, TAUS, hysteretic, relaxed
-from study.equations.free_run import prepare
 from study.equations.linear_part import connections, matrices, transfer
 from study.equations.place import Place
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.part_fit import JudgingRun
 from study.records.record import MOTIONS, Sensor
 from study.records.spectra import stretch_transforms
 from study.structure.placed_lines import placed_modulation_lines, placed_residual_lines
-from study.structure.structure_prediction import StructurePrediction
 from study.support import statistics
 from study.support.arrays import Complexes, Floats
 from study.support.errors import DivergenceError
@@ -46,19 +47,19 @@ def explained_by_place(found: Sequence[FamilyGain]) -> dict[frozenset[str], floa
     return shares
 
 
-def family_gains(prediction: StructurePrediction) -> list[FamilyGain]:
+def family_gains(fit: FreeRunFit, prediction: Prediction) -> list[FamilyGain]:
     """What each family of shapes at each place explains of what a fitted structure leaves; none if it diverges."""
-    fit, prepared = prediction.fit, prediction.prepared
-    model = fit.model
-    prediction = _from_the_fit(prediction)
-    begin = max(prediction.first, prepared.plan.judge[0] - LONGEST)
+    if prediction.run is None:
+        return []
+    model, prepared = fit.model, prediction.prepared
+    run = _from_the_fit(prediction.run)
+    begin = max(run.first, prepared.plan.judge[0] - LONGEST)
     end = min(prepared.plan.judge[1], prepared.plan.judge[0] + LONGEST)
     split = prepared.plan.judge[0] - begin if begin < prepared.plan.judge[0] else (end - begin) // 2
-    wanted = tuple(Sensor(c, m) for m in MOTIONS[:2] for c in model.coordinates)
+    ahead = replace(run, prepared=replace(prepared, plan=replace(prepared.plan, judge=(begin, end))))
     try:
-        free = prediction.motion(wanted, (begin, end))
-        own = _derivatives(prediction, begin, end)
-        predicted = prediction.motion(prepared.sensors, (begin, end))
+        free = ahead.motions([Sensor(c, m) for m in MOTIONS[:2] for c in model.coordinates])
+        own, predicted = ahead.derivatives(fit), ahead.motions()
     except DivergenceError:
         return []
     residual = prepared.outputs.stacked(prepared.measured[begin:end] - predicted)
@@ -85,25 +86,13 @@ def family_gains(prediction: StructurePrediction) -> list[FamilyGain]:
     return found
 
 
-def _from_the_fit(prediction: StructurePrediction) -> StructurePrediction:
+def _from_the_fit(run: JudgingRun) -> JudgingRun:
     """The same with the fitted stretches before the judged ones, which are as loud; of a decay, halves are not."""
-    fit, prepared = prediction.fit, prediction.prepared
-    meets = fit.span == (prepared.plan.fit[0], prepared.plan.judge[0])
-    if not prepared.record.stretches or prediction.diverged or not meets:
-        return prediction
-    states = np.concatenate([np.atleast_2d(fit.initial), np.atleast_2d(prediction.initial)])
-    return replace(prediction, first=fit.first, initial=states)
-
-
-def _derivatives(prediction: StructurePrediction, begin: int, end: int) -> Floats:
-    fit = prediction.fit
-    run = prepare(
-        fit.model, prediction.prepared.record, fit.keys, sensors=prediction.prepared.sensors,
-        steps_per_sample=fit.steps_per_sample, span=(prediction.first, end),
-    )  # fmt: skip
-    values = dict(zip(fit.keys, fit.values.tolist(), strict=True))
-    slopes = run.respond(values, prediction.initial, run.moving)[1][begin - prediction.first :]
-    return prediction.prepared.outputs.stacked(slopes)
+    fit, prepared = run.fit, run.prepared
+    if not prepared.record.stretches or fit.span != (prepared.plan.fit[0], prepared.plan.judge[0]):
+        return run
+    states = np.concatenate([np.atleast_2d(fit.initial), np.atleast_2d(run.initial)])
+    return replace(run, first=fit.first, initial=states)
 
 
 def _families(u: Floats, v: Floats) -> Iterator[tuple[str, list[Floats]]]:

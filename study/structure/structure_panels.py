@@ -9,17 +9,17 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from study.compare.panels import force_curve
+from study.compare.prediction import Prediction
 from study.equations.linear_part import Modes
 from study.figures.page import frame_cells
 from study.structure.missing_forces import MissingForces
-from study.structure.structure_prediction import StructurePrediction
 from study.support.numbers import percent
 
 DARK = 0.55  # share from which a number is written in white
 ALTERNATE = ("C0", "C1")
 
 
-def sensor_errors(axes: Axes, prediction: StructurePrediction) -> Axes:
+def sensor_errors(axes: Axes, prediction: Prediction) -> Axes:
     """Error of each sensor over its rms motion, beside what noise alone would leave."""
     place = np.arange(len(prediction.prepared.sensors))
     axes.barh(place, 100.0 * prediction.errors, height=0.6, color="C1", label="error of the free run")

@@ -20,9 +20,7 @@ from study.figures.styles import in_style
 from study.structure import structure_panels
 from study.structure.structure_comparison import StructureComparison
 from study.structure.structure_leftover import explained_by_place
-from study.structure.structure_prediction import StructurePrediction
 from study.structure.structure_verdict import StructureDiagnosis
-from study.support.arrays import Floats
 from study.support.numbers import percent
 
 WIDE = 7.2  # inches
@@ -123,7 +121,7 @@ def responses_figure(comparison: StructureComparison) -> Figure:
     time = prediction.prepared.record.time[slice(*prediction.prepared.plan.judge)]
     names: list[str] = []
     for panel, i in zip(axes, order, strict=True):
-        sensor, near = prediction.prepared.sensors[int(i)], close_by(prediction, int(i))
+        sensor, near = prediction.prepared.sensors[int(i)], prediction.of(int(i)).closeup
         panels.response_panel(
             panel, time[near], prediction.measured[near, int(i)], prediction.predicted[near, int(i)],
             prediction.prepared.record.unit(sensor),
@@ -133,25 +131,6 @@ def responses_figure(comparison: StructureComparison) -> Figure:
     page.letter(axes, names)
     page.shared_legend(figure, axes, columns=2)
     return figure
-
-
-def close_by(prediction: StructurePrediction, sensor: int) -> slice:
-    """The samples of a close-up, all of one stretch: that of the largest mean square."""
-    judged = prediction.prepared.plan.judge
-    runs = [(begin - judged[0], end - judged[0]) for begin, end in prediction.prepared.record.runs(judged)]
-    left = prediction.residual[:, sensor]
-    begin, end = max(runs, key=lambda run: float(np.mean(left[slice(*run)] ** 2)))
-    near = closeup(left[begin:end])
-    return slice(begin + near.start, begin + near.stop)
-
-
-def closeup(residual: Floats, samples: int = 300) -> slice:
-    """The stretch with the largest mean square."""
-    if len(residual) <= samples:
-        return slice(0, len(residual))
-    power = np.cumsum(np.concatenate([[0.0], residual**2]))
-    begin = int(np.argmax(power[samples:] - power[:-samples]))
-    return slice(begin, begin + samples)
 
 
 def shared_force_figure(comparison: StructureComparison) -> Figure:

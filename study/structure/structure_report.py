@@ -100,7 +100,7 @@ def separating_sensor(first: PlacedRanked, tied: list[PlacedRanked]) -> str:
         return (
             "Every coordinate is measured: a larger force, or one at another coordinate, may tell these places apart."
         )
-    one, other = (r.prediction.motion(wanted) for r in (first, places[0]))
+    one, other = (r.prediction.motions(wanted) for r in (first, places[0]))
     apart = np.sqrt(np.mean((one - other) ** 2, axis=0)) / np.std(one, axis=0)
     best = int(np.argmax(apart))
     if apart[best] < APART * first.prediction.error:

@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from study.compare.prediction import Prediction
 from study.diagnose.credibility import credible
 from study.diagnose.verdict import MISSING, MOST, NOTHING, UNKNOWN
 from study.equations.linear_part import Modes, modes_of
@@ -26,7 +27,6 @@ from study.structure.placed_ranking import PlacedRanked, rank_placed
 from study.structure.placed_search import PlacedBaseline, placed_baseline, with_placed_term
 from study.structure.structure_comparison import StructureComparison, compare_structure
 from study.structure.structure_leftover import FamilyGain, family_gains
-from study.structure.structure_prediction import StructurePrediction
 from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE
 
 SHORT, LONG = 2048, 8192  # samples: a search uses half of the fitting part, within these limits
@@ -41,7 +41,7 @@ class StructureDiagnosis:
     comparison: StructureComparison  # the structure as it was given
     candidates: tuple[PlacedRanked, ...]  # best first
     asked: int  # effects times places
-    left: float  # rms of the structure that remains beside the best explanation, over the rms response
+    left: float  # rms of what remains above the noise beside the best explanation, over the rms response
     families: tuple[FamilyGain, ...]  # for an unknown effect: what general shapes at each place explain, best first
 
     @cached_property
@@ -113,7 +113,7 @@ def _decide(rows: list[PlacedRanked], comparison: StructureComparison, asked: in
         verdict = UNKNOWN if hopeless or left > TOLERANCE else NOTHING
         return StructureDiagnosis(verdict, comparison, tuple(rows), asked, left, _ordered(families))
     first = believed[0]
-    families = tuple(family_gains(first.prediction))
+    families = tuple(family_gains(first.fit, first.prediction))
     left = _left(first.prediction, families)
     rows = [first] + [r for r in rows if r is not first]
     enough = (first.gain.explained >= ENOUGH or left <= GOOD) and not first.wanders(asked)
@@ -131,7 +131,7 @@ def _stands_out(first: PlacedRanked) -> bool:
     return bool(first.prediction.prepared.record.stretches) and first.gain.explained > MOST and not first.unphysical
 
 
-def _left(prediction: StructurePrediction, families: Sequence[FamilyGain]) -> float:
+def _left(prediction: Prediction, families: Sequence[FamilyGain]) -> float:
     """Rms over that of the response which general shapes explain of a residual, and not by chance.
 
     Of a free decay all that stands above the noise: where its run has lost the motion, shapes along it explain nothing.

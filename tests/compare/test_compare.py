@@ -65,8 +65,10 @@ def measured(truth: Model, history: Floats, share: float = 0.05, seed: int = 3) 
 def test_where_nothing_is_missing_the_error_is_the_noise_and_it_says_so(seed: int, share: float) -> None:
     comparison = trial("", seed, share)
     prediction = comparison.prediction
-    assert prediction.error == pytest.approx(prediction.floor, abs=4.0 * prediction.noise.error / prediction.size)
-    assert prediction.structure == 0.0
+    assert prediction.error == pytest.approx(
+        prediction.floor, abs=4.0 * prediction.of(0).noise.error / prediction.of(0).size
+    )
+    assert prediction.above_noise == 0.0
     assert "that is noise" in comparison_in_words(comparison)
     assert comparison.growths is None
 
@@ -118,7 +120,7 @@ def test_with_noise_the_quantity_and_the_parity_stay_right(hidden: str, seed: in
     assert (best.of, best.parity) == (("velocity" if "damping" in hidden else "displacement"), "odd")
     assert best.power == pytest.approx(2.0 if "damping" in hidden else 3.0, abs=0.6)
     prediction = comparison.prediction
-    assert prediction.error > prediction.floor + 4.0 * prediction.noise.error / prediction.size
+    assert prediction.error > prediction.floor + 4.0 * prediction.of(0).noise.error / prediction.of(0).size
 
 
 @pytest.mark.parametrize("hidden", ["relaxation", "periodic_stiffness", "harmonic_force"])
@@ -130,7 +132,7 @@ def test_the_true_model_is_as_good_as_the_noise_after_the_effect_is_added() -> N
     made = make_trial(5, hidden=["quadratic_damping"], noise=0.01)
     before = compared(made.believed, made.record)
     after = compared(made.believed.with_term(get("quadratic_damping")), made.record)
-    assert after.prediction.noise.alone
+    assert after.prediction.of(0).noise.alone
     assert after.prediction.error < 0.7 * before.prediction.error
     assert after.force.total < before.force.total
 
@@ -242,13 +244,13 @@ def test_scatter_between_periods_is_the_noise_whatever_its_spectrum_and_the_mode
     noisy = u + 0.05 * np.std(u) * coloured
     periodic = Record(DT, {"force": np.tile(one, 5), "displacement": noisy}, period=2048)
     comparison = compared(model(), periodic, Plan("displacement", (0, 6144), (6144, 10240)))
-    assert comparison.prediction.noise.source == noise.SCATTER
+    assert comparison.prediction.of(0).noise.source == noise.SCATTER
     assert comparison.prediction.floor == pytest.approx(0.05, rel=0.1)
     true = compared(model("cubic_stiffness"), periodic, Plan("displacement", (0, 6144), (6144, 10240)))
-    assert true.prediction.noise.alone
+    assert true.prediction.of(0).noise.alone
     assert "scatter between periods" in comparison_in_words(true)
     wrong = replace(periodic, period=1900)  # not its period: the force does not repeat
-    assert compared(model(), wrong).prediction.noise.source == noise.WHITE
+    assert compared(model(), wrong).prediction.of(0).noise.source == noise.WHITE
 
 
 # ---- acceleration

@@ -29,7 +29,7 @@ def judged(residual: Floats, response: Floats) -> Prediction:
     """A prediction that leaves this residual of this response."""
     record = Record(DT, {"force": np.zeros_like(response), "displacement": response})
     prepared = Prepared(record, Plan("displacement", (0, 0), (0, len(response))), (0.0, 0.5 / DT), 0)
-    return Prediction(prepared, None, response - residual, 0.0)
+    return Prediction(prepared, None, (response - residual)[:, None], np.zeros(1))
 
 
 def test_chance_changes_along_the_record_are_not_reported() -> None:

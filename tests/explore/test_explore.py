@@ -75,7 +75,7 @@ def test_decimated_peaks_stand_where_they_are():
 
 
 def test_who_has_the_diagnosis_is_not_sent_to_it(grown):
-    assert grown.now.comparison.prediction.noise.alone
+    assert grown.now.comparison.prediction.of(0).noise.alone
     asked = sessions.examined(grown)[0]
     for stage, live, sent in ((grown.now, False, True), (grown.now, True, False), (asked, False, False)):
         said = words.words(stage, (), 1, live, "N")

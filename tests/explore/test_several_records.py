@@ -25,7 +25,7 @@ from study.explore.desk import Desk
 from study.explore.live import AloneScene, Watcher
 from study.explore.saved import saved
 from study.records.excitation import Excitation, force
-from study.records.record import Record
+from study.records.record import ALONE, MOTIONS, Record, Sensor
 from study.way_in.compare_records import compare_records
 
 NAMES = ("low", "high")
@@ -72,8 +72,9 @@ def test_each_record_shows_its_part_of_the_one_free_run(begun):
     assert np.array_equal(np.concatenate(left), together.prediction.residual)
     for comparison in each:
         again = predict(comparison.fit, comparison.prepared)
-        assert comparison.prediction.predicted == pytest.approx(again.predicted, abs=1e-6 * again.size)
-        assert comparison.prediction.motion == pytest.approx(again.motion, rel=1e-4, abs=1e-4 * np.std(again.motion[2]))
+        assert comparison.prediction.predicted == pytest.approx(again.predicted, abs=1e-6 * again.of(0).size)
+        motion, anew = (p.motions([Sensor(ALONE, m) for m in MOTIONS]) for p in (comparison.prediction, again))
+        assert motion == pytest.approx(anew, rel=1e-4, abs=1e-4 * np.std(anew[:, 2]))
         assert comparison.coefficients == together.coefficients
         assert np.all(np.diff(comparison.prediction.time) > 0.0)
     assert on_each_record(each[0]) == on_each_record(compare(BELIEVED, begun.several.apart[0])) == ()
@@ -130,7 +131,7 @@ def test_a_line_breaks_where_time_is_left_out():
 
 def test_a_close_up_shows_one_stretch_of_time(begun):
     for comparison in begun.now.on_each:
-        judged = comparison.prediction
+        judged = comparison.prediction.of(0)
         assert np.any(np.diff(judged.time) > 1.5 * judged.dt)
         assert np.all(np.diff(judged.time[judged.closeup]) < 1.5 * judged.dt)
         assert len(judged.time[judged.closeup]) >= 16

@@ -158,7 +158,7 @@ def test_lost_samples_are_neither_fitted_nor_judged(measured, systems):
     prepared: Prepared = comparison.prepared
     assert prepared.lost is not None
     assert np.all(comparison.fit.residual[prepared.lost[slice(*comparison.fit.span)]] == 0.0)
-    assert np.all(comparison.prediction.difference[prepared.lost[slice(*prepared.plan.judge)]] == 0.0)
+    assert np.all(comparison.prediction.misfit[prepared.lost[slice(*prepared.plan.judge)]] == 0.0)
     assert comparison.prediction.error == pytest.approx(np.sqrt(NOISE), rel=0.1)
 
 
