@@ -15,6 +15,9 @@ import study as st
 from scripts.site_pages import force_of
 from study import cli
 from study.equations.terms import LIBRARY
+from study.records.completion import complete
+from study.records.record import Record
+from study.trials import make_trial
 
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"```python\n(.*?)```", re.DOTALL)
@@ -44,6 +47,19 @@ def folder(tmp_path_factory):
     whole = st.simulate(model, st.gaussian(samples=2048, seed=5))
     columns = np.column_stack([whole.time, whole["force"], whole["acceleration"]])
     np.savetxt(made / "base.csv", columns, delimiter=",", header="time,F,a", comments="")
+    ringing = [
+        st.simulate(model.hold(c=0.3), st.Force(np.zeros(n), 0.02), initial=(0.01, 0.0))["displacement"]
+        for n in (600, 1000)
+    ]
+    for name in ("roll", "blows"):
+        st.record({"displacement": np.concatenate(ringing)}, dt=0.02).save(made / f"{name}.csv")
+    for name, test in (("damper", "component"), ("axis", "axis")):
+        st.Record.of(make_trial(4, (), 0.01, test=test).record).save(made / f"{name}.csv")
+    table = make_trial(4, (), 0.01, test="base").record
+    moved = complete(Record(table.dt, {"force": table["force"], "acceleration": table["base_acceleration"]})).record
+    channels = {"base_displacement": moved["displacement"], "displacement": table["displacement"]}
+    channels["displacement"] = channels["displacement"] + moved["displacement"]
+    st.record(channels, dt=table.dt).save(made / "table.csv")
     return made
 
 
