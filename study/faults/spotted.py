@@ -117,13 +117,15 @@ def drop_outs(left: FittedResidual, asked: int) -> Fault | None:
 def _moving(mask: Bools, places: Ints, power: Floats, level: float, noisy: bool) -> Bools:
     """The runs of a mask in which more is left than elsewhere, by the F test of each as a single number, shape (n,).
 
-    All of them, if there is any, where noise lies on the channel: what is at rest under noise does not stand still.
+    All of them, if there is any, where noise lies on the channel: what is at rest under noise does not stand still. The
+    samples at both ends of a run do not count: friction may catch a mass, or let it go, on either side of them.
     """
     left = np.full(len(mask), np.nan)
     left[places] = power
     elsewhere = max(float(np.nanmean(left[~mask])), np.finfo(float).tiny)
     runs = _runs(mask & ~np.isnan(left))
-    sure = [float(fdtrc(1, len(power), np.mean(left[first:last]) / elsewhere)) < level for first, last in runs]
+    inside = [np.mean(left[first + 1 : last - 1] if last - first > 2 else left[first:last]) for first, last in runs]
+    sure = [float(fdtrc(1, len(power), power_inside / elsewhere)) < level for power_inside in inside]
     kept = np.zeros_like(mask)
     for (first, last), lost in zip(runs, sure, strict=True):
         kept[first:last] = lost or (noisy and any(sure))

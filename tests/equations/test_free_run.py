@@ -1,16 +1,18 @@
 """Free runs with exact derivatives."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from study.equations.free_run import FreeRun, predict_response, prepare
-from study.equations.model import Model
-from study.equations.terms import LIBRARY
+from study.equations.model import Model, ModelTerm
+from study.equations.place import Place
+from study.equations.terms import LIBRARY, get
 from study.records.outputs import alone
-from study.records.record import MOTIONS, Record
+from study.records.record import MOTIONS, Record, Sensor
 from study.support.errors import StudyError
 
 Floats = NDArray[np.float64]
@@ -104,6 +106,22 @@ def test_friction_stops_the_mass_where_it_should(rubbing: Model) -> None:
     sign = (-1.0) ** halves
     exact = [0.0, sign * 2.0 * halves * fc / k**2, -sign * 2.0 * halves / k, sign]
     np.testing.assert_allclose(jacobian[-1, :4], exact, rtol=1e-4, atol=1e-9)
+
+
+def test_a_mass_that_friction_holds_has_no_acceleration_to_the_last_bit(rubbing: Model) -> None:
+    """What stands still is told from a channel that dropped out by it; with a force too small to move the mass."""
+    drive = 0.05 * np.random.default_rng(1).standard_normal(300)
+    run = prepare(rubbing, Record(DT, {"force": drive}), sensors=alone("acceleration").sensors, steps_per_sample=8)
+    assert not np.any(run.respond({}, (0.0, 0.0))[0])
+    ends = tuple(replace(t, place=Place("at", ("first",))) for t in rubbing.terms)
+    tied = ModelTerm(get("linear_stiffness"), (90.0,), (), Place("between", ("first", "second")))
+    terms = (*ends, tied, replace(ends[0], place=Place("at", ("second",))))
+    two = Model("two", terms, ("first", "second"), (("force", "second"),))
+    sensors = [Sensor(c, "acceleration") for c in two.coordinates]
+    found = prepare(two, Record(DT, {"force": drive}), sensors=sensors, steps_per_sample=8).respond({}, np.zeros(4))[0]
+    held = found[:, 0] == 0.0
+    assert np.count_nonzero(held) > 50
+    assert not np.any((found[:, 0] != 0.0) & (np.abs(found[:, 0]) < 1e-12 * np.std(found[:, 1])))
 
 
 def test_friction_keeps_the_order_of_the_integrator(make_model: Make, report_force: Floats) -> None:

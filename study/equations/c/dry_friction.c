@@ -136,6 +136,17 @@ void held_slopes(Motion *m, const double *at_states, int64_t columns) {
     for (int64_t i = n; i < m->states; i++) add_held(m, i - n, f->slope + i * width);
 }
 
+int stands_still(const Motion *m, int64_t row) {
+    const Friction *f = &m->friction;
+    for (int64_t a = 0; a < f->places && row < m->dofs; a++) {
+        const double *direction = f->directions + a * m->dofs;
+        int64_t others = f->shifts[3 * a + 2] >= 0;
+        for (int64_t i = 0; i < m->dofs; i++) others += i != row && direction[i] != 0.0;
+        if (f->held[a] && direction[row] != 0.0 && others == 0) return 1;
+    }
+    return 0;
+}
+
 void add_held(const Motion *m, int64_t row, double *to) {
     const Friction *f = &m->friction;
     const double *by = f->right;

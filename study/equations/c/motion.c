@@ -171,6 +171,10 @@ static int observe(Motion *m, const int64_t *observed, int64_t count, double *ou
             memcpy(out, m->state + observed[k] * m->width, (size_t)m->columns * sizeof(double));
             continue;
         }
+        if (m->friction.held_any && stands_still(m, observed[k] - m->states)) {
+            memset(out, 0, (size_t)m->columns * sizeof(double)); /* to the last bit, as what is at rest is measured */
+            continue;
+        }
         row_of(m, observed[k] - m->states, m->state, out);
         if (m->friction.held_any) add_held(m, observed[k] - m->states, out);
         if (!isfinite(out[0])) return 0;

@@ -70,6 +70,9 @@ void held_slopes(Motion *m, const double *at, int64_t columns);
 /* What the derivatives of the held signs add to those of a row. */
 void add_held(const Motion *m, int64_t row, double *to);
 
+/* Whether a row is the acceleration of a degree of freedom that friction holds to what never moves. */
+int stands_still(const Motion *m, int64_t row);
+
 /* Which places are held at the first sample, and the signs of the others. */
 void set_sides(Motion *m, double time, const double *drive);
 
