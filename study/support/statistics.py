@@ -121,13 +121,13 @@ def _p_value(products: Floats) -> float:
     return float(np.sum(ways[int(np.sum(rank[products > 0.0])) :])) / 2.0**n
 
 
-def clustered_covariance(jacobian: Floats, residual: Floats, others: int = 0) -> Floats:
+def clustered_covariance(jacobian: Floats, residual: Floats, others: int = 0, keys: int = 0) -> Floats:
     """Covariance of least-squares estimates when the residual is correlated in time or with the motion.
 
     The sandwich ``H^-1 (sum over blocks g_b g_b^T) H^-1`` with ``g_b = J_b^T e_b`` and ``H = J^T J``
     (Liang and Zeger, 1986), never below the formula for white noise. ``others`` is how many unknowns the columns of the
-    Jacobian are beside. Blocks tell the variances of any number of estimates; of more than a quarter as many as there
-    are blocks they do not tell the correlations, which are those of white noise then.
+    Jacobian are beside. Blocks tell the variances of any number of estimates, but the correlations of few: where there
+    are not five blocks to each of the ``keys``, as of a structure, correlations are those of white noise.
     """
     scale = length_or_one(jacobian)
     j = jacobian / scale
@@ -142,7 +142,7 @@ def clustered_covariance(jacobian: Floats, residual: Floats, others: int = 0) ->
     variance = np.diag(sandwich)
     white = np.diag(inverse) * float(residual @ residual) / max(len(residual) - len(scale) - others, 1)
     larger = np.sqrt(np.maximum(variance, white) / np.maximum(variance, np.finfo(float).tiny))
-    if 4 * len(scale) > count:
+    if 5 * keys > count:
         size = np.sqrt(np.maximum(np.diag(inverse), np.finfo(float).tiny))
         own = np.sqrt(np.maximum(variance, white))
         covariance = inverse / np.outer(size, size) * np.outer(own, own)

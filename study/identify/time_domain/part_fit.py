@@ -98,7 +98,7 @@ def covariance_of(fit: FreeRunFit, jacobian: Floats) -> Floats:
     ``jacobian`` is what :func:`linearise` gives of the fit.
     """
     others = fit.initial.size if fit.restarts and jacobian.shape[1] == len(fit.keys) else 0
-    return clustered_covariance(fit.whitened(jacobian), fit.whitened(fit.residual), others)
+    return clustered_covariance(fit.whitened(jacobian), fit.whitened(fit.residual), others, len(fit.keys))
 
 
 def integration_shift(fit: FreeRunFit, prepared: Prepared, jacobian: Floats) -> Floats:
