@@ -206,12 +206,6 @@ def separated_records(
     return separated(model, records, arguments.each_record)
 
 
-def refuse_groups(arguments: argparse.Namespace) -> None:
-    """For what takes one record of a file."""
-    if len(arguments.group) > 1:
-        raise StudyError(f"--group {arguments.group[1]}: a second group; expected one here, a record at a time")
-
-
 @contextmanager
 def naming(record: Path, model: Path) -> Generator[None, None, None]:
     """Begin a sentence that names neither file with the one that it is about: a formula's with the model's."""
