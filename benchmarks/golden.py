@@ -101,7 +101,7 @@ def main() -> int:
         found = list(_differences(theirs[name], ours[name]))
         different += bool(found)
         print(f"{name}: {'the same' if not found else f'{len(found)} differ'}")
-        for line in found[:12]:
+        for line in sorted(found, key=lambda line: line.endswith("only in this one"))[:12]:
             print(f"    {line}")
     return int(bool(different))
 

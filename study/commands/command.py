@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Protocol
 
 from study.support.terminal import harmless
 
@@ -22,8 +23,15 @@ class Command:
     run: Callable[[argparse.Namespace], None]  # does it; a user's mistakes are raised as ``StudyError``
 
 
+class Step(Protocol):
+    """Counts a step of some work, of so many where that is known."""
+
+    def __call__(self, doing: str, of: int | None = None) -> None:
+        """A step more, in which this is done."""
+
+
 @contextmanager
-def progress(unit: str, total: int | None = None, name: str = "") -> Generator[Callable[[str], None], None, None]:
+def progress(unit: str, total: int | None = None, name: str = "") -> Generator[Step, None, None]:
     """A line of progress; what is given back counts a step, and says what is done in it unless that is empty.
 
     ``total`` is a least: a record with a fault of the measurement is compared more than once.
@@ -32,10 +40,12 @@ def progress(unit: str, total: int | None = None, name: str = "") -> Generator[C
 
     with tqdm(total=total, delay=QUIET, leave=False, unit=unit, desc=harmless(name) or None) as bar:
 
-        def step(doing: str) -> None:
+        def step(doing: str, of: int | None = None) -> None:
             if doing:
                 bar.set_description(harmless(doing), refresh=False)
-            if bar.total is not None:
+            if of is not None:
+                bar.total = of
+            elif bar.total is not None:
                 bar.total = max(bar.total, bar.n + 2)  # this step and one that is still to come
             bar.update()
 

@@ -42,8 +42,8 @@ def _run(arguments: argparse.Namespace) -> None:
 
 def _placed(arguments: argparse.Namespace, model: "Model") -> str:
     """Name of the term of a structure that is meant: by name and place, or by its name with the place in brackets."""
+    from study.diagnose.dropping import term_at
     from study.equations import layout
-    from study.structure.placed_dropping import term_at
 
     where: dict[object, object] = {"at": arguments.at} if arguments.at else {}
     where |= {"between": arguments.between} if arguments.between else {}

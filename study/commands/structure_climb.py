@@ -8,13 +8,14 @@ from study.commands.structures import prepared_structures
 from study.compare import history
 from study.compare.comparison_report import as_json
 from study.compare.history_picture import history_files as history_pictures
+from study.diagnose.diagnosis_files import placed_fields
+from study.diagnose.diagnosis_report import candidate_table
 from study.diagnose.verdict import MISSING
 from study.equations.model import Model
 from study.equations.model_file import WANTED
 from study.explore import placed_session as sessions
 from study.explore.placed_page import structure_files
 from study.explore.saved_files import PAGE
-from study.structure import structure_report
 from study.structure.structure_comparison import compare_structure
 from study.structure.structure_pictures import diagnosis_pictures
 from study.support.files import read_text, write_files
@@ -35,9 +36,9 @@ def structure_climb(arguments: argparse.Namespace, model: Model, steps: int, fol
         stage = sessions.examined(session)
         session, diagnosis = sessions.with_stage(session, stage), stage.diagnosis
         assert diagnosis is not None, "a stage that was examined has a diagnosis"
-        fields = as_json(structure_report.structure_fields(diagnosis, stage.unneeded))
+        fields = as_json(placed_fields(diagnosis, stage.unneeded))
         write_files(work / f"step_{number}", {"diagnosis.json": fields} | diagnosis_pictures(diagnosis))
-        print(f"{structure_report.placed_candidate_table(diagnosis)}\n\n{stage.said}\n", flush=True)
+        print(f"{candidate_table(diagnosis)}\n\n{stage.said}\n", flush=True)
         if diagnosis.verdict != MISSING or number == steps:
             break
         session = sessions.with_placed(session, diagnosis.candidates[0].name)

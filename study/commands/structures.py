@@ -102,20 +102,20 @@ def refuse_measured(model: "Model", command: str) -> None:
 def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
     """``study diagnose`` of a structure."""
     from study.compare.comparison_report import as_json
-    from study.diagnose.diagnosis_files import unneeded_in_words
+    from study.diagnose.diagnosis_files import (
+        diagnosis_in_words,
+        modes_before_and_after,
+        placed_fields,
+        unneeded_in_words,
+    )
+    from study.diagnose.diagnosis_report import candidate_table
+    from study.diagnose.needless import needless
     from study.diagnose.user_candidates import own_candidates
+    from study.diagnose.verdict import diagnose
     from study.equations import terms
-    from study.structure.placed_needless import placed_needless
     from study.structure.structure_comparison import compare_structure
     from study.structure.structure_page import PAGE, structure_page
     from study.structure.structure_pictures import diagnosis_pictures
-    from study.structure.structure_report import (
-        modes_before_and_after,
-        placed_candidate_table,
-        structure_diagnosis_in_words,
-        structure_fields,
-    )
-    from study.structure.structure_verdict import diagnose_structure
     from study.support.files import write_files
 
     folder = out_folder(arguments)
@@ -130,22 +130,22 @@ def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
     for prepared in ready:
         with progress(" candidates", name=prepared.record.name) as step:
             comparison = compare_structure(model, prepared)
-            diagnosis = diagnose_structure(comparison, own, arguments.without, progress=step)
-            unneeded = placed_needless(comparison)
+            diagnosis = diagnose(comparison, extra=own, without=arguments.without, progress=lambda _, total: step("", total))
+            unneeded = needless(comparison)
         print(f"{prepared.record.name}: {diagnosis.verdict.replace('_', ' ')}")
         print(
-            placed_candidate_table(diagnosis)
+            candidate_table(diagnosis)
             + "\n\n"
             + modes_before_and_after(diagnosis)
             + "\n\n"
-            + structure_diagnosis_in_words(diagnosis)
+            + diagnosis_in_words(diagnosis)
         )
         if unneeded:
             print(f"\n{unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
         prefix = f"{prepared.record.name}_" if len(ready) > 1 else ""
         made = {
             PAGE: structure_page(comparison, diagnosis),
-            "diagnosis.json": as_json(structure_fields(diagnosis, unneeded)),
+            "diagnosis.json": as_json(placed_fields(diagnosis, unneeded)),
         }
         made |= diagnosis_pictures(diagnosis)
         files |= {prefix + name: content for name, content in made.items()}
@@ -191,10 +191,10 @@ class Change:
 def add(arguments: argparse.Namespace, model: "Model") -> None:
     """``study add`` to a structure."""
     from study.compare import history
+    from study.diagnose.adding import added
     from study.equations import layout, terms
     from study.equations.model import free
     from study.equations.model_file import text_with
-    from study.structure.structure_verdict import added_term
     from study.support.errors import at
     from study.support.files import locked
 
@@ -207,17 +207,17 @@ def add(arguments: argparse.Namespace, model: "Model") -> None:
         layout.check(model.with_term(entry))
     with locked(arguments.model):  # another run may have changed it meanwhile
         text, steps = text_with(arguments.model, entry), history.read_history(arguments.model)
-        changed = Change(model.with_term(entry), lambda before: added_term(before, entry), {"added": entry.name})
+        changed = Change(model.with_term(entry), lambda before: added(before, entry), {"added": entry.name})
         _revise(arguments, model, changed, text, steps)
 
 
 def drop(arguments: argparse.Namespace, model: "Model", name: str, text: str) -> None:
     """``study drop`` from a structure; ``text`` is the model file's without the term."""
     from study.compare import history
-    from study.structure.placed_dropping import dropped_term
+    from study.diagnose.dropping import compared_without
 
     steps = history.read_history(arguments.model)
-    changed = Change(model.without_term(name), lambda before: dropped_term(before, name), {"dropped": name})
+    changed = Change(model.without_term(name), lambda before: compared_without(before, name), {"dropped": name})
     _revise(arguments, model, changed, text, steps)
 
 

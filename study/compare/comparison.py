@@ -94,6 +94,10 @@ def compare(
     of the force is free of leakage too. ``progress`` is called with what is being done, ``STEPS`` times. A model that
     cannot be fitted raises a ``StudyError``.
     """
+    if model.named:
+        from study.structure.structure_comparison import compare_structure
+
+        return compare_structure(model, prepared, fit, progress)
     report: Progress = progress or (lambda _: None)
     report("fit")
     known: Estimate | None = None

@@ -7,14 +7,14 @@ long as the model with it follows: the error is that of the longer motion.
 from study.compare.comparison import Comparison, compare
 from study.compare.running_on import running_on
 from study.diagnose.ranked import Ranked
-from study.diagnose.verdict import search_base, search_part
-from study.equations.model import free
+from study.diagnose.verdict import search_base
+from study.equations.model import ModelTerm, free
 from study.equations.terms import Term
 from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.weighted_fit import finished
 
 
-def added(comparison: Comparison, term: Term) -> Comparison:
+def added(comparison: Comparison, term: Term | ModelTerm) -> Comparison:
     """The comparison of the model with a term more, fitted as a diagnosis fits that candidate.
 
     Raises
@@ -22,14 +22,13 @@ def added(comparison: Comparison, term: Term) -> Comparison:
     StudyError
         If the model with it has no finite response.
     """
-    prepared, base = comparison.prepared, search_base(comparison)
-    fit = with_term(base.fit, free(term), base, search_part(prepared))
-    fit = finished(fit, prepared)
-    return running_on(compare(comparison.model.with_term(term), prepared, fit=fit))
+    prepared, entry = comparison.prepared, term if isinstance(term, ModelTerm) else free(term)
+    fit = finished(with_term(search_base(comparison), entry), prepared)
+    return running_on(compare(comparison.model.with_term(entry), prepared, fit=fit))
 
 
 def added_candidate(comparison: Comparison, candidate: Ranked) -> Comparison:
     """The comparison of the model with a candidate of its diagnosis, begun where the candidate's fit ended."""
     prepared = comparison.prepared
     fit = finished(candidate.fit, prepared)
-    return running_on(compare(comparison.model.with_term(candidate.term), prepared, fit=fit))
+    return running_on(compare(comparison.model.with_term(candidate.entry), prepared, fit=fit))

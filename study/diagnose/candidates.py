@@ -1,97 +1,217 @@
-"""One candidate: the model with it, fitted on one part of the record and judged on the other."""
+"""Candidates: effects at places, each fitted beside a model on one part of the record and judged on the other.
+
+Where few are asked for, as of a single mass, all are fitted. A structure has many places: there the reverse system says
+at which of them which effects are worth a fit (``shape_search``).
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from study.compare.prediction import Prediction, predict
-from study.equations.model import ModelTerm, free
-from study.equations.terms import Term, effects_but
+from study.equations.linear_part import connections
+from study.equations.model import Model, ModelTerm, free
+from study.equations.place import Place
+from study.equations.term import Term
+from study.equations.terms import effects_but, external, one_sided
 from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.shape_search import Baseline
+from study.identify.time_domain.shape_search import Baseline, Start, shape_starts
 from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import FORCE, Prepared
 from study.support.cores import side_by_side
 from study.support.errors import StudyError
 
-Floats = NDArray[np.float64]
+FITTED = 12  # of many, those that promise most, whatever they are: fitted in free run ...
+AT_EACH_PLACE = 2  # ... with so many at each place that explain this share of what the best explains ...
+PROMISING = 0.3
+OF_EACH_EFFECT = 1  # ... and each effect where it explains most: the motion that it is judged by may lack its own part
+Progress = Callable[[int, int], None]  # called with how many candidates were fitted, and of how many
+SETTLED = 4  # of the candidates, the best: fitted on the whole fitting part and with enough steps
 
 
 @dataclass(frozen=True, eq=False)
-class FittedCandidate:
+class Candidate:
     """A candidate as fitted."""
 
-    term: Term  # the effect
+    entry: ModelTerm  # the effect and its place
     fit: FreeRunFit  # the model with it, fitted on the fitting part
     prediction: Prediction  # its free run along the judging part
 
     @property
-    def unphysical(self) -> bool:
-        """Whether it is fitted outside of what makes it physical."""
-        return bool(self.term.physical(self.fit.model.values))
+    def name(self) -> str:
+        """Effect, and place where that has a name."""
+        return self.entry.name
+
+    @property
+    def term(self) -> Term:
+        """The effect."""
+        return self.entry.term
+
+    @property
+    def unphysical(self) -> str:
+        """Why it is no physical effect as fitted, in a sentence; empty if it is one."""
+        values = self.fit.model.values
+        return self.term.physical({own: values.get(k) for own, k in zip(self.term.keys, self.entry.keys, strict=True)})
 
 
-def candidate_terms(base: Baseline, extra: Sequence[Term] = (), without: Sequence[str] = ()) -> list[Term]:
-    """The library's terms and the user's own that are not in the model already."""
-    return [t for t in effects_but(base.fit.model, extra) if t.name not in without]
+@dataclass(frozen=True)
+class Screened:
+    """An effect at a place, and where fits of it begin; none where that is searched for when it is fitted."""
+
+    entry: ModelTerm
+    points: tuple[Start, ...] = ()
+
+    @property
+    def share(self) -> float:
+        """Of the residual, that it explains at the best of these points."""
+        return self.points[0].share
+
+
+def candidate_entries(model: Model, extra: Sequence[Term] = (), without: Sequence[str] = ()) -> list[ModelTerm]:
+    """Every effect at every place where the model does not have it: the library's, and the user's own.
+
+    What depends on the sign of the motion alone, a stop on one side, is tried on either side of a place between two.
+    """
+    known = {(t.term.name, t.place.path) for t in model.terms}
+    found: list[ModelTerm] = []
+    for term in effects_but(without, extra):
+        outside = external(term)
+        for place in [Place("at", (c,)) for c in model.coordinates] if outside else connections(model):
+            if (term.name, place.path) not in known:
+                found.append(free(term, place))
+                if place.kind == "between" and not outside and one_sided(term):
+                    found.append(free(term, Place("between", place.ends[::-1])))
+    return found
 
 
 def try_all(
-    terms: Sequence[Term], base: Baseline, prepared: Prepared, progress: Callable[[int], None] | None = None
-) -> list[FittedCandidate]:
-    """Fit and judge every candidate; those that cannot be fitted are left out."""
-    done: list[FittedCandidate] = []
+    entries: Sequence[ModelTerm], base: Baseline, progress: Progress | None = None
+) -> list[Candidate]:
+    """Fit and judge every candidate that is worth it; those that cannot be fitted are left out.
 
-    def fitted(term: Term) -> FittedCandidate | None:
-        return attempt(term, base, prepared)
+    Of two sides of a place the better stays.
+    """
+    if not base.several:
+        return _fitted([Screened(entry) for entry in entries], base, progress)
+    ordered = screened(entries, base)
+    chosen = worth_fitting(ordered)
+    tried = _fitted(chosen, base, progress)
+    return _one_side([*tried, *_fitted(elsewhere(tried, ordered), base, progress, len(chosen))])
 
-    for count, candidate in enumerate(side_by_side(fitted, terms, lambda term: term.effort), start=1):
+
+def screened(entries: Sequence[ModelTerm], base: Baseline) -> list[Screened]:
+    """Candidates with the points that explain most, the most promising first; those that explain nothing left out."""
+
+    def points(entry: ModelTerm) -> Screened:
+        return Screened(entry, tuple(shape_starts(entry, base)))
+
+    tried = side_by_side(points, entries, lambda entry: entry.term.effort)
+    return sorted((item for item in tried if item.points), key=lambda item: -item.share)
+
+
+def worth_fitting(ordered: Sequence[Screened]) -> list[Screened]:
+    """Those worth a fit in free run: the first of all, of each place and of each effect."""
+    best = ordered[0].share if ordered else 0.0
+    places: dict[frozenset[str], int] = {}
+    effects: dict[str, int] = {}
+    chosen: list[Screened] = []
+    for rank, item in enumerate(ordered):
+        path, effect = item.entry.place.path, item.entry.term.name
+        near = places.get(path, 0) < AT_EACH_PLACE and item.share >= PROMISING * best
+        if rank < FITTED or near or effects.get(effect, 0) < OF_EACH_EFFECT:
+            chosen.append(item)
+            places[path] = places.get(path, 0) + 1
+            effects[effect] = effects.get(effect, 0) + 1
+    return chosen
+
+
+def elsewhere(tried: Sequence[Candidate], ordered: Sequence[Screened]) -> list[Screened]:
+    """The best effect at the places where it was not tried and explains a share like that where it was.
+
+    Two places that the sensors cannot tell apart explain alike: a place is believed only if the others were tried.
+    """
+    if not tried:
+        return []
+    best = min(tried, key=_worse).entry.term.name
+    done = {c.name for c in tried}
+    share = max(item.share for item in ordered if item.entry.term.name == best)
+    return [
+        item for item in ordered
+        if item.entry.term.name == best and item.entry.name not in done and item.share >= PROMISING * share
+    ]  # fmt: skip
+
+
+def _worse(candidate: Candidate) -> tuple[bool, float]:
+    return bool(candidate.unphysical), candidate.prediction.error
+
+
+def _one_side(candidates: Sequence[Candidate]) -> list[Candidate]:
+    best: dict[tuple[str, frozenset[str]], Candidate] = {}
+    for candidate in sorted(candidates, key=_worse):
+        best.setdefault((candidate.term.name, candidate.entry.place.path), candidate)
+    return list(best.values())
+
+
+def _fitted(
+    chosen: Sequence[Screened], base: Baseline, progress: Progress | None, before: int = 0
+) -> list[Candidate]:
+    done: list[Candidate] = []
+
+    def fitted(item: Screened) -> Candidate | None:
+        return attempt(item.entry, base, item.points)
+
+    found = side_by_side(fitted, chosen, lambda item: item.entry.term.effort)
+    for count, candidate in enumerate(found, start=before + 1):
         if candidate is not None:
             done.append(candidate)
         if progress is not None:
-            progress(count)
+            progress(count, before + len(chosen))
     return done
 
 
-def attempt(term: Term, base: Baseline, prepared: Prepared) -> FittedCandidate | None:
+def attempt(entry: ModelTerm, base: Baseline, points: Sequence[Start] = ()) -> Candidate | None:
     """The model with a candidate as a search fits it; None where it has no finite response."""
-    found = _attempt(free(term), base, prepared)
-    plainer = _plainer(term) if prepared.response == FORCE and (found is None or found.unphysical) else None
-    return found if plainer is None else _attempt(plainer, base, prepared) or found
+    found = _attempt(entry, base, points)
+    component = base.prepared.response == FORCE
+    plainer = _plainer(entry) if component and (found is None or found.unphysical) else None
+    return found if plainer is None else _attempt(plainer, base) or found
 
 
-def _attempt(entry: ModelTerm, base: Baseline, prepared: Prepared) -> FittedCandidate | None:
+def _attempt(entry: ModelTerm, base: Baseline, points: Sequence[Start] = ()) -> Candidate | None:
     try:
-        return judged_candidate(entry.term, with_term(base.fit, entry, base, prepared), prepared)
+        return judged_candidate(entry, with_term(base, entry, points), base.prepared)
     except StudyError:
         return None
 
 
-def _plainer(term: Term) -> ModelTerm | None:
+def _plainer(entry: ModelTerm) -> ModelTerm | None:
     """A term whose roundness along a loop is held at zero, as Dahl's friction is; None where it has no such parameter.
 
     A prescribed stroke that slips nearly all the time tells little of it, and a fit may leave what is physical.
     """
-    fixed = tuple(0.0 if p.relative and p.signed else None for p in term.parameters)
-    return replace(free(term), parameters=fixed) if any(value == 0.0 for value in fixed) else None
+    fixed = tuple(0.0 if p.relative and p.signed else None for p in entry.term.parameters)
+    return replace(entry, parameters=fixed) if any(value == 0.0 for value in fixed) else None
 
 
-def judged_candidate(term: Term, fit: FreeRunFit, prepared: Prepared) -> FittedCandidate | None:
+def judged_candidate(entry: ModelTerm, fit: FreeRunFit, prepared: Prepared) -> Candidate | None:
     """A fitted candidate with its prediction; None where its free run does not stay finite."""
     prediction = predict(fit, prepared)
-    return None if prediction.diverged else FittedCandidate(term, fit, prediction)
+    return None if prediction.diverged else Candidate(entry, fit, prediction)
 
 
-def all_settled(candidates: Sequence[FittedCandidate], prepared: Prepared) -> list[FittedCandidate]:
+def with_best_settled(tried: Sequence[Candidate], prepared: Prepared) -> list[Candidate]:
+    """The best candidates fitted as they would be if they were added, then the others."""
+    ordered = sorted(tried, key=_worse)
+    return all_settled(ordered[:SETTLED], prepared) + ordered[SETTLED:]
+
+
+def all_settled(candidates: Sequence[Candidate], prepared: Prepared) -> list[Candidate]:
     """Candidates fitted to the whole fitting part and with enough steps, as they would be if they were added."""
 
-    def settle(candidate: FittedCandidate) -> FittedCandidate:
+    def settle(candidate: Candidate) -> Candidate:
         try:
             fit = finished(candidate.fit, prepared)
-            return judged_candidate(candidate.term, fit, prepared) or candidate
+            return judged_candidate(candidate.entry, fit, prepared) or candidate
         except StudyError:
             return candidate
 

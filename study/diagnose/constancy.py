@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy.fft import rfft, rfftfreq
 from scipy.special import chdtrc
 
-from study.equations.term import Term
+from study.equations.model import ModelTerm
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.records.prepared import Prepared
+from study.support.least_squares import length_or_one
 from study.support.thresholds import ALPHA, TOLERANCE
 
 Floats = NDArray[np.float64]
@@ -110,27 +110,28 @@ def _noise(own: Floats, cross: Floats) -> float:
 
 
 def curves(
-    fit: FreeRunFit, term: Term, prepared: Prepared, jacobian: Floats
+    fit: FreeRunFit, entry: ModelTerm, dt: float, jacobian: Floats
 ) -> tuple[CoefficientCurve | None, CoefficientCurve | None]:
-    """The coefficient of a term in a fitted model along frequency and along amplitude.
+    """The coefficient of a term in a fitted model along frequency, at the sensor that sees most of it, and amplitude.
 
-    ``jacobian`` is :func:`linearise` of the fit. None where the coefficient is zero, or the model's others could do all
-    that it does.
+    ``jacobian`` is :func:`linearise` of the fit. Along amplitude all sensors count, one after the other. None where the
+    coefficient is zero, or the model's others could do all that it does.
     """
-    columns = [fit.keys.index(s) for s in term.symbols]
+    columns = [fit.keys.index(s) for s in entry.symbols]
     direction = fit.values[columns]
     size = float(np.linalg.norm(direction))
     if size == 0.0:
         return None, None
+    sensors = len(fit.outputs)
     own = jacobian[:, columns] @ (direction / size)
-    scale = np.linalg.norm(jacobian, axis=0)
-    others = np.delete(jacobian / np.where(scale > 0.0, scale, 1.0), columns, axis=1)
-    basis = np.linalg.qr(others)[0]
+    basis = np.linalg.qr(np.delete(jacobian / length_or_one(jacobian), columns, axis=1))[0]
     alone = own - basis @ (basis.T @ own)
     if np.linalg.norm(alone) <= INDISTINCT * np.linalg.norm(own):
         return None, None
-    bands = along_frequency(alone, fit.residual, size, prepared.dt)
-    classes = along_amplitude(alone, fit.residual, size)
+    each, left = alone.reshape(-1, sensors).T, fit.residual.reshape(-1, sensors).T
+    most = int(np.argmax(np.sum(each**2, axis=1)))
+    bands = along_frequency(each[most], left[most], size, dt)
+    classes = along_amplitude(each.ravel(), left.ravel(), size)
     # A short record has not lines enough for a band, or not blocks enough for a class.
     return bands if len(bands.at) else None, classes if len(classes.at) else None
 

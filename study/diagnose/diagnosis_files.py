@@ -5,12 +5,12 @@ from typing import Any
 
 from study.compare.comparison_report import as_json, where
 from study.diagnose import diagnosis_pages, diagnosis_report
-from study.diagnose.diagnosis_pictures import PicturedDiagnosis
 from study.diagnose.diagnosis_sentences import diagnosis_sentences
 from study.diagnose.force_between import reading_in_words
-from study.diagnose.needless import Needless, Unneeded, needless_fields, needless_in_words
+from study.diagnose.needless import Needless, needless_fields, needless_in_words
 from study.diagnose.separating_test import advice
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
+from study.equations.linear_part import modes_table
 from study.faults import fault
 from study.faults.fault import Fault
 
@@ -30,7 +30,7 @@ def choices_in_words(notes: Sequence[str]) -> list[str]:
     return [note for note in notes if "(--" in note or "too coarsely" in note]
 
 
-def unneeded_in_words(found: Sequence[Unneeded], diagnosis: PicturedDiagnosis) -> str:
+def unneeded_in_words(found: Sequence[Needless], diagnosis: Diagnosis) -> str:
     """Which terms the diagnosed model does not need, at a place or without one, in sentences; empty if it needs all."""
     return needless_in_words(found, complete=diagnosis.verdict == NOTHING)
 
@@ -46,7 +46,10 @@ def diagnosis_files(
     ``by_record`` the coefficients that may differ between records.
     """
     comparison = diagnosis.comparison
+    prediction = comparison.prediction
     content = diagnosis_report.diagnosis_fields(diagnosis)
+    content["error"] = {"response": prediction.error, "force": comparison.force.total}
+    content["noise_floor"] = {"response": prediction.floor}
     content |= {"record": comparison.record.name, "where": where(comparison), "says": words}
     content["not_needed"] = needless_fields(unneeded)
     content["not_fitted"] = dict(unfitted or {})
@@ -55,3 +58,25 @@ def diagnosis_files(
     if by_record:
         content["coefficients_by_record"] = list(by_record)
     return {"diagnosis.json": as_json(content)} | diagnosis_pages.picture_files(diagnosis, comparison.record.name)
+
+
+def placed_fields(diagnosis: Diagnosis, unneeded: Sequence[Needless] = ()) -> dict[str, Any]:
+    """What ``diagnosis.json`` of a structure holds."""
+    from study.structure.structure_comparison import mode_rows, structure_document
+
+    whole, after = structure_document(diagnosis.comparison), diagnosis.modes_after
+    return {
+        **diagnosis_report.diagnosis_fields(diagnosis),
+        **{key: whole[key] for key in ("record", "error", "noise_floor", "where")},
+        "modes": {"before": whole["modes"], "after": mode_rows(after) if after is not None else None},
+        "not_needed": needless_fields(unneeded), "says": diagnosis_in_words(diagnosis),
+    }  # fmt: skip
+
+
+def modes_before_and_after(diagnosis: Diagnosis) -> str:
+    """The modes of the structure as given, and with the first candidate."""
+    comparison = diagnosis.comparison
+    before, after = modes_table(comparison.modes, comparison.model.coordinates), diagnosis.modes_after
+    if after is None:
+        return f"modes\n{before}"
+    return f"modes of the model as given\n{before}\n\nmodes with it\n{modes_table(after, comparison.model.coordinates)}"

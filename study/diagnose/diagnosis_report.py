@@ -8,7 +8,6 @@ from tabulate import tabulate
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import Diagnosis
 from study.support.numbers import percent
-from study.support.statistics import Gain
 
 TIES = 2  # ties named in the table; the file names all
 SHOWN = 8  # candidates in the table on the screen
@@ -16,67 +15,60 @@ SHOWN = 8  # candidates in the table on the screen
 
 def candidate_table(diagnosis: Diagnosis) -> str:
     """The first candidates as a person reads them in ten seconds."""
-    head = ["", "effect", "explains", "error with it", "coefficient", "p", "changes by", "tied with"]
-    units = diagnosis.comparison.record.units
-    force, length = units.get("force", "N"), units.get("displacement", "m")
-    rows = [_shown(i, row, force, length) for i, row in enumerate(diagnosis.candidates[:SHOWN], start=1)]
-    shown = tabulate(rows, head, tablefmt="simple", disable_numparse=True)
-    more = len(diagnosis.candidates) - SHOWN
-    return f"{shown}\n... and {more} more, in diagnosis.json" if more > 0 else shown
+    head = ["", "effect", "where", "explains", "error with it", "coefficient", "p", "changes by", "tied with"]
+    rows = [head, *(_shown(i, row) for i, row in enumerate(diagnosis.candidates[:SHOWN], start=1))]
+    if not diagnosis.comparison.model.named:  # there is one place
+        rows = [row[:2] + row[3:] for row in rows]
+    shown = tabulate(rows[1:], rows[0], tablefmt="simple", disable_numparse=True)
+    more, unfitted = len(diagnosis.candidates) - SHOWN, diagnosis.asked - len(diagnosis.candidates)
+    said = [f"... and {more} more, in diagnosis.json"] if more > 0 else []
+    said += [f"{unfitted} of {diagnosis.asked} effects and places explain too little to be fitted"] if unfitted else []
+    return "\n".join([shown, "; ".join(said)]) if said else shown
 
 
-def _shown(place: int, row: Ranked, force: str, length: str) -> list[str]:
-    unit = row.term.unit(row.term.symbols[0], force, length)
-    half = 1.96 * row.error
+def _shown(number: int, row: Ranked) -> list[str]:
+    ties = ", ".join(row.tied_with[:TIES])
+    ties += f" and {len(row.tied_with) - TIES} more" if len(row.tied_with) > TIES else ""
+    # of what leaves twice as much as there was, how much more matters to nobody
+    share = "below -100 %" if row.gain.explained < -1.0 else percent(row.gain.explained, "z.1f", row.gain.error, ".1f")
     return [
-        str(place), row.name, _share(row.gain), percent(row.response_error),
-        f"{row.coefficient:.4g} +- {half:.2g} {unit}", f"{row.p_value:.1g}",
-        percent(row.unsteadiness, ".0f") if math.isfinite(row.unsteadiness) else "-", _few(row.tied_with),
+        str(number), row.term.name, row.entry.place.label, share, percent(row.response_error),
+        f"{row.coefficient:.4g} +- {1.96 * row.error:.2g} {row.unit}", f"{row.p_value:.1g}",
+        percent(row.unsteadiness, ".0f") if math.isfinite(row.unsteadiness) else "-", ties,
     ]  # fmt: skip
-
-
-def _share(gain: Gain) -> str:
-    """The share explained; of what leaves twice as much as there was, how much more matters to nobody."""
-    return "below -100 %" if gain.explained < -1.0 else percent(gain.explained, "z.1f", gain.error, ".1f")
-
-
-def _few(names: tuple[str, ...]) -> str:
-    shown = ", ".join(names[:TIES])
-    return f"{shown} and {len(names) - TIES} more" if len(names) > TIES else shown
 
 
 def diagnosis_fields(diagnosis: Diagnosis) -> dict[str, Any]:
     """What ``diagnosis.json`` holds of the diagnosis itself; candidates best first."""
-    prediction = diagnosis.comparison.prediction
+    rows, named = {row.name: row for row in diagnosis.candidates}, diagnosis.comparison.model.named
+    families = diagnosis.families
+    on = [{**f.place.plain(), "on": f.family, "explained": f.gain.explained} for f in families[:SHOWN]]
     return {
         "verdict": diagnosis.verdict,
-        "error": {"response": prediction.error, "force": diagnosis.comparison.force.total},
-        "noise_floor": {"response": prediction.floor},
-        "candidates": [_candidate(row) for row in diagnosis.candidates],
+        "candidates": [_candidate(row, rows, named) for row in diagnosis.candidates],
+        "asked": diagnosis.asked,
         "pair": list(diagnosis.pair),
         "left": diagnosis.left,
-        "depends_on": diagnosis.families,
+        "depends_on": on if named else {f.family: f.gain.explained for f in families},
         "converged": diagnosis.comparison.fit.converged,
     }
 
 
-def _candidate(row: Ranked) -> dict[str, Any]:
+def _candidate(row: Ranked, rows: dict[str, Ranked], named: bool) -> dict[str, Any]:
+    def where(other: Ranked) -> dict[str, Any]:
+        return other.entry.place.plain() if named else {}
+
     return {
-        "term": row.name,
-        "parameters": row.parameters,
-        "parameter_errors": row.parameter_errors,
-        "coefficient": row.coefficient,
-        "interval": list(row.interval),
-        "response_error": row.response_error,
-        "noise_floor": row.prediction.floor,
-        "explained": row.gain.explained,
-        "explained_error": row.gain.error,
-        "p_value": row.p_value,
+        "term": row.term.name, **where(row),
+        "parameters": row.parameters, "parameter_errors": row.parameter_errors,
+        "coefficient": row.coefficient, "interval": list(row.interval),
+        "response_error": row.response_error, "noise_floor": row.prediction.floor,
+        "explained": row.gain.explained, "explained_error": row.gain.error, "p_value": row.p_value,
         "changes": {
             "frequency": row.flatness.spread() if row.flatness else None,
             "amplitude": row.steadiness.spread() if row.steadiness else None,
         },
-        "tied_with": list(row.tied_with),
-        "unphysical": row.unphysical,
-        "converged": row.fit.converged,
-    }
+        "tied_with": [{"term": rows[n].term.name, **where(rows[n])} if named else n for n in row.tied_with],
+        "distance": row.distance if math.isfinite(row.distance) else None,
+        "unphysical": row.unphysical, "converged": row.fit.converged,
+    }  # fmt: skip

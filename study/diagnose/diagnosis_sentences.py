@@ -4,9 +4,11 @@ import math
 from collections.abc import Sequence
 
 from study.diagnose.constancy import wavers
-from study.diagnose.held_out import held_out_of, residual_held_out
+from study.diagnose.held_out import evidence, held_out_of
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
+from study.equations.model import ModelTerm
+from study.equations.place import place_in_words
 from study.figures.labels import term_names
 from study.support.numbers import by_chance, percent
 from study.support.thresholds import ALPHA, UNSTEADY
@@ -27,12 +29,18 @@ def diagnosis_sentences(diagnosis: Diagnosis) -> list[str]:
 
 
 def _nothing(diagnosis: Diagnosis) -> str:
-    prediction = diagnosis.comparison.prediction
+    comparison = diagnosis.comparison
+    where = " at any place" if comparison.model.named else ""
+    asked = f"{diagnosis.asked} {'effects and places' if comparison.model.named else 'candidates'}"
     return (
-        f"Nothing is missing that this record could show: the error of the response is {percent(prediction.error)}, "
-        "and what is left depends no more than chance has it on the motion, its past or time, as noise does; "
-        f"none of {len(diagnosis.candidates)} candidates explains any of it."
+        f"Nothing is missing that this record could show: the error of {_response(diagnosis)} is "
+        f"{percent(comparison.prediction.error)}, and what is left depends no more than chance has it on the motion"
+        f"{where}, its past or time, as noise does; none of {asked} explains any of it."
     )
+
+
+def _response(diagnosis: Diagnosis) -> str:
+    return "the motions" if len(diagnosis.comparison.prepared.outputs) > 1 else "the response"
 
 
 def _before_and_after(diagnosis: Diagnosis, first: Ranked) -> str:
@@ -45,50 +53,56 @@ def _before_and_after(diagnosis: Diagnosis, first: Ranked) -> str:
     seen = first.response_error < comparison.prediction.error and errors[0] != errors[1]
     if comparison.record.stretches and not seen:
         both = (
-            residual_held_out(comparison.prediction, held_out_of(comparison)),
-            residual_held_out(first.prediction, first.held_out),
+            evidence(comparison.prediction, held_out_of(comparison)),
+            evidence(first.prediction, first.held_out),
         )
         return f"{percent(both[0].error)} to {percent(both[1].error)}, of all stretches as the others predict them"
     return f"{errors[0]} to {errors[1]}"
 
 
 def _missing(diagnosis: Diagnosis) -> list[str]:
-    first, units = diagnosis.candidates[0], diagnosis.comparison.record.units
-    force, length = units.get("force", "N"), units.get("displacement", "m")
+    first = diagnosis.candidates[0]
+    words, where = term_names(first.term.name), first.entry.place
+    placed = f" {place_in_words(where)}" if where.label else ""
     said = [
-        f"{_words(first.name)} is missing ({first.term.meaning}).",
-        f"With it the held-out error of the response falls from {_before_and_after(diagnosis, first)}; the noise floor "
-        f"is {percent(first.prediction.floor)}.",
-        f"Its coefficient is {_amount(first, force, length)}{_shape(first, length)}.",
+        f"{words[0].upper()}{words[1:]} is missing{placed} ({first.term.meaning}).",
+        f"With it the held-out error of {_response(diagnosis)} falls from {_before_and_after(diagnosis, first)}; the "
+        f"noise floor is {percent(first.prediction.floor)}.",
+        f"Its coefficient is {_amount(first)}{_shape(first)}.",
     ]
+    rows = {row.name: row for row in diagnosis.candidates}
     if diagnosis.pair:
         second = next(name for name in diagnosis.pair if name != first.name)
-        said.append(f"It does not explain all: of all candidates, {term_names(second)} beside it explains most.")
+        words = effect_in_words(rows[second].entry)
+        said.append(f"It does not explain all: of all candidates, {words} beside it explains most.")
     elif diagnosis.left > 0.0:
         said.append(f"Structure of {percent(diagnosis.left)} of the response is left beside it.")
     if first.unphysical:
         said.append(f"As fitted it is no physical effect: {first.unphysical}.")
     if first.tied_with:
-        said.append(f"This record cannot tell it from {_named(first.tied_with)}.")
+        said.append(f"This record cannot tell it from {_few([rows[name].entry for name in first.tied_with])}.")
     return said
 
 
 def _unknown(diagnosis: Diagnosis) -> list[str]:
     prediction = diagnosis.comparison.prediction
     error = percent(prediction.error)
-    said = [f"Something is missing that no candidate explains: the error of the response is {error}."]
+    said = [f"Something is missing that no candidate explains: the error of {_response(diagnosis)} is {error}."]
     best = diagnosis.candidates[0] if diagnosis.candidates else None
     if best is not None and best.gain.explained > 0.0 and best.p_value < ALPHA:
         said.append(
-            f"The nearest, {term_names(best.name)}, leaves {percent(best.response_error)}; "
+            f"The nearest, {effect_in_words(best.entry)}, leaves {percent(best.response_error)}; "
             f"{_doubt(best, diagnosis)}, so its shape is not right."
         )
-    families = sorted(diagnosis.families.items(), key=lambda item: -item[1])
-    if families and families[0][1] > DEPENDENCE:
-        named = [name for name, share in families if share > families[0][1] - CLOSE]
+    families = [f for f in diagnosis.families if f.gain.explained > DEPENDENCE]
+    if families:
+        best_place = families[0].place
+        shares = [(f.family, f.gain.explained) for f in families if f.place == best_place]
+        named = [name for name, share in shares if share > shares[0][1] - CLOSE]
+        where = f" {place_in_words(best_place)}" if best_place.label else ""
         said.append(
-            f"The missing force depends on {' or '.join(named)}: general functions of it explain "
-            f"{percent(families[0][1])} of what is unexplained, held out."
+            f"The missing force depends on {' or '.join(named)}{where}: general functions of it explain "
+            f"{percent(shares[0][1])} of what is unexplained, held out."
         )
     else:
         said.append("Neither displacement, velocity, the past nor time as such explains a tenth of it.")
@@ -104,11 +118,10 @@ def _doubt(row: Ranked, diagnosis: Diagnosis) -> str:
     return f"what remains still depends on the motion, its past or time ({percent(diagnosis.left)} of the response)"
 
 
-def _amount(row: Ranked, force: str, length: str) -> str:
+def _amount(row: Ranked) -> str:
     low, high = row.interval
     digits = _digits(row.coefficient, high - low)
-    unit = row.term.unit(row.term.symbols[0], force, length)
-    return f"{row.coefficient:.{digits}g} {unit} (95 % interval {low:.{digits}g} to {high:.{digits}g})"
+    return f"{row.coefficient:.{digits}g} {row.unit} (95 % interval {low:.{digits}g} to {high:.{digits}g})"
 
 
 def _digits(value: float, width: float) -> int:
@@ -118,23 +131,23 @@ def _digits(value: float, width: float) -> int:
     return min(max(4, math.ceil(math.log10(abs(value) / width)) + 2), 12)
 
 
-def _shape(row: Ranked, length: str) -> str:
-    units = {"length": length, "time": "s", "frequency": "Hz", "1/length": f"1/{length}"}
-    known = {p.name: units[p.quantity] for p in row.term.parameters} | {"phase": "rad"}
+def _shape(row: Ranked) -> str:
+    units = row.parameter_units
     parts = [
-        f"{name} = {value:.4g} +- {row.parameter_errors[name]:.2g} {known[name]}"
+        f"{name} = {value:.4g} +- {row.parameter_errors[name]:.2g} {units[name]}"
         for name, value in row.parameters.items()
     ]
     return f", with {', '.join(parts)}" if parts else ""
 
 
-def _named(names: Sequence[str]) -> str:
-    """A few names in words, and how many more there are."""
-    shown = [term_names(name) for name in (names if len(names) <= NAMED + 1 else names[:NAMED])]
-    more = f" and {len(names) - len(shown)} more" if len(names) > len(shown) else ""
+def _few(entries: Sequence[ModelTerm]) -> str:
+    """A few effects in words, and how many more there are."""
+    shown = [effect_in_words(entry) for entry in (entries if len(entries) <= NAMED + 1 else entries[:NAMED])]
+    more = f" and {len(entries) - len(shown)} more" if len(entries) > len(shown) else ""
     return ", ".join(shown) + more
 
 
-def _words(name: str) -> str:
-    words = term_names(name)
-    return words[0].upper() + words[1:]
+def effect_in_words(entry: ModelTerm) -> str:
+    """``cubic stiffness``, or ``cubic stiffness between floor2 and floor3``."""
+    words = term_names(entry.term.name)
+    return f"{words} {place_in_words(entry.place)}" if entry.place.label else words

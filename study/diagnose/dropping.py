@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from study.compare.comparison import Comparison, compare
+from study.equations.layout import check
 from study.equations.model import Model
+from study.equations.place import Place
 from study.identify.frequency_domain.starting_values import reverse_start
-from study.identify.time_domain.fit_model import NEAR, best_fit
+from study.identify.time_domain.fit_model import NEAR, best_fit, fit_model, grown_states
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part, linearise
 from study.identify.time_domain.weighted_fit import finished
@@ -30,7 +32,7 @@ class Removal:
     """
 
     start: dict[str, float]  # the other values with what they take over: where a fit without the term begins
-    lost: Floats  # what they cannot take over of the response, shape (n,)
+    lost: Floats  # what they cannot take over of the response, weighted as it was fitted, shape (n,)
 
 
 def removal(fit: FreeRunFit, name: str, jacobian: Floats) -> Removal:
@@ -38,11 +40,12 @@ def removal(fit: FreeRunFit, name: str, jacobian: Floats) -> Removal:
 
     A term's own shape parameters mean nothing once it is gone: they are no others.
     """
-    term = next(t.term for t in fit.model.terms if t.name == name)
-    gone = [fit.keys.index(key) for key in term.keys if key in fit.keys]
-    own = [i for i in gone if fit.keys[i] in term.symbols]
-    response = jacobian[:, own] @ fit.values[own]
-    others = np.delete(jacobian, gone, axis=1)
+    entry = next(t for t in fit.model.terms if t.name == name)
+    gone = [fit.keys.index(key) for key in entry.keys if key in fit.keys]
+    own = [i for i in gone if fit.keys[i] in entry.symbols]
+    columns = fit.whitened(jacobian)
+    response = columns[:, own] @ fit.values[own]
+    others = np.delete(columns, gone, axis=1)
     taken = least_squares(others, response, 1e-12)
     kept = [i for i in range(len(fit.keys)) if i not in gone]
     moved = {fit.keys[i]: float(fit.values[i] + shift) for i, shift in zip(kept, taken, strict=False)}
@@ -53,9 +56,16 @@ def fitted_without(fit: FreeRunFit, name: str, prepared: Prepared, start: dict[s
     """The model without a term, fitted from one start after the other; none where it has no finite response from any.
 
     These are the start given, the values as they are, and those of the reverse system: one that has taken over nothing
-    may run out of step with the measured motion, one that has taken over too much may not run at all.
+    may run out of step with the measured motion, one that has taken over too much may not run at all. None either where
+    a structure is none without the term.
     """
-    model, states = fit.model.without_term(name), _states(fit, name)
+    model = fit.model.without_term(name)
+    if model.named:
+        try:
+            check(model)
+        except StudyError:
+            return
+    states = grown_states(fit, model)[: 1 if fit.restarts else None]
     held = tuple(key for key in fit.held if key in model.values)
     for begin in _starts(model, prepared, start, held):
         try:
@@ -77,20 +87,52 @@ def compared_without(comparison: Comparison, name: str) -> Comparison:
     """
     check_can_go(comparison.model, name)
     fit, prepared = comparison.fit, comparison.prepared
-    model = fit.model.without_term(name)
+    model, given = fit.model.without_term(name), comparison.model.without_term(name)
     held = tuple(key for key in fit.held if key in model.values)
     begin = removal(fit, name, linearise(fit, prepared)).start if fit.keys and not fit.restarts else {}
     if len(held) == len(model.values):
-        return compare(comparison.model.without_term(name), prepared)
-    again = best_fit(model, prepared, _starts(model, prepared, begin, held), held)
-    return compare(comparison.model.without_term(name), prepared, fit=finished(again, prepared))
+        return compare(given, prepared)
+    fits = list[FreeRunFit]()
+    with suppress(StudyError):
+        fits.append(best_fit(model, prepared, _starts(model, prepared, begin, held), held))
+    if model.named or not fits:
+        fits.append(fit_model(given, prepared))
+    return compare(given, prepared, fit=finished(min(fits, key=lambda f: f.cost), prepared))
+
+
+def term_at(model: Model, name: str, place: Place | None = None) -> str:
+    """The full name of a term that can be left out, by effect and place; without a place if it is unique.
+
+    Raises
+    ------
+    StudyError
+        If there is no such term, the place is needed to tell it, or the model cannot be without it.
+    """
+    own = [
+        t.name for t in model.terms
+        if t.name == name or (t.term.name == name and (place is None or t.place.path == place.path))
+    ]  # fmt: skip
+    said = name if place is None else f"{name} {'-'.join(place.ends)}"
+    if model.named:
+        expect(own, f"{said!r} is not in the model; expected one of {', '.join(t.name for t in model.terms)}")
+    several = f"{name!r} is in the model at several places, {', '.join(own)}; expected --between or --at"
+    expect(len(own) < 2, several)
+    check_can_go(model, own[0] if own else name)
+    return own[0]
 
 
 def check_can_go(model: Model, name: str) -> None:
-    """Refuse a term that is not in the model, inertia, and the only term beside it."""
-    names = [t.name for t in model.terms if t.name != "inertia"]
-    expect(name != "inertia", "inertia cannot be dropped; a free run needs a mass, expected another term")
-    expect(name in names, f"{name!r} is not in the model; expected {' or '.join(names) or 'a model with more terms'}")
+    """Refuse a term that is not in the model, inertia, and one without which nothing is left to compare."""
+    names = [t.name for t in model.terms if t.term.name != "inertia"]
+    if not model.named:
+        expect(name != "inertia", "inertia cannot be dropped; a free run needs a mass, expected another term")
+    expect(
+        name in names or (model.named and name in model),
+        f"{name!r} is not in the model; expected {' or '.join(names) or 'a model with more terms'}",
+    )
+    if model.named:
+        check(model.without_term(name))
+        return
     expect(len(names) > 1, f"{name} is the only term beside inertia; expected a model that keeps another one")
 
 
@@ -102,14 +144,7 @@ def _starts(
     if start:
         yield known | start
     yield known
-    with suppress(StudyError):
-        anew = reverse_start(model, prepared)
-        yield known | {key: value for key, value in anew.items() if key in known and key not in held}
-
-
-def _states(fit: FreeRunFit, name: str) -> Floats:
-    """The initial states of a fit without that of a term, shape (1, states), or a row for each stretch."""
-    initial = np.atleast_2d(fit.initial)[: 1 if fit.restarts else None]
-    own = [t.name for t in fit.model.states]
-    names = [*[""] * (initial.shape[1] - len(own)), *own]
-    return initial[:, [i for i, other in enumerate(names) if other != name]]
+    if not model.named:  # the reverse system of a structure starts its linear terms alone
+        with suppress(StudyError):
+            anew = reverse_start(model, prepared)
+            yield known | {key: value for key, value in anew.items() if key in known and key not in held}

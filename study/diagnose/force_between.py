@@ -5,13 +5,14 @@ made straight or held between them leaves an error that grows with the square of
 samples a period make it look like relaxation, and a resonance above the Nyquist frequency is driven by nothing else.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from study.compare.comparison import Comparison, compare
 from study.compare.prediction import predict
+from study.diagnose.candidates import Progress
 from study.diagnose.verdict import NOTHING, Diagnosis, diagnose, search_part
 from study.equations.terms import Term
 from study.identify.time_domain.fit_model import fit_model
@@ -30,7 +31,7 @@ def diagnose_as_read(
     *,
     extra: Sequence[Term] = (),
     without: Sequence[str] = (),
-    progress: Callable[[int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Diagnosis:
     """The diagnosis of :func:`study.diagnose.verdict.diagnose`, unless another reading of the force explains it all.
 

@@ -12,25 +12,27 @@ from study.compare.comparison import Comparison
 from study.compare.prediction import Prediction
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import linearise
+from study.records.outputs import Noise, Outputs
 from study.records.prepared import Prepared
+from study.support import statistics
 from study.support.arrays import Floats
-from study.support.autoregression import whitened
 from study.support.errors import DivergenceError
-from study.support.least_squares import least_squares
+from study.support.least_squares import least_squares, length_or_one
 
 RANK = 1e-9  # of the largest singular value: directions below are not seen
 
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Held-out residuals; both are made white with the same filter when models are compared."""
+    """Held-out residuals, stacked; both are made white with the same filter when models are compared."""
 
     judged: Floats  # of the judging part, coefficients from the fitting part
     fitted: Floats  # of the fitting part, coefficients from the judging part; empty where that cannot be
 
-    def white(self, noise: Floats) -> Floats:
-        """Both strung together, filtered with the coefficients of an autoregressive noise, shape (n,)."""
-        return np.concatenate([whitened(part, noise) for part in (self.judged, self.fitted) if len(part)])
+    def white(self, outputs: Outputs, noise: Noise) -> tuple[Floats, Floats]:
+        """Judging and fitting part filtered with the coefficients of each sensor's autoregressive noise."""
+        judged, fitted = (outputs.whitened(part, noise) if len(part) else part for part in (self.judged, self.fitted))
+        return judged, fitted
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,25 +43,17 @@ class HeldOutResidual:
     error: float  # rms of it over that of the response
 
 
-def residual_held_out(prediction: Prediction, held: HeldOut) -> HeldOutResidual:
-    """The judging part's residual; with stretches to fit and to judge in turn, those of both parts.
+def evidence(prediction: Prediction, held: HeldOut, both: bool = True) -> HeldOutResidual:
+    """The judging part's residual; with stretches to fit and to judge in turn, those of both parts, if these count.
 
     The first stretch of a decay is the loudest, and is fitted: what shows there alone is seen the other way round.
     """
     prepared = prediction.prepared
-    if not (prepared.record.stretches and len(held.fitted)):
+    if not (both and prepared.record.stretches and len(held.fitted)):
         return HeldOutResidual(prediction.residual, prediction.error)
-    both = np.concatenate([held.judged, held.fitted])
+    residual = np.concatenate([held.judged, held.fitted])
     size = float(np.std(np.concatenate([prediction.above(prepared.judged), prediction.above(prepared.fitted)])))
-    return HeldOutResidual(both, float(np.sqrt(np.mean(both**2))) / size)
-
-
-def evidence_of(fit: FreeRunFit, prediction: Prediction, both: bool = True) -> HeldOutResidual:
-    """The same of a fitted model; of the judging part alone unless ``both`` count."""
-    prepared = prediction.prepared
-    if not (both and prepared.record.stretches):
-        return HeldOutResidual(prediction.residual, prediction.error)
-    return residual_held_out(prediction, held_out(fit, prediction, linearise(fit, prepared), prepared))
+    return HeldOutResidual(residual, float(np.sqrt(np.mean(residual**2))) / size)
 
 
 def alike(one: HeldOutResidual, other: HeldOutResidual) -> bool:
@@ -93,6 +87,60 @@ def held_out_of(comparison: Comparison) -> HeldOut:
     """Held-out residuals of the model of a comparison."""
     fit, prepared = comparison.fit, comparison.prepared
     return held_out(fit, comparison.prediction, linearise(fit, prepared), prepared)
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOutTest:
+    """Whether a candidate explains what a model leaves beyond what its own coefficients could, on held-out parts.
+
+    These have errors that show in all of the judging part alike: a candidate that happens to move them nearer to what
+    that part wants gains there with every block. So what they could do is taken out of residual and gain on each part
+    (Frisch and Waugh, 1933).
+    """
+
+    outputs: Outputs
+    noise: Noise
+    before: HeldOut  # what the model leaves
+    own: tuple[Floats, Floats]  # the same of judging and fitting part, white
+    bases: tuple[Floats, Floats]  # orthonormal bases of what its own coefficients and states could change there
+    evenly: bool  # of a decay: what a change explains lies in the loud blocks
+
+    def p_value(self, after: HeldOut, tuned: bool) -> float:
+        """Of one candidate alone, by what it leaves.
+
+        A frequency is where the fitting part has its largest line, by chance if it is noise: its blocks all agree there
+        with whatever amplitude the judging part gives that line, so that they bear witness of nothing. A part that the
+        candidate does not predict, as a search fits less than all, is left out.
+        """
+        before, left = list[Floats](), list[Floats]()
+        parts = zip(self.own, self.bases, after.white(self.outputs, self.noise), strict=True)
+        for own, basis, part in list(parts)[: 1 if tuned else 2]:
+            if len(own) == len(part):
+                alone, change = (x - basis @ (basis.T @ x) for x in (own, own - part))
+                before.append(alone)
+                left.append(alone - change)
+        return statistics.gain(np.concatenate(before), np.concatenate(left), evenly=self.evenly).p_value
+
+
+def held_out_test(fit: FreeRunFit, before: Prediction, noise: Noise) -> HeldOutTest:
+    """The test of whatever a fitted model lacks, in noise as the best candidate leaves it."""
+    prepared, outputs = before.prepared, before.prepared.outputs
+    jacobian = linearise(fit, prepared)
+    own = held_out(fit, before, jacobian, prepared)
+    columns: list[Floats] = []
+    if before.run is not None and fit.keys and not fit.restarts:
+        try:
+            columns = [before.run.derivatives(fit), jacobian]
+        except DivergenceError:
+            columns = []
+    judged, fitted = [_orthonormal(outputs.whitened(x, noise)) for x in columns] or [
+        np.zeros((len(part), 0)) for part in (own.judged, own.fitted)
+    ]
+    return HeldOutTest(outputs, noise, own, own.white(outputs, noise), (judged, fitted), prepared.free)
+
+
+def _orthonormal(columns: Floats) -> Floats:
+    return np.linalg.qr(columns / length_or_one(columns))[0]
 
 
 def independent(residual: Floats, derivatives: Floats, spread: Floats) -> Floats:

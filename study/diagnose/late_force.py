@@ -17,10 +17,10 @@ from study.faults.fault import DELAY, Fault
 from study.faults.imposed import shifted
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part, linearise
+from study.identify.time_domain.weighted_fit import noise_left
 from study.records.prepared import FORCE, Prepared
 from study.support import statistics
 from study.support.arrays import Floats
-from study.support.autoregression import autoregression
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 from study.support.thresholds import ALPHA, K
@@ -86,7 +86,8 @@ def _mover(prepared: Prepared) -> Callable[[float], Prepared]:
 
 def _behind(one: HeldOut, fit: FreeRunFit, other: HeldOut, other_fit: FreeRunFit) -> bool:
     """Whether one explanation leaves more than another, whitened with what the better of both leaves."""
-    noise = autoregression(min((fit, other_fit), key=lambda f: f.rms).residual)
-    first, second = one.white(noise), other.white(noise)
+    better = min((fit, other_fit), key=lambda f: f.rms)
+    noise = noise_left(better.residual, len(better.outputs))
+    first, second = (np.concatenate(held.white(better.outputs, noise)) for held in (one, other))
     count = min(len(first), len(second))
     return statistics.worse(first[:count], second[:count]) >= K

@@ -2,9 +2,8 @@
 
 import math
 from collections.abc import Collection, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from scipy.special import chdtri
@@ -13,16 +12,17 @@ from study.compare.comparison import Comparison
 from study.compare.prediction import Prediction, predict
 from study.diagnose.credibility import certain
 from study.diagnose.dropping import fitted_without, removal
-from study.diagnose.held_out import HeldOutResidual, alike, evidence_of
+from study.diagnose.held_out import HeldOut, evidence, held_out, held_out_of, held_out_test
 from study.equations.model import ModelTerm
+from study.equations.place import place_in_words
 from study.figures.labels import term_names
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.motion_start import has_lost_the_motion
 from study.identify.time_domain.part_fit import covariance_of, linearise
+from study.identify.time_domain.weighted_fit import noise_left
 from study.support.arrays import Floats
-from study.support.cores import cores
+from study.support.cores import side_by_side
 from study.support.numbers import percent
-from study.support.statistics import gain
 
 DOUBLED = 1.0  # of the residual's power: a term without which, linearised, so much more is left is needed for certain;
 # but where shapes or memories bend, as those of hysteresis do, they may take over what the linearised model cannot
@@ -32,52 +32,26 @@ DOUBLED = 1.0  # of the residual's power: a term without which, linearised, so m
 class Needless:
     """A term that the model does as well without."""
 
-    name: str  # of the term
+    entry: ModelTerm  # the effect and its place
     error_with: float  # held-out error of the response, over its rms, of the model as it is
     error_without: float  # the same without the term, and without those named before it
     p_value: float  # of what the term gains, if it gains nothing; the number of terms asked for accounted for
     fit: FreeRunFit  # the model without it
     prediction: Prediction  # of that
 
-    def sentence(self, any_more: bool = False) -> str:
-        """What to tell the engineer; ``any_more`` if a term was added after it."""
-        return sentence(term_names(self.name), self.error_with, self.error_without, any_more)
-
-
-class Unneeded(Protocol):
-    """A term that a model does as well without, of whatever kind the model is."""
-
     @property
     def name(self) -> str:
-        """Of the term."""
-        ...
-
-    @property
-    def error_with(self) -> float:
-        """Held-out error of the model as it is."""
-        ...
-
-    @property
-    def error_without(self) -> float:
-        """The same without the term."""
-        ...
-
-    @property
-    def p_value(self) -> float:
-        """Of what the term gains, if it gains nothing."""
-        ...
+        """Effect, and place where that has a name."""
+        return self.entry.name
 
     def sentence(self, any_more: bool = False) -> str:
-        """What to tell the engineer."""
-        ...
-
-
-def sentence(words: str, error_with: float, error_without: float, any_more: bool = False) -> str:
-    """That a term, by its name in words, is not needed."""
-    return (
-        f"{words[0].upper()}{words[1:]} is not needed{' any more' if any_more else ''}: without it the error is "
-        f"{percent(error_without)}, with it {percent(error_with)}."
-    )
+        """What to tell the engineer; ``any_more`` if a term was added after it."""
+        words = term_names(self.entry.term.name)
+        words += f" {place_in_words(self.entry.place)}" if self.entry.place.label else ""
+        return (
+            f"{words[0].upper()}{words[1:]} is not needed{' any more' if any_more else ''}: without it the error is "
+            f"{percent(self.error_without)}, with it {percent(self.error_with)}."
+        )
 
 
 def needless(comparison: Comparison, besides: Collection[str] = ()) -> tuple[Needless, ...]:
@@ -115,12 +89,11 @@ def needless(comparison: Comparison, besides: Collection[str] = ()) -> tuple[Nee
         first = min(alone, key=lambda n: n.error_without)
         found.append(first)
         stage = _Stage(first.fit, first.prediction, comparison)
-        names = [n.name for n in alone if n is not first]
-        terms = [t for t in terms if t.name in names]
+        terms = [n.entry for n in alone if n is not first]
     return tuple(found)
 
 
-def needless_in_words(found: Sequence[Unneeded], any_more: bool = False, complete: bool = True) -> str:
+def needless_in_words(found: Sequence[Needless], any_more: bool = False, complete: bool = True) -> str:
     """What to tell of all of them; empty if there are none. ``complete`` is false where an effect is missing."""
     said = [n.sentence(any_more) for n in found]
     if found and not complete:
@@ -145,7 +118,7 @@ def of_records(names: Sequence[str], found: Sequence[Sequence[Needless]], any_mo
     return " ".join([*said, "'study drop' takes a term out."])
 
 
-def needless_fields(found: Sequence[Unneeded]) -> list[dict[str, Any]]:
+def needless_fields(found: Sequence[Needless]) -> list[dict[str, Any]]:
     """The same for files, the one whose loss costs least first."""
     return [
         {"term": n.name, "error_with": n.error_with, "error_without": n.error_without, "p_value": n.p_value,
@@ -168,46 +141,44 @@ class _Stage:
 
     def each_alone(self, terms: Sequence[ModelTerm], asked: int) -> list[Needless]:
         """Those of the terms that this model does not need, each for itself, of so many that were asked for."""
-        jacobian = linearise(self.fit, self.given.prepared)
+        prepared = self.given.prepared
+        jacobian = linearise(self.fit, prepared)
         covariance = covariance_of(self.fit, jacobian)
+        own = held_out(self.fit, self.prediction, jacobian, prepared)
+        models = [(self.prediction, own)]
+        if self.fit is not self.given.fit:
+            models.append((self.given.prediction, held_out_of(self.given)))
 
         def answer(entry: ModelTerm) -> Needless | None:
-            return self._answer(entry, jacobian, covariance, asked)
+            return self._answer(entry, jacobian, covariance, models, asked)
 
-        with ThreadPoolExecutor(cores()) as pool:
-            return [n for n in pool.map(answer, terms) if n is not None]
+        return [n for n in side_by_side(answer, terms) if n is not None]
 
-    def _answer(self, entry: ModelTerm, jacobian: Floats, covariance: Floats, asked: int) -> Needless | None:
-        """The model without a term, if it does as well; None where the term is needed."""
-        sized = self._relative_interval(entry, covariance)
-        gone = removal(self.fit, entry.name, jacobian)
+    def _answer(
+        self, entry: ModelTerm, jacobian: Floats, covariance: Floats, models: Sequence[tuple[Prediction, HeldOut]],
+        asked: int,
+    ) -> Needless | None:  # fmt: skip
+        """The model without a term, if it does as well as this one and the one given; None where it is needed."""
+        place = [self.fit.keys.index(symbol) for symbol in entry.symbols]
+        sized = relative_interval(self.fit.values[place], covariance[np.ix_(place, place)])
+        gone, left = removal(self.fit, entry.name, jacobian), self.fit.whitened(self.fit.residual)
         plain = all(not t.parameters and t.term.state is None for t in self.fit.model.terms)
-        lost, left = float(gone.lost @ gone.lost), float(self.fit.residual @ self.fit.residual)
-        if plain and sized[0] > 0.0 and lost > DOUBLED * left:
+        if plain and sized[0] > 0.0 and float(gone.lost @ gone.lost) > DOUBLED * float(left @ left):
             return None
-        for fit in fitted_without(self.fit, entry.name, self.given.prepared, gone.start):
-            without = predict(fit, self.given.prepared)
-            left_then, *models = self._evidence(fit, without, not entry.term.tuned)
-            chances = [min(1.0, asked * gain(left_then.residual, m.residual).p_value) for m in models]
-            if not any(certain(left_then, m, sized, chance) for m, chance in zip(models, chances, strict=True)):
-                return Needless(entry.name, self.prediction.error, without.error, chances[0], fit, without)
+        prepared = self.given.prepared
+        noise = noise_left(self.fit.residual, len(self.fit.outputs))
+        for fit in fitted_without(self.fit, entry.name, prepared, gone.start):
+            without = predict(fit, prepared)
+            test = held_out_test(fit, without, noise)
+            both = not entry.term.tuned and all(len(held.fitted) == len(test.before.fitted) for _, held in models)
+            before = evidence(without, test.before, both)
+            after = [evidence(prediction, held, both) for prediction, held in models]
+            chances = [min(1.0, asked * test.p_value(held, entry.term.tuned)) for _, held in models]
+            if not any(certain(before, model, sized, p) for model, p in zip(after, chances, strict=True)):
+                return Needless(entry, self.prediction.error, without.error, chances[0], fit, without)
             if fit.converged:
                 break
         return None
-
-    def _evidence(self, fit: FreeRunFit, without: Prediction, both: bool) -> list[HeldOutResidual]:
-        """What a model without a term leaves, this one and the one that was given; of both parts if all have them.
-
-        A frequency was picked by the fitting part's own chance, which bears no witness of it then.
-        """
-        models = (fit, without), (self.fit, self.prediction), (self.given.fit, self.given.prediction)
-        found = [evidence_of(*model, both) for model in models]
-        return found if all(alike(found[0], e) for e in found) else [evidence_of(*model, False) for model in models]
-
-    def _relative_interval(self, entry: ModelTerm, covariance: Floats) -> tuple[float, float]:
-        """95 % interval of the size of a term's coefficients, over that size (:func:`relative_interval`)."""
-        place = [self.fit.keys.index(symbol) for symbol in entry.term.symbols]
-        return relative_interval(self.fit.values[place], covariance[np.ix_(place, place)])
 
 
 def relative_interval(size: Floats, covariance: Floats) -> tuple[float, float]:

@@ -18,7 +18,6 @@ from study.equations.model import Model, ModelTerm
 from study.identify.frequency_domain.inputs import input_history, reverse_inputs, without_inertia
 from study.identify.frequency_domain.starting_values import FAINT
 from study.identify.time_domain.shape_search import Baseline, sensitivity
-from study.records.prepared import Prepared
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
 
@@ -34,23 +33,23 @@ class PairStart:
     model: Model  # the model with both, every value given
 
 
-def promising_pairs(rows: Sequence[Ranked], base: Baseline, prepared: Prepared) -> list[PairStart]:
+def promising_pairs(rows: Sequence[Ranked], base: Baseline) -> list[PairStart]:
     """The best pairs of the reverse system and those of the sensitivities; the same pair may begin at both places.
 
     ``rows`` are the candidates with their shape parameters.
     """
     entries = {r.name: next(t for t in r.fit.model.terms if t.name == r.name) for r in rows}
-    return _of_the_reverse_system(entries, base, prepared) + _of_the_sensitivities(entries, base, prepared)
+    return _of_the_reverse_system(entries, base) + _of_the_sensitivities(entries, base)
 
 
-def _of_the_reverse_system(entries: Mapping[str, ModelTerm], base: Baseline, prepared: Prepared) -> list[PairStart]:
+def _of_the_reverse_system(entries: Mapping[str, ModelTerm], base: Baseline) -> list[PairStart]:
     """Pairs with coefficients, all of them anew, from the reverse system; best first."""
     known = base.fit.model
     everything = known
     for entry in entries.values():
         everything = everything.with_term(entry)
     try:
-        columns, target = _spectra(everything, base, prepared)
+        columns, target = _spectra(everything, base)
     except StudyError:
         return []
     own = [key for key in known.values if key in columns]
@@ -58,8 +57,8 @@ def _of_the_reverse_system(entries: Mapping[str, ModelTerm], base: Baseline, pre
     target = target - sum((float(known.values[k] or 0.0) * columns[k] for k in fixed), np.zeros(len(target)))
     free = [key for key in own if key in base.fit.keys]
     starts: list[tuple[float, PairStart]] = []
-    for one, other in combinations([n for n, e in entries.items() if set(e.term.symbols) <= set(columns)], 2):
-        keys = [*free, *entries[one].term.symbols, *entries[other].term.symbols]
+    for one, other in combinations([n for n, e in entries.items() if set(e.symbols) <= set(columns)], 2):
+        keys = [*free, *entries[one].symbols, *entries[other].symbols]
         design = np.stack([columns[k] for k in keys], axis=1)
         amounts = least_squares(design, target)
         left = float(np.sum((target - design @ amounts) ** 2))
@@ -70,12 +69,10 @@ def _of_the_reverse_system(entries: Mapping[str, ModelTerm], base: Baseline, pre
     return _best(starts)
 
 
-def _of_the_sensitivities(
-    entries: Mapping[str, ModelTerm], base: Baseline, prepared: Prepared
-) -> list[PairStart]:  # fmt: skip
+def _of_the_sensitivities(entries: Mapping[str, ModelTerm], base: Baseline) -> list[PairStart]:
     """Pairs with coefficients of zero beside the fitted model; best first."""
     known, residual = base.fit.model, base.fit.residual
-    tried = {n: sensitivity(e.term, tuple(float(p or 0.0) for p in e.parameters), base, prepared)
+    tried = {n: sensitivity(e, tuple(float(p or 0.0) for p in e.parameters), base)
              for n, e in entries.items()}  # fmt: skip
     columns = {name: added for name, added in tried.items() if added is not None}
     starts: list[tuple[float, PairStart]] = []
@@ -83,7 +80,7 @@ def _of_the_sensitivities(
         design = np.hstack([columns[one], columns[other]])
         left = float(np.sum((residual - design @ least_squares(design, residual, 1e-8)) ** 2))
         model = known.with_term(entries[one]).with_term(entries[other])
-        zero = dict.fromkeys((*entries[one].term.symbols, *entries[other].term.symbols), 0.0)
+        zero = dict.fromkeys((*entries[one].symbols, *entries[other].symbols), 0.0)
         starts.append((left, PairStart((one, other), model.with_values(zero))))
     return _best(starts)
 
@@ -92,12 +89,13 @@ def _best(starts: list[tuple[float, PairStart]]) -> list[PairStart]:
     return [start for _, start in sorted(starts, key=lambda f: f[0])[:TRIED]]
 
 
-def _spectra(model: Model, base: Baseline, prepared: Prepared) -> tuple[dict[str, Floats], Floats]:
+def _spectra(model: Model, base: Baseline) -> tuple[dict[str, Floats], Floats]:
     """Spectra of each coefficient's unit force, and of the measured force, as the response would show them.
 
     Real and imaginary parts of the lines that the force drives, one array a key. Weighted with the linear
     receptance, so that noise on the response weighs as it does in a free run.
     """
+    prepared = base.prepared
     part, inputs = prepared.record.part(*prepared.inner(prepared.plan.fit)), reverse_inputs(model)
     if prepared.free:  # its inertia force is what the others have to balance
         mass, inputs = float(model.values["m"] or 1.0), without_inertia(inputs)
@@ -109,8 +107,7 @@ def _spectra(model: Model, base: Baseline, prepared: Prepared) -> tuple[dict[str
     keep = (frequency >= prepared.band[0]) & (frequency <= frequency[loud][-1])
     if not np.any(keep):
         raise StudyError(f"no frequency that the force of {part.name!r} drives is one at which all motions are valid")
-    omega = 2j * np.pi * frequency[keep]
-    weight = base.transfer(np.where(omega == 0.0, omega[-1] / len(omega), omega))
+    weight = base.paths(len(part))[keep, 0, 0]
     columns: dict[str, Floats] = {}
     for item in inputs:
         spectrum = np.asarray(rfft(taper * input_history(item, part)))[keep] * weight

@@ -15,7 +15,6 @@ from study.identify.time_domain.fit_model import TRIED
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part
 from study.identify.time_domain.shape_search import Baseline
-from study.records.prepared import Prepared
 from study.support.cores import cores
 from study.support.errors import StudyError
 
@@ -31,12 +30,12 @@ class Pair:
     prediction: Prediction  # its free run along the judging part
 
 
-def best_pair(rows: Sequence[Ranked], base: Baseline, prepared: Prepared) -> Pair | None:
+def best_pair(rows: Sequence[Ranked], base: Baseline) -> Pair | None:
     """The pair that explains most for its number of unknowns, of those that the screening puts first.
 
     ``rows`` are the candidates, best first, with their shape parameters; ``base`` is the fitted model without them.
     """
-    order = {row.name: i for i, row in enumerate(rows)}
+    prepared, order = base.prepared, {row.name: i for i, row in enumerate(rows)}
 
     def fitted(start: PairStart) -> Pair | None:
         first, second = sorted(start.names, key=lambda name: order[name])
@@ -49,7 +48,7 @@ def best_pair(rows: Sequence[Ranked], base: Baseline, prepared: Prepared) -> Pai
 
     with ThreadPoolExecutor(cores()) as pool:
         pairs = [
-            pair for pair in pool.map(fitted, pair_screening.promising_pairs(rows, base, prepared)) if pair is not None
+            pair for pair in pool.map(fitted, pair_screening.promising_pairs(rows, base)) if pair is not None
         ]
     power = float(np.mean(base.fit.residual**2))
     return min(pairs, key=lambda pair: _misfit(pair, power), default=None)

@@ -5,31 +5,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.compare.prediction import Prediction
-from study.diagnose.candidates import FittedCandidate
+from study.diagnose.candidates import Candidate
 from study.diagnose.constancy import CoefficientCurve, changes, curves, wavers
 from study.diagnose.held_out import HeldOut, held_out
-from study.equations.model import ModelTerm, free
-from study.equations.terms import Term
-from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.equations.coefficient_units import coefficient_unit, parameter_units
+from study.equations.model import ModelTerm
 from study.identify.time_domain.part_fit import linearise, uncertainty
 from study.support import statistics
+from study.support.arrays import Floats
 from study.support.statistics import Gain
 from study.support.thresholds import ENOUGH, GOOD, NEARLY, UNSTEADY
 
-Floats = NDArray[np.float64]
 ROUNDED = math.sqrt(float(np.finfo(float).eps))  # of the response: rounding leaves no minimum told more closely
 
 
-@dataclass(frozen=True)
-class Ranked:
+@dataclass(frozen=True, eq=False)
+class Ranked(Candidate):
     """One candidate."""
 
-    term: Term  # the effect
-    fit: FreeRunFit  # the model with it
-    prediction: Prediction
     gain: Gain  # what it explains of the held-out residual, with the p value of one comparison
     p_value: float  # that of both parts of the record, with the number of candidates accounted for (Bonferroni)
     coefficient: float  # its size: the amplitude, for an effect of any phase
@@ -43,29 +38,32 @@ class Ranked:
     distance: float = math.inf  # standard errors by which it leaves more than the first; 0 for the first
 
     @property
-    def name(self) -> str:
-        """Name of the term."""
-        return self.term.name
+    def unit(self) -> str:
+        """Unit of the coefficient."""
+        return coefficient_unit(self.entry, self.term.symbols[0], self.prediction.prepared.record)
+
+    @property
+    def parameter_units(self) -> dict[str, str]:
+        """Units of the parameters, by their names."""
+        return parameter_units(self.entry, self.prediction.prepared.record) | {"phase": "rad"}
 
     @property
     def residual(self) -> Floats:
-        """Held-out residual."""
+        """Held-out residual, stacked."""
         return self.prediction.residual
 
     @property
     def numerical(self) -> float:
         """Rms error of the integration itself; of a force that takes none, that of finding a least sum of squares."""
-        return max(float(self.prediction.numerical[0]), ROUNDED * self.prediction.of(0).size)
+        prediction = self.prediction
+        own = prediction.numerical * np.array(prediction.prepared.outputs.weights)
+        size = float(np.std(prediction.above(prediction.prepared.judged)))
+        return max(float(np.sqrt(np.mean(own**2))), ROUNDED * size)
 
     @property
     def response_error(self) -> float:
         """Rms of the held-out residual over that of the response."""
         return self.prediction.error
-
-    @property
-    def unphysical(self) -> str:
-        """Why it is no physical effect as fitted, in a sentence; empty if it is one."""
-        return self.term.physical(self.fit.model.values)
 
     def wanders(self, asked: int) -> bool:
         """Whether its coefficient, of so many that are asked for, moves as that of a true term would not.
@@ -73,7 +71,12 @@ class Ranked:
         Where little is left, the faults of the rest of the model move the coefficient of what is added to it: it may
         change by a share of itself then; by no more than itself, where it takes a tenth of what a good model leaves.
         """
-        return wanders(self.response_error, self.gain, self.unsteadiness, self.steadiness, asked)
+        good = self.response_error <= GOOD
+        if good and self.gain.explained > 1.0 - NEARLY:
+            return self.unsteadiness > 1.0
+        if good or self.gain.explained >= ENOUGH:
+            return self.unsteadiness > UNSTEADY
+        return wavers(self.steadiness, asked)
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -86,25 +89,15 @@ class Ranked:
         return changes(self.flatness, self.steadiness)
 
 
-def wanders(error: float, gain: Gain, unsteadiness: float, steadiness: CoefficientCurve | None, asked: int) -> bool:
-    """:meth:`Ranked.wanders` of a candidate that leaves this error of the response."""
-    good = error <= GOOD
-    if good and gain.explained > 1.0 - NEARLY:
-        return unsteadiness > 1.0
-    if good or gain.explained >= ENOUGH:
-        return unsteadiness > UNSTEADY
-    return wavers(steadiness, asked)
-
-
-def ranked_candidate(candidate: FittedCandidate, before: Prediction) -> Ranked:
+def ranked_candidate(candidate: Candidate, before: Prediction) -> Ranked:
     """A candidate with its coefficient's error and constancy; ``before`` is the prediction without it."""
     fit, prepared = candidate.fit, before.prepared
     jacobian = linearise(fit, prepared)
     covariance = uncertainty(fit, prepared, jacobian)
-    coefficient, error, parameters, errors = amount(free(candidate.term), fit.keys, fit.values, covariance)
-    flatness, steadiness = curves(fit, candidate.term, prepared, jacobian)
+    coefficient, error, parameters, errors = amount(candidate.entry, fit.keys, fit.values, covariance)
+    flatness, steadiness = curves(fit, candidate.entry, prepared.dt, jacobian)
     return Ranked(
-        term=candidate.term, fit=fit, prediction=candidate.prediction,
+        entry=candidate.entry, fit=fit, prediction=candidate.prediction,
         gain=statistics.gain(before.residual, candidate.prediction.residual), p_value=1.0,
         coefficient=coefficient, error=error, parameters=parameters, parameter_errors=errors,
         flatness=flatness, steadiness=steadiness, held_out=held_out(fit, candidate.prediction, jacobian, prepared),

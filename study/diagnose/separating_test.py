@@ -10,15 +10,17 @@ from study.equations.free_run import prepare
 from study.figures.labels import term_names
 from study.identify.time_domain.part_fit import STEPS
 from study.records.prepared import FORCE, Prepared
-from study.records.record import MOTIONS, Record, Stretch
+from study.records.record import MOTIONS, Record, Sensor, Stretch
 from study.records.states import starting_states
 from study.support.arrays import Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
+from study.support.numbers import percent
 
 LEVELS = (1.2, 1.5, 1.8, 2.2, 2.7, 3.3, 4.0, 5.0, 0.5, 0.25)
 DISTINCT = 5.0  # standard errors by which the responses must differ
 LONGEST = 16384  # samples simulated
+APART = 2.0  # times the error of the prediction by which two places must differ at a sensor that would tell them
 
 
 def separating_level(one: Ranked, other: Ranked, prepared: Prepared) -> float | None:
@@ -64,7 +66,7 @@ def _at_level(prepared: Prepared, level: float) -> tuple[Record, tuple[int, int]
         last = min(len(stretch.source), stretch.first + LONGEST)
         begin = starting_states(stretch.source, prepared.outputs, (stretch.first,))
         return stretch.source, (stretch.first, last), level * begin
-    return record.with_channels({FORCE: level * record[FORCE]}), span, None
+    return record.with_channels({name: level * record[name] for name in record.forces}), span, None
 
 
 def advice(rows: Sequence[Ranked], prepared: Prepared) -> str:
@@ -73,11 +75,31 @@ def advice(rows: Sequence[Ranked], prepared: Prepared) -> str:
     rival = next((r for r in rows if r.name in tied), None)
     if rival is None:
         return ""
+    if rival.entry.place.path != rows[0].entry.place.path:
+        return separating_sensor(rows[0], rival)
     level = separating_level(rows[0], rival, prepared)
-    names = f"{term_names(rows[0].name)} and {term_names(rival.name)}"
+    names = f"{term_names(rows[0].term.name)} and {term_names(rival.term.name)}"
     if level is None:
         whole = prepared.response == "displacement"
         other = "another kind of test" if whole else "the displacement, its mean included,"
         return f"No level from a quarter to five times this one would tell {names} apart; {other} is needed."
     how = "move it by" if prepared.response == FORCE else "let it go at" if prepared.free else "excite at"
     return f"To tell {names} apart, {how} {level:g} times this level."
+
+
+def separating_sensor(first: Ranked, tied: Ranked) -> str:
+    """A sentence on the sensor that would tell two places apart."""
+    prepared = first.prediction.prepared
+    seen = {s.coordinate for s in prepared.outputs.sensors}
+    wanted = tuple(Sensor(c, "displacement") for c in first.fit.model.coordinates if c not in seen)
+    if not wanted:
+        return (
+            "Every coordinate is measured: a larger force, or one at another coordinate, may tell these places apart."
+        )
+    one, other = (r.prediction.motions(wanted) for r in (first, tied))
+    apart = np.sqrt(np.mean((one - other) ** 2, axis=0)) / np.std(one, axis=0)
+    best = int(np.argmax(apart))
+    differ = percent(float(apart[best]))
+    if apart[best] < APART * first.prediction.error:
+        return f"No further sensor would show them {differ} apart: try a force at another coordinate."
+    return f"A sensor at {wanted[best].coordinate} would tell the places apart: there they differ by {differ}."

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from study.diagnose.verdict import Diagnosis, search_base, search_part
+from study.diagnose.verdict import Diagnosis, search_base
+from study.equations.linear_part import connections
 from study.equations.model import Model, free
 from study.equations.redundancy import repeated_force
 from study.equations.terms import LIBRARY, Term, custom
@@ -52,12 +53,11 @@ def check_on(record: Record, terms: Sequence[Term]) -> None:
 
 def unfitted(diagnosis: Diagnosis, terms: Sequence[Term]) -> dict[str, str]:
     """By name why a candidate of the user's is not in a diagnosis; empty where all are."""
-    ranked = {row.name for row in diagnosis.candidates}
-    prepared, found = diagnosis.comparison.prepared, dict[str, str]()
+    ranked, found = {row.term.name for row in diagnosis.candidates}, dict[str, str]()
     for term in (t for t in terms if t.name not in ranked):
         base = search_base(diagnosis.comparison)
         try:
-            with_term(base.fit, free(term), base, search_part(prepared))
+            with_term(base, free(term, connections(base.fit.model)[0]))
             found[term.name] = "fitted, its free run does not stay finite on the part that is judged"
         except StudyError as error:
             found[term.name] = str(error)

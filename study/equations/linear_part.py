@@ -12,7 +12,7 @@ from scipy.fft import rfftfreq
 
 from study.equations.equations_of_motion import mass_entries
 from study.equations.model import Model
-from study.equations.place import GROUND, Place
+from study.equations.place import GROUND, HERE, Place
 from study.records.record import MOTIONS, Sensor
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
@@ -97,8 +97,10 @@ def connections(model: Model) -> tuple[Place, ...]:
     """Every pair where an effect may be missing: between the ground and each coordinate, and between neighbours.
 
     Neighbours are what a term of the model ties together. Two coordinates that inertia couples are motions of one body,
-    as heave and pitch: nothing lies between them.
+    as heave and pitch: nothing lies between them. A single mass has the one place where all of its terms act.
     """
+    if not model.named:
+        return (HERE,)
     found: dict[frozenset[str], Place] = {}
     for entry in model.terms:
         if entry.place.kind == "between":

@@ -14,8 +14,8 @@ from difflib import get_close_matches
 
 import numpy as np
 
-from study.equations import formulas
-from study.equations.graph import Graph
+from study.equations import formulas, kernels
+from study.equations.graph import Graph, Program
 from study.equations.term import QUANTITIES as QUANTITIES
 from study.equations.term import Component, PhysicalBound, Search, ShapeParameter, Term
 from study.support.errors import StudyError
@@ -255,3 +255,30 @@ def same_elsewhere(one: str, other: str, beside: Collection[str]) -> bool:
     a constant force, and only a measured displacement could tell.
     """
     return "cubic_stiffness" in beside and {one, other} == {"quadratic_stiffness", "constant_force"}
+
+
+def external(term: Term) -> bool:
+    """Whether it is a force from outside: none of its formulas names the motion."""
+    texts = [c.shape for c in term.components] + ([term.state] if term.state else [])
+    return not any({"u", "v"} & set(formulas.names(text)) for text in texts)
+
+
+def one_sided(term: Term) -> bool:
+    """Whether its force at the opposite motion is neither the same nor the opposite: it matters which end is second."""
+    values = {p.name: 0.3 for p in term.parameters}
+    motions = np.array([[0.7, 0.4], [1.3, -0.6], [0.2, 1.1]])
+    for component in term.components:
+        graph = Graph()
+        nodes = {n: graph.input(n) for n in ("u", "v", "t", "z", *values, *term.channels)}
+        program = graph.program([formulas.add_formula(graph, component.shape, nodes)])
+        forces = [
+            _value(program, {**values, "u": s * u, "v": s * v, "z": s * u}) for u, v in motions for s in (1.0, -1.0)
+        ]
+        if any(abs(abs(a) - abs(b)) > 1e-9 for a, b in zip(forces[::2], forces[1::2], strict=True)):
+            return True
+    return False
+
+
+def _value(program: Program, values: dict[str, float]) -> float:
+    known = program.with_inputs({name: values.get(name, 0.3) for name in program.inputs})
+    return float(kernels.evaluate(known, {}, 1)[0, 0])

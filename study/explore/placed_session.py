@@ -3,17 +3,17 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from study.diagnose.diagnosis_files import unneeded_in_words
+from study.diagnose.adding import added
+from study.diagnose.diagnosis_files import diagnosis_in_words, unneeded_in_words
+from study.diagnose.dropping import compared_without, term_at
+from study.diagnose.needless import Needless, needless
+from study.diagnose.verdict import Diagnosis, diagnose
 from study.equations.model import Model, free
 from study.equations.terms import Term
 from study.explore.any_session import chosen, held, holding
 from study.explore.session import Step, joined, own_term
 from study.records.prepared import Prepared
-from study.structure.placed_dropping import dropped_term, term_at
-from study.structure.placed_needless import PlacedNeedless, placed_needless
 from study.structure.structure_comparison import StructureComparison, compare_structure, structure_history_step
-from study.structure.structure_report import structure_diagnosis_in_words
-from study.structure.structure_verdict import StructureDiagnosis, added_term, diagnose_structure
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,10 +24,10 @@ class PlacedStage:
     label: str  # what was done to arrive at it
     added: str | None  # effect and place that are new in it
     comparison: StructureComparison
-    diagnosis: StructureDiagnosis | None = None  # None as long as nobody has asked
+    diagnosis: Diagnosis | None = None  # None as long as nobody has asked
     said: str = ""  # the diagnosis in words
     dropped: str | None = None  # effect and place that were taken out of the model before
-    unneeded: tuple[PlacedNeedless, ...] = ()  # terms that it does not need
+    unneeded: tuple[Needless, ...] = ()  # terms that it does not need
 
     @property
     def values(self) -> dict[str, float]:
@@ -64,7 +64,7 @@ def begin_placed(comparison: StructureComparison, earlier: Sequence[Step] = ()) 
 def with_placed(session: PlacedSession, name: str) -> PlacedSession:
     """The session with a candidate added where its diagnosis found it."""
     row = chosen(session.now.diagnosis.candidates if session.now.diagnosis is not None else (), name)
-    comparison = added_term(session.now.comparison, free(row.term, row.entry.place))
+    comparison = added(session.now.comparison, free(row.term, row.entry.place))
     stage = PlacedStage(comparison.model, f"+ {name}", name, comparison)
     return replace(session, stages=(*session.stages, stage))
 
@@ -77,7 +77,7 @@ def without_placed(session: PlacedSession, name: str) -> PlacedSession:
     StudyError
         If it is not in the model or cannot be left out.
     """
-    comparison = dropped_term(session.now.comparison, term_at(session.now.model, name, None))
+    comparison = compared_without(session.now.comparison, term_at(session.now.model, name, None))
     stage = PlacedStage(comparison.model, f"- {name}", None, comparison, dropped=name)
     return replace(session, stages=(*session.stages, stage))
 
@@ -104,17 +104,11 @@ def tried(session: PlacedSession, text: str) -> PlacedSession:
 
 def examined(session: PlacedSession, progress: Callable[[int], None] | None = None) -> PlacedStage:
     """The present stage with what is missing and where, and what is not needed, in words too."""
-    now, counted = session.now, 0
-
-    def count(_: str) -> None:
-        nonlocal counted
-        counted += 1
-        if progress is not None:
-            progress(counted)
-
-    diagnosis = diagnose_structure(now.comparison, session.own, progress=count)
-    unneeded = placed_needless(now.comparison)
-    said = f"{structure_diagnosis_in_words(diagnosis)} {unneeded_in_words(unneeded, diagnosis)}".strip()
+    now = session.now
+    report = None if progress is None else (lambda done, _: progress(done))
+    diagnosis = diagnose(now.comparison, extra=session.own, progress=report)
+    unneeded = needless(now.comparison)
+    said = f"{diagnosis_in_words(diagnosis)} {unneeded_in_words(unneeded, diagnosis)}".strip()
     return replace(now, diagnosis=diagnosis, said=said, unneeded=unneeded)
 
 

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
+from study.compare.dependence import explained_by_place
+from study.diagnose.ranked import Ranked
 from study.equations.linear_part import Modes
 from study.equations.place import Place
 from study.equations.place import place_in_words as placed
@@ -13,9 +15,7 @@ from study.explore.placed_session import PlacedStage
 from study.explore.words import HEAD, NOT_ASKED, UNKNOWN, VERDICTS, WAITING, bar, figure, gives, in_table, in_words
 from study.figures.labels import power_of_ten
 from study.figures.sketch import Sketch, svg
-from study.structure.placed_ranking import PlacedRanked
 from study.structure.structure_comparison import PlacedCoefficient, StructureComparison, structure_in_words
-from study.structure.structure_leftover import explained_by_place
 from study.structure.structure_page import terms_there
 from study.support.numbers import percent
 
@@ -96,7 +96,7 @@ def _places(stage: PlacedStage, drawn: Sketch) -> str:
     return "".join(blocks)
 
 
-def _tried(row: PlacedRanked) -> str:
+def _tried(row: Ranked) -> str:
     return f"{escape(in_words(row.term.name))} ({percent(row.gain.explained, 'z.1f', row.gain.error, '.1f')})".replace(
         "+-", "±"
     )
@@ -115,7 +115,7 @@ def _candidates(stage: PlacedStage, live: bool) -> str:
     return f"<ol>{HEAD}{''.join(_row(i, r, stage, live) for i, r in enumerate(offered))}{rest}</ol>"
 
 
-def _row(number_: int, row: PlacedRanked, stage: PlacedStage, live: bool) -> str:
+def _row(number_: int, row: Ranked, stage: PlacedStage, live: bool) -> str:
     name, where = escape(in_words(row.term.name)), row.entry.place
     add = f"<button data-act='add' data-name='{escape(row.name)}'>Add</button>" if live else ""
     ties = next((r.tied_with for r in (stage.diagnosis.candidates if stage.diagnosis else ())), ())
@@ -131,7 +131,7 @@ def _row(number_: int, row: PlacedRanked, stage: PlacedStage, live: bool) -> str
     )
 
 
-def _tied(row: PlacedRanked) -> str:
+def _tied(row: Ranked) -> str:
     return f"cannot be told from {', '.join(in_words(n) for n in row.tied_with)}"
 
 
@@ -143,12 +143,12 @@ def _drawn_label(place: Place, stage: PlacedStage) -> str:
     return known.get(place.path, place.label)
 
 
-def _axis(row: PlacedRanked) -> str:
+def _axis(row: Ranked) -> str:
     before = power_of_ten(abs(row.coefficient))[1]
     return f"{row.term.symbols[0]} / {in_text(before + row.unit)}"
 
 
-def _detail(row: PlacedRanked) -> str:
+def _detail(row: Ranked) -> str:
     unit = in_text(row.unit)
     size = f"{' ± '.join(with_error(row.coefficient, 1.96 * row.error))} {unit}"
     where = f" {escape(placed(row.entry.place))}" if row.entry.place else ""

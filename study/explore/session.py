@@ -15,15 +15,15 @@ from study.compare.comparison_report import history_step
 from study.compare.missing_force import MissingForce, missing_force
 from study.diagnose import candidates, dropping
 from study.diagnose.adding import added_candidate
-from study.diagnose.candidates import FittedCandidate
+from study.diagnose.candidates import Candidate
 from study.diagnose.diagnosis_files import diagnosis_in_words, unneeded_in_words
 from study.diagnose.force_between import diagnose_as_read
 from study.diagnose.needless import Needless, needless
 from study.diagnose.ranked import Ranked
 from study.diagnose.ranking import rank
-from study.diagnose.verdict import Diagnosis, search_base, search_part
+from study.diagnose.verdict import Diagnosis, search_base
 from study.equations import formulas
-from study.equations.model import Model
+from study.equations.model import Model, free
 from study.equations.terms import LIBRARY, Term, custom
 from study.explore.any_session import chosen, held, holding
 from study.explore.by_record import ByRecord, Several, by_record
@@ -202,7 +202,8 @@ def examined(session: Session, progress: Callable[[int], None] | None = None) ->
 
     And the diagnosis.
     """
-    diagnosis = diagnose_as_read(session.now.comparison, extra=session.own, progress=progress)
+    report = None if progress is None else (lambda done, _: progress(done))
+    diagnosis = diagnose_as_read(session.now.comparison, extra=session.own, progress=report)
     now = weighed(session).now
     said = f"{diagnosis_in_words(diagnosis)} {unneeded_in_words(now.unneeded or (), diagnosis)}".strip()
     return _foreseen(replace(now, diagnosis=diagnosis, said=said)), diagnosis
@@ -255,11 +256,10 @@ def own_term(text: str, taken: Collection[str], channels: Collection[str]) -> Te
     return term
 
 
-def _attempted(term: Term, session: Session) -> FittedCandidate | None:
+def _attempted(term: Term, session: Session) -> Candidate | None:
     """The present model with a term, fitted as the candidates of its diagnosis were; None if it cannot run."""
-    prepared = session.prepared
-    attempt = candidates.attempt(term, search_base(session.now.comparison), search_part(prepared))
-    return None if attempt is None else candidates.all_settled([attempt], prepared)[0]
+    attempt = candidates.attempt(free(term), search_base(session.now.comparison))
+    return None if attempt is None else candidates.all_settled([attempt], session.prepared)[0]
 
 
 def tried(session: Session, text: str) -> Session:
@@ -277,7 +277,7 @@ def tried(session: Session, text: str) -> Session:
     term = own_term(text, taken, session.prepared.record.extra)
     if now.diagnosis is None:
         raise StudyError("the present model is still being diagnosed; a formula can be tried when that is done")
-    known = [FittedCandidate(r.term, r.fit, r.prediction) for r in now.diagnosis.candidates]
+    known = [Candidate(r.entry, r.fit, r.prediction) for r in now.diagnosis.candidates]
     silent = f"the expression {term.components[0].shape!r} has no finite response on this record"
     try:
         with np.errstate(all="ignore"):  # a formula may overflow: then it has no finite response

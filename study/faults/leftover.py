@@ -11,11 +11,12 @@ from scipy.special import fdtrc
 
 from study.compare.prediction import Prediction, predict
 from study.equations.model import ModelTerm, free
-from study.equations.terms import LIBRARY, Term, effects_but
+from study.equations.terms import LIBRARY, effects_but
 from study.identify.time_domain import shape_search
 from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import JudgingRun, fit_part, linearise, run_of
+from study.identify.time_domain.shape_search import Start
 from study.records.prepared import Prepared
 from study.support.arrays import Floats, Ints
 from study.support.cores import side_by_side
@@ -238,16 +239,16 @@ def missing(left: FittedResidual) -> FittedResidual | None:
     """
     prepared, fit = left.prepared, left.fit
     look = prepared.shortened(int(np.clip(prepared.samples_in(shape_search.PERIODS), SHORT, LONG)))
-    terms = effects_but(fit.model)
+    entries = [free(term) for term in effects_but(fit.model)]
     try:
         near = fit if look is prepared else fit_part(fit.model, look, fit.held, steps=fit.steps_per_sample)
         base = shape_search.baseline(near, look)
     except StudyError:
         return None
 
-    def fitted(term: Term) -> FittedResidual | None:
+    def fitted(begun: tuple[ModelTerm, list[Start]]) -> FittedResidual | None:
         try:
-            near = with_term(base.fit, free(term), base, look)
+            near = with_term(base, *begun)
             initial = np.atleast_2d(near.initial)[:1] if near.first == prepared.plan.fit[0] else None
             fit = fit_part(
                 near.model, prepared, base.fit.held, steps=near.steps_per_sample, max_iterations=RUNS, initial=initial
@@ -256,16 +257,16 @@ def missing(left: FittedResidual) -> FittedResidual | None:
             return None
         return leftover(fit, prepared)
 
-    begins = side_by_side(lambda term: shape_search.shape_starts(term, base, look), terms, lambda term: term.effort)
-    starts = [(term, found) for term, found in zip(terms, begins, strict=True) if found]
-    promising = [term for term, _ in sorted(starts, key=lambda s: -s[1][0].share)[:FITTED]]
-    tried = [t for t in side_by_side(fitted, promising, lambda term: term.effort) if t is not None]
+    begins = side_by_side(lambda e: shape_search.shape_starts(e, base), entries, lambda e: e.term.effort)
+    starts = [(entry, found) for entry, found in zip(entries, begins, strict=True) if found]
+    promising = sorted(starts, key=lambda s: -s[1][0].share)[:FITTED]
+    tried = [t for t in side_by_side(fitted, promising, lambda begun: begun[0].term.effort) if t is not None]
     for group in ([t for t in tried if not unphysical(t, left)], tried):
         if group:  # of those that chance may make worse than the best, the one with the fewest unknowns
             best = min(group, key=lambda t: float(np.sum(t.residual[1] ** 2)))
             level = [t for t in group if t is best or worse(t.residual[1], best.residual[1]) < CHANCE]
             simplest = min(level, key=lambda t: (len(t.fit.keys), t is not best))
-            if leaves_less(left, simplest, len(terms)):
+            if leaves_less(left, simplest, len(entries)):
                 return simplest
     return None
 

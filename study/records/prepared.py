@@ -113,8 +113,9 @@ class Prepared:
 
     def samples_in(self, periods: float) -> int:
         """Samples that so many periods of the motion take: those of the frequency that halves the response's power."""
-        values = self.fitted - np.mean(self.fitted)
-        power: Floats = np.cumsum(np.abs(np.fft.rfft(values)) ** 2)
+        values = self.fitted.reshape(-1, len(self.outputs))
+        lines = np.fft.rfft(values - np.mean(values, axis=0), axis=0)
+        power: Floats = np.cumsum(np.sum(np.abs(lines) ** 2, axis=1))
         middle = max(1, int(np.searchsorted(power, 0.5 * float(power[-1]))))
         return math.ceil(periods * len(values) / middle)
 

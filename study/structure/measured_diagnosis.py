@@ -14,9 +14,11 @@ import numpy as np
 from study.compare.prediction import Prediction
 from study.diagnose import ranked
 from study.diagnose.credibility import credible
+from study.diagnose.held_out import HeldOut, HeldOutTest
+from study.diagnose.ranked import Ranked
 from study.diagnose.ranking import in_order
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
-from study.equations.model import Model, ModelTerm
+from study.equations.model import Model
 from study.equations.term import Term
 from study.identify.time_domain.weighted_fit import noise_left
 from study.records import noise_floor
@@ -25,64 +27,22 @@ from study.structure.measured_fit import MeasuredFit, fit_with_term, modal_run
 from study.structure.measured_prediction import predict_measured
 from study.structure.measured_screening import Screened, measured_entries, screened_by_lines
 from study.structure.measured_spectra import CoefficientSpectrum, coefficient_spectra
-from study.structure.placed_candidates import physical
-from study.structure.placed_ranking import HeldOutTest, orthonormal
 from study.support import statistics
 from study.support.arrays import Floats
 from study.support.cores import cores
 from study.support.errors import StudyError
-from study.support.statistics import Gain
+from study.support.least_squares import length_or_one
 from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE, UNSTEADY, K
 
 FITTED = 8  # candidates that promise most: fitted in free run, with the best at each place
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredRanked:
-    """One candidate with what an engineer needs to believe or doubt it (as ``placed_ranking.PlacedRanked``)."""
+class MeasuredRanked(Ranked):
+    """One candidate with its coefficients line by line."""
 
-    entry: ModelTerm  # the effect and its place
     fit: MeasuredFit
-    prediction: Prediction
-    gain: Gain
-    coefficient: float
-    error: float
-    parameters: dict[str, float]
-    parameter_errors: dict[str, float]
-    spectra: tuple[CoefficientSpectrum, ...]  # its coefficients line by line; none where they cannot be read
-    p_value: float = 1.0  # of what it explains, with the number of candidates accounted for (Bonferroni)
-    tied_with: tuple[str, ...] = ()
-    distance: float = math.inf
-
-    @property
-    def name(self) -> str:
-        """Effect and place."""
-        return self.entry.name
-
-    @property
-    def term(self) -> Term:
-        """The effect."""
-        return self.entry.term
-
-    @property
-    def residual(self) -> Floats:
-        """Held-out residual in shares of the sensors' sizes, those of one time side by side."""
-        return self.prediction.relative_residual
-
-    @property
-    def numerical(self) -> float:
-        """Its fit has steps so fine that halving them moves nothing that its errors notice."""
-        return 0.0
-
-    @property
-    def unphysical(self) -> str:
-        """Why it is no physical effect as fitted; empty if it is one."""
-        return physical(self.entry, self.fit.model)
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % confidence interval of the coefficient."""
-        return self.coefficient - 1.96 * self.error, self.coefficient + 1.96 * self.error
+    spectra: tuple[CoefficientSpectrum, ...] = ()  # none where they cannot be read
 
     def wanders(self, asked: int) -> bool:
         """Whether its coefficient, line by line, has an imaginary part or a trend as that of a true term has not."""
@@ -158,10 +118,11 @@ def _tried(item: Screened, comparison: MeasuredComparison) -> MeasuredRanked | N
         return None
     estimates = np.array([fit.values[key] for key in fit.keys])
     coefficient, error, parameters, errors = ranked.amount(item.entry, fit.keys, estimates, fit.covariance)
-    gain = statistics.gain(before.relative_residual, prediction.relative_residual)
+    gain = statistics.gain(before.residual, prediction.residual)
     return MeasuredRanked(
-        item.entry, fit, prediction, gain, coefficient, error, parameters, errors, _spectra(fit, item, comparison)
-    )
+        item.entry, fit, prediction, gain, 1.0, coefficient, error, parameters, errors, None, None,
+        HeldOut(prediction.residual, np.zeros(0)), spectra=_spectra(fit, item, comparison),
+    )  # fmt: skip
 
 
 def _spectra(fit: MeasuredFit, item: Screened, comparison: MeasuredComparison) -> tuple[CoefficientSpectrum, ...]:
@@ -180,14 +141,13 @@ def _ranked(rows: list[MeasuredRanked], comparison: MeasuredComparison, asked: i
     outputs = comparison.prepared.outputs
     noise = noise_left(outputs.stacked(best.fit.residual), len(outputs))
 
-    white = {r.name: outputs.whitened(r.prediction.residual, noise) for r in rows}
-    own = outputs.whitened(comparison.prediction.residual, noise)
+    white = {r.name: outputs.whitened(r.residual, noise) for r in rows}
+    own = HeldOut(comparison.prediction.residual, np.zeros(0))
     columns = outputs.whitened(outputs.stacked(_derivatives(comparison)), noise)
-    nothing = np.zeros(0)
-    test = HeldOutTest(outputs, noise, (own, nothing), (orthonormal(columns), np.zeros((0, 0))))
-    chances = [test.p_value((r.prediction.residual, nothing), searched=True) for r in rows]
-    rows = [replace(r, p_value=min(1.0, asked * chance)) for r, chance in zip(rows, chances, strict=True)]
-    return [replace(r, distance=away, tied_with=tied) for r, away, tied in in_order(rows, white, asked)]
+    bases = (np.linalg.qr(columns / length_or_one(columns))[0], np.zeros((0, 0)))
+    test = HeldOutTest(outputs, noise, own, own.white(outputs, noise), bases, False)
+    rows = [replace(r, p_value=min(1.0, asked * test.p_value(r.held_out, tuned=True))) for r in rows]
+    return in_order(rows, white, asked)
 
 
 def _derivatives(comparison: MeasuredComparison) -> Floats:

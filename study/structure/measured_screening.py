@@ -16,14 +16,12 @@ from study.equations.layout import LINEAR, check
 from study.equations.model import Model, ModelTerm, free
 from study.equations.place import GROUND, Place
 from study.equations.term import Term
-from study.equations.terms import LIBRARY
+from study.equations.terms import LIBRARY, external, one_sided
 from study.identify.frequency_domain.inputs import input_history, reverse_inputs
-from study.identify.time_domain.shape_search import values_to_try
+from study.identify.time_domain.shape_search import highest_lines, values_to_try, windowed
 from study.records.prepared import Prepared
 from study.records.record import Record
 from study.structure.measured_start import line_fits
-from study.structure.placed_candidates import external, one_sided
-from study.structure.placed_lines import placed_residual_lines
 from study.support.arrays import Floats
 from study.support.cores import cores
 from study.support.errors import StudyError
@@ -94,7 +92,8 @@ def screened_by_lines(
     ``residual`` is what the free run leaves of the fitting part, shape (samples, sensors): lines that stand out of it
     are tried as the frequencies of periodic effects. ``modes`` is how many there may be at most.
     """
-    lines = placed_residual_lines(residual / prepared.scale) / (len(residual) * prepared.dt)
+    seen = np.sum(np.abs(windowed(residual / prepared.scale)) ** 2, axis=1)
+    lines = np.array(highest_lines(seen)) / (len(residual) * prepared.dt)
     alone = _left(model, prepared, modes)
 
     def best(entry: ModelTerm) -> Screened | None:

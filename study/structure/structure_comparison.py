@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from study.compare.dependence import FamilyGain, explained_by_place, families, left_by
 from study.compare.prediction import Prediction, predict
 from study.equations import model_file
 from study.equations.coefficient_units import coefficient_unit, parameter_units
@@ -19,7 +20,6 @@ from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import Prepared
 from study.records.record import Record
 from study.structure.missing_forces import MissingForces, missing_forces
-from study.structure.structure_leftover import FamilyGain, explained_by_place, family_gains
 from study.structure.structure_start import first_fit
 from study.support.arrays import Floats
 from study.support.errors import expect
@@ -60,7 +60,7 @@ class StructureComparison:
     @cached_property
     def leftovers(self) -> tuple[FamilyGain, ...]:
         """What general shapes of the motion at each place explain of what is left, held out; asked for when shown."""
-        return tuple(family_gains(self.fit, self.prediction))
+        return tuple(families(left_by(self.fit, self.prepared)))
 
 
 def compare_structure(

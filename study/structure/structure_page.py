@@ -11,7 +11,9 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
 
-from study.diagnose.verdict import MISSING
+from study.diagnose.diagnosis_files import diagnosis_in_words
+from study.diagnose.ranked import Ranked
+from study.diagnose.verdict import MISSING, Diagnosis
 from study.equations.place import Place
 from study.equations.place import place_in_words as placed
 from study.figures import page
@@ -19,7 +21,6 @@ from study.figures.labels import term_names
 from study.figures.sketch import Sketch, svg
 from study.figures.styles import in_style
 from study.structure import structure_panels
-from study.structure.placed_ranking import PlacedRanked
 from study.structure.structure_comparison import StructureComparison, structure_in_words
 from study.structure.structure_pictures import (
     modes,
@@ -29,21 +30,19 @@ from study.structure.structure_pictures import (
     sketch_of,
     sketch_of_diagnosis,
 )
-from study.structure.structure_report import structure_diagnosis_in_words
-from study.structure.structure_verdict import StructureDiagnosis
 from study.support.numbers import percent
 
 PAGE = "structure.html"
 
 
-def structure_page(comparison: StructureComparison, diagnosis: StructureDiagnosis | None = None) -> bytes:
+def structure_page(comparison: StructureComparison, diagnosis: Diagnosis | None = None) -> bytes:
     """The page as the content of a file; the same bytes from the same input."""
     drawn = sketch_of(comparison) if diagnosis is None else sketch_of_diagnosis(diagnosis)
     name, model = comparison.prepared.record.name, comparison.model.name
     said = (
         structure_in_words(comparison)
         if diagnosis is None
-        else f"{structure_in_words(comparison)} {structure_diagnosis_in_words(diagnosis)}"
+        else f"{structure_in_words(comparison)} {diagnosis_in_words(diagnosis)}"
     )
     sets = [("as given", comparison.modes)]
     if diagnosis is not None and diagnosis.modes_after is not None:
@@ -88,7 +87,7 @@ def _maps(comparison: StructureComparison) -> dict[frozenset[str], bytes]:
 
 
 def _places(
-    comparison: StructureComparison, diagnosis: StructureDiagnosis | None, drawn: Sketch,
+    comparison: StructureComparison, diagnosis: Diagnosis | None, drawn: Sketch,
     maps: Mapping[frozenset[str], bytes], selected: Place,
 ) -> str:  # fmt: skip
     """What is known of each place, one block each."""
@@ -126,7 +125,7 @@ def terms_there(comparison: StructureComparison, path: frozenset[str]) -> str:
     return f"The model has {', '.join(names)} there." if names else "The model has no term there."
 
 
-def _candidates(rows: Sequence[PlacedRanked]) -> str:
+def _candidates(rows: Sequence[Ranked]) -> str:
     """Candidates at a place, best first."""
     lines = [
         f"<tr><td>{escape(term_names(r.term.name))}<td>{percent(r.gain.explained, 'z.1f', r.gain.error, '.1f')}"

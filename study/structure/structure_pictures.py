@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from study.compare import panels
+from study.compare.dependence import explained_by_place
 from study.diagnose import diagnosis_pages
-from study.diagnose.verdict import MISSING
+from study.diagnose.verdict import MISSING, Diagnosis
 from study.equations.linear_part import Modes
 from study.equations.place import place_in_words
 from study.figures import page
@@ -19,8 +20,6 @@ from study.figures.sketch_drawing import structure_sketch
 from study.figures.styles import in_style
 from study.structure import structure_panels
 from study.structure.structure_comparison import StructureComparison
-from study.structure.structure_leftover import explained_by_place
-from study.structure.structure_verdict import StructureDiagnosis
 from study.support.numbers import percent
 
 WIDE = 7.2  # inches
@@ -42,7 +41,7 @@ def structure_pictures(comparison: StructureComparison) -> dict[str, bytes]:
         )
 
 
-def diagnosis_pictures(diagnosis: StructureDiagnosis) -> dict[str, bytes]:
+def diagnosis_pictures(diagnosis: Diagnosis) -> dict[str, bytes]:
     """The pictures of a diagnosis besides those of its comparison."""
     comparison = diagnosis.comparison
     sets = [("as given", comparison.modes)]
@@ -66,7 +65,7 @@ def sketch_of(comparison: StructureComparison) -> Sketch:
     return sketch(comparison.model, comparison.forces.coordinates, explained_by_place(comparison.leftovers))
 
 
-def sketch_of_diagnosis(diagnosis: StructureDiagnosis) -> Sketch:
+def sketch_of_diagnosis(diagnosis: Diagnosis) -> Sketch:
     """The same, glowing where an effect that is found, or tied with it, explains what is left."""
     comparison = diagnosis.comparison
     if diagnosis.verdict != MISSING:

@@ -10,7 +10,7 @@ from typing import Any
 from study.compare.comparison import Comparison
 from study.compare.prediction import predict
 from study.diagnose.credibility import credible
-from study.diagnose.verdict import MISSING, Diagnosis
+from study.diagnose.verdict import MISSING, Diagnosis, diagnose
 from study.equations.model import Model
 from study.faults.fault import Fault
 from study.identify.time_domain.fit_model import rough_steps
@@ -19,7 +19,6 @@ from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import Prepared
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import StructureComparison, compare_structure
-from study.structure.structure_verdict import StructureDiagnosis, diagnose_structure
 from study.support.errors import StudyError
 from study.trials.draw import Trial
 from study.trials.kept import Row
@@ -35,12 +34,12 @@ def compared(trial: Trial, model: Model) -> tuple[Comparison, tuple[Fault, ...]]
     return found.comparison, found.faults
 
 
-def diagnosed_structure(trial: Trial) -> StructureDiagnosis:
+def diagnosed_structure(trial: Trial) -> Diagnosis:
     """What is said of a structure."""
-    return diagnose_structure(compare_structure(trial.believed, prepare_structure(trial.record, trial.believed)))
+    return diagnose(compare_structure(trial.believed, prepare_structure(trial.record, trial.believed)))
 
 
-def tie_set(diagnosis: Diagnosis | StructureDiagnosis) -> tuple[str, ...]:
+def tie_set(diagnosis: Diagnosis) -> tuple[str, ...]:
     """The effects that the record cannot tell apart, the one put first among them; empty where none is named."""
     if diagnosis.verdict != MISSING:
         return ()
@@ -82,7 +81,7 @@ def intervals(comparison: Comparison | StructureComparison, truth: Model) -> Row
     return {"held": sum(inside), "asked": len(inside)}
 
 
-def true_comparison(trial: Trial, diagnosis: StructureDiagnosis) -> StructureComparison:
+def true_comparison(trial: Trial, diagnosis: Diagnosis) -> StructureComparison:
     """The true model of a structure, fitted from its true values."""
     prepared = diagnosis.comparison.prepared
     model, start = trial.completed, trial.truth.numbers()

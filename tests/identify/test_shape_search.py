@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from study.equations.model import free
 from study.equations.terms import LIBRARY, get
 from study.identify.time_domain import shape_search
 
@@ -21,7 +22,8 @@ def base() -> SimpleNamespace:
     """A motion, and a residual of two sines."""
     residual = sum(np.sin(2 * np.pi * line * np.arange(N) / N) for line in LINES)
     residual = residual + 1e-3 * np.random.default_rng(4).standard_normal(N)
-    return SimpleNamespace(displacement=U, fit=SimpleNamespace(residual=residual), dt=DT, row=0)
+    fit = SimpleNamespace(residual=residual, samples=N)
+    return SimpleNamespace(fit=fit, prepared=SimpleNamespace(dt=DT, response="displacement"))
 
 
 POINTS = {
@@ -34,14 +36,14 @@ POINTS = {
 
 @pytest.mark.parametrize("name", POINTS)
 def test_amplitudes_and_times_come_from_the_motion(name: str, base: SimpleNamespace) -> None:
-    found = shape_search.points_to_try(get(name), base)
+    found = shape_search.points_to_try(free(get(name)), U, base)
     np.testing.assert_allclose(found, POINTS[name], rtol=1e-12)
     keys = get(name).keys[1:]
     assert all(not get(name).physical(dict(zip(keys, point, strict=True))) for point in found)
 
 
 def test_frequencies_come_from_the_lines_of_the_residual(base: SimpleNamespace) -> None:
-    found = np.array(shape_search.points_to_try(get("harmonic_force"), base))[:, 0] * N * DT
+    found = np.array(shape_search.points_to_try(free(get("harmonic_force")), U, base))[:, 0] * N * DT
     for line in LINES:
         for shift in (-0.35, 0.0, 0.35):
             assert np.min(np.abs(found - line - shift)) < 0.05
@@ -50,4 +52,4 @@ def test_frequencies_come_from_the_lines_of_the_residual(base: SimpleNamespace) 
 
 @pytest.mark.parametrize("name", [name for name, term in LIBRARY.items() if not term.parameters])
 def test_a_term_without_shape_parameters_is_tried_once(name: str, base: SimpleNamespace) -> None:
-    assert shape_search.points_to_try(get(name), base) == [()]
+    assert shape_search.points_to_try(free(get(name)), U, base) == [()]

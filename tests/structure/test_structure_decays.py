@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study.diagnose.verdict import MISSING, NOTHING
+from study.diagnose.verdict import MISSING, NOTHING, diagnose
 from study.equations.free_run import prepare
 from study.equations.model_file import parse_model
 from study.identify.time_domain.part_fit import linearise, run_of
@@ -14,7 +14,6 @@ from study.records.record import Sensor, record_of
 from study.records.record_layout import Layout
 from study.structure.prepared_structure import prepare_structure, structure_ready
 from study.structure.structure_comparison import compare_structure
-from study.structure.structure_verdict import diagnose_structure
 from study.support.errors import StudyError
 
 DT, SAMPLES = 0.01, 2000
@@ -102,7 +101,7 @@ def test_a_fit_begins_where_noise_does_not_lead_it_astray(noise, seed):
 
 def test_a_hardening_spring_is_found_where_it_is():
     comparison = compare_structure(model(), structure_ready(decay(HARD), model(), Layout()))
-    diagnosis = diagnose_structure(comparison, without=FEW)
+    diagnosis = diagnose(comparison, without=FEW)
     assert diagnosis.verdict == MISSING
     first = diagnosis.candidates[0]
     assert first.name == "cubic_stiffness[ground-a]"
@@ -114,7 +113,7 @@ def test_a_hardening_spring_is_found_where_it_is():
 @pytest.mark.parametrize("noise", [0.003, 0.05])
 def test_where_nothing_is_missing_nothing_is_said_to_be(noise):
     comparison = compare_structure(model(), structure_ready(decay(noise=noise), model(), Layout()))
-    assert diagnose_structure(comparison, without=FEW).verdict == NOTHING
+    assert diagnose(comparison, without=FEW).verdict == NOTHING
 
 
 def test_a_free_run_that_lost_the_motion_is_no_noise():

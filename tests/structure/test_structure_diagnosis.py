@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from study.cli import main
+from study.diagnose.candidates import candidate_entries, screened
+from study.diagnose.verdict import search_base
 from study.equations.model_file import format_model, read_model
-from study.equations.terms import get
+from study.equations.terms import external, get, one_sided
 from study.records.record import write_csv
-from study.structure.placed_candidates import candidate_entries, external, one_sided, screened
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure
-from study.structure.structure_verdict import placed_search_base
 
 
 @pytest.fixture(scope="module")
@@ -51,13 +51,12 @@ def test_effect_and_place_come_first(diagnosed):
 
 def test_the_reverse_system_puts_the_effect_where_it_is(believed, record_of):
     comparison = compare_structure(believed, prepare_structure(record_of(), believed))
-    ordered = screened(candidate_entries(believed), placed_search_base(comparison))
-    entry, points = ordered[0]
-    assert entry.place.path == {"floor2", "floor3"}
-    cubic = next(p[0] for e, p in ordered if e.name == "cubic_stiffness[floor2-floor3]")
-    assert cubic.share > 0.95 * points[0].share
-    assert cubic.coefficients[0] == pytest.approx(1e6, rel=0.2)
-    elsewhere = max(p[0].share for e, p in ordered if e.place.path != {"floor2", "floor3"})
+    ordered = screened(candidate_entries(believed), search_base(comparison))
+    assert ordered[0].entry.place.path == {"floor2", "floor3"}
+    cubic = next(item for item in ordered if item.entry.name == "cubic_stiffness[floor2-floor3]")
+    assert cubic.share > 0.95 * ordered[0].share
+    assert cubic.points[0].coefficients[0] == pytest.approx(1e6, rel=0.2)
+    elsewhere = max(item.share for item in ordered if item.entry.place.path != {"floor2", "floor3"})
     assert elsewhere < 0.8 * cubic.share
 
 

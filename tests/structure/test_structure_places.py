@@ -7,6 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from study.diagnose.candidates import PROMISING, Screened, elsewhere
+from study.diagnose.diagnosis_files import diagnosis_in_words
+from study.diagnose.verdict import diagnose
 from study.equations.equations_of_motion import loose_motions
 from study.equations.linear_part import check_held_masses
 from study.equations.model import free
@@ -14,15 +17,13 @@ from study.equations.model_file import parse_model
 from study.equations.place import Place
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY, get
+from study.identify.time_domain.shape_search import Start
 from study.records.completion import consistent
 from study.records.excitation import Excitation, force
 from study.records.readers import ReadOptions, read_record
 from study.records.record import Sensor, write_csv
-from study.structure.placed_candidates import PROMISING, elsewhere
 from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_comparison import compare_structure
-from study.structure.structure_report import structure_diagnosis_in_words
-from study.structure.structure_verdict import diagnose_structure
 from study.support.errors import StudyError
 
 HERE = Path("twin.yaml")
@@ -59,8 +60,8 @@ def test_places_that_the_sensors_cannot_tell_apart_are_a_tie(sensors, tied):
     model = parse_model(HEAD + MASSES + FOOT + BRANCHES, HERE)
     comparison = compare_structure(model, prepare_structure(twin_record(sensors), model))
     others = [n for n in LIBRARY if n not in ("cubic_stiffness", "quadratic_damping", "constant_force")]
-    diagnosis = diagnose_structure(comparison, without=others)
-    first, said = diagnosis.candidates[0], structure_diagnosis_in_words(diagnosis)
+    diagnosis = diagnose(comparison, without=others)
+    first, said = diagnosis.candidates[0], diagnosis_in_words(diagnosis)
     assert diagnosis.verdict == "missing_effect"
     assert first.term.name == "cubic_stiffness"
     places = {"cubic_stiffness[trunk-left]", "cubic_stiffness[trunk-right]"}
@@ -76,17 +77,17 @@ def test_places_that_the_sensors_cannot_tell_apart_are_a_tie(sensors, tied):
 def test_the_best_effect_is_tried_wherever_it_explains_as_much():
     def candidate(term, place, share):
         entry = free(get(term), Place("between", place))
-        return entry, [SimpleNamespace(share=share)]
+        return Screened(entry, (Start((), (), share),))
 
     ordered = [
         candidate("quintic_stiffness", ("a", "b"), 0.9), candidate("cubic_stiffness", ("a", "b"), 0.8),
         candidate("cubic_stiffness", ("a", "c"), 0.79), candidate("cubic_stiffness", ("ground", "a"), 0.78 * PROMISING),
     ]  # fmt: skip
     tried = [
-        SimpleNamespace(entry=ordered[0][0], unphysical="", left=0.2),
-        SimpleNamespace(entry=ordered[1][0], unphysical="", left=0.1),
+        SimpleNamespace(entry=item.entry, name=item.entry.name, unphysical="", prediction=SimpleNamespace(error=error))
+        for item, error in zip(ordered, (0.2, 0.1), strict=False)
     ]
-    assert [entry.name for entry, _ in elsewhere(tried, ordered)] == ["cubic_stiffness[a-c]"]
+    assert [item.entry.name for item in elsewhere(tried, ordered)] == ["cubic_stiffness[a-c]"]
     assert elsewhere([], ordered) == []
 
 

@@ -31,7 +31,7 @@ from study.identify.time_domain.no_response import (
 )
 from study.identify.time_domain.part_fit import STEPS, covariance_of, fit_part, linearise
 from study.identify.time_domain.settling import KEPT, better_fit, continued, from_segments, settled
-from study.identify.time_domain.shape_search import Baseline
+from study.identify.time_domain.shape_search import Baseline, Start
 from study.records.prepared import FORCE, Prepared
 from study.support.errors import StudyError
 
@@ -67,6 +67,10 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
     StudyError
         If the model cannot be fitted.
     """
+    if model.named:
+        from study.structure.structure_start import first_fit
+
+        return first_fit(model, prepared)
     if "inertia" not in model and prepared.response != FORCE:
         raise StudyError(f"model {model.name!r} has no inertia; a free run needs it")
     _check_own_formulas(model, prepared)
@@ -79,7 +83,7 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
     look = shape_search.searched_stretch(known, prepared) if unknown else prepared
     fit = _from_nothing(known, look)
     for entry in unknown:
-        fit = with_term(fit, entry, shape_search.baseline(fit, look), look)
+        fit = with_term(shape_search.baseline(fit, look), entry)
     ordered = replace(model, terms=tuple(next(t for t in fit.model.terms if t.name == e.name) for e in model.terms))
     return _followed(settled(continued(replace(fit, model=ordered), prepared), prepared), model, prepared)
 
@@ -164,12 +168,12 @@ def _built_up(model: Model, prepared: Prepared) -> FreeRunFit | None:
         return None
 
 
-def with_term(fit: FreeRunFit, entry: ModelTerm, base: Baseline, prepared: Prepared) -> FreeRunFit:
-    """The fitted model with one term more, the best of fits from several starts.
+def with_term(base: Baseline, entry: ModelTerm, points: Sequence[Start] = ()) -> FreeRunFit:
+    """The fitted model with one term more at its place, the best of fits from several starts.
 
-    These are points of a search over the term's shape parameters beside the fitted model, and the best of them anew,
-    with all coefficients from the reverse system, or beside a linear model where that has no solution: it matters where
-    the model without the term was driven to a far corner by its lack.
+    These are points of a search over the term's shape parameters beside the fitted model (``points``, if that has been
+    made), and the best of them anew, with all coefficients from the reverse system, or beside a linear model where that
+    has no solution: it matters where the model without the term was driven to a far corner by its lack.
 
     Raises
     ------
@@ -177,15 +181,12 @@ def with_term(fit: FreeRunFit, entry: ModelTerm, base: Baseline, prepared: Prepa
         If none of them has a finite response.
     """
     given = {key: value for key, value in entry.values.items() if value is not None}
-    known = fit.model.numbers()
-    grown = fit.model.with_term(entry)
-    points = shape_search.shape_starts(entry.term, base, prepared)
-    starts = [known | dict.fromkeys(entry.term.symbols, 0.0) | _shapes(entry, p.parameters) | given for p in points]
-    if points:
-        anew = _reversed(grown.with_values(starts[0]), prepared) or base.linear
-        starts.append(starts[0] | {k: v for k, v in anew.items() if k in (*fit.keys, *entry.term.symbols)} | given)
+    fit, prepared = base.fit, base.prepared
+    grown, points = fit.model.with_term(entry), points or shape_search.shape_starts(entry, base)
+    starts = (_from_the_equations if base.several else _from_the_free_run)(entry, base, points)
+    initial = grown_states(fit, grown) if base.several else None  # which no sensor may show
     try:
-        best = best_fit(grown, prepared, starts, (*fit.held, *given))
+        best = best_fit(grown, prepared, [start | given for start in starts], (*fit.held, *given), initial)
     except StudyError:
         missing = ", ".join(key for key, value in entry.values.items() if value is None)
         raise StudyError(
@@ -194,14 +195,53 @@ def with_term(fit: FreeRunFit, entry: ModelTerm, base: Baseline, prepared: Prepa
     return replace(from_the_motion(best, prepared), elsewhere=(*best.elsewhere, *fit.elsewhere))
 
 
+def _from_the_free_run(entry: ModelTerm, base: Baseline, points: Sequence[Start]) -> list[dict[str, float]]:
+    """Where fits beside the sensitivities' points begin: at none of the effect, and with all values anew."""
+    fit, known = base.fit, base.fit.model.numbers()
+    starts = [known | dict.fromkeys(entry.symbols, 0.0) | _shapes(entry, p.parameters) for p in points]
+    if points:
+        grown = fit.model.with_term(entry)
+        anew = _reversed(grown.with_values(starts[0]), base.prepared) or base.linear
+        starts.append(starts[0] | {k: v for k, v in anew.items() if k in (*fit.keys, *entry.symbols)})
+    return starts
+
+
+def _from_the_equations(entry: ModelTerm, base: Baseline, points: Sequence[Start]) -> list[dict[str, float]]:
+    """Where fits beside the reverse system's points begin: at their amounts, and at none of the effect.
+
+    A false step leads that nowhere.
+    """
+    known, starts = base.fit.model.numbers(), list[dict[str, float]]()
+    for point in points[: shape_search.STARTS - 1]:
+        amounts = dict(zip(entry.symbols, point.coefficients, strict=True)) | _shapes(entry, point.parameters)
+        starts.append(known | amounts | base.reverse.moved(entry, point, shape_search.CUTOFF))
+        if point is points[0]:
+            starts.append(known | amounts | dict.fromkeys(entry.symbols, 0.0))
+    return starts
+
+
+def grown_states(fit: FreeRunFit, model: Model) -> Floats:
+    """The states with which the stretches of a fit begin, for a model with other terms; those of new terms are zero."""
+    motions, given = 2 * len(model.coordinates), np.atleast_2d(fit.initial)
+    states = np.zeros((len(given), motions + len(model.states)))
+    own = {t.name: motions + i for i, t in enumerate(fit.model.states)}
+    states[:, :motions] = given[:, :motions]
+    for i, entry in enumerate(model.states):
+        if entry.name in own:
+            states[:, motions + i] = given[:, own[entry.name]]
+    return states
+
+
 def best_fit(
-    model: Model, prepared: Prepared, starts: Iterable[Values], held: Sequence[str] | None = None
+    model: Model, prepared: Prepared, starts: Iterable[Values], held: Sequence[str] | None = None,
+    initial: Floats | None = None,
 ) -> FreeRunFit:  # fmt: skip
     """The best of fits from several starts; the others stay with it (``elsewhere``).
 
     With open shape parameters each start is first fitted with these held: the misfit along a dead band or a gap has
-    kinks and local minima in which a fit of everything at once gets stuck. A minimum outside of what makes the terms
-    physical is taken only where no start leads to one inside.
+    kinks and local minima in which a fit of everything at once gets stuck. ``initial`` are the states that fits begin
+    with, estimated from the record if left out. A minimum outside of what makes the terms physical is taken only where
+    no start leads to one inside.
 
     Raises
     ------
@@ -211,9 +251,9 @@ def best_fit(
     held = model.held_keys if held is None else tuple(held)
     shapes = tuple(key for key in model.values if "." in key and key not in held)
     begun = list(starts)
-    each = [_tried(model, prepared, (*held, *shapes), start, TRIED) for start in begun]
+    each = [_tried(model, prepared, (*held, *shapes), start, TRIED, initial) for start in begun]
     nearer = [_halfway(begun[0], start) for start, fit in zip(begun[1:], each[1:], strict=True) if fit is None]
-    each += [_tried(model, prepared, (*held, *shapes), start, TRIED) for start in nearer]
+    each += [_tried(model, prepared, (*held, *shapes), start, TRIED, initial) for start in nearer]
     first = sorted((fit for fit in each if fit is not None), key=lambda fit: fit.rms)
     best = _at_minimum(first[0] if first else None, model, prepared, held)
     inside = next((fit for fit in first if fit.converged and not _unphysical(fit)), None)

@@ -34,7 +34,7 @@ def from_the_motion(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
 
     Segments with states of their own leave less than one free run of any model, and that says nothing for it.
     """
-    if not has_lost_the_motion(fit, prepared):
+    if fit.model.named or not has_lost_the_motion(fit, prepared):  # segments begin from what one coordinate shows
         return fit
     try:
         start = motion_start(fit.model, prepared, fit.held)

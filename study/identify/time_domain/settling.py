@@ -40,7 +40,7 @@ def continued(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
 def settled(fit: FreeRunFit, prepared: Prepared) -> FreeRunFit:
     """The fit at its minimum with enough steps; in segments where a chaotic system loses the motion in one run."""
     fine = with_enough_steps(fit, prepared)
-    if fit.model.named:  # segments begin from what is known of a single coordinate
+    if fit.model.named:
         return fine
     return replace(from_the_motion(_settled(fine, prepared), prepared), elsewhere=fit.elsewhere)
 
@@ -134,9 +134,10 @@ def better_fit(one: FreeRunFit | None, other: FreeRunFit | None) -> FreeRunFit |
 def from_segments(model: Model, prepared: Prepared, held: Sequence[str], steps: int = STEPS) -> FreeRunFit | None:
     """A fit that begins where multiple shooting ends; None where the model cannot run even in segments.
 
-    A motion that is prescribed drifts from nothing: there is nothing to cut.
+    A motion that is prescribed drifts from nothing: there is nothing to cut. Segments begin from what is known of a
+    single coordinate.
     """
-    if prepared.response == FORCE:
+    if prepared.response == FORCE or model.named:
         return None
     length = round(PERIODS * 2.0 * np.pi / (angular_rate(prepared.fitted, prepared.dt) * prepared.dt))
     stretch = prepared.shortened(int(np.clip(length, SHORTEST, LONGEST)))

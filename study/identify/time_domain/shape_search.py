@@ -1,28 +1,33 @@
-"""Starting values for a candidate: at which shape parameters does it explain most?
+"""Starting values for a candidate at a place: at which shape parameters does it explain most?
 
 The residual of the model in free run is compared with the response that a small amount of the candidate
 would add (the exact sensitivity at a zero coefficient), less all that the model's own coefficients
-could do. Each point takes one free run; the best few points start a fit of everything.
+could do. Each point takes one free run; the best few points start a fit of everything. A structure has more
+places than free runs are cheap for: there the equations of all coordinates are asked (``reverse_search``).
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
+from study.equations.linear_part import matrices, transfer
 from study.equations.model import Model, ModelTerm
+from study.equations.place import Place
 from study.equations.substeps import needed_steps
-from study.equations.term import ShapeParameter, Term
+from study.equations.term import ShapeParameter
 from study.identify.frequency_domain.starting_values import linear_start, oscillator
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import run_of, with_states
-from study.records.outputs import DISPLACEMENT, alone
+from study.identify.time_domain.reverse_search import ReverseSystem, reverse_system
+from study.records.outputs import alone
 from study.records.prepared import FORCE, Prepared
-from study.records.record import MOTIONS
+from study.records.record import MOTIONS, Sensor
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
-from study.support.least_squares import least_squares
+from study.support.least_squares import least_squares, length_or_one
 
 PERIODS = 100.0  # of the motion that a search for effects uses, at least
 SEARCHED = 4096  # samples that a search for open shape parameters looks at, if they show anything
@@ -30,6 +35,7 @@ PEAKS = 6  # lines of a spectrum that are tried as the frequency of a periodic e
 SHARP = (15.0, 40.0, 100.0, 250.0)  # per amplitude: loops that close within a small part of a stroke
 MODULATION = "lines of the modulation"  # of the two kinds of spectra whose lines are tried
 STARTS = 4  # points of the search that start a fit
+CUTOFF = 1e-8  # of the largest singular value
 SPREAD = 5  # points that start a fit where the search is blunt, from one end of the range to the other
 
 
@@ -46,42 +52,46 @@ def searched_stretch(model: Model, prepared: Prepared) -> Prepared:
     return look
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Baseline:
-    """A fitted model and what it leaves unexplained on the fitting part; n samples.
-
-    Attributes
-    ----------
-    fit : FreeRunFit
-        The fit.
-    basis : array, shape (n, p)
-        Orthonormal basis of everything its own coefficients and initial state could change.
-    displacement : array, shape (n,)
-        Displacement of the free run: free of noise.
-    linear : dict
-        Coefficients of the best linear approximation, zero for what is not linear.
-    approximation : dict
-        m, c and k of the best linear oscillator, whatever the model's terms are.
-    dt : float
-        Sampling interval in seconds.
-    row : int or None
-        Place of the measured response in ``MOTIONS``; None where it is the force of a prescribed motion.
-    """
+    """A fitted model and what it leaves unexplained on the fitting part; n samples, s sensors, c coordinates."""
 
     fit: FreeRunFit
-    basis: Floats
-    displacement: Floats
-    linear: dict[str, float]
-    approximation: dict[str, float]
-    dt: float
-    row: int | None
+    prepared: Prepared  # with as much to fit as a search uses
+    basis: Floats  # orthonormal basis of all that its own coefficients and initial states could change; (n s, p)
+    motion: Floats  # displacement, velocity and acceleration of the free run: free of noise; shape (3, n, c)
+    linear: dict[str, float]  # coefficients of a mass's best linear approximation, zero for what is not linear
+    approximation: dict[str, float]  # m, c and k of its best linear oscillator, whatever the model's terms are
 
-    def transfer(self, omega: Complexes) -> Complexes:
-        """Frequency response function from a small force to the measured response at ``omega = j 2 pi f``."""
-        if self.row is None:
-            return np.ones_like(omega)
-        own = self.approximation
-        return np.asarray(omega**self.row / (own["m"] * omega**2 + own["c"] * omega + own["k"]), dtype=np.complex128)
+    @property
+    def several(self) -> bool:
+        """Whether there are several coordinates, and with them places where an effect may sit."""
+        return len(self.fit.model.coordinates) > 1
+
+    def along(self, place: Place, order: int = 0) -> Floats:
+        """Relative displacement, or a derivative of it, at a place, shape (n,)."""
+        return self.motion[order] @ np.array(place.direction(self.fit.model.coordinates))
+
+    def paths(self, size: int) -> Complexes:
+        """Frequency response functions from a small force on each coordinate to each sensor, shape (lines, s, c).
+
+        On the lines of a transform of so many samples; a constant goes through as the lowest line does.
+        """
+        model, sensors = self.fit.model, self.fit.outputs.sensors
+        if self.several:
+            return transfer(matrices(model, model.numbers()), sensors, model.coordinates, self.prepared.dt, size)
+        omega = np.asarray(2j * np.pi * rfftfreq(size, self.prepared.dt), dtype=np.complex128)
+        if self.prepared.response == FORCE:  # nothing passes through a structure there
+            return np.ones((len(omega), 1, 1), dtype=np.complex128)
+        omega[0] = omega[1]
+        own, order = self.approximation, MOTIONS.index(self.prepared.response)
+        found = omega**order / (own["m"] * omega**2 + own["c"] * omega + own["k"])
+        return np.asarray(found, dtype=np.complex128)[:, None, None]
+
+    @cached_property
+    def reverse(self) -> ReverseSystem:
+        """What the equations of all coordinates leave along the measured motion."""
+        return reverse_system(self)
 
 
 @dataclass(frozen=True)
@@ -96,12 +106,12 @@ class Start:
 def baseline(fit: FreeRunFit, prepared: Prepared) -> Baseline:
     """Prepare a fitted model for the search."""
     jacobian = with_states(fit, prepared)
-    scale = np.linalg.norm(jacobian, axis=0)
-    basis = np.linalg.qr(jacobian / np.where(scale > 0.0, scale, 1.0))[0]
-    displacement = run_of(fit, prepared, sensors=DISPLACEMENT.sensors).respond({}, fit.initial)[0][:, 0]
-    linear, approximation = _linear(fit, prepared)
-    row = MOTIONS.index(prepared.response) if prepared.response in MOTIONS else None
-    return Baseline(fit, basis, displacement, linear, approximation, prepared.dt, row)
+    basis = np.linalg.qr(jacobian / length_or_one(jacobian))[0]
+    motions = tuple(Sensor(c, m) for m in MOTIONS for c in fit.model.coordinates)
+    free = run_of(fit, prepared, sensors=motions).respond({}, fit.initial)[0]
+    motion = free.reshape(len(free), len(MOTIONS), -1).transpose(1, 0, 2)
+    linear, approximation = ({}, {}) if len(fit.model.coordinates) > 1 else _linear(fit, prepared)
+    return Baseline(fit, prepared, basis, motion, linear, approximation)
 
 
 def _linear(fit: FreeRunFit, prepared: Prepared) -> tuple[dict[str, float], dict[str, float]]:
@@ -110,39 +120,46 @@ def _linear(fit: FreeRunFit, prepared: Prepared) -> tuple[dict[str, float], dict
         return linear_start(fit.model, prepared), oscillator(prepared)
     except StudyError:
         own = fit.model.numbers()
-        if prepared.response == FORCE:  # nothing passes through a structure there
+        if prepared.response == FORCE:
             return own, {}
         slowest = (2.0 * np.pi / (len(fit.residual) * prepared.dt)) ** 2
         approximation = {"m": own["m"], "c": own.get("c", 0.0), "k": own.get("k") or own["m"] * slowest}
         return {key: own[key] if key in approximation else 0.0 for key in own}, approximation
 
 
-def shape_starts(term: Term, base: Baseline, prepared: Prepared) -> list[Start]:
-    """The best points of the search over a candidate's shape parameters, best first."""
-    points = (_try(term, parameters, base, prepared) for parameters in points_to_try(term, base))
+def shape_starts(entry: ModelTerm, base: Baseline) -> list[Start]:
+    """The best points of the search over a candidate's shape parameters, best first.
+
+    A single mass is asked by the sensitivities of its free run, one run a point. Where there are several places a free
+    run each is too much, and the reverse system is asked.
+    """
+    if base.several:
+        u = base.reverse.record(entry.place)["displacement"]
+        found = [base.reverse.point(entry, parameters) for parameters in points_to_try(entry, u, base)]
+        return sorted((point for point in found if point is not None), key=lambda s: -s.share)
+    points = (_try(entry, parameters, base) for parameters in points_to_try(entry, base.along(entry.place), base))
     tried = [point for point in points if point is not None]
     best = sorted(tried, key=lambda s: -s.share)
-    if not any(p.search.blunt for p in term.parameters):
+    if not any(p.search.blunt for p in entry.term.parameters):
         return best[:STARTS]
     step = max(1, (len(tried) - 1) // (SPREAD - 1))
     return best[:1] + [point for point in tried[::step] if point is not best[0]]
 
 
-def sensitivity(
-    term: Term, parameters: tuple[float, ...], base: Baseline, prepared: Prepared
-) -> Floats | None:  # fmt: skip
-    """What small amounts of a candidate add to the response that the model's own coefficients cannot, (n, components).
+def sensitivity(entry: ModelTerm, parameters: tuple[float, ...], base: Baseline) -> Floats | None:
+    """What small amounts of a candidate add to the response that the model's own coefficients cannot.
 
-    None where the model with it does not run, or nothing is left.
+    Shape (n s, components). None where the model with it does not run, or nothing is left.
     """
-    entry = ModelTerm(term, (0.0,) * len(term.components), parameters)
-    model = base.fit.model.with_term(entry)
+    prepared = base.prepared
+    given = replace(entry, coefficients=(0.0,) * len(entry.symbols), parameters=parameters)
+    model = base.fit.model.with_term(given)
     steps = base.fit.steps_per_sample
     if prepared.response == FORCE:  # a loop that closes sharply asks for more than any motion would
         steps = max(steps, needed_steps(model, prepared.record, alone(FORCE)))
     try:
-        run = run_of(replace(base.fit, model=model, steps_per_sample=steps), prepared, term.symbols)
-        _, added = run.respond(dict.fromkeys(term.symbols, 0.0), base.fit.initial)
+        run = run_of(replace(base.fit, model=model, steps_per_sample=steps), prepared, entry.symbols)
+        _, added = run.respond(dict.fromkeys(entry.symbols, 0.0), base.fit.initial)
     except StudyError:
         return None
     added = prepared.known(prepared.outputs.stacked(added), base.fit.span)
@@ -150,37 +167,39 @@ def sensitivity(
     return added if np.all(np.isfinite(added)) and np.any(added) else None
 
 
-def _try(
-    term: Term, parameters: tuple[float, ...], base: Baseline, prepared: Prepared
-) -> Start | None:  # fmt: skip
-    """One point: least squares of the residual on the candidate's sensitivities."""
-    added = sensitivity(term, parameters, base, prepared)
-    if added is None:
-        return None
-    residual = base.fit.residual
-    amounts = least_squares(added, residual, 1e-8)
+def _try(entry: ModelTerm, parameters: tuple[float, ...], base: Baseline) -> Start | None:
+    added = sensitivity(entry, parameters, base)
+    return None if added is None else explained_by(added, base.fit.residual, parameters)
+
+
+def explained_by(added: Floats, residual: Floats, parameters: tuple[float, ...]) -> Start:
+    """One point: least squares of the residual on what a unit of each of the candidate's coefficients adds."""
+    amounts = least_squares(added, residual, CUTOFF)
     power = float(residual @ residual)
     share = 1.0 - float(np.sum((residual - added @ amounts) ** 2)) / power if power > 0.0 else 0.0
     return Start(parameters, tuple(float(a) for a in amounts), share)
 
 
-def points_to_try(term: Term, base: Baseline) -> list[tuple[float, ...]]:
-    """Points to try: amplitudes from the motion, times from the resonance, frequencies from spectra."""
-    points: list[tuple[float, ...]] = [()]
-    for parameter in term.parameters:
-        points = [(*point, x) for point in points for x in _places(parameter, point, base)]
-    return points
-
-
-def _places(parameter: ShapeParameter, point: tuple[float, ...], base: Baseline) -> list[float]:
-    """Values of one shape parameter to try beside those of the parameters before it."""
+def points_to_try(entry: ModelTerm, u: Floats, base: Baseline) -> list[tuple[float, ...]]:
+    """Points to try beside what is given: amplitudes from a motion u, times from the resonance, lines of spectra."""
 
     def lines(kind: str, shifts: Floats) -> Floats:
-        found = modulation_lines(base) if kind == MODULATION else residual_lines(base)
-        return _around(found, shifts, base)
+        found = modulation_lines(u, entry.place, base) if kind == MODULATION else residual_lines(base)
+        return np.add.outer(np.array(found), shifts).ravel() / (len(u) * base.prepared.dt)
 
     # a prescribed stroke may be many times the slip that closes a loop
-    return values_to_try(parameter, point, base.displacement, base.dt, lines, SHARP if base.row is None else ())
+    sharp = SHARP if base.prepared.response == FORCE else ()
+    points: list[tuple[float, ...]] = [()]
+    for parameter, given in zip(entry.term.parameters, entry.parameters, strict=True):
+        points = [
+            (*point, x)
+            for point in points
+            for x in (
+                [given] if given is not None else values_to_try(parameter, point, u, base.prepared.dt, lines, sharp)
+            )
+            if np.isfinite(x)
+        ]
+    return points
 
 
 def values_to_try(
@@ -210,30 +229,31 @@ def values_to_try(
 
 
 def windowed(values: Floats) -> Complexes:
-    """Lines of a history under a Hann window."""
-    return np.asarray(rfft(values * np.hanning(len(values))), dtype=np.complex128)
+    """Lines of a history, shape (n,) or (n, ...), under a Hann window."""
+    return np.asarray(rfft((values.T * np.hanning(len(values))).T, axis=0), dtype=np.complex128)
 
 
-def modulation_lines(base: Baseline) -> list[float]:
-    """Lines at which a stiffness that varies with time would explain most, by a matched filter.
+def modulation_lines(u: Floats, place: Place, base: Baseline) -> list[float]:
+    """Lines at which a stiffness of a place that varies with time would explain most, by a matched filter.
 
-    The response added by ``u cos(2 pi f t)`` is ``H * (u cos)``; its product with the residual, summed,
-    is one line of the spectrum of ``u`` times the residual filtered by H backwards in time.
+    The response added by ``u cos(2 pi f t)`` is ``H * (u cos)``; its product with the residual, summed, is one line of
+    the spectrum of ``u``, shape (n,), times the residuals filtered by H backwards in time.
     """
-    n = len(base.fit.residual)
-    receptance = base.transfer(np.asarray(2j * np.pi * rfftfreq(n, base.dt), dtype=np.complex128))
-    receptance[0] = receptance[1] if not np.isfinite(receptance[0]) else receptance[0]
-    matched = irfft(np.conj(receptance) * rfft(base.fit.residual), n)
-    numerator = np.abs(windowed(matched * base.displacement)) ** 2
-    passband = irfft(np.abs(receptance) ** 2, n)
-    spread = irfft(np.abs(rfft(base.displacement)) ** 2, n)
+    n, weights = len(u), np.array(base.fit.outputs.weights)
+    path = base.paths(n) @ np.array(place.direction(base.fit.model.coordinates)) * weights
+    residual = base.fit.residual.reshape(n, -1)
+    matched = irfft(np.sum(np.conj(path) * rfft(residual, axis=0), axis=1), n)
+    numerator = np.abs(windowed(matched * u)) ** 2
+    passband = irfft(np.sum(np.abs(path) ** 2, axis=1), n)
+    spread = irfft(np.abs(rfft(u)) ** 2, n)
     denominator = np.abs(rfft(passband * spread))
     return highest_lines(numerator / np.maximum(denominator, 1e-6 * np.max(denominator)))
 
 
 def residual_lines(base: Baseline) -> list[float]:
-    """Lines that stand out of the residual's own spectrum."""
-    return highest_lines(np.abs(windowed(base.fit.residual)) ** 2)
+    """Lines that stand out of the residuals' own spectra."""
+    left = base.fit.residual.reshape(base.fit.samples, -1)
+    return highest_lines(np.sum(np.abs(windowed(left)) ** 2, axis=1))
 
 
 def highest_lines(spectrum: Floats) -> list[float]:
@@ -255,9 +275,3 @@ def highest_lines(spectrum: Floats) -> list[float]:
 def _top(three: Floats) -> float:
     bend = float(three[0] - 2.0 * three[1] + three[2])
     return 0.5 * float(three[0] - three[2]) / bend if bend < 0.0 else 0.0
-
-
-def _around(lines: list[float], shifts: Floats, base: Baseline) -> Floats:
-    """Frequencies so many lines to either side of each line, in hertz, shape (lines * shifts,)."""
-    resolution = 1.0 / (len(base.fit.residual) * base.dt)
-    return np.add.outer(np.array(lines), shifts).ravel() * resolution

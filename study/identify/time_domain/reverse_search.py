@@ -1,0 +1,145 @@
+"""What a term at a place would explain, by the reverse system of all coordinates.
+
+With the linear part Z of the fitted structure, its nonlinear forces N and the measured motion x, what the equations
+leave is ``B F - Z x - N(x)``. Any force that is missing, and any change of a coefficient, is a known history times an
+unknown amount, and linear least squares find the amounts, however much the model lacks. Everything is passed through
+Z^-1 to the sensors first, where noise is what it was on the motion (the equations of a place and of its other end are
+one regression: action equals reaction). The motion is that of the free run with what the sensors show above their
+noise; where a sensor is missing it is the free run's. The best points start fits in free run.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.fft import rfftfreq
+
+from study.equations.linear_part import LINEAR, linear_keys, patterns
+from study.equations.model import ModelTerm
+from study.equations.place import Place
+from study.identify.frequency_domain.inputs import input_history
+from study.identify.time_domain.part_fit import linearise
+from study.records.record import Record
+from study.records.spectra import StretchTransforms, stretch_transforms
+from study.structure.missing_forces import corrected_motion, placed_inputs, relative_record
+from study.support.arrays import Complexes, Floats
+from study.support.errors import StudyError
+from study.support.least_squares import least_squares, length_or_one
+
+if TYPE_CHECKING:
+    from study.identify.time_domain.shape_search import Baseline, Start
+
+
+@dataclass(frozen=True, eq=False)
+class ReverseSystem:
+    """The equations of a fitted structure along its measured motion; n samples, s sensors, c coordinates."""
+
+    base: "Baseline"
+    motion: Floats  # displacement, velocity and acceleration of all coordinates, shape (3, n, c)
+    transforms: StretchTransforms  # of the stretches of the fitting part
+    paths: Complexes  # from a force on each coordinate to each sensor, on their lines; shape (lines, s, c)
+
+    def record(self, place: Place, motion: Floats | None = None) -> Record:
+        """Relative motion at a place, with the time at which it was."""
+        fit, prepared = self.base.fit, self.base.prepared
+        own = relative_record(place, fit.model, self.motion if motion is None else motion, prepared.dt)
+        return replace(own, start=prepared.record.start + fit.first * prepared.dt)
+
+    def unit_forces(self, entry: ModelTerm, record: Record) -> list[Complexes]:
+        """Lines of the force of each component with a unit coefficient along a motion."""
+        omega = np.asarray(2j * np.pi * rfftfreq(self.transforms.size, record.dt), dtype=np.complex128)
+        by_symbol: dict[str, Complexes] = {}
+        for item in placed_inputs(entry):
+            values = self.transforms.lines(
+                record["displacement"] if item.shape == "u" else input_history(item, record)
+            )
+            for part in item.parts:
+                by_symbol[part.symbol] = values * part.factor * omega**part.order
+        return [by_symbol[symbol] for symbol in entry.term.symbols]
+
+    def passed(self, place: Place, forces: Sequence[Complexes]) -> Floats:
+        """What forces at a place, given by their lines, add to the sensors, shape (n s, forces)."""
+        e = np.array(place.direction(self.base.fit.model.coordinates))
+        return self.base.fit.outputs.stacked(self.transforms.passed(-(self.paths @ e), forces))
+
+    @cached_property
+    def columns(self) -> Floats:
+        """What a unit of each key, and of the initial states, adds to the sensors, shape (n s, keys + states).
+
+        That of initial states and of shape parameters is exact; of coefficients it is that along the measured motion.
+        """
+        fit, model = self.base.fit, self.base.fit.model
+        columns = linearise(fit, self.base.prepared)
+        own, orders = patterns(model), linear_keys(model)
+        for key in orders:
+            if key in fit.keys:
+                force = self.transforms.lines(self.motion[orders[key]] @ own[key])
+                motion = self.transforms.back(-np.einsum("fsc,kfc->kfs", self.paths, force))
+                columns[:, fit.keys.index(key)] = fit.outputs.stacked(motion)
+        for entry in model.terms:
+            if set(entry.symbols) & set(fit.keys) and entry.symbols[0] not in orders:
+                added = self.passed(entry.place, self.unit_forces(entry, self.record(entry.place)))
+                for i, symbol in enumerate(entry.symbols):
+                    if symbol in fit.keys:
+                        columns[:, fit.keys.index(symbol)] = added[:, i]
+        return columns
+
+    @cached_property
+    def basis(self) -> Floats:
+        """Orthonormal basis of these."""
+        return np.linalg.qr(self.columns / length_or_one(self.columns))[0]
+
+    @cached_property
+    def violated(self) -> Floats:
+        """What the equations leave, passed to the sensors, shape (n s,).
+
+        The residual, less what the nonlinear forces along the measured motion differ by from those along the free run.
+        """
+        model = self.base.fit.model
+        total = np.zeros_like(self.base.fit.residual)
+        for entry in model.terms:
+            if entry.term.name not in LINEAR:
+                there, here = (
+                    self.passed(entry.place, self.unit_forces(entry, self.record(entry.place, motion)))
+                    for motion in (self.motion, self.base.motion)
+                )
+                total += (there - here) @ np.array([c or 0.0 for c in entry.coefficients])
+        return self.base.fit.residual - total
+
+    def beside_own(self, columns: Floats) -> Floats:
+        """Columns, shape (n s, ...), less what the model's own coefficients could do."""
+        return columns - self.basis @ (self.basis.T @ columns)
+
+    def point(self, entry: ModelTerm, parameters: tuple[float, ...]) -> "Start | None":
+        """What an effect at a place explains with these shape parameters; None where it acts nowhere."""
+        from study.identify.time_domain.shape_search import explained_by
+
+        given = replace(entry, coefficients=(0.0,) * len(entry.symbols), parameters=parameters)
+        try:
+            forces = self.unit_forces(given, self.record(entry.place))
+        except StudyError:
+            return None
+        added = self.beside_own(self.passed(entry.place, forces))
+        if not np.all(np.isfinite(added)) or not np.any(added):
+            return None
+        return explained_by(added, self.beside_own(self.violated), parameters)
+
+    def moved(self, entry: ModelTerm, point: "Start", cutoff: float) -> dict[str, float]:
+        """Coefficients of the model beside so much of a term."""
+        fit = self.base.fit
+        known = replace(entry, coefficients=point.coefficients, parameters=point.parameters)
+        forces = self.unit_forces(known, self.record(entry.place))
+        force = np.sum([c * f for c, f in zip(point.coefficients, forces, strict=True)], axis=0)
+        step = least_squares(self.columns, self.violated - self.passed(entry.place, [force])[:, 0], cutoff)
+        return dict(zip(fit.keys, (fit.values + step[: len(fit.keys)]).tolist(), strict=True))
+
+
+def reverse_system(base: "Baseline") -> ReverseSystem:
+    """The equations of the model that a search stands on, along the measured motion."""
+    fit, prepared = base.fit, base.prepared
+    free = base.motion.transpose(1, 0, 2).reshape(fit.samples, -1)
+    motion = corrected_motion(free, fit.misfit, prepared, fit.model.coordinates, fit.span)
+    transforms = stretch_transforms(prepared.record.runs(fit.span))  # of one stretch every other line is the record's
+    return ReverseSystem(base, motion, transforms, base.paths(transforms.size))
