@@ -6,6 +6,7 @@ from typing import Any
 
 from study.commands.structures import prepared_structures
 from study.compare import history
+from study.compare.comparison import compare
 from study.compare.comparison_report import as_json
 from study.compare.history_picture import history_files as history_pictures
 from study.diagnose.verdict import MISSING
@@ -15,7 +16,6 @@ from study.explore import placed_session as sessions
 from study.explore.placed_page import structure_files
 from study.explore.saved_files import PAGE
 from study.structure import structure_report
-from study.structure.structure_comparison import compare_structure
 from study.structure.structure_pictures import diagnosis_pictures
 from study.support.files import read_text, write_files
 
@@ -30,7 +30,7 @@ def structure_climb(arguments: argparse.Namespace, model: Model, steps: int, fol
     """
     work, text = folder / "climb", read_text(arguments.model, WANTED)
     (prepared,) = prepared_structures(arguments, model)
-    session = sessions.begin_placed(compare_structure(model, prepared))
+    session = sessions.begin_placed(compare(model, prepared))
     for number in range(steps + 1):
         stage = sessions.examined(session)
         session, diagnosis = sessions.with_stage(session, stage), stage.diagnosis

@@ -17,11 +17,11 @@ from study.commands.record_arguments import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from study.compare.comparison import Comparison
     from study.equations.model import Model
     from study.equations.term import Term
     from study.explore.placed_session import PlacedSession
     from study.records.prepared import Prepared
-    from study.structure.structure_comparison import StructureComparison
 
 
 def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[Prepared]":
@@ -51,8 +51,9 @@ def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[
 
 def compare_command(arguments: argparse.Namespace, model: "Model") -> None:
     """``study compare`` of a structure."""
+    from study.compare.comparison import compare
     from study.compare.comparison_report import as_json
-    from study.structure.structure_comparison import compare_structure, structure_document, structure_summary
+    from study.structure.structure_comparison import structure_document, structure_summary
     from study.structure.structure_page import PAGE, structure_page
     from study.structure.structure_pictures import structure_pictures
     from study.support.files import write_files
@@ -63,7 +64,7 @@ def compare_command(arguments: argparse.Namespace, model: "Model") -> None:
         _compare_measured(arguments, model, ready)
         return
     with progress("step", 3 * len(ready)) as step:
-        comparisons = [compare_structure(model, prepared, progress=step) for prepared in ready]
+        comparisons = [compare(model, prepared, progress=step) for prepared in ready]
     prefix = [f"{c.prepared.record.name}_" if len(ready) > 1 else "" for c in comparisons]
     files: dict[str, bytes] = {}
     for before, comparison in zip(prefix, comparisons, strict=True):
@@ -101,12 +102,12 @@ def refuse_measured(model: "Model", command: str) -> None:
 
 def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
     """``study diagnose`` of a structure."""
+    from study.compare.comparison import compare
     from study.compare.comparison_report import as_json
     from study.diagnose.diagnosis_files import unneeded_in_words
     from study.diagnose.user_candidates import own_candidates
     from study.equations import terms
     from study.structure.placed_needless import placed_needless
-    from study.structure.structure_comparison import compare_structure
     from study.structure.structure_page import PAGE, structure_page
     from study.structure.structure_pictures import diagnosis_pictures
     from study.structure.structure_report import (
@@ -129,7 +130,7 @@ def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
         return
     for prepared in ready:
         with progress(" candidates", name=prepared.record.name) as step:
-            comparison = compare_structure(model, prepared)
+            comparison = compare(model, prepared)
             diagnosis = diagnose_structure(comparison, own, arguments.without, progress=step)
             unneeded = placed_needless(comparison)
         print(f"{prepared.record.name}: {diagnosis.verdict.replace('_', ' ')}")
@@ -184,7 +185,7 @@ class Change:
     """One term more or less."""
 
     model: "Model"
-    follow: "Callable[[StructureComparison], StructureComparison]"  # beginning where the fit without the change ended
+    follow: "Callable[[Comparison], Comparison]"  # beginning where the fit without the change ended
     told: dict[str, str]  # in the history: what was ``added`` or ``dropped``
 
 
@@ -226,6 +227,7 @@ def _revise(
 ) -> None:  # fmt: skip
     """Compare a model and a changed one with all records; write the changed one with its history, and tell."""
     from study.compare import history
+    from study.compare.comparison import compare
     from study.compare.comparison_report import as_json
     from study.structure import measured_comparison, structure_comparison
 
@@ -237,7 +239,7 @@ def _revise(
             document = as_json(measured_comparison.measured_document(after))
             summaries.append(measured_comparison.measured_summary(after))
         else:
-            before = structure_comparison.compare_structure(model, prepared)
+            before = compare(model, prepared)
             revised, step = change.follow(before), structure_comparison.structure_history_step
             told = (step(before), step(revised, **change.told))
             document = as_json(structure_comparison.structure_document(revised))
@@ -250,8 +252,8 @@ def _revise(
 
 def session(arguments: argparse.Namespace, model: "Model", steps: "list[dict[str, Any]]") -> "PlacedSession":
     """What ``study explore`` of a structure begins with."""
+    from study.compare.comparison import compare
     from study.explore.placed_session import begin_placed
-    from study.structure.structure_comparison import compare_structure
     from study.support.errors import expect
 
     several = arguments.records[1:] or arguments.each_record
@@ -259,4 +261,4 @@ def session(arguments: argparse.Namespace, model: "Model", steps: "list[dict[str
     refuse_measured(model, "explore")
     (prepared,) = prepared_structures(arguments, model)
     with progress("step", 3) as step:
-        return begin_placed(compare_structure(model, prepared, progress=step), steps)
+        return begin_placed(compare(model, prepared, progress=step), steps)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
+from study.compare.leftover_by_place import DEGREE, TAUS, hysteretic, relaxed
 from study.equations.model import ModelTerm
 from study.equations.terms import custom
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -28,10 +29,8 @@ from study.support.least_squares import least_squares
 from study.support.statistics import Gain
 
 Floats = NDArray[np.float64]
-DEGREE = 7
 KNOTS = 24  # of a function of displacement or velocity in detail ...
 EDGES = (0.01, 0.99)  # ... between these quantiles: what lies beyond is too rare to tell a detail
-TAUS = (0.1, 0.3, 1.0, 3.0, 10.0)
 LONGEST = 16384  # samples of either part that are looked at
 
 
@@ -165,22 +164,6 @@ def _hats(x: Floats) -> list[Floats]:
     knots = np.linspace(first, last, KNOTS)
     inside = np.clip(x, first, last)
     return [np.clip(1.0 - np.abs(inside - knot) / (knots[1] - knots[0]), 0.0, None) for knot in knots]
-
-
-def relaxed(steps: Floats, kept: float) -> Floats:
-    """The sum of all steps so far, of each of which a share is kept from sample to sample, shape (n,)."""
-    size = next_fast_len(2 * len(steps), real=True)
-    memory = kept ** np.arange(len(steps))
-    return np.asarray(irfft(rfft(steps, size) * rfft(memory, size), size)[: len(steps)], dtype=np.float64)
-
-
-def hysteretic(steps: Floats, beta: float) -> Floats:
-    """A Bouc-Wen state along a motion's steps, no larger than one over ``beta``, shape (n,)."""
-    state, z = np.zeros_like(steps), 0.0
-    for i, step in enumerate(steps.tolist()):
-        z = min(max(z + step - beta * abs(step) * z, -1.0 / beta), 1.0 / beta)
-        state[i] = z
-    return state
 
 
 def _times(left: Unexplained) -> list[Floats]:

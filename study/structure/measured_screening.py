@@ -18,12 +18,12 @@ from study.equations.place import GROUND, Place
 from study.equations.term import Term
 from study.equations.terms import LIBRARY
 from study.identify.frequency_domain.inputs import input_history, reverse_inputs
+from study.identify.time_domain.placed_lines import placed_residual_lines
 from study.identify.time_domain.shape_search import values_to_try
 from study.records.prepared import Prepared
 from study.records.record import Record
 from study.structure.measured_start import line_fits
 from study.structure.placed_candidates import external, one_sided
-from study.structure.placed_lines import placed_residual_lines
 from study.support.arrays import Floats
 from study.support.cores import cores
 from study.support.errors import StudyError

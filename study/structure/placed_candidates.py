@@ -15,9 +15,9 @@ from study.equations.place import Place
 from study.equations.term import Term
 from study.equations.terms import effects_but
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.placed_search import PlacedBaseline, PlacedStart, placed_starts, with_placed_term
 from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import Prepared
-from study.structure.placed_search import PlacedBaseline, PlacedStart, placed_starts, with_placed_term
 from study.support.cores import cores
 from study.support.errors import StudyError
 

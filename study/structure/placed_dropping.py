@@ -2,14 +2,14 @@
 
 from contextlib import suppress
 
+from study.compare.comparison import Comparison, compare
 from study.equations.layout import check
 from study.equations.model import Model
 from study.equations.place import Place
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part
+from study.identify.time_domain.structure_start import first_fit
 from study.identify.time_domain.weighted_fit import finished
-from study.structure.structure_comparison import StructureComparison, compare_structure
-from study.structure.structure_start import first_fit
 from study.support.errors import StudyError, expect
 
 
@@ -32,7 +32,7 @@ def term_at(model: Model, name: str, place: Place | None) -> str:
     return own[0]
 
 
-def dropped_term(comparison: StructureComparison, name: str) -> StructureComparison:
+def dropped_term(comparison: Comparison, name: str) -> Comparison:
     """The comparison of a structure without one of its terms, all that it does not hold fitted again.
 
     The fit begins where that with the term ended, and as that of a new structure: the better one stays.
@@ -53,4 +53,4 @@ def dropped_term(comparison: StructureComparison, name: str) -> StructureCompari
         fits.append(first_fit(given, prepared))
     expect(fits, f"{given.name!r} without {name} has no finite motion under the forces of {prepared.record.name!r}")
     best = min(fits, key=lambda f: f.cost)
-    return compare_structure(given, prepared, finished(best, prepared))
+    return compare(given, prepared, fit=finished(best, prepared))

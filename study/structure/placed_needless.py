@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from study.compare.comparison import Comparison
 from study.compare.prediction import Prediction, predict
 from study.diagnose.credibility import certain
 from study.diagnose.needless import DOUBLED, is_open, relative_interval, sentence
@@ -18,11 +19,10 @@ from study.equations.place import place_in_words
 from study.figures.labels import term_names
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part, linearise, uncertainty
+from study.identify.time_domain.placed_search import grown_states
 from study.identify.time_domain.weighted_fit import noise_left
 from study.records.prepared import Prepared
 from study.structure.placed_ranking import held_out_parts, held_out_test
-from study.structure.placed_search import grown_states
-from study.structure.structure_comparison import StructureComparison
 from study.support.arrays import Floats
 from study.support.cores import cores
 from study.support.errors import StudyError
@@ -54,7 +54,7 @@ class PlacedNeedless:
         return sentence(words, self.error_with, self.error_without, any_more)
 
 
-def placed_needless(comparison: StructureComparison) -> tuple[PlacedNeedless, ...]:
+def placed_needless(comparison: Comparison) -> tuple[PlacedNeedless, ...]:
     """The terms that a fitted structure does not need, the one whose loss costs least first.
 
     Each one named is not needed where those before it are gone as well. Inertia, terms of which the user gives a value,

@@ -1,123 +1,21 @@
 """A structure held against a record: how good it is, and where it fails."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from study.compare.prediction import Prediction, predict
+from study.compare.comparison import Comparison
+from study.compare.fitted_coefficients import Coefficient
+from study.compare.leftover_by_place import explained_by_place
 from study.equations import model_file
-from study.equations.coefficient_units import coefficient_unit, parameter_units
-from study.equations.linear_part import Modes, modes_of, modes_table
-from study.equations.model import Model, ModelTerm
-from study.equations.place import HERE, Place, place_in_words
-from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.part_fit import linearise, uncertainty
-from study.identify.time_domain.weighted_fit import finished
-from study.records.prepared import Prepared
-from study.records.record import Record
-from study.structure.missing_forces import MissingForces, missing_forces
-from study.structure.structure_leftover import FamilyGain, explained_by_place, family_gains
-from study.structure.structure_start import first_fit
-from study.support.arrays import Floats
-from study.support.errors import expect
+from study.equations.linear_part import Modes, modes_table
+from study.equations.place import HERE, place_in_words
 from study.support.numbers import percent
 
 
-@dataclass(frozen=True)
-class PlacedCoefficient:
-    """A coefficient or shape parameter of a fitted structure."""
-
-    key: str
-    term: str
-    place: Place
-    value: float
-    error: float | None  # standard error; None where the value was held
-    unit: str
-
-    @property
-    def interval(self) -> tuple[float, float] | None:
-        """95 % confidence interval; None if the value was held."""
-        return None if self.error is None else (self.value - 1.96 * self.error, self.value + 1.96 * self.error)
-
-
-@dataclass(frozen=True, eq=False)
-class StructureComparison:
-    """A structure held against one record."""
-
-    model: Model  # as it was given
-    prepared: Prepared
-    fit: FreeRunFit
-    covariance: Floats  # of the estimates; shape (keys, keys)
-    coefficients: tuple[PlacedCoefficient, ...]
-    prediction: Prediction
-    modes: Modes
-    forces: MissingForces  # what each coordinate's equation leaves, and between which places
-    notes: tuple[str, ...]
-
-    @cached_property
-    def leftovers(self) -> tuple[FamilyGain, ...]:
-        """What general shapes of the motion at each place explain of what is left, held out; asked for when shown."""
-        return tuple(family_gains(self.fit, self.prediction))
-
-
-def compare_structure(
-    model: Model,
-    prepared: Prepared,
-    fit: FreeRunFit | None = None,
-    progress: Callable[[str], None] | None = None,
-) -> StructureComparison:
-    """Fit what a structure leaves open to one part of a record and judge it on the other.
-
-    ``fit`` is the finished fit of a candidate.
-
-    Raises
-    ------
-    StudyError
-        If the model cannot be fitted.
-    """
-    report: Callable[[str], None] = progress or (lambda _: None)
-    sentence = f"{model.name!r} has 'linear: measured'; expected a model with inertia at every coordinate here"
-    expect(not model.measured, f"{sentence}; 'study compare', 'diagnose', 'add' and 'drop' take this one")
-    report("fit")
-    if fit is None:
-        fit = finished(first_fit(model, prepared), prepared)
-    covariance = uncertainty(fit, prepared, linearise(fit, prepared))[: len(fit.keys), : len(fit.keys)]
-    report("free run")
-    prediction = predict(fit, prepared)
-    report("where it fails")
-    modes = modes_of(fit.model, fit.keys, covariance)
-    notes = [*prepared.notes]
-    if modes.rigid:
-        notes.append(f"nothing ties the structure down in {modes.rigid} of its motions: it may drift away as a whole")
-    if fit.undecided:
-        notes.append(f"this record cannot tell apart, or does not show, {', '.join(fit.undecided)}")
-    return StructureComparison(
-        model, prepared, fit, covariance, _coefficients(fit, covariance, prepared.record), prediction, modes,
-        missing_forces(fit.model, prediction), tuple(notes),
-    )  # fmt: skip
-
-
-def _coefficients(fit: FreeRunFit, covariance: Floats, record: Record) -> tuple[PlacedCoefficient, ...]:
-    errors = dict(zip(fit.keys, np.sqrt(np.diag(covariance)).tolist(), strict=True))
-    return tuple(
-        PlacedCoefficient(key, entry.term.name, entry.place, float(value), errors.get(key), unit)
-        for entry in fit.model.terms
-        for (key, value), unit in zip(entry.values.items(), _units(entry, record), strict=True)
-        if value is not None
-    )
-
-
-def _units(entry: ModelTerm, record: Record) -> list[str]:
-    own = [coefficient_unit(entry, symbol, record) for symbol in entry.term.symbols]
-    return [*own, *parameter_units(entry, record).values()]
-
-
-def structure_in_words(comparison: StructureComparison) -> str:
+def structure_in_words(comparison: Comparison) -> str:
     """What a person wants to know, in sentences."""
-    prediction, forces = comparison.prediction, comparison.forces
+    prediction, forces = comparison.prediction, comparison.missing
     worst = int(np.argmax(prediction.errors))
     said = [
         f"The free run leaves {percent(prediction.error)} of the motion, {percent(prediction.errors[worst])} at "
@@ -138,9 +36,9 @@ def structure_in_words(comparison: StructureComparison) -> str:
     return " ".join(said)
 
 
-def structure_document(comparison: StructureComparison) -> dict[str, Any]:
+def structure_document(comparison: Comparison) -> dict[str, Any]:
     """What ``comparison.json`` holds."""
-    prediction, fit, forces = comparison.prediction, comparison.fit, comparison.forces
+    prediction, fit, forces = comparison.prediction, comparison.fit, comparison.missing
     explained = explained_by_place(comparison.leftovers)
     return {
         "record": prediction.prepared.record.name,
@@ -165,7 +63,7 @@ def structure_document(comparison: StructureComparison) -> dict[str, Any]:
         "where": {
             "coordinates": [
                 {"coordinate": c, "residual_force": float(r), "force": float(f)}
-                for c, r, f in zip(forces.coordinates, forces.rms, forces.size, strict=True)
+                for c, r, f in zip(forces.coordinates, forces.rms, forces.inertia, strict=True)
             ],
             "places": [
                 {**place.plain(), "share": share, "explained": explained.get(place.path, 0.0)}
@@ -182,7 +80,7 @@ def structure_document(comparison: StructureComparison) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def placed_coefficient_row(c: PlacedCoefficient) -> dict[str, Any]:
+def placed_coefficient_row(c: Coefficient) -> dict[str, Any]:
     """A coefficient as a plain row."""
     return {
         "key": c.key, "term": c.term, **({} if c.place == HERE else c.place.plain()), "value": c.value,
@@ -203,11 +101,11 @@ def mode_rows(modes: Modes) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def structure_summary(comparison: StructureComparison) -> str:
+def structure_summary(comparison: Comparison) -> str:
     """The tables that a person reads first, and the sentences below them."""
     from tabulate import tabulate
 
-    prediction, forces = comparison.prediction, comparison.forces
+    prediction, forces = comparison.prediction, comparison.missing
     left = {c: f"{rms:.3g} {forces.units(c)['force']}" for c, rms in zip(forces.coordinates, forces.rms, strict=True)}
     rows = [
         [
@@ -231,19 +129,19 @@ def structure_summary(comparison: StructureComparison) -> str:
     return "\n\n".join(parts) + (f"\n({'; '.join(comparison.notes)})" if comparison.notes else "")
 
 
-def _interval(c: PlacedCoefficient) -> str:
+def _interval(c: Coefficient) -> str:
     return "held" if c.interval is None else f"{c.interval[0]:.5g} to {c.interval[1]:.5g}"
 
 
 def structure_history_step(
-    comparison: StructureComparison, added: str | None = None, dropped: str | None = None
+    comparison: Comparison, added: str | None = None, dropped: str | None = None
 ) -> dict[str, Any]:
     """A comparison as a step of the history (``study.compare.history``)."""
     prediction = comparison.prediction
     return {
         "terms": [t.name for t in comparison.model.terms], "added": added, "dropped": dropped,
         "record": prediction.prepared.record.name,
-        "error": {"force": comparison.forces.share, "response": prediction.error},
+        "error": {"force": comparison.missing.share, "response": prediction.error},
         "rms": float(np.sqrt(np.mean(prediction.misfit**2))), "unit": "",
         "noise_floor": {"response": prediction.floor}, "converged": comparison.fit.converged,
         "coefficients": [placed_coefficient_row(c) for c in comparison.coefficients],

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
 
+from study.compare.comparison import Comparison
 from study.diagnose.verdict import MISSING
 from study.equations.place import Place
 from study.equations.place import place_in_words as placed
@@ -20,7 +21,7 @@ from study.figures.sketch import Sketch, svg
 from study.figures.styles import in_style
 from study.structure import structure_panels
 from study.structure.placed_ranking import PlacedRanked
-from study.structure.structure_comparison import StructureComparison, structure_in_words
+from study.structure.structure_comparison import structure_in_words
 from study.structure.structure_pictures import (
     modes,
     responses_figure,
@@ -36,7 +37,7 @@ from study.support.numbers import percent
 PAGE = "structure.html"
 
 
-def structure_page(comparison: StructureComparison, diagnosis: StructureDiagnosis | None = None) -> bytes:
+def structure_page(comparison: Comparison, diagnosis: StructureDiagnosis | None = None) -> bytes:
     """The page as the content of a file; the same bytes from the same input."""
     drawn = sketch_of(comparison) if diagnosis is None else sketch_of_diagnosis(diagnosis)
     name, model = comparison.prepared.record.name, comparison.model.name
@@ -72,28 +73,28 @@ def structure_page(comparison: StructureComparison, diagnosis: StructureDiagnosi
     return text.replace("{body}", "\n".join(body)).encode()
 
 
-def _maps(comparison: StructureComparison) -> dict[frozenset[str], bytes]:
+def _maps(comparison: Comparison) -> dict[frozenset[str], bytes]:
     """The restoring-force map of each connection that the motion shows, as PNG."""
     found: dict[frozenset[str], bytes] = {}
-    for place, _ in comparison.forces.aligned:
-        curve = comparison.forces.curves.get(place.label)
+    for place, _ in comparison.missing.aligned:
+        curve = comparison.missing.curves.get(place.label)
         if curve is not None and len(curve.at):
             figure, (axes,) = page.empty_page(
                 place.label, "missing force over relative displacement", panel=2.3, headed=False
             )  # fmt: skip
-            structure_panels.connection_force(axes, comparison.forces, place.label)
+            structure_panels.connection_force(axes, comparison.missing, place.label)
             page.shared_legend(figure, [axes])
             found[place.path] = page.rendered(figure, "png")
     return found
 
 
 def _places(
-    comparison: StructureComparison, diagnosis: StructureDiagnosis | None, drawn: Sketch,
+    comparison: Comparison, diagnosis: StructureDiagnosis | None, drawn: Sketch,
     maps: Mapping[frozenset[str], bytes], selected: Place,
 ) -> str:  # fmt: skip
     """What is known of each place, one block each."""
     rows = diagnosis.candidates if diagnosis is not None else ()
-    shares = {place.path: share for place, share in comparison.forces.aligned}
+    shares = {place.path: share for place, share in comparison.missing.aligned}
     blocks: list[str] = []
     for link in drawn.links:
         place, path = link.place, link.place.path
@@ -116,7 +117,7 @@ def _capital(text: str) -> str:
     return text[0].upper() + text[1:]
 
 
-def terms_there(comparison: StructureComparison, path: frozenset[str]) -> str:
+def terms_there(comparison: Comparison, path: frozenset[str]) -> str:
     """The terms that the model has at a place, in a sentence."""
     names = [
         term_names(e.term.name)
@@ -138,7 +139,7 @@ def _candidates(rows: Sequence[PlacedRanked]) -> str:
     return f"<table>{head}{''.join(lines)}</table>"
 
 
-def _coefficients(comparison: StructureComparison) -> str:
+def _coefficients(comparison: Comparison) -> str:
     lines = [
         f"<tr><td>{escape(c.key)}<td>{c.value:.5g}<td>"
         + ("held" if c.interval is None else f"{c.interval[0]:.5g} to {c.interval[1]:.5g}")

@@ -6,6 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
+from study.compare.comparison import Comparison, compare
+from study.compare.leftover_by_place import FamilyGain, family_gains
 from study.compare.prediction import Prediction
 from study.diagnose.credibility import credible
 from study.diagnose.verdict import MISSING, MOST, NOTHING, UNKNOWN
@@ -13,6 +15,7 @@ from study.equations.linear_part import Modes, modes_of
 from study.equations.model import ModelTerm
 from study.equations.term import Term
 from study.identify.time_domain.part_fit import fit_part, linearise, uncertainty
+from study.identify.time_domain.placed_search import PlacedBaseline, placed_baseline, with_placed_term
 from study.identify.time_domain.weighted_fit import finished
 from study.structure.placed_candidates import (
     candidate_entries,
@@ -24,9 +27,6 @@ from study.structure.placed_candidates import (
     worth_fitting,
 )
 from study.structure.placed_ranking import PlacedRanked, rank_placed
-from study.structure.placed_search import PlacedBaseline, placed_baseline, with_placed_term
-from study.structure.structure_comparison import StructureComparison, compare_structure
-from study.structure.structure_leftover import FamilyGain, family_gains
 from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE
 
 SHORT, LONG = 2048, 8192  # samples: a search uses half of the fitting part, within these limits
@@ -38,7 +38,7 @@ class StructureDiagnosis:
     """What is missing from a structure."""
 
     verdict: str  # ``missing_effect``, ``nothing_missing`` or ``unknown_effect``
-    comparison: StructureComparison  # the structure as it was given
+    comparison: Comparison  # the structure as it was given
     candidates: tuple[PlacedRanked, ...]  # best first
     asked: int  # effects times places
     left: float  # rms of what remains above the noise beside the best explanation, over the rms response
@@ -55,7 +55,7 @@ class StructureDiagnosis:
 
 
 def diagnose_structure(
-    comparison: StructureComparison,
+    comparison: Comparison,
     extra: Sequence[Term] = (),
     without: Sequence[str] = (),
     progress: Callable[[str], None] | None = None,
@@ -76,7 +76,7 @@ def diagnose_structure(
     return _decide(rows, comparison, len(entries))
 
 
-def placed_search_base(comparison: StructureComparison) -> PlacedBaseline:
+def placed_search_base(comparison: Comparison) -> PlacedBaseline:
     """The fitted structure as candidates are tried beside it, on no more samples than a search takes."""
     prepared, fit = comparison.prepared, comparison.fit
     first, last = prepared.plan.fit
@@ -89,7 +89,7 @@ def placed_search_base(comparison: StructureComparison) -> PlacedBaseline:
     return placed_baseline(again, look)
 
 
-def added_term(comparison: StructureComparison, entry: ModelTerm) -> StructureComparison:
+def added_term(comparison: Comparison, entry: ModelTerm) -> Comparison:
     """The comparison of the structure with a term more, fitted as a diagnosis fits that candidate.
 
     Raises
@@ -100,10 +100,10 @@ def added_term(comparison: StructureComparison, entry: ModelTerm) -> StructureCo
     base = placed_search_base(comparison)
     fit = with_placed_term(base.fit, entry, base.prepared, base)
     model = comparison.model.with_term(entry)
-    return compare_structure(model, comparison.prepared, finished(fit, comparison.prepared))
+    return compare(model, comparison.prepared, fit=finished(fit, comparison.prepared))
 
 
-def _decide(rows: list[PlacedRanked], comparison: StructureComparison, asked: int) -> StructureDiagnosis:
+def _decide(rows: list[PlacedRanked], comparison: Comparison, asked: int) -> StructureDiagnosis:
     prediction = comparison.prediction
     believed = [r for r in rows if credible(prediction, r.prediction, r.interval, r.p_value)]
     if not believed:

@@ -11,9 +11,9 @@ from study.equations.place import GROUND, Place
 from study.equations.simulate import Integrator, simulate
 from study.equations.term import Term
 from study.equations.terms import get
+from study.identify.frequency_domain.inputs import relative_record
 from study.records.excitation import Excitation, force
 from study.records.record import MOTIONS, Record, Sensor
-from study.structure.missing_forces import relative_record
 from study.structure.placed_candidates import external
 from study.support.arrays import Floats
 from study.support.errors import expect

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.equations.model import Model, ModelTerm
-from study.equations.substeps import needed_steps
 from study.equations.terms import LIBRARY
 from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start
@@ -29,9 +28,10 @@ from study.identify.time_domain.no_response import (
     unfit,
     why_no_response,
 )
-from study.identify.time_domain.part_fit import STEPS, covariance_of, fit_part, linearise
+from study.identify.time_domain.part_fit import covariance_of, fit_part, linearise, rough_steps
 from study.identify.time_domain.settling import KEPT, better_fit, continued, from_segments, settled
 from study.identify.time_domain.shape_search import Baseline
+from study.identify.time_domain.structure_start import first_fit
 from study.records.prepared import FORCE, Prepared
 from study.support.errors import StudyError
 
@@ -67,6 +67,8 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
     StudyError
         If the model cannot be fitted.
     """
+    if model.named and start is None:
+        return settled(continued(first_fit(model, prepared), prepared), prepared)
     if "inertia" not in model and prepared.response != FORCE:
         raise StudyError(f"model {model.name!r} has no inertia; a free run needs it")
     _check_own_formulas(model, prepared)
@@ -243,11 +245,6 @@ def _at_minimum(
 
 def _unphysical(fit: FreeRunFit) -> bool:
     return any(entry.term.physical(fit.model.values) for entry in fit.model.terms)
-
-
-def rough_steps(model: Model, prepared: Prepared, start: Values) -> int:
-    """Steps of a search's runs: those of every search, or more where the model's own rates ask for them."""
-    return max(STEPS, needed_steps(model.with_values(start), prepared.record, prepared.outputs))
 
 
 def _tried(

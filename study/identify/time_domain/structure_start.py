@@ -10,12 +10,12 @@ from study.equations.equations_of_motion import loose_motions
 from study.equations.linear_part import linear_keys
 from study.equations.model import Model
 from study.identify.frequency_domain.linear_start import lumped_start
-from study.identify.time_domain.fit_model import rough_steps
+from study.identify.time_domain.free_decay import free_decay_start
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.part_fit import fit_part
+from study.identify.time_domain.part_fit import fit_part, rough_steps
+from study.identify.time_domain.placed_search import with_placed_term
 from study.identify.time_domain.shooting import own_begins
 from study.records.prepared import Prepared
-from study.structure.free_decay import free_decay_start
 from study.support.errors import DivergenceError, expect
 
 
@@ -36,8 +36,6 @@ def first_fit(model: Model, prepared: Prepared) -> FreeRunFit:
     StudyError
         If no fit begins.
     """
-    from study.structure.placed_search import with_placed_term
-
     unknown = [t for t in model.terms if None in t.parameters]
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
     fit = _fitted(known, prepared, known_linear(known, prepared))

@@ -8,17 +8,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.fft import next_fast_len
+from scipy.fft import irfft, next_fast_len, rfft
 
 from study.compare.prediction import Prediction
-from study.diagnose.dependence import DEGREE, TAUS, hysteretic, relaxed
 from study.equations.linear_part import connections, matrices, transfer
 from study.equations.place import Place
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import JudgingRun
+from study.identify.time_domain.placed_lines import placed_modulation_lines, placed_residual_lines
 from study.records.record import MOTIONS, Sensor
 from study.records.spectra import stretch_transforms
-from study.structure.placed_lines import placed_modulation_lines, placed_residual_lines
 from study.support import statistics
 from study.support.arrays import Complexes, Floats
 from study.support.errors import DivergenceError
@@ -26,6 +25,8 @@ from study.support.least_squares import least_squares
 from study.support.statistics import Gain
 from study.support.thresholds import ALPHA
 
+DEGREE = 7
+TAUS = (0.1, 0.3, 1.0, 3.0, 10.0)
 LONGEST = 8192  # samples of either part that are looked at
 
 
@@ -134,3 +135,19 @@ def _held_out(own: Floats, columns: Floats, residual: Floats, cut: int) -> tuple
     basis = np.linalg.qr(own[cut:] / np.where(length > 0.0, length, 1.0))[0]
     late = late - basis @ (basis.T @ late)
     return late[:, 0], late[:, 0] - late[:, 1]
+
+
+def relaxed(steps: Floats, kept: float) -> Floats:
+    """The sum of all steps so far, of each of which a share is kept from sample to sample, shape (n,)."""
+    size = next_fast_len(2 * len(steps), real=True)
+    memory = kept ** np.arange(len(steps))
+    return np.asarray(irfft(rfft(steps, size) * rfft(memory, size), size)[: len(steps)], dtype=np.float64)
+
+
+def hysteretic(steps: Floats, beta: float) -> Floats:
+    """A Bouc-Wen state along a motion's steps, no larger than one over ``beta``, shape (n,)."""
+    state, z = np.zeros_like(steps), 0.0
+    for i, step in enumerate(steps.tolist()):
+        z = min(max(z + step - beta * abs(step) * z, -1.0 / beta), 1.0 / beta)
+        state[i] = z
+    return state

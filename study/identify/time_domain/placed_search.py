@@ -19,15 +19,16 @@ from study.equations.linear_part import LINEAR, linear_keys, matrices, patterns,
 from study.equations.model import Model, ModelTerm
 from study.equations.place import Place
 from study.equations.term import Term
-from study.identify.frequency_domain.inputs import input_history
+from study.identify.frequency_domain.inputs import input_history, placed_inputs, relative_record
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part, linearise
+from study.identify.time_domain.placed_lines import placed_modulation_lines, placed_residual_lines
 from study.identify.time_domain.shape_search import MODULATION, values_to_try
+from study.records.completion import derivative
+from study.records.noise_floor import band_above_noise, in_band
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import StretchTransforms, stretch_transforms
-from study.structure.missing_forces import corrected_motion, placed_inputs, relative_record
-from study.structure.placed_lines import placed_modulation_lines, placed_residual_lines
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares
@@ -142,6 +143,30 @@ def placed_baseline(fit: FreeRunFit, prepared: Prepared) -> PlacedBaseline:
     violated = left - _drifted(bare, free)
     residual = violated - basis @ (basis.T @ violated)
     return replace(bare, columns=columns, basis=basis, violated=violated, residual=residual)
+
+
+def corrected_motion(
+    free: Floats, difference: Floats, prepared: Prepared, coordinates: Sequence[str], span: tuple[int, int]
+) -> Floats:
+    """A free run's motions along a span, shape (samples, 3 coordinates), with what of the difference is no noise.
+
+    Shape (3, samples, coordinates). Each stretch is differentiated by itself: at its end the difference jumps.
+    """
+    runs = [slice(begin - span[0], end - span[0]) for begin, end in prepared.record.runs(span)]
+    motion = free.reshape(len(free), len(MOTIONS), -1).transpose(1, 0, 2).copy()
+    for sensor, values in zip(prepared.sensors, difference.T, strict=True):
+        band, level = band_above_noise(values, prepared.dt, prepared.band[0]), MOTIONS.index(sensor.motion)
+        if band is None:
+            continue
+        for part in runs:
+            seen = values[part] if prepared.record.stretches else in_band(values[part], prepared.dt, *band)
+            for order in range(len(MOTIONS)):
+                steps = order - level
+                change = derivative(seen, prepared.dt, steps, prepared.band[0] if steps < 0 else 0.0)
+                if prepared.record.stretches:  # each begins and ends with a step, which no filter may meet before
+                    change = in_band(change, prepared.dt, *band)
+                motion[order, part, coordinates.index(sensor.coordinate)] += change
+    return motion
 
 
 def weighted_as(fit: FreeRunFit, values: Floats) -> Floats:
