@@ -36,6 +36,7 @@ from study.support.errors import StudyError, expect
 
 STEPS = 5  # reports of progress a record
 Progress = Callable[[str], None]
+Value = tuple[float, float, str]  # value, standard error (not a number where it was held), unit
 CHAOTIC = (
     "the fitted system magnifies disturbances, as a chaotic one does: one free run would lose the measured motion "
     "however true the model, so it is fitted and judged in segments, each from a state of its own"
@@ -87,6 +88,20 @@ class Comparison:
         if not is_positive(self.fit.model, {}):
             return Modes(*(np.zeros(0) for _ in range(4)), *(np.zeros((0, len(self.model.coordinates))),) * 2)
         return modes_of(self.fit.model, self.found.symbols, self.found.covariance)
+
+    @property
+    def natural(self) -> tuple[Value | None, Value | None]:
+        """Natural frequency and damping ratio of a single mass, (4.4) and (4.5); None without what they follow from."""
+        modes, known = self.modes, "linear_damping" in self.model
+        if not np.any(modes.frequency > 0.0):
+            return None, None
+        frequency, ratio = (
+            (float(value[0]), float(error[0]) or math.nan, unit)
+            for value, error, unit in (
+                (modes.frequency, modes.frequency_error, "Hz"), (modes.damping, modes.damping_error, "")
+            )
+        )  # fmt: skip
+        return frequency, ratio if known else None
 
     @property
     def force(self) -> ForceError:
