@@ -52,10 +52,9 @@ def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[
 def compare_command(arguments: argparse.Namespace, model: "Model") -> None:
     """``study compare`` of a structure."""
     from study.compare.comparison import compare
-    from study.compare.comparison_report import as_json
-    from study.structure.structure_comparison import structure_document, structure_summary
+    from study.compare.comparison_pictures import comparison_pictures
+    from study.compare.comparison_report import as_json, comparison_document, comparison_summary
     from study.structure.structure_page import PAGE, structure_page
-    from study.structure.structure_pictures import structure_pictures
     from study.support.files import write_files
 
     folder = out_folder(arguments)
@@ -68,11 +67,11 @@ def compare_command(arguments: argparse.Namespace, model: "Model") -> None:
     prefix = [f"{c.prepared.record.name}_" if len(ready) > 1 else "" for c in comparisons]
     files: dict[str, bytes] = {}
     for before, comparison in zip(prefix, comparisons, strict=True):
-        made = {PAGE: structure_page(comparison), "comparison.json": as_json(structure_document(comparison))}
-        made |= structure_pictures(comparison)
+        made = {PAGE: structure_page(comparison), "comparison.json": as_json(comparison_document([comparison]))}
+        made |= comparison_pictures(comparison)
         files |= {before + name: content for name, content in made.items()}
     write_files(folder, files, inputs_of(arguments))
-    print("\n\n".join(structure_summary(c) for c in comparisons))
+    print("\n\n".join(comparison_summary([c]) for c in comparisons))
     print(f"\n{folder}: {_listed(files)}")
 
 
@@ -228,8 +227,8 @@ def _revise(
     """Compare a model and a changed one with all records; write the changed one with its history, and tell."""
     from study.compare import history
     from study.compare.comparison import compare
-    from study.compare.comparison_report import as_json
-    from study.structure import measured_comparison, structure_comparison
+    from study.compare.comparison_report import as_json, comparison_document, comparison_summary, history_step
+    from study.structure import measured_comparison
 
     folder, summaries, document = out_folder(arguments), list[str](), b""
     for prepared in prepared_structures(arguments, model):
@@ -240,10 +239,10 @@ def _revise(
             summaries.append(measured_comparison.measured_summary(after))
         else:
             before = compare(model, prepared)
-            revised, step = change.follow(before), structure_comparison.structure_history_step
+            revised, step = change.follow(before), history_step
             told = (step(before), step(revised, **change.told))
-            document = as_json(structure_comparison.structure_document(revised))
-            summaries.append(structure_comparison.structure_summary(revised))
+            document = as_json(comparison_document([revised]))
+            summaries.append(comparison_summary([revised]))
         steps = history.with_step(steps, *told)
     written_together(arguments, text, steps, document, folder)
     print("\n\n".join(summaries))

@@ -19,10 +19,11 @@ from study.compare.leftover_by_place import FamilyGain, family_gains
 from study.compare.local_force_error import local_force_error
 from study.compare.minima import rivals_note
 from study.compare.missing_force import MissingForce, Unbalanced, unbalanced
-from study.compare.prediction import Prediction, predict
+from study.compare.prediction import Prediction, SensorPrediction, predict
 from study.equations.equations_of_motion import loose_motions
 from study.equations.linear_part import Modes, is_positive, modes_of
 from study.equations.model import Model
+from study.equations.place import Place
 from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -56,6 +57,7 @@ class Comparison:
     bands: tuple[Band, ...]  # where in frequency most of the unexplained power of responses and force lies
     missing: Unbalanced  # what each equation of motion leaves
     missing_force: MissingForce  # the force that the model lacks where most is missing
+    place: Place  # where that is
     growths: Growths | None  # what it grows with; None where nothing stands above the noise
     time: AlongTime  # whether the error of the sensor that is missed most changes along the record
     notes: tuple[str, ...]  # what was converted, integrated or left out
@@ -76,6 +78,16 @@ class Comparison:
         """First sample of the parts to fit and to judge, and the one after the last, as the record was sampled."""
         plan = (self.prepared.as_sampled or self.prepared).plan
         return plan.fit, plan.judge
+
+    @property
+    def views(self) -> tuple[SensorPrediction, ...]:
+        """What each sensor shows of the prediction; a single mass has one."""
+        return self.prediction.views
+
+    @property
+    def worst(self) -> SensorPrediction:
+        """What the sensor shows that is missed most."""
+        return self.views[int(np.argmax(self.prediction.errors))]
 
     @cached_property
     def coefficients(self) -> tuple[Coefficient, ...]:
@@ -183,16 +195,18 @@ def _judged(
     in_reverse: Callable[[Model, Prediction], ForceError] = force_error, report: Progress = lambda _: None,
 ) -> dict[str, Any]:  # fmt: skip
     """The fields of a comparison that say how good a fit is on the judging part, and where it fails."""
-    views = [prediction.of(i) for i in range(len(prediction.prepared.outputs))]
+    views = prediction.views
     report("force")
     forces = () if fit.model.named else (in_reverse(fit.model, prediction),)
     report("where it fails")
     missing = unbalanced(fit.model, keys, prediction)
-    lacking = missing.at(next(iter(missing.shown), missing.aligned[0][0]))
+    place = next(iter(missing.shown), missing.aligned[0][0])
+    lacking = missing.at(place)
     report("what it grows with")
     return {
         "prediction": prediction, "forces": forces, "bands": bands(views, forces), "missing": missing,
-        "missing_force": lacking, "growths": None if all(v.noise.alone for v in views) else growths(lacking),
+        "missing_force": lacking, "place": place,
+        "growths": None if all(v.noise.alone for v in views) else growths(lacking),
         "time": along_time(views[int(np.argmax(prediction.errors))]),
     }  # fmt: skip
 

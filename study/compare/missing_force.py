@@ -169,8 +169,7 @@ def unbalanced(model: Model, keys: Sequence[str], prediction: Prediction) -> Unb
     """
     if prediction.prepared.response == FORCE:
         return _along_a_known_motion(model, keys, prediction)
-    prepared, views = prediction.prepared, [prediction.of(i) for i in range(len(prediction.prepared.outputs))]
-    noises = [view.noise for view in views]
+    prepared, noises = prediction.prepared, [view.noise for view in prediction.views]
     frequency, low = noises[0].frequency, prepared.band[0]
     gates = np.stack([lines_above_noise(noise, low) for noise in noises], axis=1)
     motion = _motion(model, prediction, gates, frequency)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from study.compare.comparison import Comparison, compare
+from study.compare.comparison_report import history_step
 from study.diagnose.diagnosis_files import unneeded_in_words
 from study.equations.model import Model, free
 from study.equations.terms import Term
@@ -12,7 +13,6 @@ from study.explore.session import Step, joined, own_term
 from study.records.prepared import Prepared
 from study.structure.placed_dropping import dropped_term, term_at
 from study.structure.placed_needless import PlacedNeedless, placed_needless
-from study.structure.structure_comparison import structure_history_step
 from study.structure.structure_report import structure_diagnosis_in_words
 from study.structure.structure_verdict import StructureDiagnosis, added_term, diagnose_structure
 
@@ -53,7 +53,7 @@ class PlacedSession:
     @property
     def steps(self) -> list[Step]:
         """The history, the steps before this session included."""
-        return joined(self.earlier, [structure_history_step(s.comparison, s.added, s.dropped) for s in self.stages])
+        return joined(self.earlier, [history_step(s.comparison, s.added, s.dropped) for s in self.stages])
 
 
 def begin_placed(comparison: Comparison, earlier: Sequence[Step] = ()) -> PlacedSession:

@@ -13,6 +13,7 @@ import numpy as np
 from study.compare.comparison import Comparison
 from study.compare.connection_spectra import dynamic_stiffnesses, highest_frequency, missing_force_spectra
 from study.compare.noise import segments_of
+from study.compare.place_pictures import sketch_of
 from study.compare.residual_checks import own_checks
 from study.explore import decimate
 from study.explore.axis_scales import Columns, Floats
@@ -23,7 +24,7 @@ from study.explore.placed_words import placed_words
 from study.figures.labels import power_of_ten
 from study.figures.sketch import Sketch
 from study.records.spectra import autospectrum
-from study.structure.structure_pictures import sketch_of, sketch_of_diagnosis
+from study.structure.structure_pictures import sketch_of_diagnosis
 
 NINETY_FIVE = 1.96  # standard errors to each side
 

@@ -6,6 +6,7 @@ from html import escape
 from typing import Any
 
 from study.compare.comparison import Comparison
+from study.compare.comparison_sentences import comparison_in_words
 from study.compare.fitted_coefficients import Coefficient
 from study.compare.leftover_by_place import explained_by_place
 from study.equations.linear_part import Modes
@@ -17,7 +18,6 @@ from study.explore.words import HEAD, NOT_ASKED, UNKNOWN, VERDICTS, WAITING, bar
 from study.figures.labels import power_of_ten
 from study.figures.sketch import Sketch, svg
 from study.structure.placed_ranking import PlacedRanked
-from study.structure.structure_comparison import structure_in_words
 from study.structure.structure_page import terms_there
 from study.support.numbers import percent
 
@@ -30,7 +30,7 @@ def placed_words(stage: PlacedStage, drawn: Sketch, step: int, live: bool) -> di
     chosen = max(drawn.links, key=lambda link: link.share).place
     fragments = {
         "figures": _figures(comparison),
-        "says": escape(in_sentence(structure_in_words(comparison))),
+        "says": escape(in_sentence(comparison_in_words(comparison))),
         "sketch": svg(drawn, chosen),
         "sketch-hint": escape(_hint(stage)),
         "places": _places(stage, drawn),

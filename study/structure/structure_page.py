@@ -11,7 +11,16 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
 
+from study.compare import place_panels
 from study.compare.comparison import Comparison
+from study.compare.comparison_sentences import comparison_in_words
+from study.compare.place_pictures import (
+    modes,
+    responses_figure,
+    sensors_figure,
+    shared_force_figure,
+    sketch_of,
+)
 from study.diagnose.verdict import MISSING
 from study.equations.place import Place
 from study.equations.place import place_in_words as placed
@@ -19,17 +28,8 @@ from study.figures import page
 from study.figures.labels import term_names
 from study.figures.sketch import Sketch, svg
 from study.figures.styles import in_style
-from study.structure import structure_panels
 from study.structure.placed_ranking import PlacedRanked
-from study.structure.structure_comparison import structure_in_words
-from study.structure.structure_pictures import (
-    modes,
-    responses_figure,
-    sensors_figure,
-    shared_force_figure,
-    sketch_of,
-    sketch_of_diagnosis,
-)
+from study.structure.structure_pictures import sketch_of_diagnosis
 from study.structure.structure_report import structure_diagnosis_in_words
 from study.structure.structure_verdict import StructureDiagnosis
 from study.support.numbers import percent
@@ -42,9 +42,9 @@ def structure_page(comparison: Comparison, diagnosis: StructureDiagnosis | None 
     drawn = sketch_of(comparison) if diagnosis is None else sketch_of_diagnosis(diagnosis)
     name, model = comparison.prepared.record.name, comparison.model.name
     said = (
-        structure_in_words(comparison)
+        comparison_in_words(comparison)
         if diagnosis is None
-        else f"{structure_in_words(comparison)} {structure_diagnosis_in_words(diagnosis)}"
+        else f"{comparison_in_words(comparison)} {structure_diagnosis_in_words(diagnosis)}"
     )
     sets = [("as given", comparison.modes)]
     if diagnosis is not None and diagnosis.modes_after is not None:
@@ -82,7 +82,7 @@ def _maps(comparison: Comparison) -> dict[frozenset[str], bytes]:
             figure, (axes,) = page.empty_page(
                 place.label, "missing force over relative displacement", panel=2.3, headed=False
             )  # fmt: skip
-            structure_panels.connection_force(axes, comparison.missing, place.label)
+            place_panels.connection_force(axes, comparison.missing, place.label)
             page.shared_legend(figure, [axes])
             found[place.path] = page.rendered(figure, "png")
     return found

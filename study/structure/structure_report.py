@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from study.compare.comparison_report import comparison_document, mode_rows
 from study.diagnose.needless import needless_fields
 from study.diagnose.verdict import MISSING, NOTHING
 from study.equations.coefficient_units import parameter_units
@@ -15,7 +16,6 @@ from study.figures.labels import term_names
 from study.records.record import Sensor
 from study.structure.placed_needless import PlacedNeedless
 from study.structure.placed_ranking import PlacedRanked
-from study.structure.structure_comparison import mode_rows, structure_document
 from study.structure.structure_verdict import StructureDiagnosis
 from study.support.numbers import percent
 
@@ -132,7 +132,7 @@ def _unknown(diagnosis: StructureDiagnosis) -> list[str]:
 def structure_fields(diagnosis: StructureDiagnosis, unneeded: Sequence[PlacedNeedless] = ()) -> dict[str, Any]:
     """What ``diagnosis.json`` holds: candidates best first, and the terms that the structure does not need."""
     comparison = diagnosis.comparison
-    whole = structure_document(comparison)
+    whole = comparison_document([comparison])
     rows = {r.name: r for r in diagnosis.candidates}
     after = diagnosis.modes_after
     return {

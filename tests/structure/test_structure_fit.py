@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from study.compare.comparison import compare
+from study.compare.comparison_report import comparison_document
 from study.equations.model import Model
 from study.identify.frequency_domain.linear_start import lumped_start
 from study.structure.prepared_structure import prepare_structure
-from study.structure.structure_comparison import structure_document
 from study.support.errors import StudyError
 
 
@@ -53,15 +53,15 @@ def test_what_is_held_is_integrated_as_finely_as_what_is_fitted(frame, quiet_fra
 
 def test_the_residual_force_acts_between_the_two_floors(believed, record_of):
     quiet = compare(believed, prepare_structure(record_of(noise=0.0), believed))
-    rows = structure_document(quiet)["where"]
+    rows = comparison_document([quiet])["where"]
     assert rows["places"][0]["between"] == ["floor2", "floor3"]
     shared = np.array(rows["shared_force"])
     assert np.argmax(shared) in (5, 7)  # row floor2, column floor3, or the other way round
     assert shared[1, 2] > 0.5
     noisy = compare(believed, prepare_structure(record_of(), believed))
-    assert structure_document(noisy)["where"]["places"][0]["between"] == ["floor2", "floor3"]
-    errors = list(structure_document(noisy)["error"]["sensors"].values())
-    floors = list(structure_document(noisy)["noise_floor"]["sensors"].values())
+    assert comparison_document([noisy])["where"]["places"][0]["between"] == ["floor2", "floor3"]
+    errors = list(comparison_document([noisy])["error"]["sensors"].values())
+    floors = list(comparison_document([noisy])["noise_floor"]["sensors"].values())
     assert all(e > 1.1 * f for e, f in zip(errors, floors, strict=True))
 
 
