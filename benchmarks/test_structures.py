@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from study.compare.comparison import compare
+from study.diagnose.verdict import diagnose
 from study.equations.model import Model
 from study.equations.model_file import parse_model
 from study.equations.simulate import Integrator, simulate
 from study.records.excitation import Excitation, force
 from study.structure.prepared_structure import prepare_structure
-from study.structure.structure_comparison import compare_structure
-from study.diagnose.verdict import diagnose
 
 DT, SAMPLES, STEPS = 0.02, 8192, 4
 
@@ -61,7 +61,7 @@ def test_diagnosis(benchmark):
     record = clean.with_motions({n: x for n, x in noisy.items() if n.motion == "displacement"})
 
     def diagnosis():
-        return diagnose(compare_structure(believed, prepare_structure(record, believed)))
+        return diagnose(compare(believed, prepare_structure(record, believed)))
 
     found = benchmark.pedantic(diagnosis, rounds=1, warmup_rounds=1)
     assert found.candidates[0].name == "cubic_stiffness[ground-x0]"

@@ -84,7 +84,9 @@ def _diagnosed(
         accounted = accounted_together(arguments, model, marked, path)
         check_on(accounted.comparison.record, own)
         without = tuple(arguments.without)
-        diagnosis = diagnose_as_read(accounted.comparison, extra=own, without=without, progress=lambda _, total: step("", total))
+        diagnosis = diagnose_as_read(
+            accounted.comparison, extra=own, without=without, progress=lambda _, total: step("", total)
+        )
         unneeded = needless(accounted.comparison)
         untried = unfitted(diagnosis, own)
         words, faults = diagnosis_in_words(diagnosis), confirmed(accounted.faults, diagnosis)

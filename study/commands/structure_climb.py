@@ -6,9 +6,9 @@ from typing import Any
 
 from study.commands.structures import prepared_structures
 from study.compare import history
-from study.compare.comparison_report import as_json
+from study.compare.comparison import compare
 from study.compare.history_picture import history_files as history_pictures
-from study.diagnose.diagnosis_files import placed_fields
+from study.diagnose.diagnosis_files import diagnosis_files
 from study.diagnose.diagnosis_report import candidate_table
 from study.diagnose.verdict import MISSING
 from study.equations.model import Model
@@ -16,8 +16,6 @@ from study.equations.model_file import WANTED
 from study.explore import placed_session as sessions
 from study.explore.placed_page import structure_files
 from study.explore.saved_files import PAGE
-from study.structure.structure_comparison import compare_structure
-from study.structure.structure_pictures import diagnosis_pictures
 from study.support.files import read_text, write_files
 
 SAVED = "climb.html"  # the whole climb as one page
@@ -31,13 +29,12 @@ def structure_climb(arguments: argparse.Namespace, model: Model, steps: int, fol
     """
     work, text = folder / "climb", read_text(arguments.model, WANTED)
     (prepared,) = prepared_structures(arguments, model)
-    session = sessions.begin_placed(compare_structure(model, prepared))
+    session = sessions.begin_placed(compare(model, prepared))
     for number in range(steps + 1):
         stage = sessions.examined(session)
         session, diagnosis = sessions.with_stage(session, stage), stage.diagnosis
         assert diagnosis is not None, "a stage that was examined has a diagnosis"
-        fields = as_json(placed_fields(diagnosis, stage.unneeded))
-        write_files(work / f"step_{number}", {"diagnosis.json": fields} | diagnosis_pictures(diagnosis))
+        write_files(work / f"step_{number}", diagnosis_files(diagnosis, stage.said, stage.unneeded))
         print(f"{candidate_table(diagnosis)}\n\n{stage.said}\n", flush=True)
         if diagnosis.verdict != MISSING or number == steps:
             break

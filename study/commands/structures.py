@@ -17,11 +17,11 @@ from study.commands.record_arguments import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from study.compare.comparison import Comparison
     from study.equations.model import Model
     from study.equations.term import Term
     from study.explore.placed_session import PlacedSession
     from study.records.prepared import Prepared
-    from study.structure.structure_comparison import StructureComparison
 
 
 def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[Prepared]":
@@ -51,10 +51,10 @@ def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[
 
 def compare_command(arguments: argparse.Namespace, model: "Model") -> None:
     """``study compare`` of a structure."""
-    from study.compare.comparison_report import as_json
-    from study.structure.structure_comparison import compare_structure, structure_document, structure_summary
+    from study.compare.comparison import compare
+    from study.compare.comparison_pictures import comparison_pictures
+    from study.compare.comparison_report import as_json, comparison_document, comparison_summary
     from study.structure.structure_page import PAGE, structure_page
-    from study.structure.structure_pictures import structure_pictures
     from study.support.files import write_files
 
     folder = out_folder(arguments)
@@ -63,15 +63,15 @@ def compare_command(arguments: argparse.Namespace, model: "Model") -> None:
         _compare_measured(arguments, model, ready)
         return
     with progress("step", 3 * len(ready)) as step:
-        comparisons = [compare_structure(model, prepared, progress=step) for prepared in ready]
+        comparisons = [compare(model, prepared, progress=step) for prepared in ready]
     prefix = [f"{c.prepared.record.name}_" if len(ready) > 1 else "" for c in comparisons]
     files: dict[str, bytes] = {}
     for before, comparison in zip(prefix, comparisons, strict=True):
-        made = {PAGE: structure_page(comparison), "comparison.json": as_json(structure_document(comparison))}
-        made |= structure_pictures(comparison)
+        made = {PAGE: structure_page(comparison), "comparison.json": as_json(comparison_document([comparison]))}
+        made |= comparison_pictures(comparison)
         files |= {before + name: content for name, content in made.items()}
     write_files(folder, files, inputs_of(arguments))
-    print("\n\n".join(structure_summary(c) for c in comparisons))
+    print("\n\n".join(comparison_summary([c]) for c in comparisons))
     print(f"\n{folder}: {_listed(files)}")
 
 
@@ -101,11 +101,11 @@ def refuse_measured(model: "Model", command: str) -> None:
 
 def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
     """``study diagnose`` of a structure."""
-    from study.compare.comparison_report import as_json
+    from study.compare.comparison import compare
     from study.diagnose.diagnosis_files import (
+        diagnosis_files,
         diagnosis_in_words,
         modes_before_and_after,
-        placed_fields,
         unneeded_in_words,
     )
     from study.diagnose.diagnosis_report import candidate_table
@@ -113,9 +113,7 @@ def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
     from study.diagnose.user_candidates import own_candidates
     from study.diagnose.verdict import diagnose
     from study.equations import terms
-    from study.structure.structure_comparison import compare_structure
     from study.structure.structure_page import PAGE, structure_page
-    from study.structure.structure_pictures import diagnosis_pictures
     from study.support.files import write_files
 
     folder = out_folder(arguments)
@@ -129,8 +127,10 @@ def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
         return
     for prepared in ready:
         with progress(" candidates", name=prepared.record.name) as step:
-            comparison = compare_structure(model, prepared)
-            diagnosis = diagnose(comparison, extra=own, without=arguments.without, progress=lambda _, total: step("", total))
+            comparison = compare(model, prepared)
+            diagnosis = diagnose(
+                comparison, extra=own, without=arguments.without, progress=lambda _, total: step("", total)
+            )
             unneeded = needless(comparison)
         print(f"{prepared.record.name}: {diagnosis.verdict.replace('_', ' ')}")
         print(
@@ -143,11 +143,8 @@ def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
         if unneeded:
             print(f"\n{unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
         prefix = f"{prepared.record.name}_" if len(ready) > 1 else ""
-        made = {
-            PAGE: structure_page(comparison, diagnosis),
-            "diagnosis.json": as_json(placed_fields(diagnosis, unneeded)),
-        }
-        made |= diagnosis_pictures(diagnosis)
+        made = {PAGE: structure_page(comparison, diagnosis)}
+        made |= diagnosis_files(diagnosis, diagnosis_in_words(diagnosis), unneeded)
         files |= {prefix + name: content for name, content in made.items()}
     write_files(folder, files, inputs_of(arguments))
     print(f"\n{folder}: {_listed(files)}")
@@ -184,7 +181,7 @@ class Change:
     """One term more or less."""
 
     model: "Model"
-    follow: "Callable[[StructureComparison], StructureComparison]"  # beginning where the fit without the change ended
+    follow: "Callable[[Comparison], Comparison]"  # beginning where the fit without the change ended
     told: dict[str, str]  # in the history: what was ``added`` or ``dropped``
 
 
@@ -226,8 +223,9 @@ def _revise(
 ) -> None:  # fmt: skip
     """Compare a model and a changed one with all records; write the changed one with its history, and tell."""
     from study.compare import history
-    from study.compare.comparison_report import as_json
-    from study.structure import measured_comparison, structure_comparison
+    from study.compare.comparison import compare
+    from study.compare.comparison_report import as_json, comparison_document, comparison_summary, history_step
+    from study.structure import measured_comparison
 
     folder, summaries, document = out_folder(arguments), list[str](), b""
     for prepared in prepared_structures(arguments, model):
@@ -237,11 +235,11 @@ def _revise(
             document = as_json(measured_comparison.measured_document(after))
             summaries.append(measured_comparison.measured_summary(after))
         else:
-            before = structure_comparison.compare_structure(model, prepared)
-            revised, step = change.follow(before), structure_comparison.structure_history_step
+            before = compare(model, prepared)
+            revised, step = change.follow(before), history_step
             told = (step(before), step(revised, **change.told))
-            document = as_json(structure_comparison.structure_document(revised))
-            summaries.append(structure_comparison.structure_summary(revised))
+            document = as_json(comparison_document([revised]))
+            summaries.append(comparison_summary([revised]))
         steps = history.with_step(steps, *told)
     written_together(arguments, text, steps, document, folder)
     print("\n\n".join(summaries))
@@ -250,8 +248,8 @@ def _revise(
 
 def session(arguments: argparse.Namespace, model: "Model", steps: "list[dict[str, Any]]") -> "PlacedSession":
     """What ``study explore`` of a structure begins with."""
+    from study.compare.comparison import compare
     from study.explore.placed_session import begin_placed
-    from study.structure.structure_comparison import compare_structure
     from study.support.errors import expect
 
     several = arguments.records[1:] or arguments.each_record
@@ -259,4 +257,4 @@ def session(arguments: argparse.Namespace, model: "Model", steps: "list[dict[str
     refuse_measured(model, "explore")
     (prepared,) = prepared_structures(arguments, model)
     with progress("step", 3) as step:
-        return begin_placed(compare_structure(model, prepared, progress=step), steps)
+        return begin_placed(compare(model, prepared, progress=step), steps)

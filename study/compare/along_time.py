@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from study.compare.prediction import Prediction, SensorPrediction
+from study.compare.prediction import SensorPrediction
 
 Floats = NDArray[np.float64]
 STRETCHES = 6
@@ -37,13 +37,12 @@ class AlongTime:
     confounded: bool  # level and time change together, so that they cannot be told apart
 
 
-def along_time(prediction: Prediction) -> AlongTime:
-    """Compare stretches of the judging part.
+def along_time(seen: SensorPrediction) -> AlongTime:
+    """Compare stretches of the judging part, as one sensor shows them.
 
     The logarithm of the residual's power in blocks is explained by that of the response (and its square)
     and then by the stretch as well; an F test says whether the second step brings more than chance would.
     """
-    seen = prediction.of(0)
     residual, response = seen.residual, seen.measured - float(np.mean(seen.measured))
     count = _blocks(residual)
     e, y = _log_powers(residual, count), _log_powers(response, count)

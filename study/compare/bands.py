@@ -1,12 +1,13 @@
 """In which frequency band does the unexplained power lie?"""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study.compare.force_error import ForceError
-from study.compare.noise import Noise
+from study.compare.prediction import SensorPrediction
 
 Floats = NDArray[np.float64]
 MOST = 2.0 / 3.0  # of the unexplained power, at least, lies in the band that is named
@@ -17,20 +18,33 @@ CLEAR = 2.0  # standard errors above the noise, for a line to count
 class Band:
     """The narrowest band that holds most of what is unexplained."""
 
-    of: str  # ``response`` or ``force``
+    of: str  # ``response`` or ``force``; of several sensors, which
     low: float  # in hertz
     high: float  # in hertz
     share: float  # share of the unexplained power that lies in it
 
 
-def bands(noise: Noise, force: ForceError, low: float) -> tuple[Band, ...]:
-    """The bands of the response and of the force; one that has nothing unexplained is left out."""
+def bands(views: Sequence[SensorPrediction], forces: Sequence[ForceError]) -> tuple[Band, ...]:
+    """The bands of each response and each force; one that has nothing unexplained is left out."""
+    widest = [
+        *(narrowest(str(v.sensor) if len(views) > 1 else "response", v.noise.frequency, _response(v)) for v in views),
+        *(narrowest("force", f.frequency, _force(f)) for f in forces),
+    ]
+    return tuple(band for band in widest if band is not None)
+
+
+def _response(view: SensorPrediction) -> Floats:
+    """Density of the response that stands above the noise, shape (lines,)."""
+    noise = view.noise
     spread = CLEAR / np.sqrt(noise.averages)
     response = np.where(noise.residual > noise.density * (1.0 + spread), noise.residual - noise.density, 0.0)
-    response[noise.frequency < low] = 0.0
-    left = np.where(force.band & (force.unexplained > force.noise), force.unexplained - force.noise, 0.0) * force.force
-    widest = (narrowest("response", noise.frequency, response), narrowest("force", force.frequency, left))
-    return tuple(band for band in widest if band is not None)
+    response[noise.frequency < view.prepared.low] = 0.0
+    return response
+
+
+def _force(force: ForceError) -> Floats:
+    """Density of the force that no input explains, shape (lines,)."""
+    return np.where(force.band & (force.unexplained > force.noise), force.unexplained - force.noise, 0.0) * force.force
 
 
 def narrowest(of: str, frequency: Floats, power: Floats, most: float = MOST) -> Band | None:

@@ -1,7 +1,9 @@
 """Compare a model with measured records: how good it is, and where it fails."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,14 +12,18 @@ from study.compare.across_levels import Level, across_levels
 from study.compare.along_time import AlongTime, along_time
 from study.compare.bands import Band, bands
 from study.compare.by_estimator import FREE_RUN, fit_by
-from study.compare.fitted_coefficients import Coefficient, coefficients
+from study.compare.dependence import FamilyGain, families, left_by
+from study.compare.fitted_coefficients import Coefficient, coefficients, found_by
 from study.compare.force_error import ForceError, force_error
 from study.compare.growth import Growths, growths
 from study.compare.local_force_error import local_force_error
 from study.compare.minima import rivals_note
-from study.compare.missing_force import MissingForce, missing_force
-from study.compare.prediction import Prediction, predict
+from study.compare.missing_force import MissingForce, Unbalanced, unbalanced
+from study.compare.prediction import Prediction, SensorPrediction, predict
+from study.equations.equations_of_motion import loose_motions
+from study.equations.linear_part import Modes, is_positive, modes_of
 from study.equations.model import Model
+from study.equations.place import Place
 from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.time_domain.fit_model import fit_model
 from study.identify.time_domain.free_run_fit import FreeRunFit
@@ -25,38 +31,41 @@ from study.identify.time_domain.rivals import best_first, rivals
 from study.identify.time_domain.weighted_fit import weighted
 from study.records.plan import Plan
 from study.records.prepared import Prepared
-from study.records.record import Record
+from study.records.record import MOTIONS, Record, Sensor
 from study.records.record_layout import records_judged
-from study.support.errors import StudyError
+from study.support.errors import StudyError, expect
 
 STEPS = 5  # reports of progress a record
 Progress = Callable[[str], None]
+Value = tuple[float, float, str]  # value, standard error (not a number where it was held), unit
 CHAOTIC = (
     "the fitted system magnifies disturbances, as a chaotic one does: one free run would lose the measured motion "
     "however true the model, so it is fitted and judged in segments, each from a state of its own"
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Comparison:
     """A model held against one record."""
 
     model: Model  # as it was given
-    prepared: Prepared  # the record with all three motions in consistent units; what was fitted and what is judged
+    prepared: Prepared  # the record with all motions in consistent units; what was fitted and what is judged
     fit: FreeRunFit
-    coefficients: tuple[Coefficient, ...]  # every value with its interval and unit
-    prediction: Prediction  # measured and predicted response on the judging part, error and noise floor
-    force: ForceError  # the error in reverse
-    bands: tuple[Band, ...]  # where in frequency most of the unexplained power of response and force lies
-    missing_force: MissingForce  # the force that the model lacks
+    found: Estimate  # what was fitted, with its covariance
+    prediction: Prediction  # measured and predicted motions on the judging part, error and noise floor
+    forces: tuple[ForceError, ...]  # the error in reverse
+    bands: tuple[Band, ...]  # where in frequency most of the unexplained power of responses and force lies
+    missing: Unbalanced  # what each equation of motion leaves
+    missing_force: MissingForce  # the force that the model lacks where most is missing
+    place: Place  # where that is
     growths: Growths | None  # what it grows with; None where nothing stands above the noise
-    time: AlongTime  # whether the error changes along the record
+    time: AlongTime  # whether the error of the sensor that is missed most changes along the record
     notes: tuple[str, ...]  # what was converted, integrated or left out
     estimator: str = FREE_RUN  # what found the coefficients
 
     @property
     def record(self) -> Record:
-        """The record with all three motions in consistent units."""
+        """The record with all motions in consistent units."""
         return self.prepared.record
 
     @property
@@ -71,9 +80,60 @@ class Comparison:
         return plan.fit, plan.judge
 
     @property
+    def views(self) -> tuple[SensorPrediction, ...]:
+        """What each sensor shows of the prediction; a single mass has one."""
+        return self.prediction.views
+
+    @property
+    def worst(self) -> SensorPrediction:
+        """What the sensor shows that is missed most."""
+        return self.views[int(np.argmax(self.prediction.errors))]
+
+    @cached_property
+    def coefficients(self) -> tuple[Coefficient, ...]:
+        """Every value with its interval and unit."""
+        return coefficients(self.fit.model, self.found, self.record)
+
+    @cached_property
+    def modes(self) -> Modes:
+        """Those of the linear part; none of a model without a mass."""
+        if not is_positive(self.fit.model, {}):
+            return Modes(*(np.zeros(0) for _ in range(4)), *(np.zeros((0, len(self.model.coordinates))),) * 2)
+        return modes_of(self.fit.model, self.found.symbols, self.found.covariance)
+
+    @property
+    def natural(self) -> tuple[Value | None, Value | None]:
+        """Natural frequency and damping ratio of a single mass, (4.4) and (4.5); None without what they follow from."""
+        modes, known = self.modes, "linear_damping" in self.model
+        if not np.any(modes.frequency > 0.0):
+            return None, None
+        frequency, ratio = (
+            (float(value[0]), float(error[0]) or math.nan, unit)
+            for value, error, unit in (
+                (modes.frequency, modes.frequency_error, "Hz"), (modes.damping, modes.damping_error, "")
+            )
+        )  # fmt: skip
+        return frequency, ratio if known else None
+
+    @property
+    def force(self) -> ForceError:
+        """The error of the force on a single mass."""
+        return self.forces[0]
+
+    @property
+    def force_error(self) -> float:
+        """Share of the force's power that is unexplained; of that of inertia in a structure."""
+        return self.forces[0].total if self.forces else self.missing.share
+
+    @property
     def level(self) -> float:
         """Rms force of the fitting part."""
-        return float(np.std(self.record["force"][slice(*self.plan.fit)]))
+        return math.hypot(*(float(np.std(self.record[f][slice(*self.plan.fit)])) for f in self.record.forces))
+
+    @cached_property
+    def leftovers(self) -> tuple[FamilyGain, ...]:
+        """What general shapes of the motion at each place explain of what is left, held out; asked for when shown."""
+        return tuple(families(left_by(self.fit, self.prepared)))
 
 
 def compare(
@@ -94,11 +154,9 @@ def compare(
     of the force is free of leakage too. ``progress`` is called with what is being done, ``STEPS`` times. A model that
     cannot be fitted raises a ``StudyError``.
     """
-    if model.named:
-        from study.structure.structure_comparison import compare_structure
-
-        return compare_structure(model, prepared, fit, progress)
     report: Progress = progress or (lambda _: None)
+    sentence = f"{model.name!r} has 'linear: measured'; expected a model with inertia at every coordinate here"
+    expect(not model.measured, f"{sentence}; 'study compare', 'diagnose', 'add' and 'drop' take this one")
     report("fit")
     known: Estimate | None = None
     if estimator != FREE_RUN:
@@ -110,15 +168,26 @@ def compare(
         alike = rivals(fit, prepared)
     report("free run")
     prediction = predict(fit, prepared)
+    found = known or found_by(fit, prepared)
     keys = (*fit.keys, *(known.symbols if known else ()))
     judged = _judged(
         fit, keys, prediction, local_force_error if estimator == "local_polynomial" else force_error, report
     )
-    said = [CHAOTIC if fit.restarts else None, rivals_note(fit, alike, prediction)]
+    said = [CHAOTIC if fit.restarts else "", rivals_note(fit, alike, prediction) or "", *_of_a_structure(fit)]
     return Comparison(
-        model=model, prepared=prepared, fit=fit, coefficients=coefficients(fit, prepared, known),
-        notes=(*prepared.notes, *(note for note in said if note)), estimator=estimator, **judged,
+        model=model, prepared=prepared, fit=fit, found=found, notes=(*prepared.notes, *filter(None, said)),
+        estimator=estimator, **judged,
     )  # fmt: skip
+
+
+def _of_a_structure(fit: FreeRunFit) -> list[str]:
+    """What to say of several coordinates: motions that nothing ties down, values that the record does not show."""
+    if not fit.model.named:
+        return []
+    loose = loose_motions(fit.model)
+    drifts = f"nothing ties the structure down in {loose} of its motions: it may drift away as a whole"
+    unclear = f"this record cannot tell apart, or does not show, {', '.join(fit.undecided)}"
+    return [drifts if loose else "", unclear if fit.undecided else ""]
 
 
 def _judged(
@@ -126,15 +195,19 @@ def _judged(
     in_reverse: Callable[[Model, Prediction], ForceError] = force_error, report: Progress = lambda _: None,
 ) -> dict[str, Any]:  # fmt: skip
     """The fields of a comparison that say how good a fit is on the judging part, and where it fails."""
-    noise = prediction.of(0).noise
+    views = prediction.views
     report("force")
-    force = in_reverse(fit.model, prediction)
+    forces = () if fit.model.named else (in_reverse(fit.model, prediction),)
     report("where it fails")
-    lacking = missing_force(fit.model, keys, prediction)
+    missing = unbalanced(fit.model, keys, prediction)
+    place = next(iter(missing.shown), missing.aligned[0][0])
+    lacking = missing.at(place)
     report("what it grows with")
     return {
-        "prediction": prediction, "force": force, "bands": bands(noise, force, prediction.low),
-        "missing_force": lacking, "growths": None if noise.alone else growths(lacking), "time": along_time(prediction),
+        "prediction": prediction, "forces": forces, "bands": bands(views, forces), "missing": missing,
+        "missing_force": lacking, "place": place,
+        "growths": None if all(v.noise.alone for v in views) else growths(lacking),
+        "time": along_time(views[int(np.argmax(prediction.errors))]),
     }  # fmt: skip
 
 
@@ -157,7 +230,7 @@ def across_records(comparisons: Sequence[Comparison]) -> tuple[Level, ...]:
     ordered = sorted(comparisons, key=lambda c: c.level)
     first = ordered[0].record
     for other in ordered[1:]:
-        for channel in ("force", "displacement"):
+        for channel in (*first.forces, *(str(Sensor(c, MOTIONS[0])) for c in first.coordinates)):
             if other.record.units.get(channel) != first.units.get(channel):
                 raise StudyError(
                     f"{channel} is in {first.units.get(channel)} in {first.name} and in "

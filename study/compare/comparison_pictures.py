@@ -3,7 +3,7 @@
 # Matplotlib leaves the **kwargs of its methods untyped.
 # pyright: reportUnknownMemberType=false
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -15,6 +15,8 @@ from study.compare.comparison import Comparison
 from study.compare.decay import decays_of
 from study.compare.force_map import curve, surface
 from study.compare.loops import loops
+from study.compare.place_pictures import place_figures, responses_figure
+from study.equations.place import place_in_words
 from study.figures import coherence, page
 from study.figures.curves import InputCoherence
 from study.figures.styles import in_style
@@ -27,12 +29,14 @@ WIDE = 7.2  # inches
 
 def comparison_pictures(comparison: Comparison) -> dict[str, bytes]:
     """Every picture of one record by file name."""
-    drawn: Mapping[str, Callable[[Comparison], Figure]] = {
-        "response": response_figure, "force_error": force_error_figure, "missing_force": missing_force_figure,
-        "error_in_time": error_in_time_figure,
-    }  # fmt: skip
     with in_style():
-        return page.image_files({name: draw(comparison) for name, draw in drawn.items()} | _of_its_kind(comparison))
+        drawn = {
+            "response": (responses_figure if comparison.model.named else response_figure)(comparison),
+            **({"force_error": force_error_figure(comparison)} if comparison.forces else {}),
+            "missing_force": missing_force_figure(comparison), "error_in_time": error_in_time_figure(comparison),
+            **(place_figures if comparison.model.named else _of_its_kind)(comparison),
+        }  # fmt: skip
+        return page.image_files(drawn)
 
 
 def _of_its_kind(comparison: Comparison) -> dict[str, Figure]:
@@ -101,6 +105,10 @@ def missing_force_figure(comparison: Comparison) -> Figure:
     lacking, unit = comparison.missing_force, dict(comparison.record.units)
     band = lacking.frequency[lacking.gate]
     about = "the difference is noise" if not len(band) else f"seen in bands from {band[0]:.3g} to {band[-1]:.3g} Hz"
+    if comparison.model.named:
+        unit = comparison.missing.units(comparison.place.label)
+        unit["velocity"] = f"{unit['displacement']}/s"
+        about = f"{place_in_words(comparison.place)}, {about}"
     figure, axes = page.empty_page(
         f"{comparison.record.name}: the force that the model lacks", f"model {comparison.model.name}; {about}", rows=3,
         width=WIDE, panel=2.3, share=False,
@@ -117,11 +125,13 @@ def missing_force_figure(comparison: Comparison) -> Figure:
 def error_in_time_figure(comparison: Comparison) -> Figure:
     """Error along the judging part."""
     chance = f"differences between stretches of equal level: p = {comparison.time.p_value:.2g}"
+    if len(comparison.views) > 1:
+        chance = f"{comparison.worst.sensor}; {chance}"
     figure, axes = page.empty_page(
         f"{comparison.record.name}: error along the record", f"model {comparison.model.name}; {chance}",
         rows=2, width=WIDE, panel=2.0, share=False,
     )  # fmt: skip
-    panels.error_in_time(axes[0], comparison.time, comparison.prediction.floor)
+    panels.error_in_time(axes[0], comparison.time, comparison.worst.noise.rms / comparison.worst.size)
     panels.error_beyond_level(axes[1], comparison.time)
     page.letter(axes, ("error and response", "beyond what the level accounts for"))
     page.shared_legend(figure, axes[:1])

@@ -3,7 +3,7 @@
 import io
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -15,9 +15,12 @@ from study.compare.by_estimator import FREE_RUN
 from study.compare.comparison import Comparison
 from study.compare.comparison_sentences import comparison_in_words, says_of_all
 from study.compare.decay import decays_of
+from study.compare.dependence import explained_by_place
 from study.compare.fitted_coefficients import Coefficient
 from study.compare.force_map import curve, surface
 from study.equations import model_file
+from study.equations.linear_part import Modes, modes_table
+from study.equations.place import HERE
 from study.support.numbers import percent
 
 Row = dict[str, Any]
@@ -32,18 +35,21 @@ def comparison_document(comparisons: Sequence[Comparison], moving: Sequence[Leve
     if len(comparisons) == 1:
         return _of_record(comparisons[0])
     rows = [_of_record(c) for c in comparisons]
+    listed = [key for key, found in rows[0]["where"].items() if isinstance(found, list) and key != "shared_force"]
     return {
         "model": rows[0]["model"],
-        "error": {key: _mean([r["error"][key] for r in rows], key) for key in ("force", "response")},
-        "noise_floor": {key: _mean([r["noise_floor"][key] for r in rows], key) for key in ("force", "response")},
+        **{
+            of: {k: _mean([r[of][k] for r in rows], k) for k in ("force", "response") if k in rows[0][of]}
+            for of in ("error", "noise_floor")
+        },
         "coefficients": [{"record": r["record"], **c} for r in rows for c in r["coefficients"]],
         "where": {
-            **{key: [{"record": r["record"], **x} for r in rows for x in r["where"][key]] for key in rows[0]["where"]},
+            **{key: [{"record": r["record"], **x} for r in rows for x in r["where"][key]] for key in listed},
             "level": [level_row(level) for level in moving],
         },
         "says": says_of_all(comparisons, moving),
         "records": rows,
-    }
+    }  # fmt: skip
 
 
 def _mean(values: Sequence[float], key: str) -> float:
@@ -52,27 +58,18 @@ def _mean(values: Sequence[float], key: str) -> float:
 
 
 def _of_record(comparison: Comparison) -> Row:
-    prediction, seen = comparison.prediction, comparison.prediction.of(0)
-    return {
+    prediction, model, document = comparison.prediction, comparison.model, Row()
+    how = {"coordinates": list(model.coordinates)} if model.named else {"equation": model.equation()}
+    document |= {
         "record": comparison.record.name,
-        "model": {"name": comparison.model.name, "equation": comparison.model.equation(), "terms": [
-            model_file.format_entry(t) for t in comparison.model.terms]},
-        "error": {"force": comparison.force.total, "response": comparison.prediction.error},
-        "noise_floor": {
-            "force": comparison.force.noise_total, "response": prediction.floor,
-            "response_error": seen.noise.error / seen.size, "from": seen.noise.source,
-        },
-        "rms": {
-            "response_error": seen.error * seen.size, "response": seen.size,
-            "unit": comparison.record.units.get(comparison.plan.response, ""),
-        },
-        "error_of_fitted_coefficients": {"force": comparison.force.parametric_total},
-        "above_noise": {"response": prediction.above_noise, "standard_errors": seen.noise.significance},
+        "model": {"name": model.name, **how, "terms": [model_file.format_entry(t) for t in model.terms]},
+        "error": {"force": comparison.force_error, "response": prediction.error},
+        "noise_floor": {"response": prediction.floor},
+        "rms": {}, "above_noise": {"response": prediction.above_noise},
         "coefficients": [coefficient_row(c) for c in comparison.coefficients],
         "fit": {
             "samples": list(comparison.spans[0]), "judged": list(comparison.spans[1]),
-            "every_sample": comparison.prepared.every,
-            "response": comparison.plan.response,
+            "every_sample": comparison.prepared.every, "response": comparison.plan.response,
             "estimator": comparison.estimator, "converged": comparison.fit.converged, "message": comparison.fit.message,
         },
         "where": where(comparison),
@@ -80,22 +77,73 @@ def _of_record(comparison: Comparison) -> Row:
             "time": {
                 "p_value": comparison.time.p_value, "growth_with_level": comparison.time.growth,
                 "level_changes_too": comparison.time.confounded,
+                **({"sensor": str(comparison.worst.sensor)} if model.named else {}),
             }
         },
         "notes": list(comparison.notes),
         "says": comparison_in_words(comparison),
-        **({"decay": found.plain()} if (found := decays_of(comparison)) else {}),
+    }  # fmt: skip
+    for of, row in (_by_sensor(comparison) if model.named else _of_one_mass(comparison)).items():
+        document[of] = document[of] | row if of in document and isinstance(row, dict) else row
+    return document
+
+
+def _of_one_mass(comparison: Comparison) -> Row:
+    """What a document holds of a single mass alone, by the field that it joins."""
+    seen, found = comparison.prediction.of(0), decays_of(comparison)
+    return {
+        "noise_floor": {
+            "force": comparison.force.noise_total, "response_error": seen.noise.error / seen.size,
+            "from": seen.noise.source,
+        },
+        "rms": _in_its_unit(comparison, 0),
+        "error_of_fitted_coefficients": {"force": comparison.force.parametric_total},
+        "above_noise": {"standard_errors": seen.noise.significance},
+        **({"decay": found.plain()} if found else {}),
     }  # fmt: skip
 
 
-def where(comparison: Comparison) -> dict[str, list[Row]]:
+def _by_sensor(comparison: Comparison) -> Row:
+    """The same of a structure: every sensor's share, its modes."""
+    views = comparison.views
+    by_sensor: dict[str, Row] = {
+        "error": {str(v.sensor): v.error for v in views},
+        "noise_floor": {str(v.sensor): v.noise.rms / v.size for v in views},
+        "rms": {str(v.sensor): _in_its_unit(comparison, i) for i, v in enumerate(views)},
+        "above_noise": {str(v.sensor): {"standard_errors": v.noise.significance} for v in views},
+    }  # fmt: skip
+    return {of: {"sensors": row} for of, row in by_sensor.items()} | {"modes": mode_rows(comparison.modes)}
+
+
+def _in_its_unit(comparison: Comparison, sensor: int) -> Row:
+    seen = comparison.prediction.of(sensor)
+    return {
+        "response_error": seen.error * seen.size, "response": seen.size,
+        "unit": comparison.record.units.get(str(seen.sensor), ""),
+    }  # fmt: skip
+
+
+def mode_rows(modes: Modes) -> list[Row]:
+    """Modes as plain rows."""
+    return [
+        {
+            "frequency": float(modes.frequency[i]), "frequency_error": float(modes.frequency_error[i]),
+            "damping": float(modes.damping[i]), "damping_error": float(modes.damping_error[i]),
+            "shape": modes.shape[i].tolist(), "shape_error": modes.shape_error[i].tolist(),
+        }
+        for i in range(len(modes.frequency))
+    ]  # fmt: skip
+
+
+def where(comparison: Comparison) -> Row:
     """Where the model fails, as plain rows; ``level`` is empty for one record."""
     ways = comparison.growths.ways if comparison.growths is not None else ()
+    at: Row = comparison.place.plain() if comparison.model.named else {}
     return {
         "frequency": [{"of": b.of, "from": b.low, "to": b.high, "share": b.share} for b in comparison.bands],
         "amplitude": [
             {
-                "of": w.of, "parity": w.parity, "power": w.power, "power_error": w.power_error,
+                **at, "of": w.of, "parity": w.parity, "power": w.power, "power_error": w.power_error,
                 "share": w.share, "share_error": w.share_error,
             }
             for w in ways
@@ -105,13 +153,35 @@ def where(comparison: Comparison) -> dict[str, list[Row]]:
             for s in comparison.time.stretches
         ],
         "level": [],
+        **(_between_equations(comparison) if comparison.model.named else {}),
+    }  # fmt: skip
+
+
+def _between_equations(comparison: Comparison) -> Row:
+    """What each equation of a structure leaves, and between which places a force may be missing."""
+    missing, explained = comparison.missing, explained_by_place(comparison.leftovers)
+    return {
+        "coordinates": [
+            {"coordinate": c, "residual_force": float(r), "force": float(f)}
+            for c, r, f in zip(missing.coordinates, missing.rms, missing.inertia, strict=True)
+        ],
+        "places": [
+            {**place.plain(), "share": share, "explained": explained.get(place.path, 0.0)}
+            for place, share in missing.aligned
+        ],
+        "shared_force": missing.matrix.tolist(),
+        "maps": {
+            label: {"at": c.at.tolist(), "force": c.mean.tolist(), "error": c.error.tolist()}
+            for label, c in missing.curves.items()
+        },
     }  # fmt: skip
 
 
 def coefficient_row(coefficient: Coefficient) -> Row:
     """A coefficient as a plain row."""
     return {
-        "key": coefficient.key, "term": coefficient.term, "value": coefficient.value,
+        "key": coefficient.key, "term": coefficient.term,
+        **({} if coefficient.place == HERE else coefficient.place.plain()), "value": coefficient.value,
         "interval": None if coefficient.interval is None else list(coefficient.interval),
         "standard_error": coefficient.error, "unit": coefficient.unit, "held": coefficient.held,
     }  # fmt: skip
@@ -130,16 +200,25 @@ def history_step(comparison: Comparison, added: str | None = None, dropped: str 
 
     ``added`` names the term that is new in it, ``dropped`` the one that was taken out.
     """
-    force = comparison.force.total
+    force, prediction = comparison.force_error, comparison.prediction
+    rms, unit = in_units(comparison)
     return {
         "terms": [t.name for t in comparison.model.terms], "added": added, "dropped": dropped,
         "record": comparison.record.name,
-        "error": {"force": None if math.isnan(force) else force, "response": comparison.prediction.error},
-        "rms": float(comparison.prediction.error * comparison.prediction.of(0).size),
-        "unit": comparison.record.units.get(comparison.plan.response, ""),
-        "noise_floor": {"response": comparison.prediction.floor},
+        "error": {"force": None if math.isnan(force) else force, "response": prediction.error},
+        "rms": rms, "unit": unit,
+        "noise_floor": {"response": prediction.floor},
         "converged": comparison.fit.converged, "coefficients": [coefficient_row(c) for c in comparison.coefficients],
     }  # fmt: skip
+
+
+def in_units(comparison: Comparison) -> tuple[float, str]:
+    """Rms of what the sensors miss in their unit; where they have several, in their own rms."""
+    views, units = comparison.views, {comparison.record.units.get(str(v.sensor), "") for v in comparison.views}
+    if len(units) > 1:
+        return comparison.prediction.error, ""
+    left = [v.error * v.size for v in views]
+    return math.hypot(*left) / math.sqrt(len(left)), units.pop()
 
 
 def as_json(content: Row) -> bytes:
@@ -158,7 +237,8 @@ def _finite(value: object) -> object:
 def tables(comparisons: Sequence[Comparison], moving: Sequence[Level] = ()) -> dict[str, bytes]:
     """Every table by file name; the first column names the record."""
     builders: dict[str, Callable[[Comparison], pd.DataFrame]] = {
-        "comparison": _summary, "coefficients": _coefficients, "force_error": _force_error,
+        "comparison": _summary, "coefficients": _coefficients,
+        **({"force_error": _force_error} if comparisons[0].forces else {}),
         "response_spectrum": _response_spectrum, "missing_force_curves": _curves, "missing_force_map": _map,
         "growth": lambda c: pd.DataFrame(where(c)["amplitude"]),
         "error_in_time": lambda c: pd.DataFrame(where(c)["time"]),
@@ -184,21 +264,24 @@ def _csv(table: pd.DataFrame) -> bytes:
 
 def _summary(comparison: Comparison) -> pd.DataFrame:
     prediction = comparison.prediction
+    of_force = {
+        "force_error_of_fitted_coefficients": comparison.force.parametric_total,
+        "force_noise_floor": comparison.force.noise_total,
+    } if comparison.forces else {}  # fmt: skip
     row = {
         "model": comparison.model.name, "response_error": prediction.error, "response_noise_floor": prediction.floor,
-        "response_above_noise": prediction.above_noise, "force_error": comparison.force.total,
-        "force_error_of_fitted_coefficients": comparison.force.parametric_total,
-        "force_noise_floor": comparison.force.noise_total, "rms_force": comparison.level,
-        "time_p_value": comparison.time.p_value, "converged": comparison.fit.converged,
+        "response_above_noise": prediction.above_noise, "force_error": comparison.force_error, **of_force,
+        "rms_force": comparison.level, "time_p_value": comparison.time.p_value, "converged": comparison.fit.converged,
     }  # fmt: skip
     return pd.DataFrame([row])
 
 
 def _coefficients(comparison: Comparison) -> pd.DataFrame:
-    rows = [coefficient_row(c) for c in comparison.coefficients]
-    for row in rows:
-        low, high = row.pop("interval") or (math.nan, math.nan)
-        row |= {"low": low, "high": high}
+    rows: list[Row] = []
+    for c in comparison.coefficients:
+        low, high = c.interval or (math.nan, math.nan)
+        row = {name: value for name, value in coefficient_row(c).items() if name not in ("interval", *c.place.plain())}
+        rows.append(row | {"low": low, "high": high})
     return pd.DataFrame(rows)
 
 
@@ -214,16 +297,28 @@ def _force_error(comparison: Comparison) -> pd.DataFrame:
 
 
 def _response_spectrum(comparison: Comparison) -> pd.DataFrame:
-    noise = comparison.prediction.of(0).noise
-    return pd.DataFrame({"frequency": noise.frequency, "difference": noise.residual, "noise": noise.density})
+    return _one_below_the_other("sensor", {
+        str(v.sensor): pd.DataFrame(
+            {"frequency": v.noise.frequency, "difference": v.noise.residual, "noise": v.noise.density}
+        ) for v in comparison.views
+    })  # fmt: skip
 
 
 def _curves(comparison: Comparison) -> pd.DataFrame:
-    lacking = comparison.missing_force
-    inner = lacking.inner
-    against = {"displacement": lacking.displacement[inner], "velocity": lacking.velocity[inner]}
-    lines = {name: curve(values, lacking.force[inner]) for name, values in against.items()}
-    return pd.concat([pd.DataFrame({"against": name, **vars(line)}) for name, line in lines.items()])
+    found: dict[str, pd.DataFrame] = {}
+    for place in comparison.missing.shown:
+        lacking = comparison.missing.at(place)
+        against = {"displacement": lacking.displacement, "velocity": lacking.velocity}
+        lines = {name: curve(x[lacking.inner], lacking.force[lacking.inner]) for name, x in against.items()}
+        found[place.label] = pd.concat([pd.DataFrame({"against": name, **vars(line)}) for name, line in lines.items()])
+    return _one_below_the_other("place", found)
+
+
+def _one_below_the_other(what: str, frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Tables of several sensors or places, the first column naming which; one alone as it is."""
+    if len(frames) == 1:
+        return next(iter(frames.values()))
+    return pd.concat([frame.assign(**{what: name})[[what, *frame.columns]] for name, frame in frames.items()])
 
 
 def _map(comparison: Comparison) -> pd.DataFrame:
@@ -232,7 +327,9 @@ def _map(comparison: Comparison) -> pd.DataFrame:
     plane = surface(lacking.displacement[inner], lacking.velocity[inner], lacking.force[inner])
     i, j = np.nonzero(np.isfinite(plane.mean))
     u, v = (0.5 * (x[1:] + x[:-1]) for x in (plane.displacement, plane.velocity))
-    return pd.DataFrame({"displacement": u[i], "velocity": v[j], "mean": plane.mean[i, j], "error": plane.error[i, j]})
+    place = {"place": comparison.place.label} if comparison.model.named else {}
+    columns = {"displacement": u[i], "velocity": v[j], "mean": plane.mean[i, j], "error": plane.error[i, j]}
+    return pd.DataFrame({**place, **columns})
 
 
 def _by_level(level: Level, names: Sequence[str]) -> pd.DataFrame:
@@ -246,17 +343,36 @@ def _by_level(level: Level, names: Sequence[str]) -> pd.DataFrame:
 
 def comparison_summary(comparisons: Sequence[Comparison], moving: Sequence[Level] = ()) -> str:
     """The table that a person reads in ten seconds, and the sentences below it."""
-    first = comparisons[0]
-    heads = ["", "response error", "in units", "noise floor", "force error", "noise alone"]
-    rows = [
-        [c.record.name, percent(c.prediction.error), _in_units(c), percent(c.prediction.floor),
-         percent(c.force.total), percent(c.force.noise_total)] for c in comparisons
-    ]  # fmt: skip
+    named = comparisons[0].model.named
+    heads, rows = _sensor_rows(comparisons) if named else _record_rows(comparisons)
     errors = tabulate(rows, heads, tablefmt="simple", disable_numparse=True, stralign="right", colglobalalign="right")
-    body = _levels(moving, comparisons) if moving else _values(first)
-    text = f"{_headline(first)}\n\n{errors}\n\n{body}\n\n{says_of_all(comparisons, moving)}"
+    bodies = [_levels(moving, comparisons)] if moving else [_values(comparisons[0])]
+    if named and len(comparisons) == 1:
+        bodies.append(modes_table(comparisons[0].modes, comparisons[0].model.coordinates))
+    text = "\n\n".join([_headline(comparisons[0]), errors, *bodies, says_of_all(comparisons, moving)])
     notes = list(dict.fromkeys(note for c in comparisons for note in c.notes))
     return text + footnotes(notes)
+
+
+def _record_rows(comparisons: Sequence[Comparison]) -> tuple[list[str], list[list[str]]]:
+    heads = ["", "response error", "in units", "noise floor", "force error", "noise alone"]
+    return heads, [
+        [c.record.name, percent(c.prediction.error), _in_units(c, 0), percent(c.prediction.floor),
+         percent(c.force.total), percent(c.force.noise_total)] for c in comparisons
+    ]  # fmt: skip
+
+
+def _sensor_rows(comparisons: Sequence[Comparison]) -> tuple[list[str], list[list[str]]]:
+    heads, rows = ["sensor", "response error", "in units", "noise floor", "force left there"], list[list[str]]()
+    for c in comparisons:
+        rms = dict(zip(c.missing.coordinates, c.missing.rms, strict=True))
+        left = {name: f"{x:.3g} {c.missing.units(name)['force']}" for name, x in rms.items()}
+        before = [c.record.name] * (len(comparisons) > 1)
+        rows += [
+            [*before, str(v.sensor), percent(v.error), _in_units(c, i), percent(floor), left[v.sensor.coordinate]]
+            for i, (v, floor) in enumerate(zip(c.views, c.prediction.floors, strict=True))
+        ]
+    return [""] * (len(comparisons) > 1) + heads, rows
 
 
 def footnotes(notes: Sequence[str]) -> str:
@@ -264,20 +380,23 @@ def footnotes(notes: Sequence[str]) -> str:
     return "\n" + "".join(f"\n[{number}] {note}" for number, note in enumerate(notes, start=1)) if notes else ""
 
 
-def _in_units(comparison: Comparison) -> str:
-    unit = comparison.record.units.get(comparison.plan.response, "")
-    return f"{comparison.prediction.error * comparison.prediction.of(0).size:.3g} {unit}".strip()
+def _in_units(comparison: Comparison, sensor: int) -> str:
+    row = _in_its_unit(comparison, sensor)
+    return f"{row['response_error']:.3g} {row['unit']}".strip()
 
 
 def _headline(comparison: Comparison) -> str:
-    low, high = comparison.force.frequency[comparison.force.band][[0, -1]]
     by = "" if comparison.estimator == FREE_RUN else f" by {comparison.estimator}"
     fit, judge = comparison.spans
+    response = "of each sensor" if comparison.model.named else comparison.plan.response
+    if comparison.forces:
+        low, high = comparison.force.frequency[comparison.force.band][[0, -1]]
+        force = f"share of power unexplained, {low:.3g} to {high:.3g} Hz"
+    else:
+        force = "rms that the equation of motion leaves"
     return (
         f"model {comparison.model.name}: fitted to samples {fit[0]} to {fit[1]}{by}, judged on {judge[0]} to "
-        f"{judge[1]}\n"
-        f"response: free run, rms difference over rms {comparison.plan.response}; "
-        f"force: share of power unexplained, {low:.3g} to {high:.3g} Hz"
+        f"{judge[1]}\nresponse: free run, rms difference over rms {response}; force: {force}"
     )
 
 

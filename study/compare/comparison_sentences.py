@@ -9,6 +9,7 @@ from study.compare.along_time import AlongTime
 from study.compare.comparison import Comparison
 from study.compare.growth import Growth, Growths
 from study.compare.noise import SCATTER
+from study.equations.place import place_in_words
 from study.support.numbers import by_chance, percent
 
 NEGLIGIBLE = 2e-3  # of the rms response: what stands above the noise by less is no evidence that something is missing
@@ -33,6 +34,8 @@ def comparison_in_words(comparison: Comparison, diagnosed: bool = False) -> str:
         sentences.append(_least(comparison))
     elif comparison.prediction.above_noise > NEGLIGIBLE:
         sentences.append(_where(comparison))
+    if comparison.model.named:
+        sentences += _of_equations(comparison)
     if not comparison.fit.converged:
         sentences.append(
             f"The fit did not arrive at a minimum ({comparison.fit.message}), so this may be the fit's fault"
@@ -42,7 +45,8 @@ def comparison_in_words(comparison: Comparison, diagnosed: bool = False) -> str:
 
 def _least(comparison: Comparison) -> str:
     """What to look for when a model predicts nothing."""
-    lacking = [name.replace("_", " ") for name in LEAST if name not in comparison.model]
+    known = {entry.term.name for entry in comparison.model.terms}
+    lacking = [name.replace("_", " ") for name in LEAST if name not in known]
     if lacking:
         return f"mass, damping and stiffness are the least that a model needs; it lacks {' and '.join(lacking)}"
     held = ", ".join(comparison.model.held_keys)
@@ -58,14 +62,17 @@ def _plain(number: float) -> str:
 def _how_good(comparison: Comparison, diagnosed: bool) -> str:
     error, floor = percent(comparison.prediction.error), percent(comparison.prediction.floor)
     start = f"the model misses the response by {error} of its rms"
+    if len(comparison.views) > 1:
+        start += f", most at {comparison.worst.sensor} ({percent(comparison.worst.error)})"
     if comparison.prediction.error >= HOPELESS:
         like = "as one" if comparison.prediction.error < WORSE else "more than one"
         return (
             f"{start}, {like} without any motion would: it cannot follow this record, and its fitted coefficients "
             "mean nothing"
         )
-    if comparison.prediction.of(0).noise.alone:
-        source = " (from the scatter between periods)" if comparison.prediction.of(0).noise.source == SCATTER else ""
+    noises = [view.noise for view in comparison.views]
+    if all(noise.alone for noise in noises):
+        source = " (from the scatter between periods)" if noises[0].source == SCATTER else ""
         doubt = "" if source or diagnosed else "; 'study diagnose' looks closer"
         return f"{start}, and that is noise{source}: nothing stands above the noise floor of {floor}{doubt}"
     if comparison.prediction.above_noise <= NEGLIGIBLE:
@@ -77,14 +84,33 @@ def _how_good(comparison: Comparison, diagnosed: bool) -> str:
 
 
 def _where(comparison: Comparison) -> str:
-    response = next((b for b in comparison.bands if b.of == "response"), None)
+    response = next((b for b in comparison.bands if b.of in ("response", str(comparison.worst.sensor))), None)
     band = ""
     if response is not None:
         band = (
             f"{percent(response.share)} of what is unexplained lies between "
             f"{_plain(response.low)} and {_plain(response.high)} Hz; "
         )
-    return band + f"{_grows(comparison.growths)}; {_along(comparison.time)}"
+    at = f"{place_in_words(comparison.place)} " if comparison.model.named else ""
+    return band + f"{at}{_grows(comparison.growths)}; {_along(comparison.time)}"
+
+
+def _of_equations(comparison: Comparison) -> list[str]:
+    """Which equation of a structure is violated most, and where a force would explain most of it."""
+    missing, said = comparison.missing, list[str]()
+    if missing.lacking:
+        said.append(f"the reverse system says no force of {', '.join(missing.lacking)}, which no sensor shows")
+    if np.any(missing.rms > 0.0):
+        i = int(np.argmax(missing.rms))
+        name = missing.coordinates[i]
+        left = f"{missing.rms[i]:.3g} {missing.units(name)['force']} rms are left of its forces"
+        said.append(f"the equation of {name} is violated most: {left}")
+    if len(comparison.views) > 1:
+        place, share = missing.aligned[0]
+        said.append(
+            f"a single force {place_in_words(place)} could make {percent(share)} of what stands above the noise"
+        )
+    return said
 
 
 def _grows(growths: Growths | None) -> str:

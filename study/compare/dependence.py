@@ -170,7 +170,9 @@ def significant_share(left: Unexplained, level: float) -> float:
     """
     gains = [found.gain for found in families(left)]
     for place in connections(left.base.fit.model):
-        gains += _one_by_one(left, np.hstack([*_shapes(place, left).values(), left.passed(place, _states(place, left))]))
+        gains += _one_by_one(
+            left, np.hstack([*_shapes(place, left).values(), left.passed(place, _states(place, left))])
+        )
     return max((0.0, *(g.explained for g in gains if g.p_value * len(gains) < level)))
 
 

@@ -3,16 +3,16 @@
 import math
 from dataclasses import dataclass
 
-import numpy as np
 from scipy.special import ndtri, stdtrit
 
-from study.equations import dimensions
-from study.equations.model import ModelTerm
-from study.equations.terms import QUANTITIES
+from study.equations.coefficient_units import coefficient_unit, parameter_units
+from study.equations.model import Model, ModelTerm
+from study.equations.place import HERE, Place
 from study.identify.frequency_domain.coefficients import Estimate
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import linearise, uncertainty
 from study.records.prepared import Prepared
+from study.records.record import Record
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,7 @@ class Coefficient:
     error: float | None  # standard error, for a residual that need not be white; None if the value was held
     unit: str  # in the units of the record
     freedom: float = math.inf  # of the standard error
+    place: Place = HERE  # where the term acts
 
     @property
     def held(self) -> bool:
@@ -41,39 +42,28 @@ class Coefficient:
         return self.value - half, self.value + half
 
 
-def coefficients(fit: FreeRunFit, prepared: Prepared, known: Estimate | None = None) -> tuple[Coefficient, ...]:
-    """Every coefficient with its standard error and unit, in the order of the model.
+def found_by(fit: FreeRunFit, prepared: Prepared) -> Estimate:
+    """All that was fitted, with a covariance that allows for a residual that is no white noise.
 
-    ``known`` is what was not found by this fit.
+    In segments, where a residual has no memory beyond its own, the fit's covariance holds as it is.
     """
-    errors = {key: known.error(key) for key in known.symbols} if known else standard_errors(fit, prepared)
-    freedom = known.freedom if known else math.inf
-    force, length = prepared.record.units.get("force", "N"), prepared.record.units.get("displacement", "m")
+    if not fit.keys or fit.restarts:
+        return fit.estimate
+    count = len(fit.keys)
+    return Estimate(fit.keys, fit.values, uncertainty(fit, prepared, linearise(fit, prepared))[:count, :count])
+
+
+def coefficients(model: Model, found: Estimate, record: Record) -> tuple[Coefficient, ...]:
+    """Every coefficient of a fitted model with its standard error and unit, in the order of the model."""
+    errors = {key: found.error(key) for key in found.symbols}
     return tuple(
-        Coefficient(key, entry.name, float(value), errors.get(key), _unit(entry, key, force, length), freedom)
-        for entry in fit.model.terms
-        for key, value in entry.values.items()
+        Coefficient(key, entry.term.name, float(value), errors.get(key), unit, found.freedom, entry.place)
+        for entry in model.terms
+        for (key, value), unit in zip(entry.values.items(), _units(entry, record), strict=True)
         if value is not None
     )
 
 
-def standard_errors(fit: FreeRunFit, prepared: Prepared) -> dict[str, float]:
-    """Standard error of everything that was fitted, allowing for a residual that is no white noise.
-
-    In segments, where a residual has no memory beyond its own, the fit's covariance holds as it is.
-    """
-    if not fit.keys:
-        return {}
-    if fit.restarts:
-        return {key: fit.estimate.error(key) for key in fit.keys}
-    deviations = np.sqrt(np.diag(uncertainty(fit, prepared, linearise(fit, prepared))))
-    return dict(zip(fit.keys, deviations.tolist(), strict=False))
-
-
-def _unit(entry: ModelTerm, key: str, force: str, length: str) -> str:
-    if key in entry.term.symbols:
-        return entry.term.unit(key, force, length)
-    parameter = next(p for p in entry.term.parameters if key == f"{entry.name}.{p.name}")
-    powers = QUANTITIES[parameter.quantity]
-    unit = dimensions.compose("", length, (-powers[0], -powers[1])).strip()
-    return "Hz" if parameter.quantity == "frequency" else unit.replace("/", "1/")
+def _units(entry: ModelTerm, record: Record) -> list[str]:
+    own = [coefficient_unit(entry, symbol, record) for symbol in entry.term.symbols]
+    return [*own, *parameter_units(entry, record).values()]

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from study.compare.fitted_coefficients import Coefficient, coefficients
+from study.compare.fitted_coefficients import Coefficient, coefficients, found_by
 from study.compare.prediction import Prediction, predict
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.rivals import larger
@@ -21,7 +21,8 @@ def rivals_note(fit: FreeRunFit, rivals: Sequence[FreeRunFit], prediction: Predi
     alike = [(rival, p) for rival, p in foretold if not p.diverged and not larger(p.residual, prediction.residual)]
     if not alike:
         return None
-    own, others = coefficients(fit, prepared), [coefficients(rival, prepared) for rival, _ in alike]
+    fits = (fit, *(rival for rival, _ in alike))
+    own, *others = (coefficients(one.model, found_by(one, prepared), prepared.record) for one in fits)
     keys = {key for other in others for key in _differing(own, other)}
     errors = [prediction.error, *(p.error for _, p in alike)]
     told = [f"{_values(values, keys)} (error {percent(e)})" for values, e in zip((own, *others), errors, strict=True)]

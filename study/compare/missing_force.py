@@ -1,46 +1,54 @@
-"""The force that a model lacks, along the record, robust against noise.
+"""The force that a model lacks, along the record, robust against noise: by equation of motion, and by place.
 
-``r = F - (forces of all terms)`` needs the motion and its derivatives. Those of the measured response
+``r = F - M a - (forces of all terms)`` needs the motion and its derivatives. Those of the measured response
 would be swamped by noise; those of the free run know nothing of what is missing. The motion used here
 is the free run plus the difference to the measured response in those bands where that stands above the
 noise: where the difference is noise, r is zero; where it is not, r is the missing force. (A Wiener filter
 instead of a gate leaves a part of the missing motion out everywhere, which flattens powers: a cubic
 damping then shows a power of 2.6 at 1 % noise, with the gate 2.8.)
+
+A single mass has one equation, and one place where a force may be missing. In a structure a force that is missing
+between two coordinates is in both equations, with opposite signs.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
+from study.compare.force_map import ForceCurve, curve
 from study.compare.noise import Noise
 from study.compare.prediction import Prediction
 from study.equations import kernels
+from study.equations.coefficient_units import units_at
 from study.equations.equations_of_motion import acceleration_program
+from study.equations.linear_part import alignment, connections, matrices, transfer
 from study.equations.model import Model, named_channels
-from study.identify.frequency_domain.inputs import input_history, reverse_inputs
+from study.equations.place import HERE, Place
+from study.identify.frequency_domain.inputs import input_history, placed_inputs
 from study.identify.frequency_domain.starting_values import oscillator
 from study.records.completion import SETTLED, derivative
+from study.records.noise_floor import CLEAR, SMOOTH
 from study.records.prepared import FORCE, Prepared
-from study.records.record import ALONE, MOTIONS, Record, Sensor
+from study.records.record import MOTIONS, Record, Sensor
+from study.support.arrays import Complexes, Floats
 
-Floats = NDArray[np.float64]
-CLEAR = 3.0  # standard errors by which the residual must stand above the noise, for a line to be used
-SMOOTH = 5  # lines that are averaged
 LEAST_DAMPING = 0.02  # of critical, in the weight that a line has
+Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class MissingForce:
-    """The missing force on the judging part; n samples."""
+    """The force that is missing at one place on the judging part; n samples."""
 
-    displacement: Floats  # free of noise; shape (n,)
+    displacement: Floats  # relative motion of the place, free of noise; shape (n,)
     velocity: Floats  # the same
     force: Floats  # measured force less inertia and all forces of the model, in the unit of force; shape (n,)
     free: Floats  # its derivatives by each fitted coefficient: what a refit could take over; shape (n, p)
-    gate: NDArray[np.bool_]  # lines of ``frequency`` on which the difference stands above the noise; shape (lines,)
+    gate: Bools  # lines of ``frequency`` on which the difference stands above the noise; shape (lines,)
     weight: Floats  # response of the best linear oscillator to a unit force: noise is white behind it; shape (lines,)
     frequency: Floats  # in hertz; shape (lines,)
     noise: float  # mean square of the noise that is left in :meth:`weighted` ``force``
@@ -57,33 +65,137 @@ class MissingForce:
         return _filtered(force, self.dt, self.frequency, self.weight * self.gate)
 
 
+@dataclass(frozen=True, eq=False)
+class Unbalanced:
+    """What the equations of motion leave on the judging part; n samples, s sensors, each with an equation, p keys."""
+
+    model: Model  # the fitted one
+    record: Record  # which it is of, for its units
+    coordinates: tuple[str, ...]  # whose equations these are: those that are measured
+    motion: Floats  # displacement, velocity and acceleration of all coordinates, free of noise; (3, n, coordinates)
+    force: Floats  # measured forces less inertia and all forces of the model; shape (n, s)
+    free: Floats  # its derivatives by each fitted coefficient; shape (n, s, p)
+    inertia: Floats  # rms force of inertia, to compare with; shape (s,)
+    gates: Bools  # lines on which each difference stands above its noise; shape (lines, s)
+    stiffness: Complexes  # force in each equation for a unit of what each sensor shows; shape (lines, s, s)
+    frequency: Floats  # in hertz; shape (lines,)
+    noise: Floats  # mean square of each sensor's noise that the gate lets through; shape (s,)
+    aligned: tuple[tuple[Place, float], ...]  # share of what is left of the motions that a single force could make
+    dt: float  # sampling interval in seconds
+    edge: int  # samples at each end which filters and integrals leave unsure
+
+    @property
+    def inner(self) -> slice:
+        """The samples that filters and integrals leave sure."""
+        return slice(self.edge, len(self.force) - self.edge)
+
+    @property
+    def lacking(self) -> tuple[str, ...]:
+        """Coordinates that no sensor shows."""
+        return tuple(c for c in self.model.coordinates if c not in self.coordinates)
+
+    @property
+    def rms(self) -> Floats:
+        """Rms force that is left, shape (s,)."""
+        return np.sqrt(np.mean(self.force[self.inner] ** 2, axis=0))
+
+    @property
+    def share(self) -> float:
+        """Power of what is left over that of the forces of inertia."""
+        power = float(np.sum(self.inertia**2))
+        return float(np.sum(self.rms**2)) / power if power > 0.0 else 0.0
+
+    @property
+    def matrix(self) -> Floats:
+        """Shares of the power of what is left that two equations hold with opposite signs, shape (s, s).
+
+        On the diagonal, of what acts from outside or the ground.
+        """
+        left = self.force[self.inner]
+        power = left.T @ left
+        total = float(np.trace(power))
+        if total == 0.0:
+            return np.zeros_like(power)
+        between = np.maximum(-power, 0.0)
+        np.fill_diagonal(between, 0.0)
+        alone = np.maximum(np.diag(power) - np.sum(between, axis=1), 0.0)
+        return (2.0 * between + np.diag(alone)) / total
+
+    @property
+    def shown(self) -> tuple[Place, ...]:
+        """Places whose coordinates are all measured, that which could make most of what is left first."""
+        return tuple(p for p, _ in self.aligned if set(p.moving) <= set(self.coordinates))
+
+    @cached_property
+    def curves(self) -> dict[str, ForceCurve]:
+        """Missing force over relative displacement of each of these by its label: a restoring-force map."""
+        found = ((place, self.at(place)) for place in self.shown)
+        return {place.label: curve(f.displacement[f.inner], f.force[f.inner]) for place, f in found}
+
+    def units(self, label: str) -> dict[str, str]:
+        """Units of force and displacement of the map of a place, or of the equation of a coordinate."""
+        place = next((p for p, _ in self.aligned if p.label == label), None) or Place("at", (label,))
+        return dict(zip(("force", "displacement"), units_at(place, self.record), strict=True))
+
+    def at(self, place: Place) -> MissingForce:
+        """The force that is missing at a place, as the equations that it is in have it."""
+        everywhere, e = (np.array(place.direction(c)) for c in (self.model.coordinates, self.coordinates))
+        size = float(e @ e)
+        u, v = (x @ everywhere for x in self.motion[:2])
+        ends = np.flatnonzero(e)
+        largest = float(np.max(self.noise[ends]))
+        noise = self.noise / largest if largest > 0.0 else np.ones(len(e))
+        paths = np.abs(np.einsum("i,fis->fs", e, self.stiffness)) / size
+        power = np.sqrt(np.sum(noise * paths**2, axis=1))
+        return MissingForce(
+            displacement=u, velocity=v, force=self.force @ e / size, free=np.einsum("nip,i->np", self.free, e) / size,
+            gate=np.any(self.gates[:, ends], axis=1), weight=1.0 / np.maximum(power, np.finfo(float).tiny),
+            frequency=self.frequency, noise=largest, dt=self.dt, edge=self.edge,
+        )  # fmt: skip
+
+
 def missing_force(model: Model, keys: Sequence[str], prediction: Prediction) -> MissingForce:
-    """The missing force on the judging part. Every value of the model is known; ``keys`` are what was fitted of it."""
+    """The missing force of a single mass; see :func:`unbalanced`."""
+    return unbalanced(model, keys, prediction).at(HERE)
+
+
+def unbalanced(model: Model, keys: Sequence[str], prediction: Prediction) -> Unbalanced:
+    """What each equation leaves. Every value of the model is known; ``keys`` are what was fitted of it.
+
+    Raises
+    ------
+    StudyError
+        If the model is incomplete, or names a channel that the record lacks.
+    """
     if prediction.prepared.response == FORCE:
-        return _along_a_known_motion(keys, prediction)
-    noise, prepared = prediction.of(0).noise, prediction.prepared
-    gate = lines_above_noise(noise, prepared.band[0])
-    motion = _motion(prediction, gate, noise.frequency)
-    part = prepared.record.part(*prepared.plan.judge)
-    named = part.with_channels(dict(zip(MOTIONS, motion, strict=True)))
-    forces = unbalanced_force(model, keys, named)
-    width = float(noise.frequency[1])
-    return MissingForce(
-        displacement=motion[0], velocity=motion[1], force=forces[:, 0], free=forces[:, 1:], gate=gate,
-        weight=_weight(prepared, noise.frequency), frequency=noise.frequency,
-        noise=float(np.sum(noise.density[gate]) * width), dt=prediction.dt, edge=_edge(prediction, width),
+        return _along_a_known_motion(model, keys, prediction)
+    prepared, noises = prediction.prepared, [view.noise for view in prediction.views]
+    frequency, low = noises[0].frequency, prepared.band[0]
+    gates = np.stack([lines_above_noise(noise, low) for noise in noises], axis=1)
+    motion = _motion(model, prediction, gates, frequency)
+    forces, inertia = _forces(model, keys, motion, prepared.record.part(*prepared.plan.judge))
+    rows = [model.coordinates.index(c) for c in prepared.coordinates]
+    forces, inertia, stiffness = forces[:, rows], inertia[:, rows], _stiffness(model, prepared, frequency)[:, rows]
+    width = float(frequency[1])
+    edge = _edge(prediction, width)
+    noise = [float(np.sum(n.density[gate]) * width) for n, gate in zip(noises, gates.T, strict=True)]
+    return Unbalanced(
+        model, prepared.record, prepared.coordinates, motion, forces[:, :, 0], forces[:, :, 1:],
+        np.std(inertia[edge : len(inertia) - edge], axis=0), gates, stiffness, frequency, np.array(noise),
+        _aligned(model, prediction, gates, frequency), prediction.dt, edge,
     )  # fmt: skip
 
 
-def _along_a_known_motion(keys: Sequence[str], prediction: Prediction) -> MissingForce:
+def _along_a_known_motion(model: Model, keys: Sequence[str], prediction: Prediction) -> Unbalanced:
     """The same where the motion is prescribed: what is left of the measured force, at all frequencies."""
     seen, prepared, run = prediction.of(0), prediction.prepared, prediction.run
     part = prepared.record.part(*prepared.plan.judge)
     free = np.zeros((len(part), len(keys))) if run is None else run.derivatives(run.fit)[:, : len(keys)]
-    noise, lines = seen.noise, np.ones(len(seen.noise.frequency), dtype=np.bool_)
-    return MissingForce(
-        displacement=part["displacement"], velocity=part["velocity"], force=seen.difference, free=free,
-        gate=lines, weight=np.ones(len(lines)), frequency=noise.frequency, noise=noise.rms**2, dt=prediction.dt, edge=0,
+    lines = np.ones((len(seen.noise.frequency), 1, 1))
+    return Unbalanced(
+        model, prepared.record, model.coordinates, np.stack([part[m] for m in MOTIONS])[:, :, None],
+        seen.difference[:, None], free[:, None], np.zeros(1), lines[:, 0] > 0.0, lines.astype(np.complex128),
+        seen.noise.frequency, np.array([seen.noise.rms**2]), ((HERE, 1.0),), prediction.dt, 0,
     )  # fmt: skip
 
 
@@ -95,7 +207,7 @@ def _edge(prediction: Prediction, width: float) -> int:
     return min(round(max(memory, settling)), len(prediction.measured) // 8)
 
 
-def lines_above_noise(noise: Noise, low: float) -> NDArray[np.bool_]:
+def lines_above_noise(noise: Noise, low: float) -> Bools:
     """Lines on which the residual, averaged over a few of them, surely stands above the noise."""
     few = np.ones(SMOOTH)
     level = np.convolve(noise.residual, few, "same") / np.convolve(np.ones_like(noise.residual), few, "same")
@@ -103,47 +215,81 @@ def lines_above_noise(noise: Noise, low: float) -> NDArray[np.bool_]:
     return (level > noise.density * (1.0 + spread)) & (noise.frequency >= low)
 
 
-def _motion(prediction: Prediction, gate: NDArray[np.bool_], frequency: Floats) -> Floats:
-    """Displacement, velocity and acceleration: free run plus what is sure of the difference, shape (3, n).
+def _motion(model: Model, prediction: Prediction, gates: Bools, frequency: Floats) -> Floats:
+    """Displacement, velocity and acceleration of all coordinates: free run plus what is sure of the difference.
 
-    The difference is integrated before it is gated: a gate blurs the ends, which an integration would blow up.
+    Shape (3, n, coordinates). The difference is integrated before it is gated: a gate blurs the ends, which an
+    integration would blow up.
     """
-    parts: list[Floats] = []
-    seen, prepared = prediction.of(0).difference, prediction.prepared
-    for row in range(3):
-        order = row - MOTIONS.index(prepared.response)
-        low = prepared.band[0] if order < 0 else 0.0
-        moved = derivative(seen, prepared.dt, order, low) if order else seen
-        parts.append(_filtered(moved, prepared.dt, frequency, gate.astype(np.float64)))
-    free = prediction.motions([Sensor(ALONE, motion) for motion in MOTIONS])
-    return np.ascontiguousarray(free.T) + np.stack(parts)
+    prepared, shape = prediction.prepared, (len(MOTIONS), len(model.coordinates))
+    free = prediction.motions([Sensor(c, motion) for motion in MOTIONS for c in model.coordinates])
+    motion = np.ascontiguousarray(free.T).reshape(*shape, len(free))
+    for sensor, seen, gate in zip(prepared.outputs.sensors, prediction.misfit.T, gates.T, strict=True):
+        for row in range(len(MOTIONS)):
+            order = row - MOTIONS.index(sensor.motion)
+            low = prepared.band[0] if order < 0 else 0.0
+            moved = derivative(seen, prepared.dt, order, low) if order else seen
+            sure = _filtered(moved, prepared.dt, frequency, gate.astype(np.float64))
+            motion[row, model.coordinates.index(sensor.coordinate)] += sure
+    return motion.transpose(0, 2, 1)
 
 
-def unbalanced_force(model: Model, keys: Sequence[str], record: Record) -> Floats:
-    """``F - (forces of all terms)`` along a record, and its derivatives by some keys, shape (n, 1 + keys).
+def _forces(model: Model, keys: Sequence[str], motion: Floats, part: Record) -> tuple[Floats, Floats]:
+    """``F - M a - (forces of all terms)`` along a motion, then its derivatives by some keys, and the forces of inertia.
 
-    Raises
-    ------
-    StudyError
-        If the model is incomplete, or names a channel that the record lacks.
+    Shapes (n, coordinates, 1 + keys) and (n, coordinates).
     """
-    values, program = model.numbers(), acceleration_program(model, keys)
-    columns = {"u:": record["displacement"], "v:": record["velocity"], "t": record.time}
-    columns |= {f"drive:{name}": record[name] for name in ("force", *named_channels(model, record.extra))}
-    memories = [input_history(item, record) for item in reverse_inputs(model) if item.state is not None]
-    columns |= {f"z:{term.name}": z for term, z in zip(model.states, memories, strict=True)}
-    out = kernels.evaluate(program, columns, len(record))
-    out[:, 0] -= record["acceleration"]
-    return out * values["m"]
+    values, n = model.numbers(), motion.shape[1]
+    columns = {f"{x}:{c}": motion[order][:, i] for order, x in enumerate("uv") for i, c in enumerate(model.coordinates)}
+    columns |= {f"drive:{name}": part[name] for name in (*dict(model.forces), *named_channels(model, part.extra))}
+    for entry in model.states:
+        item = next(item for item in placed_inputs(entry) if item.state is not None)
+        along = motion @ np.array(entry.place.direction(model.coordinates))
+        columns[f"z:{entry.name}"] = input_history(item, replace(part.relative(along), stretches=part.stretches))
+    made = kernels.evaluate(acceleration_program(model, keys), columns | {"t": part.time}, n)
+    left = made.reshape(n, len(model.coordinates), 1 + len(keys))
+    left[:, :, 0] -= motion[2]
+    mass = matrices(model, values)[2]
+    return np.einsum("ij,njk->nik", mass, left), motion[2] @ mass.T
 
 
-def _weight(prepared: Prepared, frequency: Floats) -> Floats:
-    """|H(f)| of the best linear oscillator from force to the measured response."""
-    own = oscillator(prepared)
-    omega = 2.0 * np.pi * np.maximum(frequency, 0.5 * frequency[1])
-    damping = max(abs(own["c"]), 2.0 * LEAST_DAMPING * float(np.sqrt(abs(own["k"]) * own["m"])))
-    stiffness = np.abs(own["k"] - own["m"] * omega**2 + 1j * omega * damping)
-    return omega ** MOTIONS.index(prepared.response) / stiffness
+def _stiffness(model: Model, prepared: Prepared, frequency: Floats) -> Complexes:
+    """Force in each equation for a unit of what each sensor shows, shape (lines, coordinates, sensors).
+
+    Of a single mass that of the best linear oscillator, whose resonance is never sharper than the least damping.
+    """
+    if model.named:
+        stiffness, damping, mass = matrices(model, model.numbers())
+    else:
+        own = oscillator(prepared)
+        least = 2.0 * LEAST_DAMPING * float(np.sqrt(abs(own["k"]) * own["m"]))
+        stiffness, damping, mass = (np.array([[x]]) for x in (own["k"], max(abs(own["c"]), least), own["m"]))
+    omega = 2.0 * np.pi * np.maximum(frequency, 0.5 * frequency[1])[:, None, None]
+    dynamic = stiffness - mass * omega**2 + 1j * omega * damping
+    sensors = prepared.outputs.sensors
+    orders = np.array([MOTIONS.index(s.motion) for s in sensors])
+    return dynamic[:, :, [model.coordinates.index(s.coordinate) for s in sensors]] / omega**orders
+
+
+def _aligned(
+    model: Model, prediction: Prediction, gates: Bools, frequency: Floats
+) -> tuple[tuple[Place, float], ...]:  # fmt: skip
+    """What share of what is left of the motions a single force at each place could make, the largest first.
+
+    Of all connections, neighbours and the ground. Unlike the shares of the equations it needs no derivatives of noisy
+    motions.
+    """
+    places = connections(model) if model.named else (HERE,)
+    if len(places) == 1:
+        return ((places[0], 1.0),)
+    prepared, pairs = prediction.prepared, zip(prediction.misfit.T, gates.T, strict=True)
+    seen = [_filtered(x, prepared.dt, frequency, gate.astype(np.float64)) for x, gate in pairs]
+    size = next_fast_len(2 * len(seen[0]), real=True)
+    lines = np.asarray(rfft(np.stack(seen, axis=1) / prediction.size, size, axis=0), dtype=np.complex128)
+    linear = matrices(model, model.numbers())
+    paths = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, size) / prediction.size[:, None]
+    found = [(p, alignment(paths @ np.array(p.direction(model.coordinates)), lines)) for p in places]
+    return tuple(sorted(found, key=lambda item: -item[1]))
 
 
 def _filtered(values: Floats, dt: float, frequency: Floats, gain: Floats) -> Floats:

@@ -19,7 +19,6 @@ Floats = NDArray[np.float64]
 AVERAGES = 8  # segments without overlap, at least
 LONGEST = 1024  # samples in a segment
 SAME = 1e-3  # rms by which the force of two periods may differ, over its own
-SIGNIFICANT = 5.0  # standard errors by which a residual must stand above the noise
 WHITE, SCATTER, EXACT = "quietest bands of the residual", "scatter between periods", "error of the integration"
 
 
@@ -40,7 +39,7 @@ class Noise:
     @property
     def alone(self) -> bool:
         """Whether noise alone would leave such a residual."""
-        return self.significance <= SIGNIFICANT
+        return self.significance <= noise_floor.SIGNIFICANT
 
 
 def segments_of(samples: int) -> Segments:

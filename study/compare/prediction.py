@@ -68,17 +68,17 @@ class Prediction:
     @cached_property
     def relative_residual(self) -> Floats:
         """The residuals over the sizes of their responses, those of one time side by side, shape (n s,)."""
-        return np.stack([view.residual / view.size for view in self._views], axis=1).ravel()
+        return np.stack([view.residual / view.size for view in self.views], axis=1).ravel()
 
     @cached_property
     def size(self) -> Floats:
         """Rms of each measured response about its mean, without what lies below ``low``, shape (s,)."""
-        return np.array([view.size for view in self._views])
+        return np.array([view.size for view in self.views])
 
     @cached_property
     def errors(self) -> Floats:
         """Rms of each sensor's residual over that of its response, shape (s,)."""
-        return np.array([view.error for view in self._views])
+        return np.array([view.error for view in self.views])
 
     @property
     def error(self) -> float:
@@ -88,7 +88,7 @@ class Prediction:
     @cached_property
     def floors(self) -> Floats:
         """The part of each sensor's error that no model could explain, as far as this residual shows, shape (s,)."""
-        return np.array([view.noise.rms / view.size for view in self._views])
+        return np.array([view.noise.rms / view.size for view in self.views])
 
     @property
     def floor(self) -> float:
@@ -103,16 +103,17 @@ class Prediction:
         one of its own colour. It asks for no derivative, and so sees what is left where the free run has lost the
         motion.
         """
-        found = [0.0 if v.noise.alone else float(np.sqrt(v.noise.excess)) / v.size for v in self._views]
+        found = [0.0 if v.noise.alone else float(np.sqrt(v.noise.excess)) / v.size for v in self.views]
         return _rms(np.array(found))
 
     @cached_property
-    def _views(self) -> tuple["SensorPrediction", ...]:
+    def views(self) -> tuple["SensorPrediction", ...]:
+        """What each sensor shows; a single mass has one."""
         return tuple(SensorPrediction(self, i) for i in range(len(self.prepared.outputs)))
 
     def of(self, sensor: int) -> "SensorPrediction":
         """What one of the sensors shows; a single mass has one, the first."""
-        return self._views[sensor]
+        return self.views[sensor]
 
     def motions(self, sensors: Sequence[Sensor]) -> Floats:
         """Motions of the free run that any sensors would show, zero where it diverged, shape (n, sensors)."""

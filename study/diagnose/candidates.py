@@ -84,9 +84,7 @@ def candidate_entries(model: Model, extra: Sequence[Term] = (), without: Sequenc
     return found
 
 
-def try_all(
-    entries: Sequence[ModelTerm], base: Baseline, progress: Progress | None = None
-) -> list[Candidate]:
+def try_all(entries: Sequence[ModelTerm], base: Baseline, progress: Progress | None = None) -> list[Candidate]:
     """Fit and judge every candidate that is worth it; those that cannot be fitted are left out.
 
     Of two sides of a place the better stays.
@@ -152,9 +150,7 @@ def _one_side(candidates: Sequence[Candidate]) -> list[Candidate]:
     return list(best.values())
 
 
-def _fitted(
-    chosen: Sequence[Screened], base: Baseline, progress: Progress | None, before: int = 0
-) -> list[Candidate]:
+def _fitted(chosen: Sequence[Screened], base: Baseline, progress: Progress | None, before: int = 0) -> list[Candidate]:
     done: list[Candidate] = []
 
     def fitted(item: Screened) -> Candidate | None:

@@ -3,8 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from study.compare.comparison_report import as_json, where
-from study.diagnose import diagnosis_pages, diagnosis_report
+from study.compare.comparison_report import as_json, mode_rows, where
+from study.diagnose import diagnosis_report
+from study.diagnose.diagnosis_pictures import picture_files
 from study.diagnose.diagnosis_sentences import diagnosis_sentences
 from study.diagnose.force_between import reading_in_words
 from study.diagnose.needless import Needless, needless_fields, needless_in_words
@@ -45,11 +46,16 @@ def diagnosis_files(
     was corrected for, or may have, ``unfitted`` by name why candidates of the user's could not be fitted,
     ``by_record`` the coefficients that may differ between records.
     """
-    comparison = diagnosis.comparison
-    prediction = comparison.prediction
+    comparison, prediction = diagnosis.comparison, diagnosis.comparison.prediction
     content = diagnosis_report.diagnosis_fields(diagnosis)
-    content["error"] = {"response": prediction.error, "force": comparison.force.total}
+    content["error"] = {"response": prediction.error, "force": comparison.force_error}
     content["noise_floor"] = {"response": prediction.floor}
+    if comparison.model.named:
+        for of, found in (("error", prediction.errors), ("noise_floor", prediction.floors)):
+            shown = zip(prediction.prepared.outputs.sensors, found.tolist(), strict=True)
+            content[of]["sensors"] = {str(sensor): value for sensor, value in shown}
+        after = diagnosis.modes_after
+        content["modes"] = {"before": mode_rows(comparison.modes), "after": after and mode_rows(after)}
     content |= {"record": comparison.record.name, "where": where(comparison), "says": words}
     content["not_needed"] = needless_fields(unneeded)
     content["not_fitted"] = dict(unfitted or {})
@@ -57,26 +63,13 @@ def diagnosis_files(
     content |= {"measurement": [fault.fault_fields(f) for f in faults]}
     if by_record:
         content["coefficients_by_record"] = list(by_record)
-    return {"diagnosis.json": as_json(content)} | diagnosis_pages.picture_files(diagnosis, comparison.record.name)
-
-
-def placed_fields(diagnosis: Diagnosis, unneeded: Sequence[Needless] = ()) -> dict[str, Any]:
-    """What ``diagnosis.json`` of a structure holds."""
-    from study.structure.structure_comparison import mode_rows, structure_document
-
-    whole, after = structure_document(diagnosis.comparison), diagnosis.modes_after
-    return {
-        **diagnosis_report.diagnosis_fields(diagnosis),
-        **{key: whole[key] for key in ("record", "error", "noise_floor", "where")},
-        "modes": {"before": whole["modes"], "after": mode_rows(after) if after is not None else None},
-        "not_needed": needless_fields(unneeded), "says": diagnosis_in_words(diagnosis),
-    }  # fmt: skip
+    return {"diagnosis.json": as_json(content)} | picture_files(diagnosis, comparison.record.name)
 
 
 def modes_before_and_after(diagnosis: Diagnosis) -> str:
-    """The modes of the structure as given, and with the first candidate."""
-    comparison = diagnosis.comparison
-    before, after = modes_table(comparison.modes, comparison.model.coordinates), diagnosis.modes_after
+    """The modes of a structure as given, and with the first candidate."""
+    comparison, after = diagnosis.comparison, diagnosis.modes_after
+    before = modes_table(comparison.modes, comparison.model.coordinates)
     if after is None:
         return f"modes\n{before}"
     return f"modes of the model as given\n{before}\n\nmodes with it\n{modes_table(after, comparison.model.coordinates)}"

@@ -1,93 +1,73 @@
-"""Pictures of a diagnosis: Axes in, Axes out."""
+"""The pictures of a diagnosis: as files, and each alone (Axes in, Axes out)."""
 
 # Matplotlib leaves the **kwargs of its methods untyped.
 # pyright: reportUnknownMemberType=false
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from study.diagnose.constancy import CoefficientCurve
+from study.compare.place_pictures import modes, sketch_of, structure_figure
+from study.diagnose.ranked import Ranked
+from study.diagnose.verdict import MISSING, Diagnosis
+from study.figures import page
 from study.figures.labels import term_names
+from study.figures.sketch import Sketch, sketch
+from study.figures.styles import in_style
 from study.support.numbers import percent
-from study.support.statistics import Gain
 
 SHOWN = 10
+FOLLOWED = 3  # candidates whose coefficient is drawn along frequency and amplitude
 LEAST = -30.0  # per cent: a candidate that explains less than nothing is drawn no further
 FURTHEST = (-4.0, 6.0)  # of a coefficient, relative to its value: what lies beyond is no constant
 
 
-class PicturedCandidate(Protocol):
-    """What the pictures show of a candidate, at a place or without one."""
-
-    @property
-    def name(self) -> str:
-        """Effect, and place if it has one."""
-        ...
-
-    @property
-    def gain(self) -> Gain:
-        """What it explains, held out."""
-        ...
-
-    @property
-    def response_error(self) -> float:
-        """Error of the response with it, held out."""
-        ...
-
-    @property
-    def coefficient(self) -> float:
-        """Its size."""
-        ...
-
-    @property
-    def flatness(self) -> CoefficientCurve | None:
-        """The coefficient along frequency."""
-        ...
-
-    @property
-    def steadiness(self) -> CoefficientCurve | None:
-        """The coefficient along amplitude."""
-        ...
-
-    @property
-    def tied_with(self) -> tuple[str, ...]:
-        """Names of those that the record cannot tell from it."""
-        ...
+def picture_files(diagnosis: Diagnosis, record: str) -> dict[str, bytes]:
+    """The pictures by file name, in the project's style; of a structure with those that its places ask for."""
+    comparison = diagnosis.comparison
+    with in_style():
+        drawn = diagnosis_figures(diagnosis, record) if diagnosis.candidates or not comparison.model.named else {}
+        if comparison.model.named:
+            sets = [("as given", comparison.modes)]
+            sets += [("with the first candidate", diagnosis.modes_after)] if diagnosis.modes_after is not None else []
+            drawn["structure"] = structure_figure(comparison, sketch_of_diagnosis(diagnosis))
+            drawn["modes"] = modes(comparison, sets)
+        return page.image_files(drawn)
 
 
-class _Judged(Protocol):
-    @property
-    def error(self) -> float: ...
+def sketch_of_diagnosis(diagnosis: Diagnosis) -> Sketch:
+    """The sketch of a structure, glowing where an effect that is found, or tied with it, explains what is left."""
+    comparison = diagnosis.comparison
+    if diagnosis.verdict != MISSING:
+        return sketch_of(comparison)
+    first = diagnosis.candidates[0]
+    shares: dict[frozenset[str], float] = {}
+    for row in diagnosis.candidates:
+        if row.name in (first.name, *first.tied_with):
+            shares.setdefault(row.entry.place.path, float(np.clip(row.gain.explained, 0.0, 1.0)))
+    return sketch(comparison.model, comparison.missing.coordinates, shares)
 
 
-class _Compared(Protocol):
-    @property
-    def prediction(self) -> _Judged: ...
+def diagnosis_figures(diagnosis: Diagnosis, record: str) -> dict[str, Figure]:
+    """Figures by the stem of their file name; the caller applies the style sheet."""
+    widest, (axes,) = page.empty_page(
+        f"What is missing from the model of {record}", f"verdict: {diagnosis.verdict.replace('_', ' ')}",
+        panel=3.4, legend_rows=0, headed=False, width=(1.4 if diagnosis.comparison.model.named else 1.0) * page.WIDTH,
+    )  # fmt: skip
+    widest.subplots_adjust(left=0.34)
+    ranking(axes, diagnosis)
+    constancy, panels = page.empty_page(
+        f"Is the coefficient a constant? {record}", "that of a true term is, along frequency and along amplitude",
+        columns=2, width=page.width(2), panel=2.8, share=False,
+    )  # fmt: skip
+    constancy_panels(panels[0], panels[1], diagnosis.candidates[:FOLLOWED])
+    page.shared_legend(constancy, panels)
+    return {"candidates": widest, "constancy": constancy}
 
 
-class PicturedDiagnosis(Protocol):
-    """What they show of a diagnosis, of a structure or of a single mass."""
-
-    @property
-    def verdict(self) -> str:
-        """What is said."""
-        ...
-
-    @property
-    def candidates(self) -> Sequence[PicturedCandidate]:
-        """Best first."""
-        ...
-
-    @property
-    def comparison(self) -> _Compared:
-        """Of the model as it is."""
-        ...
-
-
-def ranking(axes: Axes, diagnosis: PicturedDiagnosis) -> Axes:
+def ranking(axes: Axes, diagnosis: Diagnosis) -> Axes:
     """Share of the held-out difference that each candidate explains, with its standard error."""
     rows = diagnosis.candidates[:SHOWN]
     place = np.arange(len(rows))
@@ -110,12 +90,12 @@ def ranking(axes: Axes, diagnosis: PicturedDiagnosis) -> Axes:
     return axes
 
 
-def _label(row: PicturedCandidate, first: PicturedCandidate) -> str:
+def _label(row: Ranked, first: Ranked) -> str:
     tied = row.name in first.tied_with or (row is first and bool(first.tied_with))
     return term_names(row.name) + (" (tie)" if tied else "")
 
 
-def constancy_panels(frequency: Axes, amplitude: Axes, rows: Sequence[PicturedCandidate]) -> None:
+def constancy_panels(frequency: Axes, amplitude: Axes, rows: Sequence[Ranked]) -> None:
     """The coefficient of the first candidates along frequency and amplitude, relative to its value."""
     followed(frequency, rows, "frequency")
     followed(amplitude, rows, "amplitude")
@@ -125,7 +105,7 @@ def constancy_panels(frequency: Axes, amplitude: Axes, rows: Sequence[PicturedCa
     amplitude.set_ylabel("")
 
 
-def followed(axes: Axes, rows: Sequence[PicturedCandidate], along: str) -> Axes:
+def followed(axes: Axes, rows: Sequence[Ranked], along: str) -> Axes:
     """The coefficient of candidates along ``frequency`` or ``amplitude``, relative to its value."""
     low, high = -0.5, 2.5
     styles = (("o", "-", "0.1"), ("s", "--", "0.45"), ("^", ":", "0.6"))

@@ -47,9 +47,7 @@ def best_pair(rows: Sequence[Ranked], base: Baseline) -> Pair | None:
         return None if prediction.diverged else Pair((first, second), fit, prediction)
 
     with ThreadPoolExecutor(cores()) as pool:
-        pairs = [
-            pair for pair in pool.map(fitted, pair_screening.promising_pairs(rows, base)) if pair is not None
-        ]
+        pairs = [pair for pair in pool.map(fitted, pair_screening.promising_pairs(rows, base)) if pair is not None]
     power = float(np.mean(base.fit.residual**2))
     return min(pairs, key=lambda pair: _misfit(pair, power), default=None)
 

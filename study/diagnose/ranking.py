@@ -43,9 +43,7 @@ def rank(candidates: Sequence[Candidate], comparison: Comparison, asked: int | N
     white = {r.name: np.concatenate(r.held_out.white(outputs, noise)) for r in rows}
     alone = evidence(before, held_out_of(comparison))
     test = held_out_test(comparison.fit, before, noise)
-    rows = [
-        replace(_gained(r, alone), p_value=min(1.0, asked * test.p_value(r.held_out, r.term.tuned))) for r in rows
-    ]
+    rows = [replace(_gained(r, alone), p_value=min(1.0, asked * test.p_value(r.held_out, r.term.tuned))) for r in rows]
     return in_order(rows, white, asked)
 
 

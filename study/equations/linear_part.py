@@ -197,12 +197,21 @@ def modes_of(model: Model, keys: Sequence[str] = (), covariance: Floats | None =
         if key in orders:
             by_square[i], by_shape[i] = _changes(units[key], orders[key], squares, shapes)
             by_ratio[i] = _root_changes(units[key], orders[key], roots, damping, mass)
-    errors = [np.sqrt(np.maximum(np.einsum("p...,pq,q...->...", g, covariance, g), 0.0)) for g in (by_square, by_ratio)]
     moving = omega > 0.0
+    rate = np.where(moving, omega, 1.0)
+    ratio = -roots[0].real / np.abs(roots[0])
+    still = roots[0].imag == 0.0  # beyond critical damping nothing oscillates: the ratio is that of the mode's damping
+    own = np.einsum("cm,cd,dm->m", shapes, damping, shapes) / (2.0 * rate)
+    by_own = np.einsum("pcm,cd,dm->pm", by_shape, damping, shapes) / rate - own * by_square / (2.0 * rate**2)
+    for i, key in enumerate(keys):
+        if orders.get(key) == 1:
+            by_own[i] += np.einsum("cm,cd,dm->m", shapes, units[key], shapes) / (2.0 * rate)
+    ratio, by_ratio = np.where(still, own, ratio), np.where(still, by_own, by_ratio)
+    errors = [np.sqrt(np.maximum(np.einsum("p...,pq,q...->...", g, covariance, g), 0.0)) for g in (by_square, by_ratio)]
     shape, shape_error = _normalised(shapes, by_shape, covariance)
     return Modes(
-        omega / (2.0 * np.pi), np.where(moving, errors[0] / (4.0 * np.pi * np.where(moving, omega, 1.0)), 0.0),
-        np.where(moving, -roots[0].real / np.abs(roots[0]), 0.0), np.where(moving, errors[1], 0.0), shape, shape_error,
+        omega / (2.0 * np.pi), np.where(moving, errors[0] / (4.0 * np.pi * rate), 0.0), np.where(moving, ratio, 0.0),
+        np.where(moving, errors[1], 0.0), shape, shape_error,
     )  # fmt: skip
 
 

@@ -7,8 +7,9 @@ import numpy as np
 from bokeh.document import Document
 from bokeh.models import ColumnDataSource
 
-from study.compare.comparison_report import as_json
-from study.diagnose.diagnosis_files import placed_fields
+from study.compare.comparison_pictures import comparison_pictures
+from study.compare.comparison_report import as_json, comparison_document
+from study.diagnose.diagnosis_files import diagnosis_files
 from study.explore import any_session, check_plots, placed_panels, placed_session, plots, theme
 from study.explore.any_page import EMPTY, Page, frame, history_columns, history_ends, history_height, page_of
 from study.explore.any_page import variables as any_variables
@@ -18,8 +19,6 @@ from study.explore.placed_session import PlacedSession
 from study.explore.placed_view import PlacedView, placed_view
 from study.explore.saved import as_file, stored
 from study.explore.saved_files import PAGE, beside
-from study.structure.structure_comparison import structure_document
-from study.structure.structure_pictures import diagnosis_pictures, structure_pictures
 
 TEMPLATE = "placed.html"
 SHOWN = {  # of all places, sensors and candidates, by the source that the script fills with the selected one's
@@ -121,10 +120,9 @@ def structure_files(
 
 def _drawn(session: PlacedSession) -> dict[str, bytes]:
     now = session.now
-    contents = {"comparison.json": as_json(structure_document(now.comparison))} | structure_pictures(now.comparison)
+    contents = {"comparison.json": as_json(comparison_document([now.comparison]))} | comparison_pictures(now.comparison)
     if now.diagnosis is not None:
-        contents |= {"diagnosis.json": as_json(placed_fields(now.diagnosis, now.unneeded))}
-        contents |= diagnosis_pictures(now.diagnosis)
+        contents |= diagnosis_files(now.diagnosis, now.said, now.unneeded)
     return contents
 
 

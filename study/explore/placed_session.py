@@ -3,6 +3,8 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from study.compare.comparison import Comparison, compare
+from study.compare.comparison_report import history_step
 from study.diagnose.adding import added
 from study.diagnose.diagnosis_files import diagnosis_in_words, unneeded_in_words
 from study.diagnose.dropping import compared_without, term_at
@@ -13,7 +15,6 @@ from study.equations.terms import Term
 from study.explore.any_session import chosen, held, holding
 from study.explore.session import Step, joined, own_term
 from study.records.prepared import Prepared
-from study.structure.structure_comparison import StructureComparison, compare_structure, structure_history_step
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +24,7 @@ class PlacedStage:
     model: Model  # values that it gives are held
     label: str  # what was done to arrive at it
     added: str | None  # effect and place that are new in it
-    comparison: StructureComparison
+    comparison: Comparison
     diagnosis: Diagnosis | None = None  # None as long as nobody has asked
     said: str = ""  # the diagnosis in words
     dropped: str | None = None  # effect and place that were taken out of the model before
@@ -52,10 +53,10 @@ class PlacedSession:
     @property
     def steps(self) -> list[Step]:
         """The history, the steps before this session included."""
-        return joined(self.earlier, [structure_history_step(s.comparison, s.added, s.dropped) for s in self.stages])
+        return joined(self.earlier, [history_step(s.comparison, s.added, s.dropped) for s in self.stages])
 
 
-def begin_placed(comparison: StructureComparison, earlier: Sequence[Step] = ()) -> PlacedSession:
+def begin_placed(comparison: Comparison, earlier: Sequence[Step] = ()) -> PlacedSession:
     """A session with a structure as it was compared."""
     first = PlacedStage(comparison.model, "as given", None, comparison)
     return PlacedSession(comparison.prepared, (first,), earlier=tuple(earlier))
@@ -84,7 +85,7 @@ def without_placed(session: PlacedSession, name: str) -> PlacedSession:
 
 def with_held(session: PlacedSession, key: str, hold: bool) -> PlacedSession:
     """The session with a value held where it stands, or freed; it must not be so already."""
-    comparison = compare_structure(holding(session, key, hold), session.prepared)
+    comparison = compare(holding(session, key, hold), session.prepared)
     stage = PlacedStage(comparison.model, held(key, hold), None, comparison)
     return replace(session, stages=(*session.stages, stage))
 

@@ -10,8 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from study.compare.comparison import Comparison
+from study.compare.connection_spectra import dynamic_stiffnesses, highest_frequency, missing_force_spectra
 from study.compare.noise import segments_of
+from study.compare.place_pictures import sketch_of
 from study.compare.residual_checks import own_checks
+from study.diagnose.diagnosis_pictures import sketch_of_diagnosis
 from study.explore import decimate
 from study.explore.axis_scales import Columns, Floats
 from study.explore.check_columns import by_itself
@@ -21,9 +25,6 @@ from study.explore.placed_words import placed_words
 from study.figures.labels import power_of_ten
 from study.figures.sketch import Sketch
 from study.records.spectra import autospectrum
-from study.structure.connection_spectra import dynamic_stiffnesses, highest_frequency, missing_force_spectra
-from study.structure.structure_comparison import StructureComparison
-from study.structure.structure_pictures import sketch_of, sketch_of_diagnosis
 
 NINETY_FIVE = 1.96  # standard errors to each side
 
@@ -73,27 +74,27 @@ def _plain(column: Any) -> bool:
     return getattr(column, "dtype", None) == np.float64
 
 
-def _scales(comparison: StructureComparison) -> tuple[Scale, Scale]:
+def _scales(comparison: Comparison) -> tuple[Scale, Scale]:
     """Units in which relative displacements and missing forces of all places are easy to read."""
-    curves = [c for c in comparison.forces.curves.values() if len(c.at)]
+    curves = [c for c in comparison.missing.curves.values() if len(c.at)]
     far = max((float(np.max(np.abs(c.at))) for c in curves), default=1.0)
     most = max((float(np.max(np.abs(c.mean))) for c in curves), default=1.0)
     (force, unit), turns = comparison.prepared.record.force_and_length, _turns(comparison)
     return _length(comparison, far), power(f"{force} or {force} {unit}" if turns else force, most)
 
 
-def _turns(comparison: StructureComparison) -> bool:
+def _turns(comparison: Comparison) -> bool:
     """Whether a coordinate is a rotation."""
     return bool(comparison.prepared.record.rotations)
 
 
-def _length(comparison: StructureComparison, largest: float) -> Scale:
+def _length(comparison: Comparison, largest: float) -> Scale:
     """Metres become mm where that is easier to read; beside angles they stay."""
     unit = comparison.prepared.record.force_and_length[1]
     return power(f"{unit} or rad", largest) if _turns(comparison) else length(unit, largest)
 
 
-def _sensors(comparison: StructureComparison) -> Columns:
+def _sensors(comparison: Comparison) -> Columns:
     prediction = comparison.prediction
     names = [str(s) for s in prediction.prepared.sensors]
     units = [
@@ -114,7 +115,7 @@ def _joined(parts: Iterator[tuple[str, Mapping[str, Floats]]], names: Sequence[s
     return {"of": marks, **{n: np.concatenate(c) if c else np.empty(0) for n, c in found.items()}}
 
 
-def _motion_scale(comparison: StructureComparison, i: int) -> Scale:
+def _motion_scale(comparison: Comparison, i: int) -> Scale:
     """Unit in which the motion of a sensor is easy to read."""
     sensor = comparison.prediction.prepared.sensors[i]
     unit = comparison.prepared.record.unit(sensor)
@@ -124,7 +125,7 @@ def _motion_scale(comparison: StructureComparison, i: int) -> Scale:
     return rate(unit, most) if "/" in unit else length(unit, most)
 
 
-def _motions(comparison: StructureComparison, close: bool = False) -> Columns:
+def _motions(comparison: Comparison, close: bool = False) -> Columns:
     """Measured and predicted motion of every sensor and their difference, on the part that is judged.
 
     Or ``close`` up where that is largest.
@@ -146,7 +147,7 @@ def _motions(comparison: StructureComparison, close: bool = False) -> Columns:
     return _joined(parts(), ("t", "measured", "predicted", "difference"))
 
 
-def _spectra(comparison: StructureComparison) -> Columns:
+def _spectra(comparison: Comparison) -> Columns:
     """Density of the difference of every sensor, and of its noise, over its rms motion."""
     prediction = comparison.prediction
 
@@ -162,7 +163,7 @@ def _spectra(comparison: StructureComparison) -> Columns:
     return _joined(parts(), ("f", "difference", "noise"))
 
 
-def _checks(comparison: StructureComparison) -> dict[str, Columns]:
+def _checks(comparison: Comparison) -> dict[str, Columns]:
     """Autocorrelation and distribution of every sensor's residual; all have as many samples, so one band is for all."""
     prediction = comparison.prediction
     found = [by_itself(own_checks(x, prediction.prepared.dt)) for x in prediction.misfit.T]
@@ -177,11 +178,11 @@ def _checks(comparison: StructureComparison) -> dict[str, Columns]:
 
 
 def _maps(
-    comparison: StructureComparison, labels: Mapping[frozenset[str], str], along: Scale, force: Scale
+    comparison: Comparison, labels: Mapping[frozenset[str], str], along: Scale, force: Scale
 ) -> Columns:  # fmt: skip
     def parts() -> Iterator[tuple[str, Mapping[str, Floats]]]:
-        for place, _ in comparison.forces.aligned:
-            curve = comparison.forces.curves.get(place.label)
+        for place, _ in comparison.missing.aligned:
+            curve = comparison.missing.curves.get(place.label)
             if curve is not None and place.path in labels:
                 half = NINETY_FIVE * curve.error
                 values = {"mean": curve.mean, "low": curve.mean - half, "high": curve.mean + half}
@@ -191,7 +192,7 @@ def _maps(
     return _joined(parts(), ("at", "mean", "low", "high"))
 
 
-def _force(comparison: StructureComparison, labels: Mapping[frozenset[str], str], force: Scale) -> Columns:
+def _force(comparison: Comparison, labels: Mapping[frozenset[str], str], force: Scale) -> Columns:
     """Density of the force that each place lacks."""
     frequency, densities = missing_force_spectra(comparison)
     inside = (frequency > 0.0) & (frequency <= highest_frequency(comparison))
@@ -204,7 +205,7 @@ def _force(comparison: StructureComparison, labels: Mapping[frozenset[str], str]
     return _joined(parts(), ("f", "force"))
 
 
-def _stiffness(comparison: StructureComparison, labels: Mapping[frozenset[str], str]) -> tuple[Columns, str]:
+def _stiffness(comparison: Comparison, labels: Mapping[frozenset[str], str]) -> tuple[Columns, str]:
     """Dynamic stiffness of each connection with 95 % intervals and that of the model, and their unit."""
     found = dynamic_stiffnesses(comparison)
     unit = "/".join(comparison.prepared.record.force_and_length)

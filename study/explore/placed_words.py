@@ -5,7 +5,10 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
+from study.compare.comparison import Comparison
+from study.compare.comparison_sentences import comparison_in_words
 from study.compare.dependence import explained_by_place
+from study.compare.fitted_coefficients import Coefficient
 from study.diagnose.ranked import Ranked
 from study.equations.linear_part import Modes
 from study.equations.place import Place
@@ -15,7 +18,6 @@ from study.explore.placed_session import PlacedStage
 from study.explore.words import HEAD, NOT_ASKED, UNKNOWN, VERDICTS, WAITING, bar, figure, gives, in_table, in_words
 from study.figures.labels import power_of_ten
 from study.figures.sketch import Sketch, svg
-from study.structure.structure_comparison import PlacedCoefficient, StructureComparison, structure_in_words
 from study.structure.structure_page import terms_there
 from study.support.numbers import percent
 
@@ -28,7 +30,7 @@ def placed_words(stage: PlacedStage, drawn: Sketch, step: int, live: bool) -> di
     chosen = max(drawn.links, key=lambda link: link.share).place
     fragments = {
         "figures": _figures(comparison),
-        "says": escape(in_sentence(structure_in_words(comparison))),
+        "says": escape(in_sentence(comparison_in_words(comparison))),
         "sketch": svg(drawn, chosen),
         "sketch-hint": escape(_hint(stage)),
         "places": _places(stage, drawn),
@@ -42,14 +44,14 @@ def placed_words(stage: PlacedStage, drawn: Sketch, step: int, live: bool) -> di
     return {"place": list(fragments), "html": list(fragments.values())}
 
 
-def _figures(comparison: StructureComparison) -> str:
+def _figures(comparison: Comparison) -> str:
     prediction = comparison.prediction
     worst = max(zip(prediction.errors, prediction.prepared.sensors, strict=True), key=lambda pair: pair[0])
     about = f"worst {in_percent(worst[0])} at {worst[1].coordinate}"
     cells = (
         ("error", "Error of the motions", in_percent(prediction.error), about),
         ("floor", "Noise floor", in_percent(prediction.floor), "what no model could explain"),
-        ("force", "Error of the forces", in_percent(comparison.forces.share), "of the power of those of inertia"),
+        ("force", "Error of the forces", in_percent(comparison.missing.share), "of the power of those of inertia"),
     )  # fmt: skip
     return "".join(figure(*cell) for cell in cells)
 
@@ -72,7 +74,7 @@ def _verdict(stage: PlacedStage, live: bool) -> str:
 def _places(stage: PlacedStage, drawn: Sketch) -> str:
     """What is known of each place, one block each: the script shows that of the selected one."""
     comparison = stage.comparison
-    shares = {place.path: share for place, share in comparison.forces.aligned}
+    shares = {place.path: share for place, share in comparison.missing.aligned}
     general = explained_by_place(comparison.leftovers)
     rows = stage.diagnosis.candidates if stage.diagnosis is not None else ()
     blocks: list[str] = []
@@ -175,7 +177,7 @@ def _coefficients(stage: PlacedStage, live: bool) -> str:
     return f"<table>{head}{''.join(rows)}</table>"
 
 
-def _coefficient(c: PlacedCoefficient, drop: str, live: bool) -> str:
+def _coefficient(c: Coefficient, drop: str, live: bool) -> str:
     size, half = in_table(c.value, c.error)
     act, label = ("free", "Free") if c.error is None else ("hold", "Hold")
     button = f"<button data-act='{act}' data-name='{escape(c.key)}'>{label}</button>" if live else ""

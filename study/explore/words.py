@@ -11,7 +11,6 @@ from study.compare.comparison import Comparison
 from study.compare.comparison_sentences import comparison_in_words
 from study.compare.fitted_coefficients import Coefficient
 from study.compare.force_map import FEWEST, surface
-from study.compare.modal import modal
 from study.diagnose.needless import Needless
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, NOTHING, Diagnosis
@@ -225,7 +224,7 @@ def _modal(comparison: Comparison) -> str:
     """Natural frequency and damping ratio of the linear part, if it has them."""
     rows = ""
     named = (("f<sub>n</sub>", "natural frequency"), ("ζ", "damping ratio"))
-    for (symbol, what), found in zip(named, modal(comparison.fit, comparison.prepared), strict=True):
+    for (symbol, what), found in zip(named, comparison.natural, strict=True):
         if found is not None:
             value, error, unit = found
             size, half = with_error(value, 1.96 * error)

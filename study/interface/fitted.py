@@ -92,18 +92,16 @@ class Fit(FitPictures):
     @property
     def f_n(self) -> Number | None:
         """Natural frequency of the linear part in hertz, (4.4); None without mass, or stiffness above zero."""
-        return self._modal()[0]
+        return self._natural(0)
 
     @property
     def zeta(self) -> Number | None:
         """Damping ratio of the linear part, (4.5); None without mass, damping, or stiffness above zero."""
-        return self._modal()[1]
+        return self._natural(1)
 
-    def _modal(self) -> tuple[Number | None, Number | None]:
-        from study.compare.modal import modal
-
-        found = modal(self.comparison.fit, self.comparison.prepared)
-        return tuple(None if n is None else Number(*n) for n in found)  # pyright: ignore[reportReturnType]
+    def _natural(self, which: int) -> Number | None:
+        found = self.comparison.natural[which]
+        return None if found is None else Number(*found)
 
     @property
     def error(self) -> float:

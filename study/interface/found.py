@@ -164,8 +164,7 @@ class Diagnosis:
 
         Relative to its value, with 95 % intervals.
         """
-        from study.diagnose.diagnosis_pages import FOLLOWED
-        from study.diagnose.diagnosis_pictures import followed
+        from study.diagnose.diagnosis_pictures import FOLLOWED, followed
 
         expect(along in ("amplitude", "frequency"), f"along is {along!r}; expected amplitude or frequency")
         with drawing_axes(ax) as (axes,):

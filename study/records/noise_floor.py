@@ -7,11 +7,15 @@ autospectrum. The excess in other bands is systematic: a better model could expl
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from study.records.spectra import Segments, autospectrum
 from study.support.arrays import Floats
 from study.support.errors import StudyError
 
+SIGNIFICANT = 5.0  # standard errors by which a residual must stand above the noise
+CLEAR = 3.0  # standard errors by which a line must stand above the noise, to be used
+SMOOTH = 5  # lines that are averaged
 BANDS = 20  # bands of the spectrum, or as many as there are lines
 FEWEST = 8  # lines that show a noise floor
 QUIET = 5  # bands, the quietest, that give the floor
@@ -74,3 +78,28 @@ def _selection(bands: int, quiet: int) -> float:
 
     ranks = (np.arange(1, quiet + 1) - 0.375) / (bands + 0.25)
     return -float(np.mean(ndtri(ranks)))
+
+
+def band_above_noise(values: Floats, dt: float, low: float) -> tuple[Floats, Floats] | None:
+    """Frequencies in hertz, and 1 at those where a density stands above that of white noise, 0 at others.
+
+    None if noise alone would do.
+    """
+    found = floor(values, dt, low)
+    if found.significance <= SIGNIFICANT:
+        return None
+    cut = Segments(length=max(32, min(1024, 2 ** int(np.log2(len(values) / 8)))))
+    frequency, density = autospectrum(values, dt, cut)
+    white = found.noise**2 / (0.5 / dt - low)
+    smooth = np.convolve(np.pad(density, SMOOTH // 2, mode="edge"), np.ones(SMOOTH) / SMOOTH, "valid")
+    limit = white * (1.0 + CLEAR / np.sqrt(cut.effective_averages(len(values)) * SMOOTH / cut.line_inflation()))
+    return frequency, ((smooth > limit) & (frequency >= low)).astype(np.float64)
+
+
+def in_band(values: Floats, dt: float, frequency: Floats, gate: Floats) -> Floats:
+    """Values, shape (n,), of which each frequency is kept to its share."""
+    size = next_fast_len(2 * len(values), real=True)
+    at = np.asarray(rfftfreq(size, dt), dtype=np.float64)
+    weight = np.asarray(np.interp(at, frequency, gate), dtype=np.float64)
+    lines = np.asarray(rfft(values, size), dtype=np.complex128)
+    return np.asarray(irfft(lines * weight, size), dtype=np.float64)[: len(values)]

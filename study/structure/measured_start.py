@@ -13,11 +13,10 @@ from scipy.fft import rfft
 
 from study.equations.modal_keys import ModalKeys
 from study.equations.model import Model
-from study.identify.frequency_domain.inputs import input_history
+from study.identify.frequency_domain.inputs import input_history, placed_inputs
 from study.identify.frequency_domain.subspace import observability
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS
-from study.structure.missing_forces import placed_inputs
 from study.support.arrays import Complexes, Floats
 from study.support.errors import expect
 from study.support.least_squares import least_squares

@@ -11,7 +11,18 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
 
+from study.compare import place_panels
+from study.compare.comparison import Comparison
+from study.compare.comparison_sentences import comparison_in_words
+from study.compare.place_pictures import (
+    modes,
+    responses_figure,
+    sensors_figure,
+    shared_force_figure,
+    sketch_of,
+)
 from study.diagnose.diagnosis_files import diagnosis_in_words
+from study.diagnose.diagnosis_pictures import sketch_of_diagnosis
 from study.diagnose.ranked import Ranked
 from study.diagnose.verdict import MISSING, Diagnosis
 from study.equations.place import Place
@@ -20,29 +31,19 @@ from study.figures import page
 from study.figures.labels import term_names
 from study.figures.sketch import Sketch, svg
 from study.figures.styles import in_style
-from study.structure import structure_panels
-from study.structure.structure_comparison import StructureComparison, structure_in_words
-from study.structure.structure_pictures import (
-    modes,
-    responses_figure,
-    sensors_figure,
-    shared_force_figure,
-    sketch_of,
-    sketch_of_diagnosis,
-)
 from study.support.numbers import percent
 
 PAGE = "structure.html"
 
 
-def structure_page(comparison: StructureComparison, diagnosis: Diagnosis | None = None) -> bytes:
+def structure_page(comparison: Comparison, diagnosis: Diagnosis | None = None) -> bytes:
     """The page as the content of a file; the same bytes from the same input."""
     drawn = sketch_of(comparison) if diagnosis is None else sketch_of_diagnosis(diagnosis)
     name, model = comparison.prepared.record.name, comparison.model.name
     said = (
-        structure_in_words(comparison)
+        comparison_in_words(comparison)
         if diagnosis is None
-        else f"{structure_in_words(comparison)} {diagnosis_in_words(diagnosis)}"
+        else f"{comparison_in_words(comparison)} {diagnosis_in_words(diagnosis)}"
     )
     sets = [("as given", comparison.modes)]
     if diagnosis is not None and diagnosis.modes_after is not None:
@@ -71,28 +72,28 @@ def structure_page(comparison: StructureComparison, diagnosis: Diagnosis | None 
     return text.replace("{body}", "\n".join(body)).encode()
 
 
-def _maps(comparison: StructureComparison) -> dict[frozenset[str], bytes]:
+def _maps(comparison: Comparison) -> dict[frozenset[str], bytes]:
     """The restoring-force map of each connection that the motion shows, as PNG."""
     found: dict[frozenset[str], bytes] = {}
-    for place, _ in comparison.forces.aligned:
-        curve = comparison.forces.curves.get(place.label)
+    for place, _ in comparison.missing.aligned:
+        curve = comparison.missing.curves.get(place.label)
         if curve is not None and len(curve.at):
             figure, (axes,) = page.empty_page(
                 place.label, "missing force over relative displacement", panel=2.3, headed=False
             )  # fmt: skip
-            structure_panels.connection_force(axes, comparison.forces, place.label)
+            place_panels.connection_force(axes, comparison.missing, place.label)
             page.shared_legend(figure, [axes])
             found[place.path] = page.rendered(figure, "png")
     return found
 
 
 def _places(
-    comparison: StructureComparison, diagnosis: Diagnosis | None, drawn: Sketch,
+    comparison: Comparison, diagnosis: Diagnosis | None, drawn: Sketch,
     maps: Mapping[frozenset[str], bytes], selected: Place,
 ) -> str:  # fmt: skip
     """What is known of each place, one block each."""
     rows = diagnosis.candidates if diagnosis is not None else ()
-    shares = {place.path: share for place, share in comparison.forces.aligned}
+    shares = {place.path: share for place, share in comparison.missing.aligned}
     blocks: list[str] = []
     for link in drawn.links:
         place, path = link.place, link.place.path
@@ -115,7 +116,7 @@ def _capital(text: str) -> str:
     return text[0].upper() + text[1:]
 
 
-def terms_there(comparison: StructureComparison, path: frozenset[str]) -> str:
+def terms_there(comparison: Comparison, path: frozenset[str]) -> str:
     """The terms that the model has at a place, in a sentence."""
     names = [
         term_names(e.term.name)
@@ -137,7 +138,7 @@ def _candidates(rows: Sequence[Ranked]) -> str:
     return f"<table>{head}{''.join(lines)}</table>"
 
 
-def _coefficients(comparison: StructureComparison) -> str:
+def _coefficients(comparison: Comparison) -> str:
     lines = [
         f"<tr><td>{escape(c.key)}<td>{c.value:.5g}<td>"
         + ("held" if c.interval is None else f"{c.interval[0]:.5g} to {c.interval[1]:.5g}")

@@ -7,18 +7,16 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from study.compare.comparison import Comparison
+from study.compare.comparison import Comparison, compare
 from study.compare.prediction import predict
 from study.diagnose.credibility import credible
 from study.diagnose.verdict import MISSING, Diagnosis, diagnose
 from study.equations.model import Model
 from study.faults.fault import Fault
-from study.identify.time_domain.fit_model import rough_steps
-from study.identify.time_domain.part_fit import fit_part
+from study.identify.time_domain.part_fit import fit_part, rough_steps
 from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import Prepared
 from study.structure.prepared_structure import prepare_structure
-from study.structure.structure_comparison import StructureComparison, compare_structure
 from study.support.errors import StudyError
 from study.trials.draw import Trial
 from study.trials.kept import Row
@@ -36,7 +34,7 @@ def compared(trial: Trial, model: Model) -> tuple[Comparison, tuple[Fault, ...]]
 
 def diagnosed_structure(trial: Trial) -> Diagnosis:
     """What is said of a structure."""
-    return diagnose(compare_structure(trial.believed, prepare_structure(trial.record, trial.believed)))
+    return diagnose(compare(trial.believed, prepare_structure(trial.record, trial.believed)))
 
 
 def tie_set(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -68,7 +66,7 @@ def evidence_row(diagnosis: Diagnosis, hidden: Sequence[str]) -> Row:
     }
 
 
-def intervals(comparison: Comparison | StructureComparison, truth: Model) -> Row:
+def intervals(comparison: Comparison | Comparison, truth: Model) -> Row:
     """How many of the coefficients of a model with the true terms lie in their 95 % intervals: ``held`` of ``asked``.
 
     Nothing is asked of a model with other terms.
@@ -81,12 +79,12 @@ def intervals(comparison: Comparison | StructureComparison, truth: Model) -> Row
     return {"held": sum(inside), "asked": len(inside)}
 
 
-def true_comparison(trial: Trial, diagnosis: Diagnosis) -> StructureComparison:
+def true_comparison(trial: Trial, diagnosis: Diagnosis) -> Comparison:
     """The true model of a structure, fitted from its true values."""
     prepared = diagnosis.comparison.prepared
     model, start = trial.completed, trial.truth.numbers()
     fit = fit_part(model, prepared, (), start, steps=rough_steps(model, prepared, start))
-    return compare_structure(model, prepared, finished(fit, prepared))
+    return compare(model, prepared, fit=finished(fit, prepared))
 
 
 def error_of_truth(trial: Trial, prepared: Prepared, steps: int) -> float:

@@ -11,9 +11,9 @@ from study.equations.place import GROUND, Place
 from study.equations.simulate import Integrator, simulate
 from study.equations.term import Term
 from study.equations.terms import external, get
+from study.identify.frequency_domain.inputs import relative_record
 from study.records.excitation import Excitation, force
 from study.records.record import MOTIONS, Record, Sensor
-from study.structure.missing_forces import relative_record
 from study.support.arrays import Floats
 from study.support.errors import expect
 from study.trials.effects import Asked, Rig, Shares, Sizing, beyond_linear, drawn_effect, force_along, forgets

@@ -61,13 +61,15 @@ def two_effects():
     prepared = prepare_record(made.record)
     comparison = compare(made.believed, prepared)
     base = shape_search.baseline(comparison.fit, prepared)
-    terms = [free(get(n)) for n in ("quadratic_stiffness", "quadratic_damping", "cubic_stiffness", "bilinear_stiffness")]
+    terms = [
+        free(get(n)) for n in ("quadratic_stiffness", "quadratic_damping", "cubic_stiffness", "bilinear_stiffness")
+    ]
     tried = candidates.try_all(terms, base)
     return made, prepared, base, rank(tried, comparison)
 
 
 def test_both_of_two_effects_are_the_best_pair(two_effects):
-    made, prepared, base, rows = two_effects
+    made, _, base, rows = two_effects
     best = pairs.best_pair(rows, base)
     assert best is not None
     assert set(best.names) == set(made.hidden)

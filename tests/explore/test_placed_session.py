@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from study.compare import history
+from study.compare.comparison import compare
 from study.equations import model_file
 from study.explore import any_session
 from study.explore import placed_session as sessions
@@ -17,7 +18,6 @@ from study.explore.placed_view import placed_view
 from study.explore.saved_files import PAGE
 from study.records.readers import read_record
 from study.structure.prepared_structure import prepare_structure
-from study.structure.structure_comparison import compare_structure
 from study.support.errors import StudyError
 
 CUBIC = "cubic_stiffness[floor2-floor3]"
@@ -27,7 +27,7 @@ CUBIC = "cubic_stiffness[floor2-floor3]"
 def begun(hall):
     model = model_file.read_model(hall / "frame.yaml")
     prepared = prepare_structure(read_record(hall / "frame.csv", roles=model.roles), model)
-    return sessions.begin_placed(compare_structure(model, prepared))
+    return sessions.begin_placed(compare(model, prepared))
 
 
 @pytest.fixture(scope="module")

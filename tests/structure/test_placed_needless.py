@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import pytest
 
+from study.compare.comparison import compare
 from study.diagnose.needless import needless
 from study.equations.model import free
 from study.equations.place import Place
 from study.equations.terms import get
 from study.structure.prepared_structure import prepare_structure
-from study.structure.structure_comparison import compare_structure
 
 CUBIC = free(get("cubic_stiffness"), Place("between", ("floor2", "floor3")))
 DRAG = free(get("quadratic_damping"), Place("between", ("ground", "floor1")))
@@ -18,7 +18,7 @@ DRAG = free(get("quadratic_damping"), Place("between", ("ground", "floor1")))
 @pytest.fixture(scope="module")
 def found(believed, record_of):
     model = replace(believed, terms=(*believed.terms, CUBIC, DRAG))
-    return needless(compare_structure(model, prepare_structure(record_of(), model, (0, 1500), (1500, 3000))))
+    return needless(compare(model, prepare_structure(record_of(), model, (0, 1500), (1500, 3000))))
 
 
 def test_the_term_that_the_record_lacks_is_named_with_its_place_and_no_other(found):
@@ -34,4 +34,4 @@ def test_a_given_value_is_not_asked_for(believed, record_of):
     drag = replace(DRAG, coefficients=(0.0,))
     model = replace(believed, terms=(*believed.terms, CUBIC, drag))
     prepared = prepare_structure(record_of(), model, (0, 1500), (1500, 3000))
-    assert needless(compare_structure(model, prepared)) == ()
+    assert needless(compare(model, prepared)) == ()

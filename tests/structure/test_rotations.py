@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from study.compare.comparison import compare
+from study.compare.comparison_report import comparison_summary
 from study.equations.coefficient_units import coefficient_unit, parameter_units, units_at
 from study.equations.model import free
 from study.equations.place import Place
@@ -12,7 +14,6 @@ from study.equations.terms import get
 from study.records.readers import read_record
 from study.records.record import Sensor, record_of, write_csv
 from study.structure.prepared_structure import prepare_structure
-from study.structure.structure_comparison import compare_structure, structure_summary
 
 TURNS = record_of(
     0.01, {"shaker": np.zeros(9)}, {Sensor(c, "displacement"): np.zeros(9) for c in ("heave", "pitch")}
@@ -58,8 +59,8 @@ def test_a_record_tells_which_coordinates_turn(tmp_path, frame, quiet_frame, uni
     )  # fmt: skip
     record = read_record(path, roles=frame.roles)
     assert record.rotations == {"floor3"}
-    comparison = compare_structure(frame, prepare_structure(record, frame))
-    said = structure_summary(comparison)
+    comparison = compare(frame, prepare_structure(record, frame))
+    said = comparison_summary([comparison])
     assert comparison.prediction.error < 1e-5
     assert "kg m^2" in said
     assert " N m" in said

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from study.compare.comparison import compare
 from study.diagnose.verdict import MISSING, NOTHING, diagnose
 from study.equations.free_run import prepare
 from study.equations.model_file import parse_model
@@ -13,7 +14,6 @@ from study.identify.time_domain.part_fit import linearise, run_of
 from study.records.record import Sensor, record_of
 from study.records.record_layout import Layout
 from study.structure.prepared_structure import prepare_structure, structure_ready
-from study.structure.structure_comparison import compare_structure
 from study.support.errors import StudyError
 
 DT, SAMPLES = 0.01, 2000
@@ -72,7 +72,7 @@ def test_a_decay_is_fitted_and_judged_in_turn_and_its_motion_begins_anew():
 
 def test_derivatives_by_the_states_of_each_stretch_are_those_of_the_motion():
     prepared = structure_ready(decay(HARD), model(more=HARD), Layout())
-    fit = compare_structure(model(more=HARD), prepared).fit
+    fit = compare(model(more=HARD), prepared).fit
     jacobian = fit.outputs.apart(linearise(fit, prepared))
     assert fit.initial.shape == (len(prepared.record.runs(prepared.plan.fit)), 4)
     run = run_of(fit, prepared)
@@ -93,14 +93,14 @@ def test_derivatives_by_the_states_of_each_stretch_are_those_of_the_motion():
 def test_a_fit_begins_where_noise_does_not_lead_it_astray(noise, seed):
     """Of displacements every 0.01 s: two derivatives of their noise are larger than the acceleration itself."""
     record = decay(noise=noise, seed=seed)
-    comparison = compare_structure(model(), structure_ready(record, model(), Layout((), (0, 1000), (1000, 1600))))
+    comparison = compare(model(), structure_ready(record, model(), Layout((), (0, 1000), (1000, 1600))))
     found = comparison.fit.model.values
     assert found["k[ground-a]"] == pytest.approx(40.0, rel=0.02)
     assert found["k[a-b]"] == pytest.approx(25.0, rel=0.02)
 
 
 def test_a_hardening_spring_is_found_where_it_is():
-    comparison = compare_structure(model(), structure_ready(decay(HARD), model(), Layout()))
+    comparison = compare(model(), structure_ready(decay(HARD), model(), Layout()))
     diagnosis = diagnose(comparison, without=FEW)
     assert diagnosis.verdict == MISSING
     first = diagnosis.candidates[0]
@@ -112,18 +112,18 @@ def test_a_hardening_spring_is_found_where_it_is():
 
 @pytest.mark.parametrize("noise", [0.003, 0.05])
 def test_where_nothing_is_missing_nothing_is_said_to_be(noise):
-    comparison = compare_structure(model(), structure_ready(decay(noise=noise), model(), Layout()))
+    comparison = compare(model(), structure_ready(decay(noise=noise), model(), Layout()))
     assert diagnose(comparison, without=FEW).verdict == NOTHING
 
 
 def test_a_free_run_that_lost_the_motion_is_no_noise():
     """One run of a linear model along the decay of a hard spring: whatever explains nothing there, something lacks."""
     prepared = prepare_structure(decay(HARD), model(), (0, 1000), (1000, 1600))
-    prediction = compare_structure(model(), prepared).prediction
+    prediction = compare(model(), prepared).prediction
     assert prediction.error > 20.0 * prediction.floor
     assert prediction.above_noise > 0.5 * prediction.error
     right = model(more=HARD)
-    again = compare_structure(right, prepare_structure(decay(HARD), right, (0, 1000), (1000, 1600))).prediction
+    again = compare(right, prepare_structure(decay(HARD), right, (0, 1000), (1000, 1600))).prediction
     assert again.above_noise < 2e-3
 
 

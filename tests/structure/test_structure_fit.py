@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from study.compare.comparison import compare
+from study.compare.comparison_report import comparison_document
 from study.equations.model import Model
 from study.identify.frequency_domain.linear_start import lumped_start
 from study.structure.prepared_structure import prepare_structure
-from study.structure.structure_comparison import compare_structure, structure_document
 from study.support.errors import StudyError
 
 
@@ -22,45 +23,45 @@ def noise_over_motion(comparison):
 )
 def test_the_true_model_is_found_within_its_errors(frame, record_of, motion, without):
     free = frame.with_values(dict.fromkeys(frame.values, None))
-    comparison = compare_structure(free, prepare_structure(record_of(motion, without=without), free))
+    comparison = compare(free, prepare_structure(record_of(motion, without=without), free))
     off = comparison.fit.values - [frame.values[key] for key in comparison.fit.keys]
-    distance = off @ np.linalg.solve(comparison.covariance, off)  # chi square with ten degrees of freedom
+    distance = off @ np.linalg.solve(comparison.found.covariance, off)  # chi square with ten degrees of freedom
     assert distance < 29.6  # its 99.9 % quantile
     assert comparison.prediction.error == pytest.approx(noise_over_motion(comparison), rel=0.05)
     assert comparison.prediction.floor == pytest.approx(comparison.prediction.error, rel=0.05)
     true = 2.16976, 5.07901, 7.31513
     apart = np.abs(comparison.modes.frequency - true) / comparison.modes.frequency_error
     assert np.max(apart) < 4.0
-    assert bool(comparison.forces.lacking) == bool(without)
+    assert bool(comparison.missing.lacking) == bool(without)
 
 
 def test_held_values_are_held(frame, record_of):
     """With nothing open nothing is fitted: the error is that of the model as it is."""
-    comparison = compare_structure(frame, prepare_structure(record_of(), frame))
+    comparison = compare(frame, prepare_structure(record_of(), frame))
     assert comparison.fit.keys == ()
     assert all(c.error is None for c in comparison.coefficients)
     assert comparison.prediction.error == pytest.approx(noise_over_motion(comparison), rel=0.05)
     wrong = frame.with_values({"m[floor2]": 5.0})
-    assert compare_structure(wrong, prepare_structure(record_of(), wrong)).prediction.error > 0.2
+    assert compare(wrong, prepare_structure(record_of(), wrong)).prediction.error > 0.2
 
 
 def test_what_is_held_is_integrated_as_finely_as_what_is_fitted(frame, quiet_frame):
     """Seven samples a period of the third mode: the integration alone left 0.15 %."""
-    held = compare_structure(frame, prepare_structure(quiet_frame, frame))
+    held = compare(frame, prepare_structure(quiet_frame, frame))
     assert held.prediction.error < 1e-5
 
 
 def test_the_residual_force_acts_between_the_two_floors(believed, record_of):
-    quiet = compare_structure(believed, prepare_structure(record_of(noise=0.0), believed))
-    rows = structure_document(quiet)["where"]
+    quiet = compare(believed, prepare_structure(record_of(noise=0.0), believed))
+    rows = comparison_document([quiet])["where"]
     assert rows["places"][0]["between"] == ["floor2", "floor3"]
     shared = np.array(rows["shared_force"])
     assert np.argmax(shared) in (5, 7)  # row floor2, column floor3, or the other way round
     assert shared[1, 2] > 0.5
-    noisy = compare_structure(believed, prepare_structure(record_of(), believed))
-    assert structure_document(noisy)["where"]["places"][0]["between"] == ["floor2", "floor3"]
-    errors = list(structure_document(noisy)["error"]["sensors"].values())
-    floors = list(structure_document(noisy)["noise_floor"]["sensors"].values())
+    noisy = compare(believed, prepare_structure(record_of(), believed))
+    assert comparison_document([noisy])["where"]["places"][0]["between"] == ["floor2", "floor3"]
+    errors = list(comparison_document([noisy])["error"]["sensors"].values())
+    floors = list(comparison_document([noisy])["noise_floor"]["sensors"].values())
     assert all(e > 1.1 * f for e, f in zip(errors, floors, strict=True))
 
 

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from study.compare.comparison import compare
 from study.diagnose.candidates import PROMISING, Screened, elsewhere
 from study.diagnose.diagnosis_files import diagnosis_in_words
 from study.diagnose.verdict import diagnose
@@ -23,7 +24,6 @@ from study.records.excitation import Excitation, force
 from study.records.readers import ReadOptions, read_record
 from study.records.record import Sensor, write_csv
 from study.structure.prepared_structure import prepare_structure
-from study.structure.structure_comparison import compare_structure
 from study.support.errors import StudyError
 
 HERE = Path("twin.yaml")
@@ -58,7 +58,7 @@ def twin_record(sensors):
 @pytest.mark.parametrize(("sensors", "tied"), [(("trunk",), True), (("trunk", "right"), False)])
 def test_places_that_the_sensors_cannot_tell_apart_are_a_tie(sensors, tied):
     model = parse_model(HEAD + MASSES + FOOT + BRANCHES, HERE)
-    comparison = compare_structure(model, prepare_structure(twin_record(sensors), model))
+    comparison = compare(model, prepare_structure(twin_record(sensors), model))
     others = [n for n in LIBRARY if n not in ("cubic_stiffness", "quadratic_damping", "constant_force")]
     diagnosis = diagnose(comparison, without=others)
     first, said = diagnosis.candidates[0], diagnosis_in_words(diagnosis)
@@ -120,9 +120,9 @@ def test_a_mechanism_is_named_where_no_fit_begins():
     with pytest.raises(
         StudyError, match=r"nothing ties 'twin' down and what is measured drifts; expected acceleration"
     ):
-        compare_structure(open_values, prepare_structure(drifting, open_values))
+        compare(open_values, prepare_structure(drifting, open_values))
     steady = free_body.with_motions({s: x for s, x in free_body.motions.items() if s.motion == "acceleration"})
-    comparison = compare_structure(open_values, prepare_structure(steady, open_values))
+    comparison = compare(open_values, prepare_structure(steady, open_values))
     assert comparison.prediction.error < 1e-3
     assert any("may drift away as a whole" in note for note in comparison.notes)
 

@@ -185,3 +185,17 @@ def test_a_structure_that_nothing_ties_down_has_a_rigid_mode():
 
 def test_the_frame_is_a_model():
     assert modes_of(read_model(ROOT / "models" / "structures" / "frame.yaml")).rigid == 0
+
+
+def test_the_damping_of_what_does_not_oscillate_and_its_error_are_those_in_closed_form():
+    values = {"m": 2.0, "c": 90.0, "k": 300.0}
+    terms = [
+        ModelTerm(get(n), (x,), ())
+        for n, x in zip(("inertia", "linear_damping", "linear_stiffness"), values.values(), strict=True)
+    ]
+    variance = np.diag([1e-4, 0.09, 1.0])
+    modes = modes_of(Model("slow", tuple(terms)), tuple(values), variance)
+    ratio = 90.0 / (2.0 * np.sqrt(600.0))
+    slopes = ratio * np.array([-0.5 / 2.0, 1.0 / 90.0, -0.5 / 300.0])
+    np.testing.assert_allclose(modes.damping, ratio)
+    np.testing.assert_allclose(modes.damping_error, np.sqrt(slopes @ variance @ slopes))

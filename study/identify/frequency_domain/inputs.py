@@ -14,7 +14,7 @@ import numpy as np
 from study.equations import formulas
 from study.equations.graph import Graph
 from study.equations.model import Model, ModelTerm
-from study.equations.place import ALONE
+from study.equations.place import ALONE, HERE, Place
 from study.records.interpolation import between_samples
 from study.records.record import Record
 from study.support.arrays import Complexes, Floats
@@ -203,3 +203,15 @@ def _columns(wanted: Sequence[str], formula: str, record: Record) -> list[Floats
             )
         columns.append(record.time if name == "t" else record[channel])
     return columns
+
+
+def placed_inputs(entry: ModelTerm) -> tuple[Input, ...]:
+    """The shapes of a term, whatever its place; its shape parameters are known."""
+    return reverse_inputs(Model("alone", (replace(entry, place=HERE),)))
+
+
+def relative_record(place: Place, model: Model, motion: Floats, dt: float) -> Record:
+    """Relative motion at a place as a record of a single coordinate; ``motion`` as :func:`corrected_motion` has it."""
+    e = np.array(place.direction(model.coordinates))
+    displacement, velocity = (np.asarray(x @ e, dtype=np.float64) for x in motion[:2])
+    return Record(dt, {"force": np.zeros(len(displacement)), "displacement": displacement, "velocity": velocity})

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study.equations.model import Model, ModelTerm
-from study.equations.substeps import needed_steps
 from study.equations.terms import LIBRARY
 from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start
@@ -29,9 +28,10 @@ from study.identify.time_domain.no_response import (
     unfit,
     why_no_response,
 )
-from study.identify.time_domain.part_fit import STEPS, covariance_of, fit_part, linearise
+from study.identify.time_domain.part_fit import covariance_of, fit_part, linearise, rough_steps
 from study.identify.time_domain.settling import KEPT, better_fit, continued, from_segments, settled
 from study.identify.time_domain.shape_search import Baseline, Start
+from study.identify.time_domain.structure_start import first_fit
 from study.records.prepared import FORCE, Prepared
 from study.support.errors import StudyError
 
@@ -67,11 +67,7 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
     StudyError
         If the model cannot be fitted.
     """
-    if model.named:
-        from study.structure.structure_start import first_fit
-
-        return first_fit(model, prepared)
-    if "inertia" not in model and prepared.response != FORCE:
+    if not model.named and "inertia" not in model and prepared.response != FORCE:
         raise StudyError(f"model {model.name!r} has no inertia; a free run needs it")
     _check_own_formulas(model, prepared)
     if start is not None:
@@ -80,8 +76,8 @@ def fit_model(model: Model, prepared: Prepared, start: Values | None = None) -> 
         )
     unknown = tuple(t for t in model.terms if None in t.parameters)
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
-    look = shape_search.searched_stretch(known, prepared) if unknown else prepared
-    fit = _from_nothing(known, look)
+    look = shape_search.searched_stretch(known, prepared) if unknown and not model.named else prepared
+    fit = first_fit(known, look) if model.named else _from_nothing(known, look)
     for entry in unknown:
         fit = with_term(shape_search.baseline(fit, look), entry)
     ordered = replace(model, terms=tuple(next(t for t in fit.model.terms if t.name == e.name) for e in model.terms))
@@ -285,11 +281,6 @@ def _unphysical(fit: FreeRunFit) -> bool:
     return any(entry.term.physical(fit.model.values) for entry in fit.model.terms)
 
 
-def rough_steps(model: Model, prepared: Prepared, start: Values) -> int:
-    """Steps of a search's runs: those of every search, or more where the model's own rates ask for them."""
-    return max(STEPS, needed_steps(model.with_values(start), prepared.record, prepared.outputs))
-
-
 def _tried(
     model: Model, prepared: Prepared, held: Sequence[str], start: Values, runs: int, initial: Floats | None = None
 ) -> FreeRunFit | None:  # fmt: skip
@@ -329,7 +320,7 @@ def _shapes(entry: ModelTerm, parameters: Sequence[float]) -> dict[str, float]:
 
 def _check_own_formulas(model: Model, prepared: Prepared) -> None:
     """A user's formula must be a number all along the measured motion: a fit that it stops would be blamed else."""
-    if all(term.name in LIBRARY for term in model.terms):
+    if model.named or all(term.name in LIBRARY for term in model.terms):  # not all of its motions may be measured
         return
     motion = prepared.record.part(*prepared.inner((0, len(prepared.record))))
     known = replace(model, terms=tuple(t for t in model.terms if None not in t.parameters))

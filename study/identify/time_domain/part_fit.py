@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from study.equations.free_run import FreeRun, prepare
 from study.equations.model import Model
+from study.equations.substeps import needed_steps
 from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
 from study.identify.time_domain.stretch_states import states_along, states_of_segments
 from study.records.prepared import Prepared
@@ -21,6 +22,11 @@ from study.support.statistics import clustered_covariance
 Floats = NDArray[np.float64]
 FAR = 1e150  # a shift beyond all measure
 STEPS = 2  # Runge-Kutta steps in a sampling interval while a search compares models
+
+
+def rough_steps(model: Model, prepared: Prepared, start: Mapping[str, float]) -> int:
+    """Steps of a search's runs: those of every search, or more where the model's own rates ask for them."""
+    return max(STEPS, needed_steps(model.with_values(start), prepared.record, prepared.outputs))
 
 
 def fit_part(

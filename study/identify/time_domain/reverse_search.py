@@ -19,11 +19,13 @@ from scipy.fft import rfftfreq
 from study.equations.linear_part import LINEAR, linear_keys, patterns
 from study.equations.model import ModelTerm
 from study.equations.place import Place
-from study.identify.frequency_domain.inputs import input_history
+from study.identify.frequency_domain.inputs import input_history, placed_inputs, relative_record
 from study.identify.time_domain.part_fit import linearise
-from study.records.record import Record
+from study.records.completion import derivative
+from study.records.noise_floor import band_above_noise, in_band
+from study.records.prepared import Prepared
+from study.records.record import MOTIONS, Record
 from study.records.spectra import StretchTransforms, stretch_transforms
-from study.structure.missing_forces import corrected_motion, placed_inputs, relative_record
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 from study.support.least_squares import least_squares, length_or_one
@@ -52,9 +54,7 @@ class ReverseSystem:
         omega = np.asarray(2j * np.pi * rfftfreq(self.transforms.size, record.dt), dtype=np.complex128)
         by_symbol: dict[str, Complexes] = {}
         for item in placed_inputs(entry):
-            values = self.transforms.lines(
-                record["displacement"] if item.shape == "u" else input_history(item, record)
-            )
+            values = self.transforms.lines(record["displacement"] if item.shape == "u" else input_history(item, record))
             for part in item.parts:
                 by_symbol[part.symbol] = values * part.factor * omega**part.order
         return [by_symbol[symbol] for symbol in entry.term.symbols]
@@ -143,3 +143,27 @@ def reverse_system(base: "Baseline") -> ReverseSystem:
     motion = corrected_motion(free, fit.misfit, prepared, fit.model.coordinates, fit.span)
     transforms = stretch_transforms(prepared.record.runs(fit.span))  # of one stretch every other line is the record's
     return ReverseSystem(base, motion, transforms, base.paths(transforms.size))
+
+
+def corrected_motion(
+    free: Floats, difference: Floats, prepared: Prepared, coordinates: Sequence[str], span: tuple[int, int]
+) -> Floats:
+    """A free run's motions along a span, shape (samples, 3 coordinates), with what of the difference is no noise.
+
+    Shape (3, samples, coordinates). Each stretch is differentiated by itself: at its end the difference jumps.
+    """
+    runs = [slice(begin - span[0], end - span[0]) for begin, end in prepared.record.runs(span)]
+    motion = free.reshape(len(free), len(MOTIONS), -1).transpose(1, 0, 2).copy()
+    for sensor, values in zip(prepared.sensors, difference.T, strict=True):
+        band, level = band_above_noise(values, prepared.dt, prepared.band[0]), MOTIONS.index(sensor.motion)
+        if band is None:
+            continue
+        for part in runs:
+            seen = values[part] if prepared.record.stretches else in_band(values[part], prepared.dt, *band)
+            for order in range(len(MOTIONS)):
+                steps = order - level
+                change = derivative(seen, prepared.dt, steps, prepared.band[0] if steps < 0 else 0.0)
+                if prepared.record.stretches:  # each begins and ends with a step, which no filter may meet before
+                    change = in_band(change, prepared.dt, *band)
+                motion[order, part, coordinates.index(sensor.coordinate)] += change
+    return motion

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
+from study.compare.missing_force import Unbalanced
 from study.compare.panels import force_curve
 from study.compare.prediction import Prediction
 from study.equations.linear_part import Modes
 from study.figures.page import frame_cells
-from study.structure.missing_forces import MissingForces
 from study.support.numbers import percent
 
 DARK = 0.55  # share from which a number is written in white
@@ -36,14 +36,14 @@ def sensor_errors(axes: Axes, prediction: Prediction) -> Axes:
     return axes
 
 
-def coordinate_forces(axes: Axes, forces: MissingForces) -> Axes:
+def coordinate_forces(axes: Axes, forces: Unbalanced) -> Axes:
     """Rms force that each measured coordinate's equation leaves, beside that of its inertia."""
     place = np.arange(len(forces.coordinates))
-    axes.barh(place, forces.size, height=0.6, color="0.82", label="force of inertia")
+    axes.barh(place, forces.inertia, height=0.6, color="0.82", label="force of inertia")
     axes.barh(place, forces.rms, height=0.3, color="C1", label="left of the equation")
     axes.set_yticks(place, forces.coordinates)
     axes.invert_yaxis()
-    axes.set_xlim(0.0, 1.2 * float(max(np.max(forces.size), np.max(forces.rms), 1e-300)))
+    axes.set_xlim(0.0, 1.2 * float(max(np.max(forces.inertia), np.max(forces.rms), 1e-300)))
     for y, left, name in zip(place, forces.rms, forces.coordinates, strict=True):
         axes.annotate(
             f"{left:.3g} {forces.units(name)['force']}", (float(left), y), xytext=(4, 0), textcoords="offset points",
@@ -53,7 +53,7 @@ def coordinate_forces(axes: Axes, forces: MissingForces) -> Axes:
     return axes
 
 
-def shared_force(axes: Axes, forces: MissingForces) -> Axes:
+def shared_force(axes: Axes, forces: Unbalanced) -> Axes:
     """Shares of the residual force that two equations hold with opposite signs; on the diagonal, from outside."""
     names, share = list(forces.coordinates), 100.0 * forces.matrix
     axes.imshow(share, cmap="Oranges", vmin=0.0, vmax=100.0, aspect="auto")
@@ -68,7 +68,7 @@ def shared_force(axes: Axes, forces: MissingForces) -> Axes:
     return axes
 
 
-def connection_force(axes: Axes, forces: MissingForces, label: str) -> Axes:
+def connection_force(axes: Axes, forces: Unbalanced, label: str) -> Axes:
     """Missing force of one connection against its relative displacement."""
     return force_curve(axes, forces.curves[label], "displacement", forces.units(label))
 

@@ -1,18 +1,17 @@
 """What spectra say of each connection: the force that is missing there, and its dynamic stiffness as measured."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from study.compare.comparison import Comparison
 from study.compare.noise import segments_of
 from study.identify.frequency_domain import coefficients, conditioned
 from study.identify.frequency_domain.inputs import Input
 from study.identify.frequency_domain.reverse_system import Equation, equations_of
 from study.records import spectra
-from study.structure.missing_forces import MissingForces
-from study.structure.structure_comparison import StructureComparison
 from study.support.arrays import Floats
 from study.support.errors import StudyError
 
@@ -42,35 +41,29 @@ class DynamicStiffness:
     model: Floats
 
 
-def highest_frequency(comparison: StructureComparison) -> float:
+def highest_frequency(comparison: Comparison) -> float:
     """Where pictures of spectra end, in hertz: above the modes, below half of the sampling frequency."""
     half = 0.5 / comparison.prepared.dt
     fastest = HIGHEST * float(np.max(comparison.modes.frequency))
     return min(half, fastest) if fastest > 0.0 else half
 
 
-def missing_force_spectra(comparison: StructureComparison) -> tuple[Floats, dict[frozenset[str], Floats]]:
+def missing_force_spectra(comparison: Comparison) -> tuple[Floats, dict[frozenset[str], Floats]]:
     """Autospectra of the force that each connection lacks, in N^2/Hz by what it lies between, and their lines in Hz.
 
     Of the connections whose coordinates are all measured.
     """
-    forces, dt = comparison.forces, comparison.prepared.dt
-    cut = segments_of(len(forces.residual))
-    known = [p for p, _ in forces.aligned if set(p.moving) <= set(forces.coordinates)]
+    missing, dt = comparison.missing, comparison.prepared.dt
     found: dict[frozenset[str], Floats] = {}
     frequency = np.empty(0)
-    for place in known:
-        frequency, found[place.path] = spectra.autospectrum(along(forces, place.direction(forces.coordinates)), dt, cut)
+    for place in missing.shown:
+        lacking = missing.at(place)
+        sure = lacking.force[lacking.inner]
+        frequency, found[place.path] = spectra.autospectrum(sure, dt, segments_of(len(sure)))
     return frequency, found
 
 
-def along(forces: MissingForces, direction: Sequence[float]) -> Floats:
-    """The force that is missing at a connection, as the equations that it is in have it; shape (samples,)."""
-    e = np.asarray(direction)
-    return np.asarray(-(forces.residual @ e) / float(e @ e), dtype=np.float64)
-
-
-def dynamic_stiffnesses(comparison: StructureComparison) -> dict[frozenset[str], DynamicStiffness]:
+def dynamic_stiffnesses(comparison: Comparison) -> dict[frozenset[str], DynamicStiffness]:
     """The dynamic stiffness of every connection with a linear term; none where no equation or line can be read."""
     model, prepared = comparison.fit.model, comparison.prepared
     try:

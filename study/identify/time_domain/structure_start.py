@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import replace
 
 import numpy as np
 
@@ -10,13 +9,11 @@ from study.equations.equations_of_motion import loose_motions
 from study.equations.linear_part import linear_keys
 from study.equations.model import Model
 from study.identify.frequency_domain.linear_start import lumped_start
-from study.identify.time_domain.fit_model import rough_steps, with_term
+from study.identify.time_domain.free_decay import free_decay_start
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.part_fit import fit_part
-from study.identify.time_domain.shape_search import baseline
+from study.identify.time_domain.part_fit import fit_part, rough_steps
 from study.identify.time_domain.shooting import own_begins
 from study.records.prepared import Prepared
-from study.structure.free_decay import free_decay_start
 from study.support.errors import DivergenceError, expect
 
 
@@ -30,26 +27,14 @@ def known_linear(model: Model, prepared: Prepared) -> dict[str, float]:
 def first_fit(model: Model, prepared: Prepared) -> FreeRunFit:
     """Fit all that a structure leaves open; what it gives is held.
 
-    Terms with an open shape parameter are searched for one after the other beside the others.
+    From the linear terms alone, and where that diverges or stays far from the motion, with more damping.
 
     Raises
     ------
     StudyError
         If no fit begins.
     """
-    unknown = [t for t in model.terms if None in t.parameters]
-    known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
-    fit = _fitted(known, prepared, known_linear(known, prepared))
-    for entry in unknown:
-        fit = with_term(baseline(fit, prepared), entry)
-    order = [t.name for t in model.terms]
-    terms = tuple(sorted(fit.model.terms, key=lambda t: order.index(t.name)))
-    again = replace(fit.model, terms=terms)
-    return fit if not unknown else fit_part(again, prepared, fit.held, steps=fit.steps_per_sample)
-
-
-def _fitted(model: Model, prepared: Prepared, linear: Mapping[str, float]) -> FreeRunFit:
-    """From the linear terms alone, and where that diverges or stays far from the motion, with half of them."""
+    linear = known_linear(model, prepared)
     open_keys = [key for key, value in model.values.items() if value is None]
     start = dict.fromkeys(open_keys, 0.0) | {key: linear[key] for key in open_keys if key in linear}
     fits: list[FreeRunFit] = []

@@ -1,4 +1,4 @@
-"""The pictures of a structure's comparison and diagnosis, as the bytes of files."""
+"""Pictures of a structure: where a force is missing, errors by sensor, shared forces, connections and modes."""
 
 # Matplotlib leaves the **kwargs of its methods untyped.
 # pyright: reportUnknownMemberType=false
@@ -8,77 +8,38 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from study.compare import panels
+from study.compare import panels, place_panels
+from study.compare.comparison import Comparison
 from study.compare.dependence import explained_by_place
-from study.diagnose import diagnosis_pages
-from study.diagnose.verdict import MISSING, Diagnosis
 from study.equations.linear_part import Modes
 from study.equations.place import place_in_words
 from study.figures import page
 from study.figures.sketch import Sketch, sketch
 from study.figures.sketch_drawing import structure_sketch
-from study.figures.styles import in_style
-from study.structure import structure_panels
-from study.structure.structure_comparison import StructureComparison
 from study.support.numbers import percent
 
 WIDE = 7.2  # inches
 MAPS, SENSORS, MODES = 9, 6, 6  # panels on one page at most: the first connections, the worst sensors, slowest modes
 
 
-def structure_pictures(comparison: StructureComparison) -> dict[str, bytes]:
-    """Every picture of a comparison by file name."""
-    with in_style():
-        return page.image_files(
-            {
-                "structure": structure_figure(comparison, sketch_of(comparison)),
-                "sensors": sensors_figure(comparison),
-                "response": responses_figure(comparison),
-                "shared_force": shared_force_figure(comparison),
-                "modes": modes(comparison, [("fitted", comparison.modes)]),
-                **restoring_forces(comparison),
-            }
-        )
+def place_figures(comparison: Comparison) -> dict[str, Figure]:
+    """The pictures that a structure has besides those of any comparison, by file name."""
+    return {
+        "structure": structure_figure(comparison, sketch_of(comparison)), "sensors": sensors_figure(comparison),
+        "shared_force": shared_force_figure(comparison), "modes": modes(comparison, [("fitted", comparison.modes)]),
+        **restoring_forces(comparison),
+    }  # fmt: skip
 
 
-def diagnosis_pictures(diagnosis: Diagnosis) -> dict[str, bytes]:
-    """The pictures of a diagnosis besides those of its comparison."""
-    comparison = diagnosis.comparison
-    sets = [("as given", comparison.modes)]
-    sets += [("with the first candidate", diagnosis.modes_after)] if diagnosis.modes_after is not None else []
-    with in_style():
-        found = {
-            "structure": structure_figure(comparison, sketch_of_diagnosis(diagnosis)),
-            "modes": modes(comparison, sets),
-        }
-        if diagnosis.candidates:
-            found |= diagnosis_pages.pages(diagnosis, comparison.prepared.record.name)
-            found["candidates"].set_size_inches(1.4 * page.WIDTH, found["candidates"].get_figheight())
-        return page.image_files(found)
-
-
-def sketch_of(comparison: StructureComparison) -> Sketch:
+def sketch_of(comparison: Comparison) -> Sketch:
     """The sketch of a structure.
 
     A connection glows with the held-out share of what is left that general functions of its own motion explain.
     """
-    return sketch(comparison.model, comparison.forces.coordinates, explained_by_place(comparison.leftovers))
+    return sketch(comparison.model, comparison.missing.coordinates, explained_by_place(comparison.leftovers))
 
 
-def sketch_of_diagnosis(diagnosis: Diagnosis) -> Sketch:
-    """The same, glowing where an effect that is found, or tied with it, explains what is left."""
-    comparison = diagnosis.comparison
-    if diagnosis.verdict != MISSING:
-        return sketch_of(comparison)
-    first = diagnosis.candidates[0]
-    shares: dict[frozenset[str], float] = {}
-    for row in diagnosis.candidates:
-        if row.name in (first.name, *first.tied_with):
-            shares.setdefault(row.entry.place.path, float(np.clip(row.gain.explained, 0.0, 1.0)))
-    return sketch(comparison.model, comparison.forces.coordinates, shares)
-
-
-def structure_figure(comparison: StructureComparison, drawn: Sketch) -> Figure:
+def structure_figure(comparison: Comparison, drawn: Sketch) -> Figure:
     """The sketch on a page."""
     places = [link for link in drawn.links if link.share > 0.0]
     most = max(places, key=lambda link: link.share, default=None)
@@ -93,23 +54,23 @@ def structure_figure(comparison: StructureComparison, drawn: Sketch) -> Figure:
     return figure
 
 
-def sensors_figure(comparison: StructureComparison) -> Figure:
+def sensors_figure(comparison: Comparison) -> Figure:
     """Errors by sensor, and the force left at each coordinate."""
-    prediction, count = comparison.prediction, len(comparison.prediction.prepared.sensors)
+    prediction, count = comparison.prediction, len(comparison.prediction.prepared.outputs.sensors)
     figure, axes = page.empty_page(
         f"{comparison.prepared.record.name}: error by sensor",
         f"model {comparison.model.name}; all sensors {percent(prediction.error)}, noise {percent(prediction.floor)}",
         columns=2, width=page.width(2), panel=max(1.4, 0.48 * count), share=False,
     )  # fmt: skip
     figure.subplots_adjust(left=0.13, wspace=0.3)
-    structure_panels.sensor_errors(axes[0], prediction)
-    structure_panels.coordinate_forces(axes[1], comparison.forces)
+    place_panels.sensor_errors(axes[0], prediction)
+    place_panels.coordinate_forces(axes[1], comparison.missing)
     page.letter(axes, ("motions", "equations of motion"))
     page.shared_legend(figure, axes, columns=4)
     return figure
 
 
-def responses_figure(comparison: StructureComparison) -> Figure:
+def responses_figure(comparison: Comparison) -> Figure:
     """Measured and predicted motion of the sensors that are predicted worst, where the difference is largest."""
     prediction = comparison.prediction
     order = np.argsort(-prediction.errors)[:SENSORS]
@@ -132,22 +93,22 @@ def responses_figure(comparison: StructureComparison) -> Figure:
     return figure
 
 
-def shared_force_figure(comparison: StructureComparison) -> Figure:
+def shared_force_figure(comparison: Comparison) -> Figure:
     """The matrix of shared residual force between places."""
-    count = len(comparison.forces.coordinates)
+    count = len(comparison.missing.coordinates)
     figure, (axes,) = page.empty_page(
         f"{comparison.prepared.record.name}: shared residual force",
         "off the diagonal it acts between two coordinates, on it from outside or the ground",
         panel=max(1.8, 0.5 * count), width=max(WIDE, 2.6 + 0.8 * count), legend_rows=0, headed=False,
     )  # fmt: skip
     figure.subplots_adjust(left=0.2, right=0.8)
-    structure_panels.shared_force(axes, comparison.forces)
+    place_panels.shared_force(axes, comparison.missing)
     return figure
 
 
-def restoring_forces(comparison: StructureComparison) -> Mapping[str, Figure]:
+def restoring_forces(comparison: Comparison) -> Mapping[str, Figure]:
     """Missing force of each connection against its relative displacement; nothing where the difference is noise."""
-    labels = [n for n in comparison.forces.curves if len(comparison.forces.curves[n].at)][:MAPS]
+    labels = [n for n in comparison.missing.curves if len(comparison.missing.curves[n].at)][:MAPS]
     if not labels:
         return {}
     columns = min(2, len(labels))
@@ -157,8 +118,8 @@ def restoring_forces(comparison: StructureComparison) -> Mapping[str, Figure]:
         rows=-(-len(labels) // columns), columns=columns, width=page.width(columns), panel=1.9, share=False,
     )  # fmt: skip
     for panel, label in zip(axes, labels, strict=False):
-        structure_panels.connection_force(panel, comparison.forces, label)
-        share = next((s for p, s in comparison.forces.aligned if p.label == label), 0.0)
+        place_panels.connection_force(panel, comparison.missing, label)
+        share = next((s for p, s in comparison.missing.aligned if p.label == label), 0.0)
         panel.set_title(f"{label} ({percent(share)})")
     for panel in axes[len(labels) :]:
         panel.set_visible(False)
@@ -166,7 +127,7 @@ def restoring_forces(comparison: StructureComparison) -> Mapping[str, Figure]:
     return {"restoring_forces": figure}
 
 
-def modes(comparison: StructureComparison, sets: list[tuple[str, Modes]]) -> Figure:
+def modes(comparison: Comparison, sets: list[tuple[str, Modes]]) -> Figure:
     """Natural frequencies, damping ratios and shapes with 95 % intervals, before and after."""
     names, count = comparison.model.coordinates, min(MODES, len(comparison.modes.frequency))
     figure, axes = page.empty_page(
@@ -174,9 +135,9 @@ def modes(comparison: StructureComparison, sets: list[tuple[str, Modes]]) -> Fig
         f"model {comparison.model.name}; bars are 95 % intervals",
         rows=-(-(count + 1) // 2), columns=2, width=page.width(2), panel=1.8, share=False,
     )  # fmt: skip
-    structure_panels.mode_frequencies(axes[0], sets)
+    place_panels.mode_frequencies(axes[0], sets)
     for number in range(count):
-        structure_panels.mode_shapes(axes[1 + number], sets, number, names)
+        place_panels.mode_shapes(axes[1 + number], sets, number, names)
     for panel in axes[1 + count :]:
         panel.set_visible(False)
     page.shared_legend(figure, axes[:1])

@@ -11,9 +11,9 @@ import numpy as np
 
 from study.equations.linear_part import linear_keys, patterns
 from study.equations.model import Model
+from study.records.noise_floor import band_above_noise, in_band
 from study.records.plan import FEWEST
 from study.records.prepared import Prepared
-from study.structure.missing_forces import band_above_noise, in_band
 from study.support.arrays import Floats, Ints
 from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares
