@@ -1,14 +1,18 @@
 """Structures whose linear part is a sum of modes, with nonlinear terms between sensors."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from study.cli import main
 from study.compare import history
 from study.equations.free_run import prepare
-from study.equations.linear_part import modes_of
+from study.equations.linear_part import matrices, modes_of, transfer
+from study.equations.modal_part import ModalPart
+from study.equations.model import Model
 from study.equations.model_file import format_model, parse_model, read_model
 from study.equations.simulate import Integrator, simulate
 from study.identify.frequency_domain.subspace import observability
@@ -31,6 +35,64 @@ terms:
 
 def modal(text=MODAL):
     return parse_model(text, Path("modal.yaml"))
+
+
+@pytest.fixture(scope="module")
+def lumped_and_by_modes():
+    """Three masses with a stop between two of them, and the same by all of its modes, which damping couples."""
+    lumped = read_model(ROOT / "models" / "structures" / "three_masses.yaml")
+    lumped = lumped.without_term("coulomb_friction[first-second]")
+    stiffness, damping, mass = matrices(lumped, lumped.numbers())
+    squares, shapes = eigh(stiffness, mass)  # of unit modal mass
+    part, modal_damping = ModalPart(lumped.coordinates).of(3), shapes.T @ damping @ shapes
+    values = dict(zip(part.stiffness, squares.tolist(), strict=True))
+    values |= {key: float(modal_damping[pair]) for pair, key in zip(part.pairs, part.damping, strict=True)}
+    for point, row in zip(part.points, shapes.tolist(), strict=True):
+        values |= dict(zip(part.shape(point), row, strict=True))
+    stops = tuple(t for t in lumped.terms if t.term.name == "one_sided_contact")
+    return lumped, Model("by modes", stops, lumped.coordinates, lumped.forces, part.with_values(values))
+
+
+def test_a_structure_by_all_of_its_modes_is_the_structure(lumped_and_by_modes):
+    lumped, own = lumped_and_by_modes
+    drive = {"shaker": force(Excitation(level=100.0, cutoff=8.0), 400, 0.02, 5)}
+    wanted, found = (simulate(model, drive, 0.02, Integrator("rk4", 8)) for model in (lumped, own))
+    for sensor, motion in wanted.motions.items():
+        assert np.max(np.abs(found[sensor] - motion)) < 1e-9 * np.std(motion), sensor
+    assert np.any(wanted["third displacement"] - wanted["second displacement"] > 0.002), "the stop is met"
+    sensors = (Sensor("third", "acceleration"), Sensor("first", "displacement"))
+    np.testing.assert_allclose(*(transfer(model, sensors, 0.02, 256) for model in (lumped, own)), rtol=1e-9)
+    modes, same = (modes_of(model) for model in (lumped, own))
+    for name in ("frequency", "damping", "shape"):
+        np.testing.assert_allclose(getattr(same, name), getattr(modes, name), rtol=1e-9, err_msg=name)
+
+
+def test_numbers_of_modes_are_values_of_the_model(lumped_and_by_modes):
+    own = lumped_and_by_modes[1]
+    keys = (*own.terms[0].keys, "w2[1]", "w2[2]", "w2[3]", "g[1,1]", "g[1,2]", "g[1,3]", "g[2,2]", "g[2,3]", "g[3,3]")
+    assert tuple(own.values) == (*keys, *(f"phi[{c},{r}]" for c in own.coordinates for r in (1, 2, 3)))
+    assert own.held_keys == tuple(own.numbers())
+    opened = own.with_values({"w2[2]": None, "phi[third,1]": None})
+    assert set(own.held_keys) - set(opened.held_keys) == {"w2[2]", "phi[third,1]"}
+    assert opened.with_values(own.numbers()) == own
+
+
+def test_errors_of_modes_are_those_of_the_scatter(lumped_and_by_modes):
+    own, keys = lumped_and_by_modes[1], ("w2[1]", "g[1,1]", "g[1,2]", "phi[first,1]", "phi[third,1]")
+    middle = np.array([own.numbers()[key] for key in keys])
+    deviations = 0.01 * np.abs(middle)
+    found, rng = modes_of(own, keys, np.diag(deviations**2)), np.random.default_rng(3)
+    samples = middle + deviations * rng.standard_normal((1500, len(keys)))
+    drawn = [modes_of(own.with_values(dict(zip(keys, x.tolist(), strict=True)))) for x in samples]
+    for name in ("frequency", "damping", "shape"):
+        scatter = np.std([getattr(d, name) for d in drawn], axis=0)
+        np.testing.assert_allclose(getattr(found, f"{name}_error"), scatter, rtol=0.12, atol=2e-6, err_msg=name)
+
+
+def test_before_a_record_has_shown_its_modes_it_does_not_run(lumped_and_by_modes):
+    bare = replace(lumped_and_by_modes[1], modal=ModalPart(("first", "second", "third")))
+    with pytest.raises(StudyError, match="'linear: modal' and no modes yet; expected it fitted to a record"):
+        simulate(bare, {"shaker": np.zeros(100)}, 0.02)
 
 
 @pytest.fixture(scope="module")
