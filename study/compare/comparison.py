@@ -155,8 +155,8 @@ def compare(
     cannot be fitted raises a ``StudyError``.
     """
     report: Progress = progress or (lambda _: None)
-    sentence = f"{model.name!r} has 'linear: measured'; expected a model with inertia at every coordinate here"
-    expect(not model.measured, f"{sentence}; 'study compare', 'diagnose', 'add' and 'drop' take this one")
+    sentence = f"{model.name!r} has 'linear: modal'; expected a model with inertia at every coordinate here"
+    expect(model.modal is None, f"{sentence}; 'study compare', 'diagnose', 'add' and 'drop' take this one")
     report("fit")
     known: Estimate | None = None
     if estimator != FREE_RUN:

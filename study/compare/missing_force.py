@@ -286,8 +286,7 @@ def _aligned(
     seen = [_filtered(x, prepared.dt, frequency, gate.astype(np.float64)) for x, gate in pairs]
     size = next_fast_len(2 * len(seen[0]), real=True)
     lines = np.asarray(rfft(np.stack(seen, axis=1) / prediction.size, size, axis=0), dtype=np.complex128)
-    linear = matrices(model, model.numbers())
-    paths = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, size) / prediction.size[:, None]
+    paths = transfer(model, prepared.sensors, prepared.dt, size) / prediction.size[:, None]
     found = [(p, alignment(paths @ np.array(p.direction(model.coordinates)), lines)) for p in places]
     return tuple(sorted(found, key=lambda item: -item[1]))
 

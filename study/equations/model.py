@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from study.equations import formulas
+from study.equations.modal_part import ModalPart
 from study.equations.place import ALONE, HERE, Place
 from study.equations.term import Term
 from study.support.errors import StudyError
@@ -97,16 +98,16 @@ class Model:
         Where sensors, forces and terms are; a single mass has one without a name.
     forces : tuple of pairs of str
         Name of each measured force, and the coordinate on which it acts.
-    measured : bool
-        Whether the linear part of a structure is as it is measured: coordinates are those with sensors, terms what acts
-        between them beside it.
+    modal : ModalPart, optional
+        The linear part where it is a sum of modes: coordinates are those with sensors, terms what acts between them
+        beside it.
     """
 
     name: str
     terms: tuple[ModelTerm, ...]
     coordinates: tuple[str, ...] = (ALONE,)
     forces: tuple[tuple[str, str], ...] = (("force", ALONE),)
-    measured: bool = False
+    modal: ModalPart | None = None
 
     def __post_init__(self) -> None:
         """Refuse the same term twice."""
@@ -126,8 +127,9 @@ class Model:
 
     @property
     def values(self) -> dict[str, float | None]:
-        """Every coefficient and shape parameter by key."""
-        return {key: value for t in self.terms for key, value in t.values.items()}
+        """Every coefficient and shape parameter by key, then every number of its modes."""
+        own = {key: value for t in self.terms for key, value in t.values.items()}
+        return own | (self.modal.values if self.modal else {})
 
     @property
     def roles(self) -> "Roles":
@@ -160,8 +162,9 @@ class Model:
         return replace(self, terms=tuple(t for t in self.terms if t.name != name))
 
     def with_values(self, values: Mapping[str, float | None]) -> "Model":
-        """The same terms with other coefficients or shape parameters."""
-        return replace(self, terms=tuple(t.with_values(values) for t in self.terms))
+        """The same terms with other coefficients or shape parameters, and the same modes with other numbers."""
+        modal = self.modal.with_values(values) if self.modal else None
+        return replace(self, terms=tuple(t.with_values(values) for t in self.terms), modal=modal)
 
     def equation(self) -> str:
         """The equation of motion in one line, with symbols."""
@@ -170,6 +173,7 @@ class Model:
 
     def numbers(self) -> dict[str, float]:
         """Every value; all must be known, and the mass of a single coordinate positive."""
+        check_modes(self)
         known = {key: value for key, value in self.values.items() if value is not None}
         missing = [key for key in self.values if key not in known]
         if missing:
@@ -177,6 +181,12 @@ class Model:
         if not self.named and "m" in known and not known["m"] > 0.0:
             raise StudyError(f"model {self.name!r} has the mass {known.get('m', 0.0):g}; it must be above zero")
         return known
+
+
+def check_modes(model: Model) -> None:
+    """Refuse a model whose linear part is modes that no record has been asked for yet."""
+    if model.modal and not model.modal.count:
+        raise StudyError(f"model {model.name!r} has 'linear: modal' and no modes yet; expected it fitted to a record")
 
 
 def named_channels(model: Model, available: Collection[str]) -> tuple[str, ...]:

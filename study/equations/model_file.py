@@ -25,6 +25,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from study.equations import layout, terms
+from study.equations.modal_part import ModalPart
 from study.equations.model import Model, ModelTerm, free
 from study.equations.model_entry import LONGEST_NAME, entry_from, refuse_long, refuse_unknown
 from study.equations.redundancy import repeated_force
@@ -106,7 +107,7 @@ def text_without(path: Path, name: str) -> str:
     """
     text = read_text(path, WANTED)
     before = parse_model(text, path)
-    if name not in before or (len(before.terms) == 1 and not before.measured):
+    if name not in before or (len(before.terms) == 1 and not before.modal):
         raise StudyError(f"{path}: {shown(name)} cannot be taken out of {', '.join(t.name for t in before.terms)}")
     return revised(text, str(path), before.without_term(name))
 
@@ -122,11 +123,11 @@ def revised(text: str, source: str, model: Model) -> str:
     for number, entry in enumerate(entries):
         if wanted[number - len(gone) :][:1] != [entry.name]:
             gone.append(number)
-    if len(gone) == len(entries) and entries and (wanted or not model.measured):
+    if len(gone) == len(entries) and entries and (wanted or not model.modal):
         raise StudyError(f"{source}: none of its terms is left; expected a model that keeps one")
     for number in reversed(gone):
         text = yaml_text.without_entry(text, "terms", number)
-    if not wanted:  # a linear part as measured is a model of its own
+    if not wanted:  # a sum of modes is a model of its own
         text = NO_TERMS.sub(lambda found: f"terms: []{'  ' + found[1] if found[1] else ''}", text)
     before = [entry for number, entry in enumerate(entries) if number not in gone]
     for number, entry in enumerate(model.terms):
@@ -148,8 +149,8 @@ def _model(document: object, stem: str) -> Model:
     name = top.get("name", stem)
     if not isinstance(name, str) or not name.strip() or not name.isprintable() or len(name) > LONGEST_NAME:
         raise StudyError(f"the name is {shown(name)}; expected a short text on one line")
-    entries, measured = as_list(top.get("terms")), layout.linear_measured(top)
-    if not entries and not (measured and top.get("terms") == []):
+    entries, modal = as_list(top.get("terms")), layout.linear_modal(top)
+    if not entries and not (modal and top.get("terms") == []):
         content = shown(top["terms"]) if "terms" in top else "missing"
         raise StudyError(f"'terms' is {content}; expected a list such as [inertia, linear_damping, linear_stiffness]")
     entries = entries or []
@@ -157,7 +158,7 @@ def _model(document: object, stem: str) -> Model:
         raise StudyError(f"'terms' has {len(entries)} entries; at most {MOST_TERMS} are read")
     coordinates, forces = layout.coordinates_and_forces(top)
     listed = tuple(_entry(item, number, coordinates) for number, item in enumerate(entries, 1))
-    model = Model(name, listed, coordinates, forces, measured)
+    model = Model(name, listed, coordinates, forces, ModalPart(coordinates) if modal else None)
     if model.named:
         layout.check(model)
     elif fault := repeated_force(model):

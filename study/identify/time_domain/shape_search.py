@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
-from study.equations.linear_part import matrices, transfer
+from study.equations.linear_part import transfer
 from study.equations.model import Model, ModelTerm
 from study.equations.place import Place
 from study.equations.substeps import needed_steps
@@ -79,7 +79,7 @@ class Baseline:
         """
         model, sensors = self.fit.model, self.fit.outputs.sensors
         if self.several:
-            return transfer(matrices(model, model.numbers()), sensors, model.coordinates, self.prepared.dt, size)
+            return transfer(model, sensors, self.prepared.dt, size)
         omega = np.asarray(2j * np.pi * rfftfreq(size, self.prepared.dt), dtype=np.complex128)
         if self.prepared.response == FORCE:  # nothing passes through a structure there
             return np.ones((len(omega), 1, 1), dtype=np.complex128)

@@ -11,6 +11,7 @@ from study.equations.model import Model
 from study.identify.frequency_domain.linear_start import lumped_start
 from study.identify.time_domain.free_decay import free_decay_start
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.modal_fit import modal_fit
 from study.identify.time_domain.part_fit import fit_part, rough_steps
 from study.identify.time_domain.shooting import own_begins
 from study.records.prepared import Prepared
@@ -34,6 +35,8 @@ def first_fit(model: Model, prepared: Prepared) -> FreeRunFit:
     StudyError
         If no fit begins.
     """
+    if model.modal:
+        return modal_fit(model, prepared)
     linear = known_linear(model, prepared)
     open_keys = [key for key, value in model.values.items() if value is None]
     start = dict.fromkeys(open_keys, 0.0) | {key: linear[key] for key in open_keys if key in linear}
