@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import irfft, rfft
 
+from study.records.completion import SHORTEST
 from study.records.record import Record
 from study.support.arrays import Floats, Ints
 
 BAND_LIMITED = "band_limited"
 READINGS = (BAND_LIMITED, "straight", "held")
-EDGE = 512  # samples by which a record that does not close on itself is continued at each end
 CLOSES = 10.0  # a record that does not close has many times the energy there of one whose ends are continued
 
 
@@ -38,24 +38,21 @@ def between_samples(values: Floats, factor: int, reading: str = BAND_LIMITED) ->
         fine = np.append(np.repeat(values[:-1], factor), values[-1])
         fine[factor:-1:factor] = 0.5 * (values[:-2] + values[1:-1])
         return fine
-    edge = min(EDGE, n - 1)
-    longer = _reflected(values, edge)
-    if _closes(values, longer):
+    if closes(values):
         return _periodic(values, factor)[: factor * (n - 1) + 1]
+    longer = _reflected(values)
+    edge = (len(longer) - n) // 2
     return _periodic(longer, factor)[factor * edge : factor * (edge + n - 1) + 1]
 
 
 def closes(values: Floats) -> bool:
     """Whether a record goes on from its last sample to its first without a jump, as a period of a force does."""
-    return _closes(values, _reflected(values, min(EDGE, len(values) - 1)))
+    return _top_energy(values) <= CLOSES * _top_energy(_reflected(values))
 
 
-def _closes(values: Floats, longer: Floats) -> bool:
-    return _top_energy(values) <= CLOSES * _top_energy(longer)
-
-
-def _reflected(values: Floats, edge: int) -> Floats:
+def _reflected(values: Floats) -> Floats:
     """A record continued at both ends by point reflection that is faded out, shape (n + 2 edge,)."""
+    edge = min(SHORTEST, len(values) - 1)
     fade = 0.5 - 0.5 * np.cos(np.pi * np.arange(edge) / edge)
     before = (2.0 * values[0] - values[edge:0:-1]) * fade
     after = (2.0 * values[-1] - values[-2 : -edge - 2 : -1]) * fade[::-1]

@@ -6,14 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from study.records.record import ALONE, MOTIONS, Record, Sensor
-from study.records.spectra import Segments, autospectrum
+from study.records.spectra import Segments, autospectrum, segment_length
 from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 
 Span = tuple[int, int]
 FEWEST = 64  # samples in a part
 MOST = 0.5  # of a part: channels that rest for longer do not move in it
-SEGMENTS = 8  # of each part, side by side, at least
 
 
 @dataclass(frozen=True)
@@ -29,11 +28,6 @@ def make_plan(record: Record, fit: Span | None = None, judge: Span | None = None
     """Fit the first half and judge the second by default; compare with the first motion that was measured.
 
     Of a record that rests in one of the halves, those of the stretch that moves (:func:`_halves`).
-
-    Raises
-    ------
-    StudyError
-        If a part leaves the record, is too short, overlaps the other or does not move.
     """
     sensors = compared_sensors(record, measured)
     given = fit is not None or judge is not None
@@ -56,11 +50,6 @@ def compared_sensors(record: Record, wanted: str | None = None) -> tuple[Sensor,
     """One motion of each coordinate that is measured: the one that is wanted, or the first of them.
 
     Or the force, where that is wanted: the motion is prescribed then.
-
-    Raises
-    ------
-    StudyError
-        If no motion was measured, or not the one that is wanted.
     """
     if wanted in record.forces:
         return (Sensor(ALONE, wanted),)
@@ -145,7 +134,7 @@ def shared(record: Record, one: Span, other: Span) -> float:
     found: list[float] = []
     for force in (record[name] for name in record.forces):
         parts = [force[slice(*span)] - np.mean(force[slice(*span)]) for span in (one, other)]
-        length = 2 ** int(np.log2(max(min(map(len, parts)) // SEGMENTS, 4)))
+        length = segment_length(min(map(len, parts)), held=8, fewest=4)
         densities = [autospectrum(part, record.dt, Segments(length))[1] for part in parts]
         if all(float(np.sum(d)) > 0.0 for d in densities):
             first, second = (d / np.sum(d) for d in densities)

@@ -161,18 +161,13 @@ class Record:
     def part(self, first: int, last: int) -> "Record":
         """Samples ``first`` to ``last`` (exclusive), with the time they were taken at."""
         channels = {name: values[first:last] for name, values in self.channels.items()}
-        start = self.start + first * self.dt
-        return replace(self, channels=channels, start=start, stretches=self._stretches(first, last))
-
-    def _stretches(self, first: int, last: int) -> tuple[Stretch, ...]:
-        """The stretches, or parts of them, that samples ``first`` to ``last`` come from."""
         kept: list[Stretch] = []
         for begin, stretch in zip((0, *self.joints), self.stretches, strict=False):
             low, high = max(first - begin, 0), min(last - begin, len(stretch))
             if high > low:
                 going_on = stretch.continues and bool(kept)
                 kept.append(Stretch(stretch.source, stretch.first + low, stretch.first + high, going_on))
-        return tuple(kept)
+        return replace(self, channels=channels, start=self.start + first * self.dt, stretches=tuple(kept))
 
     def with_motions(self, motions: Mapping[Sensor, Floats]) -> "Record":
         """The same with these motions in place of its own."""

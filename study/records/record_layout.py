@@ -79,11 +79,6 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
         What the user says.
     kind : KindOfTest, optional
         What the model makes of them.
-
-    Raises
-    ------
-    StudyError
-        If ranges overlap or leave the record, the response asked for was not measured, or it cannot be completed.
     """
     kind, notes, every = kind or KindOfTest(), list[str](), 1
     _refuse_contradictions(records, layout, kind)
@@ -93,7 +88,8 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
         records, notes = [r for r, _ in readied], [note for _, said in readied for note in said]
     wanted = FORCE if kind.prescribed else layout.response
     sensors = compared_sensors(records[0], wanted)
-    free = not kind.prescribed and all(_unforced(r, layout) for r in records)
+    forced = any(np.any(r[f][a:b]) for r in records for a, b in _samples(r, layout) for f in r.forces)
+    free = not (kind.prescribed or forced)
     several = len(records) > 1 or len(layout.use) > 1
     by_itself = (free or kind.prescribed) and not (layout.explicit or kind.unbroken)
     turns = several or layout.alternate or by_itself
@@ -114,7 +110,10 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
     else:
         stretches = [sure(c, *span) for c in completed for span in _samples(c.record, layout)]
         stretches = [_until_rest(s, sensors) for s in stretches] if turns and kind.anew else stretches
-        fit, judge = alternating(stretches, sensors, kind.anew) if turns else _halved(stretches[0])
+        middle = (stretches[0].first + stretches[0].last) // 2
+        fit, judge = [replace(stretches[0], last=middle)], [replace(stretches[0], first=middle)]
+        if turns:
+            fit, judge = alternating(stretches, sensors, kind.anew)
         notes += [_said(fit, judge, len(stretches), anew=bool(kind.anew))] if turns else []
     if kind.drifts:
         (fit, first), (judge, second) = (within_the_horizon(part, sensors) for part in (fit, judge))
@@ -163,11 +162,6 @@ def _why(record: Record, plan: Plan) -> str:
     )
 
 
-def _unforced(record: Record, layout: Layout) -> bool:
-    """Whether no force acts along the stretches that are used."""
-    return all(not np.any(record[f][a:b]) for a, b in _samples(record, layout) for f in record.forces)
-
-
 def _samples(record: Record, layout: Layout) -> list[Span]:
     """The stretches to use, in samples."""
     spans: list[Span] = []
@@ -197,11 +191,6 @@ def sure(completed: CompletedRecord, first: int, last: int) -> Stretch:
         f"{FEWEST} or more",
     )
     return Stretch(completed.record, low, high)
-
-
-def _halved(stretch: Stretch) -> tuple[list[Stretch], list[Stretch]]:
-    middle = (stretch.first + stretch.last) // 2
-    return [replace(stretch, last=middle)], [replace(stretch, first=middle)]
 
 
 def _until_rest(stretch: Stretch, sensors: Sequence[Sensor]) -> Stretch:
@@ -268,13 +257,7 @@ def strung_together(
     fit: Sequence[Stretch], judge: Sequence[Stretch], sensors: Sequence[Sensor], completed: Sequence[CompletedRecord],
     notes: Sequence[str] = (),
 ) -> Prepared:  # fmt: skip
-    """One prepared record of the stretches to fit and those to judge; ``completed`` are the records they come from.
-
-    Raises
-    ------
-    StudyError
-        If the records differ in sampling, channels' units or what was measured, or a part is too short.
-    """
+    """One prepared record of the stretches to fit and those to judge; ``completed`` are the records they come from."""
     first = completed[0].record
     for other in completed[1:]:
         _refuse_different(first, other.record)
