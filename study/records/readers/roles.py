@@ -97,8 +97,11 @@ def assign(path: Path, table: Table, options: ReadOptions, roles: Roles) -> dict
         named[channel] = column
     given = set(named)
     complete = all(f in named for f in roles.forces) and roles.motions(named) == list(roles.coordinates)
-    if not complete:
-        _check_duplicates(path, table, roles)
+    for name, count in Counter(c.name for c in table.columns if c.name and not complete).items():
+        numbers = [str(k) for k, c in enumerate(table.columns, start=1) if c.name == name]
+        twice = f"the column {name!r} is there {count} times, as columns {' and '.join(numbers)}"
+        like = f"--column {(*roles.forces, _motion_of(roles))[0]}={numbers[0]}"
+        expect(count == 1, f"{path}: {twice}; give columns by number, such as {like}")
     rest = [c for c in table.columns if all(c is not n for n in named.values())]
     if not complete or "time" not in named:
         guesses = _guessed(path, table, rest, named, roles)
@@ -106,7 +109,8 @@ def assign(path: Path, table: Table, options: ReadOptions, roles: Roles) -> dict
     motion = bool(roles.motions(named))
     base = roles.alone and any(name in BASE for name in (*named, *(c.name for c in table.columns)))
     lacking = [f for f in roles.forces if f not in named]
-    unforced = options.free or not _unknown(table, named, roles)
+    told = [column for channel, column in named.items() if channel not in roles.forces]
+    unforced = options.free or all(any(c is t for t in told) for c in table.columns)  # else a column may be a force
     if motion and not given.intersection(roles.forces) and (unforced or (base and lacking)):
         for force in roles.forces:  # a free decay: the user says so, or there is no column that could be a force
             named.pop(force, None)
@@ -123,11 +127,6 @@ def assign(path: Path, table: Table, options: ReadOptions, roles: Roles) -> dict
     return dict(sorted((named | _extra(table, named, roles)).items(), key=lambda item: place[id(item[1])]))
 
 
-def _unknown(table: Table, named: Mapping[str, Column], roles: Roles) -> bool:
-    """Whether a column that is no motion and no time may be a force."""
-    return any(all(c is not n for r, n in named.items() if r not in roles.forces) for c in table.columns)
-
-
 def _named(path: Path, table: Table, role: str, wanted: str | int, roles: Roles) -> Column:
     """The column that the user names, by its name, the end of its path, or its number."""
     matches = [c for c in table.columns if c.name == wanted]
@@ -142,14 +141,6 @@ def _named(path: Path, table: Table, role: str, wanted: str | int, roles: Roles)
         numbers = " and ".join(str(k) for k, c in enumerate(table.columns, start=1) if any(c is m for m in matches))
         raise _ask(path, table, roles, f"the column {wanted!r} for {role} is there {len(matches)} times, as {numbers}")
     return matches[0]
-
-
-def _check_duplicates(path: Path, table: Table, roles: Roles) -> None:
-    for name, count in Counter(c.name for c in table.columns if c.name).items():
-        numbers = [str(k) for k, c in enumerate(table.columns, start=1) if c.name == name]
-        twice = f"the column {name!r} is there {count} times, as columns {' and '.join(numbers)}"
-        like = f"--column {(*roles.forces, _motion_of(roles))[0]}={numbers[0]}"
-        expect(count == 1, f"{path}: {twice}; give columns by number, such as {like}")
 
 
 def _guessed(
