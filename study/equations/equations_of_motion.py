@@ -10,17 +10,60 @@ of it is the force that this takes. With a measured linear part the columns of T
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from study.equations import formulas
 from study.equations.graph import Graph, Program
-from study.equations.modal_keys import ModalKeys
 from study.equations.model import Model, ModelTerm
 from study.equations.place import Place
 from study.equations.term import Component
-from study.records.record import MOTIONS
+from study.records.record import MOTIONS, Sensor
+
+
+@dataclass(frozen=True)
+class ModalKeys:
+    """Names of the numbers of a linear part with so many modes; modes count from 1.
+
+    ``q'' + G q' + W q = p`` and ``u = phi^T q``: any structure with symmetric mass, damping and stiffness matrices, of
+    which some modes are kept. W is diagonal, the squares of the natural frequencies; G is the symmetric matrix of modal
+    damping. By reciprocity a mode is felt and driven at a point alike: a sensor where a force acts makes the
+    coefficients of the terms known in newtons.
+    """
+
+    points: tuple[str, ...]  # coordinates with a sensor or a force, and the ends of terms
+    modes: int  # how many
+
+    @property
+    def stiffness(self) -> tuple[str, ...]:
+        """Squares of the natural angular frequencies, ``w2[1]``."""
+        return tuple(f"w2[{r}]" for r in range(1, self.modes + 1))
+
+    @property
+    def pairs(self) -> tuple[tuple[int, int], ...]:
+        """Rows and columns of the damping matrix, counted from zero."""
+        return tuple((r, s) for r in range(self.modes) for s in range(r, self.modes))
+
+    @property
+    def damping(self) -> tuple[str, ...]:
+        """Elements of the modal damping matrix, ``g[1,2]``."""
+        return tuple(f"g[{r + 1},{s + 1}]" for r, s in self.pairs)
+
+    @property
+    def coupling(self) -> tuple[str, ...]:
+        """Those off its diagonal."""
+        return tuple(key for (r, s), key in zip(self.pairs, self.damping, strict=True) if r != s)
+
+    def shape(self, point: str) -> tuple[str, ...]:
+        """Amplitudes of the modes at a point, ``phi[tip,1]``."""
+        return tuple(f"phi[{point},{r}]" for r in range(1, self.modes + 1))
+
+    @property
+    def all(self) -> tuple[str, ...]:
+        """Every name."""
+        return (*self.stiffness, *self.damping, *(key for point in self.points for key in self.shape(point)))
 
 
 class Equations:
@@ -33,9 +76,12 @@ class Equations:
         self.prescribed = () if modal else tuple(c for c in model.coordinates if c not in masses)
         self.free = () if modal else tuple(c for c in model.coordinates if c in masses)
         forces = [(name, where) for name, where in model.forces if where not in self.prescribed]
-        motions = MOTIONS if accelerated or self._accelerated() else MOTIONS[:2]
-        moved = [(c, m) for c in self.prescribed for m in motions]
-        self.drive = (*(name for name, _ in forces), *(channel_of(c, m) for c, m in moved), *model.channels)
+        driven, moving = set(self.prescribed), set(self.free)
+        for entry in model.terms:  # a mass that is tied to a prescribed motion, or friction that may hold one
+            jumps = entry.term.name == "inertia" or any("sgn" in c.shape for c in entry.term.components)
+            accelerated |= jumps and bool(driven & set(entry.place.moving)) and bool(moving & set(entry.place.moving))
+        moved = [(c, m) for c in self.prescribed for m in (MOTIONS if accelerated else MOTIONS[:2])]
+        self.drive = (*(name for name, _ in forces), *(str(Sensor(c, m)) for c, m in moved), *model.channels)
         self.time = graph.input("t")
         drive = [graph.input(f"drive:{name}") for name in self.drive]
         self.forces = [(where, node) for (_, where), node in zip(forces, drive, strict=False)]
@@ -55,14 +101,6 @@ class Equations:
     def states(self) -> list[int]:
         """Displacements and velocities of the degrees of freedom, then the terms' own states."""
         return [*self.motion[0], *self.motion[1], *self.memory.values()]
-
-    def _accelerated(self) -> bool:
-        """Whether they need the acceleration of a prescribed motion: a mass is tied to it, or friction may hold one."""
-        return any(
-            entry.term.name == "inertia" or any("sgn" in c.shape for c in entry.term.components)
-            for entry in self.model.terms
-            if set(entry.place.moving) & set(self.prescribed) and set(entry.place.moving) & set(self.free)
-        )
 
     def at(self, coordinate: str, order: int) -> int:
         """Displacement, velocity or acceleration (``order`` 2) of a coordinate."""
@@ -214,11 +252,6 @@ def _ties(entry: ModelTerm) -> bool:
     rate = formulas.add_formula(graph, term.state, names) if term.state is not None else None
     units = [unit_force(graph, c, names, rate) for c in term.components if c.order < 2]
     return any(graph.constant_value(graph.derivative(unit, names["u"])) != 0.0 for unit in units)
-
-
-def channel_of(coordinate: str, motion: str) -> str:
-    """What a record calls the motion of a coordinate."""
-    return f"{coordinate} {motion}".strip()
 
 
 def mass_entries(model: Model) -> list[tuple[int, int, float, str]]:

@@ -51,10 +51,7 @@ def matrices(model: Model, values: Mapping[str, float]) -> Floats:
 def checked_mass_matrix(model: Model) -> Floats:
     """The mass matrix of a model whose values are known, shape (coordinates, coordinates).
 
-    Raises
-    ------
-    StudyError
-        If it is not positive definite: some motion would have no kinetic energy, or a negative one.
+    Refused unless positive definite: else some motion would have no kinetic energy, or a negative one.
     """
     mass = matrices(model, model.numbers())[2]
     _check_positive(model, mass)
@@ -139,23 +136,13 @@ RIGID = 1e-6  # of the highest natural frequency: what is below is motion as a r
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Modes of a structure, the slowest first; n coordinates.
+    """Modes of a structure, the slowest first; n coordinates. Errors are standard errors."""
 
-    Attributes
-    ----------
-    frequency, frequency_error : array, shape (n,)
-        Undamped natural frequencies in hertz, and their standard errors; zero for motion as a rigid body.
-    damping, damping_error : array, shape (n,)
-        Damping ratios; zero for motion as a rigid body.
-    shape, shape_error : array, shape (n, n)
-        Each row a mode shape, one at the coordinate that moves most.
-    """
-
-    frequency: Floats
+    frequency: Floats  # undamped natural frequencies in hertz, (n,); zero for motion as a rigid body
     frequency_error: Floats
-    damping: Floats
+    damping: Floats  # ratios, (n,); zero for motion as a rigid body
     damping_error: Floats
-    shape: Floats
+    shape: Floats  # each row a mode shape, one at the coordinate that moves most, (n, n)
     shape_error: Floats
 
     @property
@@ -175,15 +162,12 @@ def modes_of(model: Model, keys: Sequence[str] = (), covariance: Floats | None =
         What was estimated; everything else counts as exact.
     covariance : array, shape (keys, keys)
         Of these.
-
-    Raises
-    ------
-    StudyError
-        If the mass matrix is not positive definite.
     """
-    checked_mass_matrix(model)
-    stiffness, damping, mass = matrices(model, model.numbers())
-    squares, shapes = _undamped(stiffness, mass)
+    mass = checked_mass_matrix(model)
+    stiffness, damping, _ = matrices(model, model.numbers())
+    half = np.linalg.inv(np.linalg.cholesky(mass))
+    squares, vectors = np.linalg.eigh(half @ stiffness @ half.T)
+    shapes: Floats = np.asarray(half.T @ vectors, dtype=np.float64)  # of unit modal mass, in columns
     omega = np.sqrt(np.maximum(squares, 0.0))
     omega = np.where(omega > RIGID * np.max(omega), omega, 0.0)
     roots = _roots(stiffness, damping, mass, omega)
@@ -202,13 +186,6 @@ def modes_of(model: Model, keys: Sequence[str] = (), covariance: Floats | None =
         omega / (2.0 * np.pi), np.where(moving, errors[0] / (4.0 * np.pi * np.where(moving, omega, 1.0)), 0.0),
         np.where(moving, -roots[0].real / np.abs(roots[0]), 0.0), np.where(moving, errors[1], 0.0), shape, shape_error,
     )  # fmt: skip
-
-
-def _undamped(stiffness: Floats, mass: Floats) -> tuple[Floats, Floats]:
-    """Squares of the angular frequencies, and the shapes of unit modal mass in columns, the slowest first."""
-    half = np.linalg.inv(np.linalg.cholesky(mass))
-    squares, vectors = np.linalg.eigh(half @ stiffness @ half.T)
-    return squares, np.asarray(half.T @ vectors, dtype=np.float64)
 
 
 def _roots(stiffness: Floats, damping: Floats, mass: Floats, omega: Floats) -> tuple[Complexes, Complexes]:

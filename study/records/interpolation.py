@@ -94,11 +94,10 @@ def between_runs(record: Record, name: str, factor: int) -> Floats:
     parts: list[Floats] = []
     runs, places = runs_of(record)
     own, begin = name in record.changed, 0
-    reading = record.between if name in record.forces else BAND_LIMITED
     for run in runs:
         inside = (places >= begin) & (places < begin + len(run))
         along = np.interp(np.arange(begin, begin + len(run)), places[inside], record[name][inside]) if own else None
-        fine = between_samples(run.source[name] if along is None else along, factor, reading)
+        fine = between_samples(run.source[name] if along is None else along, factor, record.reading(name))
         fine = fine[0 if own else factor * run.first :][: factor * len(run)]
         parts.append(np.pad(fine, (0, factor * len(run) - len(fine)), mode="edge"))
         begin += len(run)

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from study.records.completion import complete
 from study.records.outputs import Outputs
 from study.records.plan import FEWEST, Plan, make_plan
-from study.records.record import ALONE, Record, Sensor
+from study.records.record import ALONE, FORCE, Record, Sensor
 from study.support.arrays import Floats
 
-FORCE = "force"  # what is predicted where the motion is prescribed
 QUIET = 0.5  # of the motion's size: a stretch that shows less is no picture of the record
 
 

@@ -13,6 +13,7 @@ from study.support.units import is_angle
 
 ALONE = ""  # the only coordinate of a single mass has no name, so that its channels are called as their motions are
 MOTIONS = ("displacement", "velocity", "acceleration")
+FORCE = "force"  # on a single mass; what is predicted where the motion is prescribed
 SI_UNITS = {"time": "s", "force": "N", "displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 
 
@@ -108,6 +109,10 @@ class Record:
     def unit(self, channel: str | Sensor) -> str:
         """Unit of a channel: the SI one where nobody says, none of a further channel then."""
         return self.units.get(str(channel)) or self.usual_unit(channel)
+
+    def reading(self, channel: str) -> str:
+        """What a channel does between its samples: a motion is band-limited."""
+        return self.between if channel in self.forces else "band_limited"
 
     def usual_unit(self, channel: str | Sensor) -> str:
         """The SI unit of a force or a motion; empty for a further channel."""

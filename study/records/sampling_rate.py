@@ -182,7 +182,7 @@ def decimated(record: Record, factor: int) -> Record:
         reach = 0 if _goes_round(values) else min(4 * NEAR_END * factor, len(values) // 2)
         longer = values - mean if reach == 0 else with_continuations(values - mean, reach)
         cycles = np.asarray(rfftfreq(len(longer)))  # of a sample
-        held = _held(cycles, record.between if name in record.forces else BAND_LIMITED)
+        held = _held(cycles, record.reading(name))
         low = irfft(np.asarray(rfft(longer)) * _gain(2.0 * factor * cycles) * held, len(longer))
         channels[name] = np.asarray(low[reach : reach + len(values)][::factor] + mean)
     period = None if record.period is None else record.period // factor

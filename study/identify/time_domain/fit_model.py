@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from study.equations.free_run import needed_steps
 from study.equations.model import Model, ModelTerm
-from study.equations.substeps import needed_steps
 from study.equations.terms import LIBRARY
 from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.identify.frequency_domain.starting_values import linear_start, reverse_start

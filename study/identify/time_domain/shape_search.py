@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
+from study.equations.free_run import needed_steps
 from study.equations.model import Model, ModelTerm
-from study.equations.substeps import needed_steps
 from study.equations.term import ShapeParameter, Term
 from study.identify.frequency_domain.starting_values import linear_start, oscillator
 from study.identify.time_domain.free_run_fit import FreeRunFit
