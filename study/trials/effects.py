@@ -230,18 +230,8 @@ def stands_out(clean: Record, truth: Model, name: str, noise: float) -> bool:
     """Whether the coefficient of an effect would stand ``VISIBLE_ERRORS`` standard errors from zero, of white noise.
 
     This is asked of the true model alone (the bound of Cramer and Rao), so that no property of the search decides which
-    trials there are.
-
-    Parameters
-    ----------
-    clean : Record
-        As measured, without noise.
-    truth : Model
-        What made it.
-    name : str
-        The hidden effect.
-    noise : float
-        Standard deviation of the noise on what is predicted, in its unit.
+    trials there are. ``clean`` is the record as measured, without noise, that ``truth`` made; ``noise`` is the standard
+    deviation of that on what is predicted, in its unit.
     """
     entry = next(t for t in truth.terms if t.name == name)
     try:
