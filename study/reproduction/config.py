@@ -123,11 +123,6 @@ def load_config(folder: Path) -> StudyConfig:
     """Read ``config.yaml`` and ``cases.tsv`` of a folder, and the models that they name, and check them all.
 
     Nothing that passes here can be refused by a job for the way it is configured.
-
-    Raises
-    ------
-    StudyError
-        At the first fault, naming file, row and value.
     """
     source, models = folder / "config.yaml", folder.parent / "models"
     settings = read_yaml(source, StudySettings)

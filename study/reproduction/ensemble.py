@@ -15,6 +15,7 @@ from study.reproduction.settings import IdentificationSettings, RecordSettings
 from study.support.arrays import Floats
 from study.support.cores import cores
 from study.support.errors import DivergenceError
+from study.support.numbers import LAST_DIGITS, SAME_RUN
 
 T = TypeVar("T")
 S = TypeVar("S")
@@ -25,7 +26,6 @@ ERROR_COLUMNS = [
     "bias", "bias_error", "scatter", "seeds", "found", "noted", "first_error",
 ]  # fmt: skip
 FIRST = 2  # seeds whose median has a column of its own: by it a later run shows that it gives the same errors
-ALIKE = 0.01  # share of a median error by which two runs of the same study may differ
 
 
 def threaded(
@@ -132,12 +132,12 @@ def differing_cases(own: pd.DataFrame, kept: pd.DataFrame) -> list[str]:
     """Cases whose first seeds do not come out as those of a kept table did: other settings or other code show there.
 
     Both are as :func:`estimator_errors` gives them; ``kept`` may have cases and estimators that ``own`` lacks.
-    A case differs where a ``first_error`` is not in ``kept`` or is off by more than ``ALIKE``.
+    A case differs where a ``first_error`` is not in ``kept`` or is off by more than ``SAME_RUN``.
     """
     keys = ["case", "estimator", "parameter"]
     before = kept.set_index(keys).reindex(pd.MultiIndex.from_frame(own[keys])).reset_index()
-    same = np.isclose(before["true"], own["true"], rtol=1e-9, atol=0.0)
-    same &= np.isclose(before["first_error"], own["first_error"], rtol=ALIKE, atol=0.0)
+    same = np.isclose(before["true"], own["true"], rtol=LAST_DIGITS, atol=0.0)
+    same &= np.isclose(before["first_error"], own["first_error"], rtol=SAME_RUN, atol=0.0)
     return list(dict.fromkeys(str(case) for case in own.loc[~same, "case"]))
 
 

@@ -19,7 +19,6 @@ Row = Mapping[str, Any]
 TITLE = "The report, run again"
 LONGEST = 110  # characters of a measured number in a table
 WANTED = 0.99  # of the seeds, for each noise-free parameter
-ENOUGH = 5  # seeds from which a scatter means something
 INTRODUCTION = (
     "Bendat, Palo and Coppolino identify nonlinear systems with one degree of freedom from force and response: "
     "reverse the two, and every term of the equation of motion is a linear path of its own (reverse dynamic MI/SO). "
@@ -245,7 +244,7 @@ def estimator_blocks(results: Results) -> list[Block]:
         Image("Errors of the estimators by parameter and case", "../figures/estimators.png"), Text(note),
         by_estimator(errors, ("case", "parameter"), names, _error_and_gain),
     ]  # fmt: skip
-    noisy = errors[(errors["case"].map(noise) > 0.0) & (errors["seeds"] >= ENOUGH)]
+    noisy = errors[(errors["case"].map(noise) > 0.0) & (errors["seeds"] >= 5)]  # of fewer a scatter means nothing
     if not len(noisy):
         return blocks
 

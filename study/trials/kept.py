@@ -8,10 +8,11 @@ from typing import Any, cast
 import numpy as np
 import pandas as pd
 
+from study.support.numbers import SAME_RUN
+
 Row = dict[str, Any]
 TRIALS, BY_TEST, STRUCTURES = "trials", "trials_by_test", "trials_of_structures"
 TIMES = ("seconds",)  # of another machine, or another hour
-SAME_RUN = 0.01  # relative: numbers of two runs of the same code on two machines
 COLUMNS_OF_WORDS = (  # the others hold numbers
     "kind", "test", "hidden", "place", "response", "known", "faults", "fault", "fault_channel", "faults_found",
     "fault_rivals", "fault_shown", "found", "found_channel", "verdict", "first", "first_place", "effect_first",
