@@ -207,7 +207,7 @@ def consistent(record: Record) -> tuple[Record, tuple[str, ...]]:
     """
     sensors = sorted(record.sensors, key=lambda s: (record.coordinates.index(s.coordinate), MOTIONS.index(s.motion)))
     units = {str(s): role_unit(s.motion, record.unit(s)) for s in sensors}
-    if len({u.powers[3] for u in units.values()}) > 1:
+    if len({u.powers.voltage for u in units.values()}) > 1:
         mixed = ", ".join(f"{channel} in {u.text}" for channel, u in units.items())
         raise StudyError(f"{record.name}: {mixed} cannot be compared; expected all calibrated, or all in volts")
     turning = record.rotations
@@ -223,12 +223,12 @@ def consistent(record: Record) -> tuple[Record, tuple[str, ...]]:
         first = next((u.text for u in forces.values() if u.powers == ROLES["force"][0]), "N")
         units |= forces
         for name, u in forces.items():
-            wanted[name] = u.text if u.powers[3] else f"{first} {length}" if u.powers[1] else first
+            wanted[name] = u.text if u.powers.voltage else f"{first} {length}" if u.powers.length else first
     channels: dict[str, Floats] = {}
     notes: list[str] = []
     for channel, unit in units.items():
         factor = unit.factor / parse_unit(wanted[channel]).factor
-        if unit.powers[3] == 0 and factor != 1.0:
+        if unit.powers.voltage == 0 and factor != 1.0:
             channels[channel] = record[channel] * factor
             notes.append(f"{channel} is converted from {unit.text} to {wanted[channel]}")
     return replace(record.with_channels(channels), units={**record.units, **wanted}), tuple(notes)
