@@ -30,7 +30,6 @@ MEASURED = "measured"
 LINEAR = ("inertia", "linear_stiffness", "linear_damping")
 PLACES: tuple[Kind, ...] = ("at", "between", "couples")
 MOST = 40  # coordinates
-LONGEST = 40  # characters in a name
 Forces = tuple[tuple[str, str], ...]
 
 
@@ -71,7 +70,7 @@ def linear_measured(top: Mapping[object, object]) -> bool:
 
 
 def _name(item: object, what: str) -> str:
-    usable = isinstance(item, str) and item.isidentifier() and item.isascii() and len(item) <= LONGEST
+    usable = isinstance(item, str) and item.isidentifier() and item.isascii() and len(item) <= 40
     expect(usable, f"{what} is {shown(item)}; expected a name of letters, digits and underscores, such as floor1")
     return cast(str, item)
 

@@ -19,8 +19,6 @@ from study.support.autoregression import burg, continued_by
 from study.support.errors import StudyError
 from study.support.units import ROLES, VOLTAGE, parse_unit, role_unit
 
-ORDER = 64  # coefficients of the linear prediction at each end
-TRAINING = 4096  # samples from which the linear prediction is estimated
 SHORTEST = 512  # samples by which each end is continued, at least
 RINGING = 4.0  # periods of the cut-off frequency by which ends are continued when integrating
 SETTLED = 2.0  # periods of the cut-off frequency at each end where an integrated channel is uncertain
@@ -162,9 +160,9 @@ def _predicted(values: Floats, reach: int) -> Floats:
 
     A prediction of high order is stable in exact arithmetic only; one that grows is replaced by a shorter one.
     """
-    recent = values[-TRAINING:]
+    recent = values[-4096:]  # from which it is estimated
     limit = 2.0 * float(np.max(np.abs(recent)))
-    order = min(ORDER, len(recent) // 3)
+    order = min(64, len(recent) // 3)
     while order > 0:
         continued = continued_by(burg(recent, order), recent, reach)
         if float(np.max(np.abs(continued), initial=0.0)) <= limit:

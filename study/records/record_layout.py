@@ -259,8 +259,14 @@ def strung_together(
 ) -> Prepared:  # fmt: skip
     """One prepared record of the stretches to fit and those to judge; ``completed`` are the records they come from."""
     first = completed[0].record
-    for other in completed[1:]:
-        _refuse_different(first, other.record)
+    for other in (c.record for c in completed[1:]):
+        rates = f"{first.name} is sampled at {1.0 / first.dt:g} Hz and {other.name} at {1.0 / other.dt:g} Hz"
+        same = abs(other.dt / first.dt - 1.0) <= 1e-6
+        expect(same, f"{rates}; expected the same for records that are judged together")
+        for channel in (*first.forces, *map(str, first.sensors)):
+            one, two = first.units.get(channel, ""), other.units.get(channel, "")
+            differ = f"{channel} is in {one} in {first.name} and in {two} in {other.name}"
+            expect(one == two, f"{differ}; expected the same unit in records that are judged together")
     stretches = (*fit, *judge)
     common = [c for c in first.channels if all(c in s.source for s in stretches)]
     channels = {c: np.concatenate([s.source[c][s.first : s.last] for s in stretches]) for c in common}
@@ -275,21 +281,6 @@ def strung_together(
     said = tuple(dict.fromkeys((*(n for c in completed for n in c.notes), *notes)))
     plan = Plan(sensors[0].motion, (0, split), (split, total))
     return Prepared(record, plan, band, 0, said, sensors=tuple(sensors))
-
-
-def _refuse_different(first: Record, other: Record) -> None:
-    if abs(other.dt / first.dt - 1.0) > 1e-6:
-        raise StudyError(
-            f"{first.name} is sampled at {1.0 / first.dt:g} Hz and {other.name} at {1.0 / other.dt:g} Hz; expected the "
-            "same for records that are judged together"
-        )
-    for channel in (*first.forces, *map(str, first.sensors)):
-        one, two = first.units.get(channel, ""), other.units.get(channel, "")
-        expect(
-            one == two,
-            f"{channel} is in {one} in {first.name} and in {two} in {other.name}; expected the same unit in records "
-            "that are judged together",
-        )
 
 
 def records_judged(prepared: Prepared) -> tuple[Prepared, ...]:

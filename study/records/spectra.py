@@ -15,7 +15,6 @@ from scipy.fft import irfft, rfft, rfftfreq
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
-KAISER = 20.0  # side lobes at -150 dB
 CHUNK = 64  # segments transformed at a time: they stay in the cache, and memory does not grow with the record
 
 
@@ -51,7 +50,7 @@ class Segments:
         if self.window == "hann":  # SciPy's signal package takes longer to load than most steps of the study to run
             return np.hanning(self.length + 1)[:-1]
         if self.window == "kaiser":
-            return np.kaiser(self.length + 1, KAISER)[:-1]
+            return np.kaiser(self.length + 1, 20.0)[:-1]  # side lobes at -150 dB
         from scipy.signal import get_window
 
         return np.asarray(get_window(self.window, self.length), dtype=np.float64)

@@ -16,12 +16,13 @@ from scipy.special import ndtri
 
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
 from study.equations.terms import LIBRARY, same_elsewhere
+from study.trials.draw import NOISES
 from study.trials.effects import VISIBLE_ERRORS
 from study.trials.kept import BY_TEST, STRUCTURES, TRIALS, Row, rows_of
 from study.trials.kinds import TESTS
 from study.trials.runs import COMPLETED, NONE, PAIR, REMOVED, SINGLE, WITH, WITHOUT
 
-FAINT_NOISE, MODEST_NOISE = 0.01, 0.05  # noise up to which ties are to be short, and the true effect has to come first
+_, FAINT_NOISE, MODEST_NOISE, _ = NOISES  # up to which ties are to be short, and the true effect has to come first
 WITHIN = 1.05  # held-out error after adding, over that of the true model
 SAME_PLACE, END_IN_COMMON, ANOTHER_PLACE = "the same place", "a place with an end in common", "another place"
 NOT_DIAGNOSED = "not_diagnosed"

@@ -30,7 +30,6 @@ __all__ = [
 
 SINGLE_MASS = Roles()
 EXPECTED = "expected CSV, MATLAB, HDF5, UFF or Parquet"
-CHUNK = 1 << 20  # bytes
 LARGEST_PIPE = 1 << 32  # bytes: what never ends must not fill the disk
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 BINARY = {
@@ -137,7 +136,7 @@ def _next(descriptor: int) -> bytes:
     """What comes next, waiting for it while somebody has the pipe open to write; empty at its end."""
     while True:
         try:
-            return os.read(descriptor, CHUNK)
+            return os.read(descriptor, 1 << 20)
         except OSError as error:
             if error.errno != errno.EAGAIN:
                 raise

@@ -18,7 +18,6 @@ from study.support.terminal import harmless
 from study.support.units import is_unit, parse_unit, role_unit
 
 LONGEST_NAME = 120  # characters of a record's name: names of files have 255 bytes, and more is put to it
-AGREE = 0.01  # share by which a given interval may differ from that of the times
 AGAIN = 0.7  # of its rms: a force that changes by more after a period does not repeat (a random one changes by 1.4)
 
 
@@ -35,7 +34,15 @@ def record_from(path: Path, table: Table, options: ReadOptions, roles: Roles) ->
     given = _given_units(path, columns, options, roles)
     _check_apart(path, columns, roles)
     units = _units(path, columns, given, roles)
-    first, last = _range(path, len(next(iter(columns.values())).values), options)
+    length, (first, asked) = lengths.pop(), options.samples or (0, None)
+    last = length if asked is None else asked
+    expect(
+        first < length and last <= length,
+        f"{path}: samples {f'from {first} on' if asked is None else f'{first} to {last}'} are asked for; the record "
+        f"has {length}; expected a range within, counted from 0",
+    )
+    few = f"{path}: {last - first} samples are too few; expected {checks.FEWEST_SAMPLES} or more"
+    expect(last - first >= checks.FEWEST_SAMPLES, few)
     cut = table.from_sample(first)
     kept = {channel: replace(c, values=c.values[first:last]) for channel, c in columns.items()}
     kept = _usable(path, kept, cut, options, roles)
@@ -111,20 +118,6 @@ def _units(
     return units
 
 
-def _range(path: Path, length: int, options: ReadOptions) -> tuple[int, int]:
-    first, last = options.samples or (0, None)
-    end = length if last is None else last
-    asked = f"from {first} on" if last is None else f"{first} to {last}"
-    inside = first < length and end <= length
-    expect(
-        inside,
-        f"{path}: samples {asked} are asked for; the record has {length}; expected a range within, counted from 0",
-    )
-    few = f"{path}: {end - first} samples are too few; expected {checks.FEWEST_SAMPLES} or more"
-    expect(end - first >= checks.FEWEST_SAMPLES, few)
-    return first, end
-
-
 def _usable(
     path: Path, columns: Mapping[str, Column], table: Table, options: ReadOptions, roles: Roles
 ) -> dict[str, Column]:
@@ -165,7 +158,7 @@ def _sampling(
             f"{path}: an interval of {stated:g} s is given (--fs or --dt), its times step by {step:g} s; leave the "
             "option out, or say with --unit time=UNIT what the times are in"
         )
-        expect(abs(step / stated - 1.0) < AGREE, differ)
+        expect(abs(step / stated - 1.0) < checks.JITTER, differ)
         return stated, float(time[0])
     dt = stated if stated is not None else table.dt
     if dt is None:

@@ -19,8 +19,7 @@ FEWEST_CLIPPED = 10  # samples at the very same extreme value ...
 CLIPPED_SHARE = 1e-3  # ... and this share of the record ...
 CLIPPED_RATIO = 10.0  # ... and this many times as many as at the values next to it: then it is clipped
 FEWEST_VALUES = 20  # with fewer different values it is a switched signal, not a clipped one
-NEAR = 0.05  # of the range: the values next to the extreme
-JITTER = 0.01  # of the sampling interval: the unevenness of sampling that is taken for even
+JITTER = 0.01  # of the sampling interval: what is uneven by less is even, and what is off by less is the same
 ROUNDING = 0.4  # of the sampling interval: the coarsest rounding of printed times that still shows a lost sample
 CONTENT = 1e-6  # of its maximum: autospectra below are leakage
 COHERENT = 0.3  # lines less coherent than this say little
@@ -79,7 +78,7 @@ def saturated(values: Floats) -> str | None:
         different, times = np.unique(below, return_counts=True)
         if len(different) < FEWEST_VALUES:
             continue
-        near = (different > 0.0) & (different <= NEAR / LAST_DIGITS)
+        near = (different > 0.0) & (different <= 0.05 / LAST_DIGITS)  # of the range: the values next to the extreme
         usual = float(np.mean(times[near])) if near.any() else float(np.median(times))
         if count > CLIPPED_RATIO * usual and not _comes_to_rest(values, extreme):
             return (

@@ -8,7 +8,7 @@ gives it. Where there is one coordinate, or one force, the usual names will do f
 
 import re
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -123,8 +123,13 @@ def assign(path: Path, table: Table, options: ReadOptions, roles: Roles) -> dict
         missing = f"the force{'' if roles.alone else f' {lacking[0]!r}'}" if lacking else motions
         free = " (or say --free where no force acts)" if motion else ""
         raise _ask(path, table, roles, f"no column is known to be {missing}{free}")
+    # Further channels are columns of the same length with names of their own.
+    length, counts = len(next(iter(named.values())).values), Counter(c.name for c in table.columns)
+    known, taken = {"", *named, *NAMES, *roles.kinds}, [id(c) for c in named.values()]
+    usable = [c for c in table.columns if not c.fault and len(c.values) == length and id(c) not in taken]
+    named |= {c.name: c for c in usable if counts[c.name] == 1 and c.name not in known}
     place = {id(c): k for k, c in enumerate(table.columns)}
-    return dict(sorted((named | _extra(table, named, roles)).items(), key=lambda item: place[id(item[1])]))
+    return dict(sorted(named.items(), key=lambda item: place[id(item[1])]))
 
 
 def _named(path: Path, table: Table, role: str, wanted: str | int, roles: Roles) -> Column:
@@ -210,14 +215,6 @@ def _unit_role(unit: str) -> str:
     except StudyError:
         return ""
     return next((role for role, (own, _) in ROLES.items() if own == powers), "")
-
-
-def _extra(table: Table, named: Mapping[str, Column], roles: Roles) -> dict[str, Column]:
-    """Further channels of the same length, under their own names."""
-    length, taken = len(next(iter(named.values())).values), [id(c) for c in named.values()]
-    counts, known = Counter(c.name for c in table.columns), {"", *named, *NAMES, *roles.kinds}
-    usable = [c for c in table.columns if not c.fault and len(c.values) == length and id(c) not in taken]
-    return {c.name: c for c in usable if counts[c.name] == 1 and c.name not in known}
 
 
 def _motion_of(roles: Roles) -> str:
