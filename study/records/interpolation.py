@@ -5,13 +5,11 @@ an integrator with several steps a sample would respond to. Band-limited interpo
 content above its Nyquist frequency.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.fft import irfft, rfft
 
 from study.records.completion import SHORTEST
-from study.records.record import Record
+from study.records.record import Record, Stretch
 from study.support.arrays import Floats, Ints
 
 BAND_LIMITED = "band_limited"
@@ -59,28 +57,18 @@ def _reflected(values: Floats) -> Floats:
     return np.concatenate([before, values, after])
 
 
-@dataclass(frozen=True, eq=False)
-class ContinuousRun:
-    """Samples of a record along which one motion runs: stretches that continue each other, and what lies between."""
+def runs_of(record: Record) -> tuple[tuple[Stretch, ...], Ints]:
+    """The motions of a record that is strung together, and the place of each of its samples in them, shape (n,).
 
-    source: Record
-    first: int
-    last: int
-
-    def __len__(self) -> int:
-        """Number of samples."""
-        return self.last - self.first
-
-
-def runs_of(record: Record) -> tuple[tuple[ContinuousRun, ...], Ints]:
-    """The motions of a record that is strung together, and the place of each of its samples in them, shape (n,)."""
-    runs, places, begin = list[ContinuousRun](), list[Ints](), 0
+    One motion runs along stretches that continue each other, and what lies between.
+    """
+    runs, places, begin = list[Stretch](), list[Ints](), 0
     for stretch in record.stretches:
         if stretch.continues and runs:
-            runs[-1] = ContinuousRun(runs[-1].source, runs[-1].first, stretch.last)
+            runs[-1] = Stretch(runs[-1].source, runs[-1].first, stretch.last)
         else:
             begin += len(runs[-1]) if runs else 0
-            runs.append(ContinuousRun(stretch.source, stretch.first, stretch.last))
+            runs.append(Stretch(stretch.source, stretch.first, stretch.last))
         places.append(begin - runs[-1].first + np.arange(stretch.first, stretch.last))
     return tuple(runs), np.concatenate(places)
 

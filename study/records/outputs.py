@@ -29,7 +29,7 @@ class Outputs:
 
     def measured(self, record: Record, span: tuple[int, int]) -> Floats:
         """What the sensors show along a span, shape (n, sensors)."""
-        return np.stack([record[str(sensor)][slice(*span)] for sensor in self.sensors], axis=1)
+        return record.columns(self.sensors, span)
 
     def stacked(self, values: Floats) -> Floats:
         """Values (n, sensors, ...) weighted, those of one time side by side, shape (n sensors, ...)."""

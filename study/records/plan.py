@@ -34,7 +34,7 @@ def make_plan(record: Record, fit: Span | None = None, judge: Span | None = None
     half = len(record) // 2
     usual = ((0, half), (half, len(record))) if given or len(record) < 2 * FEWEST else _halves(record, sensors)
     fit, judge = fit or usual[0], judge or usual[1]
-    motion, force = _side_by_side(record, sensors), _side_by_side(record, record.forces)
+    motion, force = record.columns(sensors), record.columns(record.forces)
     for name, (first, last) in (("fit", fit), ("judge", judge)):
         if not 0 <= first < last <= len(record) or last - first < FEWEST:
             raise StudyError(f"the part to {name}, {first}:{last}, must hold {FEWEST} samples or more of {len(record)}")
@@ -66,17 +66,12 @@ def compared_sensors(record: Record, wanted: str | None = None) -> tuple[Sensor,
 
 
 def _still(record: Record, channels: Sequence[Sensor] | Sequence[str], part: str) -> str:
-    first, last = moving(_side_by_side(record, channels))
+    first, last = moving(record.columns(channels))
     names = " and ".join(map(str, channels))
     return (
         f"the {names} of {record.name!r} does not move in {part}; it moves in samples {first}:{last}, expected parts "
         "there, by --fit A:B and --judge A:B"
     )
-
-
-def _side_by_side(record: Record, channels: Sequence[Sensor] | Sequence[str]) -> Floats:
-    """Channels, shape (n, channels)."""
-    return np.stack([record[channel] for channel in channels], axis=1) if channels else np.zeros((len(record), 0))
 
 
 def _moves(values: Floats) -> bool:
@@ -104,7 +99,7 @@ def _halves(record: Record, sensors: Sequence[Sensor]) -> tuple[Span, Span]:
     Of the stretch where one half has no motion, or the first no force: a hammer's blow with a long rest behind it, a
     trigger long before it, chunks of a file that nothing was written to.
     """
-    half, motion, force = len(record) // 2, _side_by_side(record, sensors), _side_by_side(record, record.forces)
+    half, motion, force = len(record) // 2, record.columns(sensors), record.columns(record.forces)
     first, last = 0, len(record)
     if _rests(motion[:half]) or _rests(motion[half:]) or not (record.unforced or _moves(force[:half])):
         start, last = moving(motion)

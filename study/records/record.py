@@ -1,7 +1,7 @@
 """A record: what was measured or simulated, with its units."""
 
 from bisect import bisect_right
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate, pairwise
 from pathlib import Path
@@ -95,6 +95,12 @@ class Record:
     def motion(self, coordinate: str) -> Floats:
         """Displacement, velocity and acceleration of a coordinate of a completed record, shape (3, n)."""
         return np.stack([self[Sensor(coordinate, motion)] for motion in MOTIONS])
+
+    def columns(self, channels: Sequence[Sensor] | Sequence[str], span: tuple[int, int] | None = None) -> Floats:
+        """Channels side by side, all along or along a span, shape (n, channels)."""
+        first, last = span or (0, len(self))
+        values = [self[channel][first:last] for channel in channels]
+        return np.stack(values, axis=1) if values else np.zeros((last - first, 0))
 
     @property
     def rotations(self) -> frozenset[str]:

@@ -195,7 +195,7 @@ def sure(completed: CompletedRecord, first: int, last: int) -> Stretch:
 
 def _until_rest(stretch: Stretch, sensors: Sequence[Sensor]) -> Stretch:
     """A stretch up to where the motion has died away to practically nothing: rest tells nothing of a structure."""
-    values = np.stack([stretch.source[s][stretch.first : stretch.last] for s in sensors], axis=1)
+    values = stretch.source.columns(sensors, (stretch.first, stretch.last))
     away = np.abs(values - np.mean(values[-FEWEST // 2 :], axis=0))
     loud = np.flatnonzero(np.any(away > TOLERANCE * np.max(away, axis=0), axis=1))
     last = int(loud[-1]) + 1 if len(loud) else 0

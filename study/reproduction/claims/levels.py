@@ -15,7 +15,7 @@ from study.reproduction.claims.judgement import Condition, at_least, claims, exp
 from study.reproduction.claims.reported import COMBINED, Reported
 from study.reproduction.claims.sample import Sample, average
 from study.reproduction.ensemble import NOISE_OFFSET, threaded
-from study.support.arrays import Floats
+from study.support.arrays import Complexes, Floats
 from study.support.numbers import percent
 
 PARTS = ("m", "c", "k", "k3", "c3")
@@ -173,7 +173,8 @@ def noise_cubic(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
         bias, scatter = f"bias of {name}", f"scatter of a line of the {part} part"
         sizes, spreads = {noise: abs(by_name[name].mean) for noise, by_name in biases.items()}, dict[float, float]()
         for noise, e in ensembles.items():  # of a line of A_2, relative to its exact value; median over the band
-            lines = np.stack([getattr(o.miso.response[1], part[:4]) for o in e.seeds])
+            second: Complexes = np.stack([o.miso.response[1] for o in e.seeds])
+            lines = second.imag if part == "imaginary" else second.real
             slope = 2.0 * np.pi * e.frequency * reported.table_1(COMBINED, "c3") / 3.0
             exact = slope if part == "imaginary" else reported.table_1(COMBINED, "k3")
             spreads[noise] = float(np.median(np.std(lines, axis=0, ddof=1) / exact))
