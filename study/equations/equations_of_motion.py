@@ -62,7 +62,6 @@ class ModalKeys:
 
     @property
     def all(self) -> tuple[str, ...]:
-        """Every name."""
         return (*self.stiffness, *self.damping, *(key for point in self.points for key in self.shape(point)))
 
 
@@ -94,7 +93,6 @@ class Equations:
 
     @property
     def dofs(self) -> int:
-        """Degrees of freedom."""
         return len(self.motion[0])
 
     @property

@@ -83,7 +83,6 @@ class Graph:
         return self._node(Op.INPUT, self.names.index(name), 0)
 
     def const(self, value: float) -> int:
-        """Node of a constant."""
         if value not in self.values:
             self.values.append(value)
         return self._node(Op.CONST, self.values.index(value), 0)
@@ -94,7 +93,6 @@ class Graph:
         return self.values[a] if op is Op.CONST else None
 
     def add(self, a: int, b: int) -> int:
-        """a + b."""
         x, y = self.constant_value(a), self.constant_value(b)
         if x is not None and y is not None:
             return self.const(x + y)
@@ -103,7 +101,6 @@ class Graph:
         return a if y == 0.0 else self._node(Op.ADD, min(a, b), max(a, b))
 
     def sub(self, a: int, b: int) -> int:
-        """a - b."""
         x, y = self.constant_value(a), self.constant_value(b)
         if x is not None and y is not None:
             return self.const(x - y)
@@ -112,12 +109,10 @@ class Graph:
         return self.neg(b) if x == 0.0 else self._node(Op.SUB, a, b)
 
     def neg(self, a: int) -> int:
-        """-a."""
         x = self.constant_value(a)
         return self.const(-x) if x is not None else self._node(Op.NEG, a, a)
 
     def mul(self, a: int, b: int) -> int:
-        """a b."""
         x, y = self.constant_value(a), self.constant_value(b)
         if x is not None and y is not None:
             return self.const(x * y)
@@ -128,12 +123,10 @@ class Graph:
         return a if y == 1.0 else self._node(Op.MUL, min(a, b), max(a, b))
 
     def div(self, a: int, b: int) -> int:
-        """a / b."""
         trivial = self.constant_value(a) == 0.0 or self.constant_value(b) == 1.0
         return a if trivial else self._node(Op.DIV, a, b)
 
     def unary(self, op: Op, a: int) -> int:
-        """A function of one argument."""
         return self._node(op, a, a)
 
     def binary(self, op: Op, a: int, b: int) -> int:

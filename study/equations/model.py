@@ -52,7 +52,6 @@ class ModelTerm:
 
     @property
     def values(self) -> dict[str, float | None]:
-        """Coefficients and shape parameters by key."""
         return dict(zip(self.keys, self.coefficients + self.parameters, strict=True))
 
     def with_values(self, values: Mapping[str, float | None]) -> "ModelTerm":
@@ -82,14 +81,12 @@ class Model:
     measured: bool = False  # whether the linear part of a structure is as it is measured
 
     def __post_init__(self) -> None:
-        """Refuse the same term twice."""
         names = [t.name for t in self.terms]
         for name in names:
             if names.count(name) > 1:
                 raise StudyError(f"model {self.name!r} lists the term {name!r} twice; expected once")
 
     def __contains__(self, name: str) -> bool:
-        """Whether a term of this name is in the model."""
         return any(t.name == name for t in self.terms)
 
     @property
@@ -125,19 +122,15 @@ class Model:
         return tuple(sorted({name for t in self.terms for name in t.term.channels}))
 
     def with_term(self, term: Term | ModelTerm) -> "Model":
-        """The model and one term more."""
         return replace(self, terms=(*self.terms, term if isinstance(term, ModelTerm) else free(term)))
 
     def without_term(self, name: str) -> "Model":
-        """The model and one term less."""
         return replace(self, terms=tuple(t for t in self.terms if t.name != name))
 
     def with_values(self, values: Mapping[str, float | None]) -> "Model":
-        """The same terms with other coefficients or shape parameters."""
         return replace(self, terms=tuple(t.with_values(values) for t in self.terms))
 
     def equation(self) -> str:
-        """The equation of motion in one line, with symbols."""
         return " + ".join(f"{' , '.join(t.symbols)} [{t.term.formula}]" for t in self.terms) + " = F(t)"
 
     def numbers(self) -> dict[str, float]:

@@ -59,12 +59,10 @@ class Sketch:
 
     @property
     def width(self) -> float:
-        """Of all that is drawn."""
         return self.boxes[-1].x + 2.0 * SIDE
 
     @property
     def height(self) -> float:
-        """Of all that is drawn."""
         return self.top - self.bottom
 
 

@@ -47,7 +47,6 @@ class Excitation:
     periods: int = 1  # how often the same history is repeated in the record
 
     def __post_init__(self) -> None:
-        """Refuse settings that no force can have."""
         for name, known in (("kind", tuple(_HISTORIES)), ("reading", READINGS), ("sweep", SWEEPS)):
             if getattr(self, name) not in known:
                 raise StudyError(f"{name} of the excitation is {getattr(self, name)!r}; it may be {', '.join(known)}")

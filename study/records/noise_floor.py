@@ -27,7 +27,6 @@ class Floor:
 
     @property
     def significance(self) -> float:
-        """Excess in its own standard errors."""
         return self.excess / self.excess_error if self.excess_error > 0.0 else np.inf
 
 

@@ -24,7 +24,6 @@ class Outputs:
     weights: tuple[float, ...]  # one for each sensor; 1 for a single one
 
     def __len__(self) -> int:
-        """Number of sensors."""
         return len(self.sensors)
 
     def measured(self, record: Record, span: tuple[int, int]) -> Floats:

@@ -103,7 +103,6 @@ class Prepared:
         return max(span[0], self.edge), min(span[1], len(self.record) - self.edge)
 
     def with_fit(self, first: int, last: int) -> "Prepared":
-        """The same record with another part to fit."""
         return replace(self, plan=replace(self.plan, fit=(first, last)))
 
     @cached_property

@@ -43,7 +43,6 @@ class Stretch:
     continues: bool = False
 
     def __len__(self) -> int:
-        """Number of samples."""
         return self.last - self.first
 
     @property
@@ -70,15 +69,12 @@ class Record:
     computed: frozenset[str] = frozenset()  # motions that were not measured but computed from those that were
 
     def __len__(self) -> int:
-        """Number of samples."""
         return len(next(iter(self.channels.values())))
 
     def __getitem__(self, channel: str | Sensor) -> Floats:
-        """One channel."""
         return self.channels[str(channel)]
 
     def __contains__(self, channel: str | Sensor) -> bool:
-        """Whether the record has this channel."""
         return str(channel) in self.channels
 
     @property
@@ -197,7 +193,6 @@ class Record:
         return Record(self.dt, channels, name=self.name, start=self.start + first * self.dt)
 
     def with_channels(self, channels: Mapping[str, Floats]) -> "Record":
-        """The same record with channels replaced or added."""
         changed = self.changed.union(channels) if self.stretches else self.changed
         return replace(self, channels={**self.channels, **channels}, changed=changed)
 

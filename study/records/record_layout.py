@@ -42,7 +42,6 @@ class Layout:
 
     @property
     def explicit(self) -> bool:
-        """Whether samples are named."""
         return self.fit is not None or self.judge is not None
 
     def settled(self, samples: int) -> "Layout":

@@ -107,7 +107,6 @@ class SpectralMatrix:
     segments: Segments
 
     def band(self, low: float, high: float) -> "SpectralMatrix":
-        """The lines from ``low`` to ``high`` hertz."""
         keep = (self.frequency >= low) & (self.frequency <= high)
         return SpectralMatrix(self.frequency[keep], self.density[keep], self.averages, self.segments)
 

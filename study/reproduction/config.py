@@ -114,7 +114,6 @@ class StudyConfig:
         )  # fmt: skip
 
     def drawn(self, case: str) -> list[str]:
-        """The estimators that a case's figures show."""
         drawn = self.settings.drawn
         return list(drawn.with_noise if self.cases[case].noise > 0.0 else drawn.without_noise)
 

@@ -77,7 +77,6 @@ class StructureSettings(Section):
 
     @property
     def for_estimators(self) -> Settings:
-        """What the estimators themselves are told."""
         low, high = self.fit_band
         return Settings(
             self.segments.segments(), (low, high), LocalPolynomial(**self.local_polynomial.model_dump())

@@ -10,7 +10,6 @@ import pandas as pd
 from study.figures.styles import look
 from study.reproduction import ensemble
 from study.reproduction.claims.judgement import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED, SEPARATOR
-from study.reproduction.integrator_study import FINE
 from study.support import document
 from study.support.document import Block, Bullets, Fold, Heading, Image, PageSection, Picture, Text, table
 from study.support.numbers import percent
@@ -391,7 +390,7 @@ def integrator_blocks(results: Results) -> list[Block]:
 
     said = (
         "Mean error of each MI/SO estimate against the same records integrated finely "
-        f"({FINE.method}, {FINE.steps_per_sample} steps a sample), with its standard error; "
+        f"({ensemble.FINE.method}, {ensemble.FINE.steps_per_sample} steps a sample), with its standard error; "
         "relative in percent, in the parameter's own unit where the true value is zero. "
         "The report's own setting is abm4 with one step a sample (Section 2.2)."
     )

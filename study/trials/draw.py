@@ -48,7 +48,6 @@ class Trial:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """What the record's columns are called."""
         return tuple(self.record.channels)
 
     @property

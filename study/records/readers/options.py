@@ -37,7 +37,6 @@ class ReadOptions:
     as_sampled: bool = False  # all samples are used, though the motion asks for fewer
 
     def __post_init__(self) -> None:
-        """Refuse what contradicts itself or no record can have."""
         if self.dt is not None and self.fs is not None:
             raise StudyError(f"both dt = {self.dt:g} and fs = {self.fs:g} are given; expected one of them")
         for name, value in (("dt", self.dt), ("fs", self.fs)):

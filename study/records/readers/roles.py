@@ -54,7 +54,6 @@ class Roles:
 
     @property
     def alone(self) -> bool:
-        """Whether they are those of a single mass."""
         return self.coordinates == (ALONE,)
 
     def said(self, name: str, kind: str = "") -> str:
