@@ -34,13 +34,10 @@ def record_from(path: Path, table: Table, options: ReadOptions, roles: Roles) ->
     given = _given_units(path, columns, options, roles)
     _check_apart(path, columns, roles)
     units = _units(path, columns, given, roles)
-    length, (first, asked) = lengths.pop(), options.samples or (0, None)
-    last = length if asked is None else asked
-    expect(
-        first < length and last <= length,
-        f"{path}: samples {f'from {first} on' if asked is None else f'{first} to {last}'} are asked for; the record "
-        f"has {length}; expected a range within, counted from 0",
-    )
+    length, (first, end) = lengths.pop(), options.samples or (0, None)
+    last, asked = (length, f"from {first} on") if end is None else (end, f"{first} to {end}")
+    within = f"the record has {length}; expected a range within, counted from 0"
+    expect(first < length and last <= length, f"{path}: samples {asked} are asked for; {within}")
     few = f"{path}: {last - first} samples are too few; expected {checks.FEWEST_SAMPLES} or more"
     expect(last - first >= checks.FEWEST_SAMPLES, few)
     cut = table.from_sample(first)
@@ -52,9 +49,8 @@ def record_from(path: Path, table: Table, options: ReadOptions, roles: Roles) ->
     usual = {"time": "s"} | {channel: SI_UNITS[kind] for channel, kind in roles.kinds.items()}
     named = {channel: unit for channel, unit in units.items() if channel in channels}
     period = _period(path, columns, channels, options, roles)
-    name = (
-        path.resolve().parent.name if path.stem == "record" else path.stem
-    )  # as the simulator calls all that it writes
+    simulated = path.stem == "record"  # as all are called that the simulator writes, each in a folder of its own
+    name = path.resolve().parent.name if simulated else path.stem
     name = f"{name}_{options.group.strip('/').replace('/', '_')}" if options.group else name
     name = harmless(name)[:LONGEST_NAME]  # files are named after it, and pictures show it
     return Record(
