@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from study.equations import kernels
-from study.equations.equations_of_motion import ModalKeys
+from study.equations.modal_keys import ModalKeys
 from study.equations.model import Model, named_channels
 from study.equations.motion_program import MotionProgram, motion_program
 from study.records.interpolation import between_runs, between_samples, runs_of

@@ -8,8 +8,9 @@ from itertools import count
 import numpy as np
 
 from study.equations import formulas
-from study.equations.equations_of_motion import Equations, ModalKeys
+from study.equations.equations_of_motion import Equations
 from study.equations.graph import Graph, Op, Program
+from study.equations.modal_keys import ModalKeys
 from study.equations.model import Model
 from study.equations.place import Place
 from study.records.record import FORCE, MOTIONS, Sensor

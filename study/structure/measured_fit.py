@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from study.equations.equations_of_motion import ModalKeys
 from study.equations.free_run import ROUGH, FreeRun, prepare
+from study.equations.modal_keys import ModalKeys
 from study.equations.model import Model, ModelTerm
 from study.identify.time_domain.settling import SHIFT
 from study.records.prepared import Prepared

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import rfft
 
-from study.equations.equations_of_motion import ModalKeys
+from study.equations.modal_keys import ModalKeys
 from study.equations.model import Model
 from study.identify.frequency_domain.inputs import input_history
 from study.identify.frequency_domain.subspace import observability
