@@ -59,8 +59,8 @@ def compare_command(arguments: argparse.Namespace, model: "Model") -> None:
 
     folder = out_folder(arguments)
     ready = prepared_structures(arguments, model)
-    if model.measured:
-        _compare_measured(arguments, model, ready)
+    if model.modal:
+        _compare_modal(arguments, model, ready)
         return
     with progress("step", 3 * len(ready)) as step:
         comparisons = [compare_structure(model, prepared, progress=step) for prepared in ready]
@@ -75,8 +75,8 @@ def compare_command(arguments: argparse.Namespace, model: "Model") -> None:
     print(f"\n{folder}: {_listed(files)}")
 
 
-def _compare_measured(arguments: argparse.Namespace, model: "Model", ready: "list[Prepared]") -> None:
-    """The same where the linear part is as measured."""
+def _compare_modal(arguments: argparse.Namespace, model: "Model", ready: "list[Prepared]") -> None:
+    """The same where the linear part is a sum of modes."""
     from study.compare.comparison_report import as_json
     from study.structure.measured_comparison import compare_measured, measured_document, measured_summary
     from study.support.files import write_files
@@ -91,12 +91,12 @@ def _compare_measured(arguments: argparse.Namespace, model: "Model", ready: "lis
     print(f"\n{folder}: {', '.join(files)}")
 
 
-def refuse_measured(model: "Model", command: str) -> None:
+def refuse_modal(model: "Model", command: str) -> None:
     """Say so where a command needs masses, stiffnesses and dampings."""
     from study.support.errors import expect
 
     like = "expected inertia at every coordinate; 'compare', 'diagnose', 'add' and 'drop' take it"
-    expect(not model.measured, f"{command} knows no {model.name!r} with 'linear: measured' yet; {like}")
+    expect(model.modal is None, f"{command} knows no {model.name!r} with 'linear: modal' yet; {like}")
 
 
 def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
@@ -124,8 +124,8 @@ def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
         terms.get(name)
     files: dict[str, bytes] = {}
     ready = prepared_structures(arguments, model)
-    if model.measured:
-        _diagnose_measured(arguments, model, ready, own)
+    if model.modal:
+        _diagnose_modal(arguments, model, ready, own)
         return
     for prepared in ready:
         with progress(" candidates", name=prepared.record.name) as step:
@@ -153,10 +153,8 @@ def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
     print(f"\n{folder}: {_listed(files)}")
 
 
-def _diagnose_measured(
-    arguments: argparse.Namespace, model: "Model", ready: "list[Prepared]", own: "list[Term]"
-) -> None:
-    """The same where the linear part is as measured."""
+def _diagnose_modal(arguments: argparse.Namespace, model: "Model", ready: "list[Prepared]", own: "list[Term]") -> None:
+    """The same where the linear part is a sum of modes."""
     from study.compare.comparison_report import as_json
     from study.structure.measured_comparison import compare_measured
     from study.structure.measured_diagnosis import diagnose_measured
@@ -231,7 +229,7 @@ def _revise(
 
     folder, summaries, document = out_folder(arguments), list[str](), b""
     for prepared in prepared_structures(arguments, model):
-        if model.measured:  # its modes are fitted anew
+        if model.modal:  # its modes are fitted anew
             linear, after = (measured_comparison.compare_measured(m, prepared) for m in (model, change.model))
             told = (measured_comparison.measured_step(linear), measured_comparison.measured_step(after, **change.told))
             document = as_json(measured_comparison.measured_document(after))
@@ -256,7 +254,7 @@ def session(arguments: argparse.Namespace, model: "Model", steps: "list[dict[str
 
     several = arguments.records[1:] or arguments.each_record
     expect(not several, f"{several and several[0]}: the page of a structure shows one record; expected no more")
-    refuse_measured(model, "explore")
+    refuse_modal(model, "explore")
     (prepared,) = prepared_structures(arguments, model)
     with progress("step", 3) as step:
         return begin_placed(compare_structure(model, prepared, progress=step), steps)

@@ -5,7 +5,7 @@ acts with its force on one end and with the opposite on the other. The mass matr
 
 Coordinates are where sensors, forces and terms are; degrees of freedom q are what is integrated: ``u = T q``. A
 coordinate with inertia is a degree of freedom of its own; the motion of one without is prescribed, and what is observed
-of it is the force that this takes. With a measured linear part the columns of T are modes, and
+of it is the force that this takes. With a modal linear part the columns of T are modes, and
 ``q'' + G q' + W q = T^T (F - sum over terms)``.
 """
 
@@ -16,7 +16,7 @@ import numpy as np
 
 from study.equations import formulas
 from study.equations.graph import Graph, Program
-from study.equations.modal_keys import ModalKeys
+from study.equations.modal_part import ModalPart
 from study.equations.model import Model, ModelTerm
 from study.equations.place import Place
 from study.equations.term import Component
@@ -26,9 +26,9 @@ from study.records.record import MOTIONS, Sensor
 class Equations:
     """Nodes of the equations of motion; inputs are the time, what drives, the states, and every key."""
 
-    def __init__(self, model: Model, modal: ModalKeys | None = None, accelerated: bool = False) -> None:
+    def __init__(self, model: Model, accelerated: bool = False) -> None:
         graph = self.graph = Graph()
-        self.model, self.modal = model, modal
+        self.model, modal = model, model.modal
         masses = {e.place.ends[0] for e in model.terms if e.term.name == "inertia" and e.place.kind == "at"}
         self.prescribed = () if modal else tuple(c for c in model.coordinates if c not in masses)
         self.free = () if modal else tuple(c for c in model.coordinates if c in masses)
@@ -47,7 +47,7 @@ class Equations:
         names = modal.stiffness if modal else self.free
         self.motion = tuple([graph.input(f"{x}:{name}") for name in names] for x in "uv")
         self.memory = {t.name: graph.input(f"z:{t.name}") for t in model.states}
-        self.values = {key: graph.input(key) for key in (*model.values, *(modal.all if modal else ()))}
+        self.values = {key: graph.input(key) for key in model.values}
 
     @property
     def dofs(self) -> int:
@@ -63,10 +63,10 @@ class Equations:
         if coordinate in self.prescribed:
             return self.moved[coordinate, MOTIONS[order]]
         nodes = self.motion[order] if order < 2 else self.slopes[: self.dofs]
-        if self.modal is None:
+        if self.model.modal is None:
             return nodes[self.free.index(coordinate)]
         total = self.graph.const(0.0)
-        for key, node in zip(self.modal.shape(coordinate), nodes, strict=True):
+        for key, node in zip(self.model.modal.shape(coordinate), nodes, strict=True):
             total = self.graph.add(total, self.graph.mul(self.values[key], node))
         return total
 
@@ -130,8 +130,8 @@ class Equations:
         for where, node in self.forces:
             loads[where] = graph.add(loads[where], node)
         loads = {c: graph.sub(load, against[c]) for c, load in loads.items()}  # summed first, subtracted once
-        if self.modal is not None:
-            return [*self._modal(self.modal, loads), *rates]
+        if self.model.modal is not None:
+            return [*self._modal(self.model.modal, loads), *rates]
         n, right = len(self.free), [loads[c] for c in self.free]
         matrix = [[graph.const(0.0)] * n for _ in range(n)]
         for i, j, weight, key in mass_entries(self.model):
@@ -145,10 +145,10 @@ class Equations:
                 right[k] = (graph.sub if weight > 0.0 else graph.add)(right[k], inertia)
         return [*_solved(graph, matrix, right), *rates]
 
-    def _modal(self, modal: ModalKeys, loads: dict[str, int]) -> list[int]:
+    def _modal(self, modal: ModalPart, loads: dict[str, int]) -> list[int]:
         """Accelerations of the modes."""
         graph, (q, rate) = self.graph, self.motion
-        totals = [graph.const(0.0)] * modal.modes
+        totals = [graph.const(0.0)] * modal.count
         for coordinate, load in loads.items():
             if graph.constant_value(load) != 0.0:
                 for r, key in enumerate(modal.shape(coordinate)):

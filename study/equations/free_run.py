@@ -15,7 +15,6 @@ from itertools import pairwise
 import numpy as np
 
 from study.equations import kernels
-from study.equations.modal_keys import ModalKeys
 from study.equations.model import Model, named_channels
 from study.equations.motion_program import MotionProgram, motion_program
 from study.records.interpolation import between_runs, between_samples, runs_of
@@ -182,8 +181,6 @@ def prepare(
     steps_per_sample: int = 2,
     span: tuple[int, int] | None = None,
     restarts: Sequence[int] = (),
-    modal: ModalKeys | None = None,
-    held: Mapping[str, float] | None = None,
 ) -> FreeRun:
     """Make a model ready to run under the forces of a record; coordinates without inertia, along their motion.
 
@@ -205,10 +202,6 @@ def prepare(
         First sample, and the one after the last; the whole record if left out.
     restarts : sequence of int
         Samples of the record, within the span, at which the motion begins anew (``shooting``).
-    modal : ModalKeys, optional
-        Modes that the linear part is a sum of.
-    held : mapping of float, optional
-        Values of these that are not among the ``keys``.
     """
     first, last = span or (0, len(record))
     if not 0 <= first < last - 1 < len(record):
@@ -221,7 +214,7 @@ def prepare(
         raise StudyError(f"the restarts {tuple(restarts)} must rise, and leave two samples between {first} and {last}")
     expect(steps_per_sample >= 1, f"steps_per_sample is {steps_per_sample}; at least 1 is needed")
     named_channels(model, record.extra)
-    motion = motion_program(model, keys, sensors, modal=modal, held=held)
+    motion = motion_program(model, keys, sensors)
     lacking = ", ".join(name for name in motion.drive if name not in record)
     expect(not lacking, f"record {record.name!r} has no channel {lacking}; expected {', '.join(motion.drive)}")
     drive, starts, places = along_motions(record, (first, last), motion.drive, 2 * steps_per_sample)

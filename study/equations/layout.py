@@ -10,8 +10,8 @@
       - {term: cubic_stiffness, between: [floor1, floor2]}    # on the second's motion minus the first's
       - {term: inertia, couples: [floor1, floor2]}            # off the diagonal of the mass matrix
 
-With ``linear: measured`` the coordinates are those with sensors, and the terms nonlinear alone: masses, stiffnesses and
-dampings of the structure are whatever its measured frequency response functions say.
+With ``linear: modal`` the coordinates are those with sensors, and the terms nonlinear alone: what is linear is a sum of
+modes, as many as a record shows. ``linear: measured`` says the same.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,7 +26,7 @@ from study.support.errors import StudyError, expect
 from study.support.yaml_text import as_list, as_mapping, scalar, shown
 
 KEYS = ("coordinates", "forces", "linear")
-MEASURED = "measured"
+MODAL, ALIAS = "modal", "measured"
 LINEAR = ("inertia", "linear_stiffness", "linear_damping")
 PLACES: tuple[Kind, ...] = ("at", "between", "couples")
 MOST = 40  # coordinates
@@ -58,14 +58,14 @@ def coordinates_and_forces(top: Mapping[object, object]) -> tuple[tuple[str, ...
     return names, tuple(found)
 
 
-def linear_measured(top: Mapping[object, object]) -> bool:
-    """Whether a model leaves its linear part to the measurement."""
+def linear_modal(top: Mapping[object, object]) -> bool:
+    """Whether the linear part of a model is a sum of modes."""
     if "linear" not in top:
         return False
     given = top["linear"]
-    expect(given == MEASURED, f"'linear' is {shown(given)}; expected {MEASURED}, or no such key")
+    expect(given in (MODAL, ALIAS), f"'linear' is {shown(given)}; expected {MODAL}, or no such key")
     expect("coordinates" in top, "the model has 'linear' and no 'coordinates'; expected both")
-    expect(as_mapping(top.get("forces")), "'linear: measured' needs 'forces'; expected such as {shaker: tip}")
+    expect(as_mapping(top.get("forces")), "'linear: modal' needs 'forces'; expected such as {shaker: tip}")
     return True
 
 
@@ -126,9 +126,9 @@ def written(model: Model) -> str:
     if not model.named:
         return ""
     forces = ", ".join(f"{scalar(name)}: {scalar(where)}" for name, where in model.forces)
-    measured = f"linear: {MEASURED}\n" if model.measured else ""
+    linear = f"linear: {MODAL}\n" if model.modal else ""
     return f"coordinates: [{', '.join(scalar(c) for c in model.coordinates)}]\n" + (
-        f"forces: {{{forces}}}\n{measured}" if forces else ""
+        f"forces: {{{forces}}}\n{linear}" if forces else ""
     )
 
 
@@ -144,10 +144,10 @@ def check(model: Model) -> None:
     for entry in model.terms:
         groups.setdefault((entry.place.path, entry.place.kind == "couples"), []).append(entry)
         (masses if entry.term.name == "inertia" and entry.place.kind == "at" else acted).update(entry.place.moving)
-        if model.measured:
-            sentence = "is linear, and 'linear: measured' holds it already; expected nonlinear terms alone"
+        if model.modal:
+            sentence = "is linear, and 'linear: modal' holds it already; expected nonlinear terms alone"
             expect(entry.term.name not in LINEAR, f"{entry.name} {sentence}")
-    for name in () if model.measured else model.coordinates:
+    for name in () if model.modal else model.coordinates:
         expect(name in masses, f"the coordinate {name!r} has no inertia; expected {{term: inertia, at: {name}}}")
         loose = f"nothing ties the coordinate {name!r} to another or drives it"
         expect(name in acted, f"{loose}; expected a term between it and another, or a force")

@@ -1,7 +1,8 @@
 """The linear part of a model: its matrices, the paths from forces to sensors, its modes.
 
 Eigenvalues are those of ``(lambda^2 M + lambda C + K) psi = 0``, mode shapes those without damping. Errors follow from
-the covariance of the coefficients by the exact derivatives of eigenvalues and vectors (Fox and Kapoor, 1968).
+the covariance of the coefficients by the exact derivatives of eigenvalues and vectors (Fox and Kapoor, 1968). The
+matrices are those of the degrees of freedom q, ``u = T q``: of the coordinates, or of modes, whose M is one.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,14 +22,22 @@ LINEAR = {"linear_stiffness": 0, "linear_damping": 1, "inertia": 2}  # and the o
 
 
 def linear_keys(model: Model) -> dict[str, int]:
-    """Keys of the linear terms of a structure, with the order of their derivative."""
+    """Keys of the linear part of a structure in its matrices, with the order of their derivative."""
+    if model.modal:
+        return dict.fromkeys(model.modal.stiffness, 0) | dict.fromkeys(model.modal.damping, 1)
     return {entry.symbols[0]: LINEAR[entry.term.name] for entry in model.terms if entry.term.name in LINEAR}
 
 
 def patterns(model: Model) -> dict[str, Floats]:
-    """What a unit of each linear key adds to its matrix, shape (coordinates, coordinates)."""
-    n = len(model.coordinates)
+    """What a unit of each linear key adds to its matrix, shape (degrees of freedom, degrees of freedom)."""
     found: dict[str, Floats] = {}
+    if modal := model.modal:
+        each = (*((r, r) for r in range(modal.count)), *modal.pairs)
+        for key, (r, s) in zip((*modal.stiffness, *modal.damping), each, strict=True):
+            found[key] = np.zeros((modal.count, modal.count))
+            found[key][[r, s], [s, r]] = 1.0
+        return found
+    n = len(model.coordinates)
     for i, j, weight, key in mass_entries(model):
         found.setdefault(key, np.zeros((n, n)))[i, j] += weight
     for entry in model.terms:
@@ -39,17 +48,25 @@ def patterns(model: Model) -> dict[str, Floats]:
 
 
 def matrices(model: Model, values: Mapping[str, float]) -> Floats:
-    """Stiffness, damping and mass matrix for values by key, shape (3, coordinates, coordinates)."""
-    n = len(model.coordinates)
+    """Stiffness, damping and mass matrix for values by key, shape (3, degrees of freedom, degrees of freedom)."""
+    n = model.modal.count if model.modal else len(model.coordinates)
     total = np.zeros((3, n, n))
+    total[2] = np.eye(n) if model.modal else 0.0
     orders, own = linear_keys(model), patterns(model)
     for key, order in orders.items():
         total[order] += values[key] * own[key]
     return total
 
 
+def shapes_of(model: Model, values: Mapping[str, float]) -> Floats:
+    """T of ``u = T q``, shape (coordinates, degrees of freedom)."""
+    if model.modal is None:
+        return np.eye(len(model.coordinates))
+    return np.array([[values[key] for key in model.modal.shape(c)] for c in model.coordinates])
+
+
 def checked_mass_matrix(model: Model) -> Floats:
-    """The mass matrix of a model whose values are known, shape (coordinates, coordinates).
+    """The mass matrix of a model whose values are known, shape (degrees of freedom, degrees of freedom).
 
     Refused unless positive definite: else some motion would have no kinetic energy, or a negative one.
     """
@@ -105,17 +122,20 @@ def connections(model: Model) -> tuple[Place, ...]:
     return tuple(found.values())
 
 
-def transfer(linear: Floats, sensors: Sequence[Sensor], coordinates: Sequence[str], dt: float, size: int) -> Complexes:
-    """From a force on each coordinate to each sensor, shape (lines, sensors, coordinates).
+def transfer(model: Model, sensors: Sequence[Sensor], dt: float, size: int) -> Complexes:
+    """From a force on each coordinate to each sensor, shape (lines, sensors, coordinates); all values are known.
 
-    ``linear`` holds stiffness, damping and mass matrix; the lines are those of a transform of ``size`` samples.
+    The lines are those of a transform of ``size`` samples.
     """
     omega = np.asarray(2j * np.pi * rfftfreq(size, dt), dtype=np.complex128)
     omega[0] = omega[1]  # a structure that nothing ties down has no response to a constant
-    stiffness, damping, mass = linear
+    values = model.numbers()
+    (stiffness, damping, mass), shapes = matrices(model, values), shapes_of(model, values)
     dynamic = mass * omega[:, None, None] ** 2 + damping * omega[:, None, None] + stiffness
     inverse = np.asarray(np.linalg.inv(dynamic), dtype=np.complex128)
-    rows = [list(coordinates).index(s.coordinate) for s in sensors]
+    if model.modal:
+        inverse = shapes @ inverse @ shapes.T
+    rows = [model.coordinates.index(s.coordinate) for s in sensors]
     order = np.stack([omega ** MOTIONS.index(s.motion) for s in sensors], axis=1)
     return np.asarray(inverse[:, rows] * order[:, :, None], dtype=np.complex128)
 
@@ -136,13 +156,13 @@ RIGID = 1e-6  # of the highest natural frequency: what is below is motion as a r
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Modes of a structure, the slowest first; n coordinates. Errors are standard errors."""
+    """Modes of a structure, the slowest first; n of them, with standard errors beside."""
 
-    frequency: Floats  # undamped natural frequencies in hertz, (n,); zero for motion as a rigid body
+    frequency: Floats  # undamped natural frequencies in hertz; zero for motion as a rigid body; shape (n,)
     frequency_error: Floats
-    damping: Floats  # ratios, (n,); zero for motion as a rigid body
+    damping: Floats  # damping ratios; zero for motion as a rigid body; shape (n,)
     damping_error: Floats
-    shape: Floats  # each row a mode shape, one at the coordinate that moves most, (n, n)
+    shape: Floats  # each row a mode shape, one at the coordinate that moves most; shape (n, coordinates)
     shape_error: Floats
 
     @property
@@ -157,14 +177,15 @@ def modes_of(model: Model, keys: Sequence[str] = (), covariance: Floats | None =
     Parameters
     ----------
     model : Model
-        Its linear terms count.
+        Its linear terms count, or its modal part.
     keys : sequence of str
         What was estimated; everything else counts as exact.
     covariance : array, shape (keys, keys)
         Of these.
     """
     mass = checked_mass_matrix(model)
-    stiffness, damping, _ = matrices(model, model.numbers())
+    values = model.numbers()
+    stiffness, damping, _ = matrices(model, values)
     half = np.linalg.inv(np.linalg.cholesky(mass))
     squares, vectors = np.linalg.eigh(half @ stiffness @ half.T)
     shapes: Floats = np.asarray(half.T @ vectors, dtype=np.float64)  # of unit modal mass, in columns
@@ -181,7 +202,13 @@ def modes_of(model: Model, keys: Sequence[str] = (), covariance: Floats | None =
             by_ratio[i] = _root_changes(units[key], orders[key], roots, damping, mass)
     errors = [np.sqrt(np.maximum(np.einsum("p...,pq,q...->...", g, covariance, g), 0.0)) for g in (by_square, by_ratio)]
     moving = omega > 0.0
-    shape, shape_error = _normalised(shapes, by_shape, covariance)
+    basis, by_shape = shapes_of(model, values), shapes_of(model, values) @ by_shape
+    if model.modal:
+        felt = {key: (i, r) for i, c in enumerate(model.coordinates) for r, key in enumerate(model.modal.shape(c))}
+        for i, key in enumerate(keys):
+            if key in felt:
+                by_shape[i, felt[key][0]] += shapes[felt[key][1]]
+    shape, shape_error = _normalised(basis @ shapes, by_shape, covariance)
     return Modes(
         omega / (2.0 * np.pi), np.where(moving, errors[0] / (4.0 * np.pi * np.where(moving, omega, 1.0)), 0.0),
         np.where(moving, -roots[0].real / np.abs(roots[0]), 0.0), np.where(moving, errors[1], 0.0), shape, shape_error,

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from study.equations import formulas
+from study.equations.modal_part import ModalPart
 from study.equations.place import ALONE, HERE, Place
 from study.equations.term import Term
 from study.support.errors import StudyError
@@ -70,15 +71,15 @@ def free(term: Term, place: Place = HERE) -> ModelTerm:
 class Model:
     """An equation of motion.
 
-    Where the linear part is ``measured``, the coordinates are those with sensors, the terms what acts between them
-    beside it.
+    Where the linear part is ``modal``, a sum of modes, the coordinates are those with sensors, the terms what acts
+    between them beside it.
     """
 
     name: str  # in tables and messages
     terms: tuple[ModelTerm, ...]  # each at most once at each place
     coordinates: tuple[str, ...] = (ALONE,)  # where sensors, forces and terms are; a single mass's has no name
     forces: tuple[tuple[str, str], ...] = (("force", ALONE),)  # each measured one, and the coordinate on which it acts
-    measured: bool = False  # whether the linear part of a structure is as it is measured
+    modal: ModalPart | None = None
 
     def __post_init__(self) -> None:
         names = [t.name for t in self.terms]
@@ -96,8 +97,9 @@ class Model:
 
     @property
     def values(self) -> dict[str, float | None]:
-        """Every coefficient and shape parameter by key."""
-        return {key: value for t in self.terms for key, value in t.values.items()}
+        """Every coefficient and shape parameter by key, then every number of its modes."""
+        own = {key: value for t in self.terms for key, value in t.values.items()}
+        return own | (self.modal.values if self.modal else {})
 
     @property
     def roles(self) -> "Roles":
@@ -128,13 +130,15 @@ class Model:
         return replace(self, terms=tuple(t for t in self.terms if t.name != name))
 
     def with_values(self, values: Mapping[str, float | None]) -> "Model":
-        return replace(self, terms=tuple(t.with_values(values) for t in self.terms))
+        modal = self.modal.with_values(values) if self.modal else None
+        return replace(self, terms=tuple(t.with_values(values) for t in self.terms), modal=modal)
 
     def equation(self) -> str:
         return " + ".join(f"{' , '.join(t.symbols)} [{t.term.formula}]" for t in self.terms) + " = F(t)"
 
     def numbers(self) -> dict[str, float]:
         """Every value; all must be known, and the mass of a single coordinate positive."""
+        check_modes(self)
         known = {key: value for key, value in self.values.items() if value is not None}
         missing = [key for key in self.values if key not in known]
         if missing:
@@ -142,6 +146,12 @@ class Model:
         if not self.named and "m" in known and not known["m"] > 0.0:
             raise StudyError(f"model {self.name!r} has the mass {known.get('m', 0.0):g}; it must be above zero")
         return known
+
+
+def check_modes(model: Model) -> None:
+    """Refuse a model whose linear part is modes that no record has been asked for yet."""
+    if model.modal and not model.modal.count:
+        raise StudyError(f"model {model.name!r} has 'linear: modal' and no modes yet; expected it fitted to a record")
 
 
 def named_channels(model: Model, available: Collection[str]) -> tuple[str, ...]:

@@ -26,6 +26,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from study.equations import layout, terms
+from study.equations.modal_part import ModalPart
 from study.equations.model import Model, ModelTerm, free
 from study.equations.redundancy import repeated_force
 from study.equations.terms import Term
@@ -62,8 +63,8 @@ def parse_model(text: str, source: Path) -> Model:
         name = top.get("name", source.stem)
         if not isinstance(name, str) or not name.strip() or not name.isprintable() or len(name) > LONGEST_NAME:
             raise StudyError(f"the name is {shown(name)}; expected a short text on one line")
-        entries, measured = as_list(top.get("terms")), layout.linear_measured(top)
-        if not entries and not (measured and top.get("terms") == []):
+        entries, modal = as_list(top.get("terms")), layout.linear_modal(top)
+        if not entries and not (modal and top.get("terms") == []):
             content = shown(top["terms"]) if "terms" in top else "missing"
             like = "expected a list such as [inertia, linear_damping, linear_stiffness]"
             raise StudyError(f"'terms' is {content}; {like}")
@@ -71,7 +72,7 @@ def parse_model(text: str, source: Path) -> Model:
         expect(len(entries) <= MOST_TERMS, f"'terms' has {len(entries)} entries; at most {MOST_TERMS} are read")
         coordinates, forces = layout.coordinates_and_forces(top)
         listed = tuple(_entry(item, number, coordinates) for number, item in enumerate(entries, 1))
-        model = Model(name, listed, coordinates, forces, measured)
+        model = Model(name, listed, coordinates, forces, ModalPart(coordinates) if modal else None)
         if model.named:
             layout.check(model)
         elif fault := repeated_force(model):
@@ -142,7 +143,7 @@ def text_without(path: Path, name: str) -> str:
     """
     text = read_text(path, WANTED)
     before = parse_model(text, path)
-    if name not in before or (len(before.terms) == 1 and not before.measured):
+    if name not in before or (len(before.terms) == 1 and not before.modal):
         raise StudyError(f"{path}: {shown(name)} cannot be taken out of {', '.join(t.name for t in before.terms)}")
     return revised(text, str(path), before.without_term(name))
 
@@ -158,11 +159,11 @@ def revised(text: str, source: str, model: Model) -> str:
     for number, entry in enumerate(entries):
         if wanted[number - len(gone) :][:1] != [entry.name]:
             gone.append(number)
-    if len(gone) == len(entries) and entries and (wanted or not model.measured):
+    if len(gone) == len(entries) and entries and (wanted or not model.modal):
         raise StudyError(f"{source}: none of its terms is left; expected a model that keeps one")
     for number in reversed(gone):
         text = yaml_text.without_entry(text, "terms", number)
-    if not wanted:  # a linear part as measured is a model of its own
+    if not wanted:  # a sum of modes is a model of its own
         text = NO_TERMS.sub(lambda found: f"terms: []{'  ' + found[1] if found[1] else ''}", text)
     before = [entry for number, entry in enumerate(entries) if number not in gone]
     for number, entry in enumerate(model.terms):

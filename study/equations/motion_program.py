@@ -10,8 +10,7 @@ import numpy as np
 from study.equations import formulas
 from study.equations.equations_of_motion import Equations
 from study.equations.graph import Graph, Op, Program
-from study.equations.modal_keys import ModalKeys
-from study.equations.model import Model
+from study.equations.model import Model, check_modes
 from study.equations.place import Place
 from study.records.record import FORCE, MOTIONS, Sensor
 from study.support.arrays import Floats, Ints
@@ -45,39 +44,31 @@ def motion_program(
     keys: Sequence[str],
     observed: Sequence[Sensor],
     *,
-    modal: ModalKeys | None = None,
-    held: Mapping[str, float] | None = None,
     switching: bool = True,
 ) -> MotionProgram:
     """The program of a model all of whose values but those of ``keys`` are known.
 
-    ``observed`` are motions of its coordinates, or the force on one whose motion is prescribed. With ``modal`` the
-    linear part is a sum of modes, of which ``held`` has the values. Without ``switching`` dry friction jumps within a
-    step.
+    ``observed`` are motions of its coordinates, or the force on one whose motion is prescribed. Without ``switching``
+    dry friction jumps within a step.
     """
-    expect(
-        modal is not None or not model.measured,
-        f"model {model.name!r} has 'linear: measured', and no masses to run with; expected inertia",
-    )
-    values: dict[str, float | None] = {**model.values, **dict.fromkeys(modal.all if modal else ()), **(held or {})}
+    check_modes(model)
+    values = model.values
     if missing := [key for key, value in values.items() if value is None and key not in keys]:
         raise StudyError(f"model {model.name!r} gives no value for {', '.join(missing)}; a free run needs all")
     if unknown := [key for key in keys if key not in values]:
         raise StudyError(f"model {model.name!r} has no {', '.join(unknown)}; it has {', '.join(values)}")
     open_model = model.with_values(dict.fromkeys(model.values))
-    made = _compiled(open_model, tuple(keys), tuple(observed), modal, switching)
+    made = _compiled(open_model, tuple(keys), tuple(observed), switching)
     known = {key: value for key, value in values.items() if key not in keys and value is not None}
     return replace(made, program=made.program.with_inputs(known))
 
 
 @lru_cache(maxsize=128)
-def _compiled(
-    model: Model, keys: tuple[str, ...], observed: tuple[Sensor, ...], modal: ModalKeys | None, switching: bool
-) -> MotionProgram:
+def _compiled(model: Model, keys: tuple[str, ...], observed: tuple[Sensor, ...], switching: bool) -> MotionProgram:
     """The same of a model without values: a diagnosis runs each of its models many times."""
-    made = Equations(model, modal, any(sensor.motion == MOTIONS[2] for sensor in observed))
+    made = Equations(model, any(sensor.motion == MOTIONS[2] for sensor in observed))
     graph, states = made.graph, made.states
-    jumps = _jumps(made) if switching and modal is None else []
+    jumps = _jumps(made) if switching and model.modal is None else []
     table = {sign: side for sign, side, _ in jumps}
     slopes = graph.substituted(made.slopes, table)
     where = [_row(made, sensor) for sensor in observed]

@@ -86,7 +86,7 @@ def simulate(
     model.numbers()
     named_channels(model, extra)
     heavy = any(entry.term.name == "inertia" for entry in model.terms)
-    expect(heavy, f"model {model.name!r} has no inertia; a simulation needs it")
+    expect(heavy or model.modal, f"model {model.name!r} has no inertia; a simulation needs it")
     motion = motion_program(model, (), wanted, switching=integrator.method != "abm4")
     if model.named:
         checked_mass_matrix(model)

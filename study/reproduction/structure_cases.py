@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field
 
 from study.equations.layout import LINEAR
 from study.equations.linear_part import connections
+from study.equations.modal_part import ModalPart
 from study.equations.model import Model, ModelTerm, free
 from study.equations.model_file import read_model
 from study.equations.simulate import Integrator, simulate
@@ -207,4 +208,4 @@ def measured_model(model: Model, sensors: Sequence[str]) -> Model:
     """The nonlinear terms of a structure alone, their coefficients open, between its sensors; all else as measured."""
     kept = tuple(t for t in model.terms if t.term.name not in LINEAR)
     opened = tuple(t.with_values(dict.fromkeys(t.symbols)) for t in kept)
-    return Model(f"{model.name} as measured", opened, tuple(sensors), model.forces, measured=True)
+    return Model(f"{model.name} as measured", opened, tuple(sensors), model.forces, ModalPart(tuple(sensors)))

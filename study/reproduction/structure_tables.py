@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from study.equations.linear_part import matrices, modes_of, transfer
+from study.equations.linear_part import modes_of, transfer
 from study.equations.model import Model
 from study.identify.frequency_domain.conditioned import MisoResult
 from study.identify.frequency_domain.inputs import Input
@@ -26,7 +26,6 @@ from study.reproduction.tables import (
     stacked,
 )
 from study.structure.measured_comparison import MeasuredComparison
-from study.structure.measured_fit import MeasuredFit
 from study.support.arrays import Complexes, Floats
 from study.support.numbers import percent
 
@@ -123,12 +122,14 @@ def modal_parameters(
     case: StructureCase, truth: Model, comparison: MeasuredComparison, settings: StructureSettings
 ) -> pd.DataFrame:  # fmt: skip
     """Coefficients with their tolerance, then natural frequencies and damping ratios beside the exact ones."""
-    fit, modes, exact = comparison.fit, comparison.modes, modes_of(truth)
+    modes, exact = comparison.modes, modes_of(truth)
     allowed, rows = settings.tolerances.measured.coefficient, list[tuple[Any, ...]]()
     for key in comparison.model.values:
-        true, value = truth.numbers()[key], fit.values[key]
+        true, value = truth.numbers()[key], comparison.values[key]
         off = value / true - 1.0
-        rows.append((case.case, BY_MODES, key, true, value, fit.error(key), off, allowed, abs(off) <= allowed, ""))
+        rows.append(
+            (case.case, BY_MODES, key, true, value, comparison.error(key), off, allowed, abs(off) <= allowed, "")
+        )
     for r, frequency in enumerate(modes.frequency.tolist()):
         k = int(np.argmin(np.abs(exact.frequency - frequency)))
         for name, true, found, error in (
@@ -158,11 +159,11 @@ def modal_responses(
     prepared = comparison.prepared
     (name, where), *_ = truth.forces
     places = [s.coordinate for s in prepared.sensors]
-    f, found, exact = transfer_functions(
-        truth, prepared.record[name], prepared.measured.T, places, prepared.dt, settings.segments.segments()
-    )
+    cut, fitted = settings.segments.segments(), comparison.fit.model
+    f, found, exact = transfer_functions(truth, prepared.record[name], prepared.measured.T, places, prepared.dt, cut)
     inside = (f > 0.0) & (f < case.cutoff - LEAKED * f[1])
-    modal = modal_transfer(comparison.fit, places, where, f)
+    sensors = [Sensor(place, MOTIONS[0]) for place in places]
+    modal = transfer(fitted, sensors, prepared.dt, cut.length)[:, :, fitted.coordinates.index(where)]
     for k, place in enumerate(places):
         for estimator, values in (("siso", found[:, k]), (BY_MODES, modal[:, k])):
             own, true = values[inside], exact[inside, k]
@@ -182,23 +183,9 @@ def transfer_functions(
     (_, where), *_ = model.forces
     sensors = tuple(Sensor(place, MOTIONS[0]) for place in places)
     matrix = cross_spectra([force, *motions], dt, cut)
-    linear = transfer(matrices(model, model.numbers()), sensors, model.coordinates, dt, cut.length)
+    linear = transfer(model, sensors, dt, cut.length)
     found = matrix.density[:, 0, 1:] / matrix.density[:, :1, 0].real
     return matrix.frequency, found, linear[:, :, model.coordinates.index(where)]
-
-
-def modal_transfer(fit: MeasuredFit, places: Sequence[str], where: str, frequency: Floats) -> Complexes:
-    """Displacement at each place by a force at another, from the modes; shape (lines, places)."""
-    modal, n = fit.modal, fit.modal.modes
-    s = 2j * np.pi * frequency[:, None, None]
-    damping = np.zeros((n, n))
-    for (r, c), key in zip(modal.pairs, modal.damping, strict=True):
-        damping[r, c] = damping[c, r] = fit.values[key]
-    stiffness = np.diag([fit.values[key] for key in modal.stiffness])
-    push = np.array([fit.values[key] for key in modal.shape(where)])
-    moved = np.linalg.solve(s**2 * np.eye(n) + s * damping + stiffness, push[:, None])[:, :, 0]
-    felt = np.array([[fit.values[key] for key in modal.shape(place)] for place in places])
-    return np.asarray(moved @ felt.T, dtype=np.complex128)
 
 
 # ---- claims: SI/SO shows one nonlinear connection everywhere, MI/SO puts it where it is
@@ -276,10 +263,10 @@ def _reaction(result: CaseResult, settings: StructureSettings) -> Iterable[Condi
 def _modal(
     case: StructureCase, truth: Model, comparison: MeasuredComparison, settings: StructureSettings
 ) -> Iterable[Condition]:
-    allowed, fit = settings.tolerances.measured, comparison.fit
+    allowed = settings.tolerances.measured
     for key in comparison.model.values:
         true = truth.numbers()[key]
-        off = fit.values[key] / true - 1.0
+        off = comparison.values[key] / true - 1.0
         met = abs(off) <= allowed.coefficient
         yield Condition(
             f"{key} within {percent(allowed.coefficient)} of {true:.6g}", f"{key} {percent(off, '+.2g')}", met

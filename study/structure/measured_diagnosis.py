@@ -1,6 +1,6 @@
-"""Which effect is missing between sensors where the linear part is as measured, and where it sits.
+"""Which effect is missing between sensors where the linear part is a sum of modes, and where it sits.
 
-Effects between sensors are screened by their lines (``measured_screening``), the most promising are fitted in free run
+Effects between sensors are screened by their lines (``modal_screening``), the most promising are fitted in free run
 with modes of their own, and ranked, tied and believed as with masses and springs (``placed_ranking``).
 """
 
@@ -8,33 +8,90 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
-from study.compare.prediction import Prediction
+from study.compare.prediction import Prediction, predict
 from study.diagnose import ranked
 from study.diagnose.credibility import credible
 from study.diagnose.ranking import in_order
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
-from study.equations.model import Model, ModelTerm
+from study.equations import formulas
+from study.equations.layout import LINEAR, check
+from study.equations.model import Model, ModelTerm, free
+from study.equations.place import GROUND, Place
 from study.equations.term import Term
+from study.equations.terms import LIBRARY
+from study.identify.frequency_domain.coefficient_spectra import CoefficientSpectrum, coefficient_spectra
+from study.identify.frequency_domain.inputs import input_history, reverse_inputs
+from study.identify.frequency_domain.modal_screening import Screened, screened_by_lines
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.modal_fit import with_modal_term
+from study.identify.time_domain.part_fit import linearise, uncertainty
 from study.identify.time_domain.weighted_fit import noise_left
-from study.records import noise_floor
+from study.records.prepared import Prepared
+from study.records.record import Record
 from study.structure.measured_comparison import MeasuredComparison
-from study.structure.measured_fit import MeasuredFit, fit_with_term, modal_run
-from study.structure.measured_prediction import predict_measured
-from study.structure.measured_screening import Screened, measured_entries, screened_by_lines
-from study.structure.measured_spectra import CoefficientSpectrum, coefficient_spectra
-from study.structure.placed_candidates import physical
+from study.structure.placed_candidates import external, one_sided, physical
 from study.structure.placed_ranking import HeldOutTest, orthonormal
 from study.support import statistics
 from study.support.arrays import Floats
 from study.support.cores import cores
 from study.support.errors import StudyError
 from study.support.statistics import Gain
-from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE, UNSTEADY, K
+from study.support.thresholds import ALPHA, ENOUGH, GOOD, TOLERANCE, UNSTEADY
 
 FITTED = 8  # candidates that promise most: fitted in free run, with the best at each place
+
+
+def between_sensors(model: Model, prepared: Prepared) -> tuple[Place, ...]:
+    """Every place that the sensors show: each to the ground, and each two of them."""
+    seen = [s.coordinate for s in prepared.sensors]
+    pairs = [*((GROUND, c) for c in seen), *combinations(seen, 2)]
+    known = {t.place.path: t.place for t in model.terms if t.place.kind == "between"}
+    return tuple(known.get(frozenset(ends), Place("between", ends)) for ends in pairs)
+
+
+def measured_entries(
+    model: Model, prepared: Prepared, extra: Sequence[Term] = (), without: Sequence[str] = ()
+) -> list[ModelTerm]:
+    """Every nonlinear effect at every place that the sensors show and where the model does not have it.
+
+    A force from outside is none: it is no property of a place.
+    """
+    known = {(t.term.name, t.place.path) for t in model.terms}
+    effects = [t for t in (*LIBRARY.values(), *extra) if t.name not in (*LINEAR, *without)]
+    found: list[ModelTerm] = []
+    for term in (t for t in effects if not external(t) and not _linear(t)):
+        for place in between_sensors(model, prepared):
+            if (term.name, place.path) not in known:
+                found.append(free(term, place))
+                if one_sided(term):
+                    found.append(free(term, Place("between", place.ends[::-1])))
+    return [entry for entry in found if _fits_in(model, entry)]
+
+
+def _linear(term: Term) -> bool:
+    """Whether twice the motion has twice the force, at any time: modes hold it already."""
+    if any("t" in formulas.names(c.shape) for c in term.components) or term.channels:
+        return False
+    u, v = (np.random.default_rng(1).standard_normal(200).cumsum() for _ in range(2))
+    model = Model("alone", (replace(free(term), parameters=(0.3,) * len(term.parameters)),))
+
+    def forces(times: float) -> list[Floats]:
+        motion = {"force": 0.0 * u, "displacement": times * u, "velocity": times * v}
+        return [input_history(item, Record(0.1, motion)) for item in reverse_inputs(model)]
+
+    return all(np.allclose(b, 2.0 * a) for a, b in zip(forces(1.0), forces(2.0), strict=True))
+
+
+def _fits_in(model: Model, entry: ModelTerm) -> bool:
+    try:
+        check(model.with_term(entry))
+    except StudyError:
+        return False
+    return True
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +99,7 @@ class MeasuredRanked:
     """One candidate with what an engineer needs to believe or doubt it (as ``placed_ranking.PlacedRanked``)."""
 
     entry: ModelTerm  # the effect and its place
-    fit: MeasuredFit
+    fit: FreeRunFit
     prediction: Prediction
     gain: Gain
     coefficient: float
@@ -80,6 +137,11 @@ class MeasuredRanked:
         return physical(self.entry, self.fit.model)
 
     @property
+    def modes(self) -> int:
+        """How many its fit has."""
+        return self.fit.model.modal.count if self.fit.model.modal else 0
+
+    @property
     def interval(self) -> tuple[float, float]:
         """95 % confidence interval of the coefficient."""
         return self.coefficient - 1.96 * self.error, self.coefficient + 1.96 * self.error
@@ -110,14 +172,14 @@ def diagnose_measured(
     comparison: MeasuredComparison, extra: Sequence[Term] = (), without: Sequence[str] = (),
     progress: Callable[[str], None] | None = None,
 ) -> MeasuredDiagnosis:  # fmt: skip
-    """Find the effect that a structure with a measured linear part lacks, and its place between sensors.
+    """Find the effect that a structure with a modal linear part lacks, and its place between sensors.
 
     ``extra`` are the user's own candidates, ``without`` terms of the library to leave out; ``progress`` is called with
     each candidate that was fitted.
     """
     model, prepared, fit = comparison.fit.model, comparison.prepared, comparison.fit
     entries = measured_entries(model, prepared, extra, without)
-    ordered = screened_by_lines(model, prepared, entries, fit.residual, fit.modal.modes)
+    ordered = screened_by_lines(model, prepared, entries, fit)
 
     def tried(item: Screened) -> MeasuredRanked | None:
         row = _tried(item, comparison)
@@ -146,25 +208,27 @@ def _shaped(comparison: MeasuredComparison) -> Model:
     """The model as it was given, shape parameters as they were fitted."""
     given = comparison.model
     shapes = {k for t in given.terms for k in t.keys[len(t.symbols) :]}
-    return given.with_values({k: comparison.fit.values[k] for k in shapes})
+    return given.with_values({k: comparison.values[k] for k in shapes})
 
 
 def _tried(item: Screened, comparison: MeasuredComparison) -> MeasuredRanked | None:
     prepared, before = comparison.prepared, comparison.prediction
     try:
-        fit = fit_with_term(_shaped(comparison), item.entry, prepared)
-        prediction = predict_measured(fit, prepared)
+        fit = with_modal_term(_shaped(comparison), item.entry, prepared)
     except StudyError:
         return None
-    estimates = np.array([fit.values[key] for key in fit.keys])
-    coefficient, error, parameters, errors = ranked.amount(item.entry, fit.keys, estimates, fit.covariance)
+    prediction = predict(fit, prepared)
+    if prediction.diverged:
+        return None
+    covariance = uncertainty(fit, prepared, linearise(fit, prepared))
+    coefficient, error, parameters, errors = ranked.amount(item.entry, fit.keys, fit.values, covariance)
     gain = statistics.gain(before.relative_residual, prediction.relative_residual)
     return MeasuredRanked(
         item.entry, fit, prediction, gain, coefficient, error, parameters, errors, _spectra(fit, item, comparison)
     )
 
 
-def _spectra(fit: MeasuredFit, item: Screened, comparison: MeasuredComparison) -> tuple[CoefficientSpectrum, ...]:
+def _spectra(fit: FreeRunFit, item: Screened, comparison: MeasuredComparison) -> tuple[CoefficientSpectrum, ...]:
     """The candidate's coefficients line by line."""
     try:
         found = coefficient_spectra(fit, comparison.prepared)
@@ -178,11 +242,11 @@ def _ranked(rows: list[MeasuredRanked], comparison: MeasuredComparison, asked: i
         return []
     best = min(rows, key=lambda r: float(r.residual @ r.residual))
     outputs = comparison.prepared.outputs
-    noise = noise_left(outputs.stacked(best.fit.residual), len(outputs))
-
+    noise = noise_left(best.fit.residual, len(outputs))
     white = {r.name: outputs.whitened(r.prediction.residual, noise) for r in rows}
     own = outputs.whitened(comparison.prediction.residual, noise)
-    columns = outputs.whitened(outputs.stacked(_derivatives(comparison)), noise)
+    run = comparison.prediction.run
+    columns = np.zeros((len(own), 0)) if run is None else outputs.whitened(run.derivatives(comparison.fit), noise)
     nothing = np.zeros(0)
     test = HeldOutTest(outputs, noise, (own, nothing), (orthonormal(columns), np.zeros((0, 0))))
     chances = [test.p_value((r.prediction.residual, nothing), searched=True) for r in rows]
@@ -190,34 +254,14 @@ def _ranked(rows: list[MeasuredRanked], comparison: MeasuredComparison, asked: i
     return [replace(r, distance=away, tied_with=tied) for r, away, tied in in_order(rows, white, asked)]
 
 
-def _derivatives(comparison: MeasuredComparison) -> Floats:
-    """Of the motions on the judging part by the keys of the fit and its initial state."""
-    fit, prepared = comparison.fit, comparison.prepared
-    begin = prepared.plan.fit[0] if prepared.plan.judge[0] == prepared.plan.fit[1] else prepared.plan.judge[0]
-    span = (begin, prepared.plan.judge[1])
-    run = modal_run(fit.model, fit.modal, prepared, prepared.sensors, fit.steps, span, fit.values, fit.keys)
-    return run.respond(fit.values, fit.initial, run.states)[1][prepared.plan.judge[0] - begin :]
-
-
 def _decide(rows: list[MeasuredRanked], comparison: MeasuredComparison, asked: int) -> MeasuredDiagnosis:
     believed = [r for r in rows if credible(comparison.prediction, r.prediction, r.interval, r.p_value)]
     if not believed:
-        left = rms_above_noise(comparison.prediction)
+        left = comparison.prediction.above_noise
         verdict = UNKNOWN if left > TOLERANCE else NOTHING
         return MeasuredDiagnosis(verdict, comparison, tuple(rows), asked, left)
     first = believed[0]
-    left = rms_above_noise(first.prediction)
+    left = first.prediction.above_noise
     enough = (first.gain.explained >= ENOUGH or left <= GOOD) and not first.wanders(asked)
     ordered = (first, *(r for r in rows if r is not first))
     return MeasuredDiagnosis(MISSING if enough else UNKNOWN, comparison, ordered, asked, left)
-
-
-def rms_above_noise(prediction: Prediction) -> float:
-    """Rms over that of the motion of what stands above white noise at any sensor, beyond chance; zero if nothing does.
-
-    What no model could explain is white here; a mode that the fit has not is above it as well.
-    """
-    floors = [noise_floor.floor(x, prediction.prepared.dt) for x in prediction.misfit.T]
-    excess = [max(f.excess, 0.0) / s**2 if f.significance > K else 0.0
-              for f, s in zip(floors, prediction.size, strict=True)]  # fmt: skip
-    return float(np.sqrt(np.mean(excess)))

@@ -30,7 +30,7 @@ def _shown(number: int, row: MeasuredRanked) -> list[str]:
     return [
         str(number), row.term.name, row.entry.place.label if row.entry.place else "",
         percent(row.gain.explained, "z.1f", row.gain.error, ".1f"), percent(row.prediction.error),
-        f"{row.coefficient:.4g} +- {1.96 * row.error:.2g} {_unit(row)}", str(row.fit.modal.modes), f"{row.p_value:.1g}",
+        f"{row.coefficient:.4g} +- {1.96 * row.error:.2g} {_unit(row)}", str(row.modes), f"{row.p_value:.1g}",
         ", ".join(row.tied_with[:TIES]) + more,
     ]  # fmt: skip
 
@@ -58,7 +58,7 @@ def measured_in_words(diagnosis: MeasuredDiagnosis) -> str:
     words, (low, high) = _named(first), first.interval
     said = [
         f"{words[0].upper()}{words[1:]} is missing ({first.term.meaning}).",
-        f"With it and {first.fit.modal.modes} modes instead of {diagnosis.comparison.fit.modal.modes} the held-out "
+        f"With it and {first.modes} modes instead of {len(diagnosis.comparison.modes.frequency)} the held-out "
         f"error of the motions falls from {percent(before.error)} to {percent(first.prediction.error)}; white noise "
         f"alone would leave {percent(first.prediction.floor)}.",
         f"Its coefficient is {first.coefficient:.5g} {_unit(first)} (95 % interval {low:.5g} to {high:.5g}).",
@@ -106,7 +106,7 @@ def _candidate(row: MeasuredRanked, rows: dict[str, MeasuredRanked]) -> dict[str
         "term": row.term.name, **_place(row), "parameters": row.parameters, "parameter_errors": row.parameter_errors,
         "coefficient": row.coefficient, "interval": list(row.interval), "response_error": row.prediction.error,
         "noise_floor": row.prediction.floor, "explained": row.gain.explained, "explained_error": row.gain.error,
-        "p_value": row.p_value, "modes": row.fit.modal.modes,
+        "p_value": row.p_value, "modes": row.modes,
         "by_frequency": [
             {"key": s.key, "mean": list(s.mean), "imaginary": list(s.imaginary), "trend": list(s.trend)}
             for s in row.spectra

@@ -6,7 +6,7 @@ the difference is noise, r is zero. A missing force between two coordinates is i
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
@@ -17,10 +17,10 @@ from study.compare.prediction import Prediction
 from study.equations import kernels
 from study.equations.coefficient_units import units_at
 from study.equations.equations_of_motion import acceleration_program
-from study.equations.linear_part import alignment, checked_mass_matrix, connections, matrices, transfer
+from study.equations.linear_part import alignment, checked_mass_matrix, connections, transfer
 from study.equations.model import Model, ModelTerm
-from study.equations.place import HERE, Place
-from study.identify.frequency_domain.inputs import Input, input_history, reverse_inputs
+from study.equations.place import Place
+from study.identify.frequency_domain.inputs import input_history, placed_inputs
 from study.records import noise_floor
 from study.records.completion import derivative
 from study.records.prepared import Prepared
@@ -192,11 +192,6 @@ def _state(entry: ModelTerm, model: Model, motion: Floats, dt: float) -> Floats:
     return input_history(item, relative_record(entry.place, model, motion, dt))
 
 
-def placed_inputs(entry: ModelTerm) -> tuple[Input, ...]:
-    """The shapes of a term, whatever its place; its shape parameters are known."""
-    return reverse_inputs(Model("alone", (replace(entry, place=HERE),)))
-
-
 def relative_record(place: Place, model: Model, motion: Floats, dt: float) -> Record:
     """Relative motion at a place as a record of a single coordinate; ``motion`` as :func:`corrected_motion` has it."""
     e = np.array(place.direction(model.coordinates))
@@ -222,8 +217,7 @@ def _aligned(model: Model, prediction: Prediction) -> tuple[tuple[Place, float],
         return ()
     size = next_fast_len(2 * len(seen), real=True)
     lines = np.asarray(rfft(seen / prediction.size, size, axis=0), dtype=np.complex128)
-    linear = matrices(model, model.numbers())
-    paths = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, size) / prediction.size[:, None]
+    paths = transfer(model, prepared.sensors, prepared.dt, size) / prediction.size[:, None]
     found = [(p, alignment(paths @ np.array(p.direction(model.coordinates)), lines)) for p in connections(model)]
     return tuple(sorted(found, key=lambda item: -item[1]))
 

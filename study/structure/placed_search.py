@@ -15,18 +15,18 @@ import numpy as np
 from scipy.fft import rfftfreq
 
 from study.equations.free_run import prepare
-from study.equations.linear_part import LINEAR, linear_keys, matrices, patterns, transfer
+from study.equations.linear_part import LINEAR, linear_keys, patterns, transfer
 from study.equations.model import Model, ModelTerm
 from study.equations.place import Place
 from study.equations.term import Term
-from study.identify.frequency_domain.inputs import input_history
+from study.identify.frequency_domain.inputs import input_history, placed_inputs
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import fit_part, linearise
 from study.identify.time_domain.shape_search import MODULATION, values_to_try
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import StretchTransforms, stretch_transforms
-from study.structure.missing_forces import corrected_motion, placed_inputs, relative_record
+from study.structure.missing_forces import corrected_motion, relative_record
 from study.structure.placed_lines import placed_modulation_lines, placed_residual_lines
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
@@ -98,8 +98,7 @@ class PlacedBaseline:
         """:func:`placed_modulation_lines` of a place with the relative displacement u."""
         e, fit, paths = np.array(place.direction(self.fit.model.coordinates)), self.fit, self.paths[::2]
         if len(self.transforms.runs) > 1:
-            linear = matrices(fit.model, fit.model.numbers())
-            paths = transfer(linear, self.prepared.sensors, fit.model.coordinates, self.prepared.dt, len(u))
+            paths = transfer(fit.model, self.prepared.sensors, self.prepared.dt, len(u))
         return placed_modulation_lines(u, (paths @ e) * np.array(fit.outputs.weights), self.by_sensor)
 
     def dated(self, record: Record) -> Record:
@@ -131,7 +130,7 @@ def placed_baseline(fit: FreeRunFit, prepared: Prepared) -> PlacedBaseline:
     free = run.respond({}, fit.initial)[0]
     motion = corrected_motion(free, fit.misfit, prepared, model.coordinates, fit.span)
     own = stretch_transforms(prepared.record.runs(fit.span))  # of one stretch every other line is one of the record
-    paths = transfer(matrices(model, model.numbers()), prepared.sensors, model.coordinates, prepared.dt, own.size)
+    paths = transfer(model, prepared.sensors, prepared.dt, own.size)
     left = fit.whitened(fit.residual)
     bare = PlacedBaseline(fit, prepared, motion, paths, own, free, free, left, left)
     columns = fit.whitened(linearise(fit, prepared))  # right for the initial state and for shape parameters

@@ -35,12 +35,12 @@ def structure_ready(record: Record, model: Model, layout: Layout) -> Prepared:
         As :func:`study.records.record_layout.laid_out`, or if nothing measures a coordinate and nothing ties it to
         another, or the masses that are given leave no positive definite mass matrix.
     """
-    prepared = laid_out([record], layout, KindOfTest(unbroken=model.measured, anew=PERIODS))
+    prepared = laid_out([record], layout, KindOfTest(unbroken=model.modal is not None, anew=PERIODS))
     return _made(prepared if layout.as_sampled else without_spare_samples(prepared), record, model)
 
 
 def _made(prepared: Prepared, record: Record, model: Model) -> Prepared:
-    if not model.measured:  # whose masses nobody lumps
+    if not model.modal:  # whose masses nobody lumps
         check_held_masses(model)
     sensors = prepared.sensors or compared_sensors(record)
     seen = {sensor.coordinate for sensor in sensors}

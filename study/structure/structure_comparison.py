@@ -79,8 +79,8 @@ def compare_structure(
         If the model cannot be fitted.
     """
     report: Callable[[str], None] = progress or (lambda _: None)
-    sentence = f"{model.name!r} has 'linear: measured'; expected a model with inertia at every coordinate here"
-    expect(not model.measured, f"{sentence}; 'study compare', 'diagnose', 'add' and 'drop' take this one")
+    sentence = f"{model.name!r} has 'linear: modal'; expected a model with inertia at every coordinate here"
+    expect(model.modal is None, f"{sentence}; 'study compare', 'diagnose', 'add' and 'drop' take this one")
     report("fit")
     if fit is None:
         fit = finished(first_fit(model, prepared), prepared)

@@ -12,7 +12,7 @@ from scipy.fft import next_fast_len
 
 from study.compare.prediction import Prediction
 from study.diagnose.dependence import DEGREE, TAUS, hysteretic, relaxed
-from study.equations.linear_part import connections, matrices, transfer
+from study.equations.linear_part import connections, transfer
 from study.equations.place import Place
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import JudgingRun
@@ -65,13 +65,12 @@ def family_gains(fit: FreeRunFit, prediction: Prediction) -> list[FamilyGain]:
     residual = prepared.outputs.stacked(prepared.measured[begin:end] - predicted)
     own_runs = stretch_transforms(prepared.record.runs((begin, end)))
     transforms = replace(own_runs, size=next_fast_len(own_runs.size, real=True))
-    linear = matrices(model, model.numbers())
-    paths = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, transforms.size)
+    paths = transfer(model, prepared.sensors, prepared.dt, transforms.size)
     weights = np.array(prepared.outputs.weights)
     paths = paths * weights[:, None]
     cut, n = split * len(prepared.sensors), len(model.coordinates)
     early = residual[:cut].reshape(split, -1)
-    short = transfer(linear, prepared.sensors, model.coordinates, prepared.dt, split) * weights[:, None]
+    short = transfer(model, prepared.sensors, prepared.dt, split) * weights[:, None]
     steady = placed_residual_lines(early)
     found: list[FamilyGain] = []
     for place in connections(model):

@@ -12,6 +12,7 @@ from study.equations.model import Model
 from study.identify.frequency_domain.linear_start import lumped_start
 from study.identify.time_domain.fit_model import rough_steps
 from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.modal_fit import modal_fit
 from study.identify.time_domain.part_fit import fit_part
 from study.identify.time_domain.shooting import own_begins
 from study.records.prepared import Prepared
@@ -38,6 +39,8 @@ def first_fit(model: Model, prepared: Prepared) -> FreeRunFit:
     """
     from study.structure.placed_search import with_placed_term
 
+    if model.modal:
+        return modal_fit(model, prepared)
     unknown = [t for t in model.terms if None in t.parameters]
     known = replace(model, terms=tuple(t for t in model.terms if t not in unknown))
     fit = _fitted(known, prepared, known_linear(known, prepared))

@@ -14,7 +14,7 @@ import numpy as np
 from study.equations import formulas
 from study.equations.graph import Graph
 from study.equations.model import Model, ModelTerm
-from study.equations.place import ALONE
+from study.equations.place import ALONE, HERE
 from study.records.interpolation import between_samples
 from study.records.record import Record
 from study.support.arrays import Complexes, Floats
@@ -86,6 +86,11 @@ def reverse_inputs(model: Model, coordinate: str = ALONE) -> tuple[Input, ...]:
             direction = place.direction(model.coordinates)
             acting.append((entry, direction, direction[i]))
     return _collected(acting)
+
+
+def placed_inputs(entry: ModelTerm) -> tuple[Input, ...]:
+    """The shapes of a term, whatever its place; its shape parameters are known."""
+    return reverse_inputs(Model("alone", (replace(entry, place=HERE),)))
 
 
 def _collected(acting: Iterable[tuple[ModelTerm, tuple[float, ...], float]]) -> tuple[Input, ...]:

@@ -203,7 +203,7 @@ def fit_free_run(
     states = np.zeros((len(run.cuts) + 1, free))
     if not isinstance(initial, str):
         states[:] = initial
-    elif free:
+    elif free and model.modal is None:  # how modes begin no sensor shows by itself
         begins = (first, *(first + cut for cut in run.cuts))
         shown = starting_states(record, outputs, begins, coordinates=model.coordinates)
         states[:, : run.moving] = shown[:, : run.moving]

@@ -18,11 +18,12 @@ from study.equations.place import HERE, Place
 from study.identify.frequency_domain import instruments
 from study.identify.frequency_domain.coefficients import Responses
 from study.identify.frequency_domain.inputs import Input, input_history, reverse_inputs
+from study.identify.time_domain.free_run_fit import FreeRunFit
+from study.identify.time_domain.part_fit import run_of
 from study.records import spectra
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS, Record, Sensor
 from study.records.spectra import Segments
-from study.structure.measured_fit import MeasuredFit, modal_run
 from study.support.arrays import Complexes, Floats
 
 Bools = NDArray[np.bool_]
@@ -83,7 +84,7 @@ class CoefficientSpectrum:
         return float(np.sum(weight * values)) / total, float(np.sqrt(0.5 * self.inflation / total))
 
 
-def coefficient_spectra(fit: MeasuredFit, prepared: Prepared) -> tuple[CoefficientSpectrum, ...]:
+def coefficient_spectra(fit: FreeRunFit, prepared: Prepared) -> tuple[CoefficientSpectrum, ...]:
     """Every coefficient of a fitted structure's terms, line by line, from its fitting part."""
     model, (first, last) = fit.model, prepared.plan.fit
     measured = {c: prepared.record.motion(c)[:, first:last] for c in prepared.coordinates}
@@ -112,11 +113,10 @@ def coefficient_spectra(fit: MeasuredFit, prepared: Prepared) -> tuple[Coefficie
     return tuple(found)
 
 
-def _free_motion(fit: MeasuredFit, prepared: Prepared) -> dict[str, Floats]:
+def _free_motion(fit: FreeRunFit, prepared: Prepared) -> dict[str, Floats]:
     """Displacement and velocity of each measured coordinate in the free run, shape (2, samples)."""
     wanted = tuple(Sensor(c, m) for c in prepared.coordinates for m in MOTIONS[:2])
-    run = modal_run(fit.model, fit.modal, prepared, wanted, fit.steps, prepared.plan.fit, fit.values)
-    motion, _ = run.respond(fit.values, fit.initial)
+    motion, _ = run_of(fit, prepared, sensors=wanted).respond({}, fit.initial)
     return {c: motion[:, 2 * i : 2 * i + 2].T for i, c in enumerate(prepared.coordinates)}
 
 

@@ -1,4 +1,4 @@
-"""What is missing between sensors where the linear part is as measured: effect and place, on the beam."""
+"""What is missing between sensors where the linear part is a sum of modes: effect and place, on the beam."""
 
 import json
 from dataclasses import replace
@@ -14,14 +14,13 @@ from study.equations.terms import LIBRARY
 from study.records.excitation import Excitation, force
 from study.records.record import Sensor, write_csv
 from study.structure.measured_comparison import compare_measured
-from study.structure.measured_diagnosis import diagnose_measured
+from study.structure.measured_diagnosis import between_sensors, diagnose_measured, measured_entries
 from study.structure.measured_report import measured_in_words
-from study.structure.measured_screening import between_sensors, measured_entries
 from study.structure.prepared_structure import prepare_structure
 
 ROOT = Path(__file__).parents[2]
 DT, SAMPLES = 0.005, 4000
-BARE = "name: bare\ncoordinates: [p4, p10]\nforces: {shaker: p4}\nlinear: measured\nterms: []\n"
+BARE = "name: bare\ncoordinates: [p4, p10]\nforces: {shaker: p4}\nlinear: modal\nterms: []\n"
 OTHERS = tuple(name for name in LIBRARY if name != "cubic_stiffness")  # left out: all effects would take a minute
 
 
@@ -99,9 +98,9 @@ def test_an_open_shape_parameter_is_searched_for():
     drive = force(Excitation(level=1.0, cutoff=12.5), 2048, 0.02, 1990)
     record = simulate(whole, {"shaker": drive}, 0.02, Integrator("rk4", 16))
     shown = record.with_motions({s: x for s, x in record.motions.items() if s.motion == "displacement"})
-    model = parse_model(f"{place}linear: measured\nterms: [{{term: dead_band, at: x}}]", Path("dead.yaml"))
+    model = parse_model(f"{place}linear: modal\nterms: [{{term: dead_band, at: x}}]", Path("dead.yaml"))
     comparison = compare_measured(model, prepare_structure(shown, model))
-    true, found = whole.numbers(), comparison.fit.values
+    true, found = whole.numbers(), comparison.values
     assert "dead_band[x].u_g" in comparison.fit.keys
     assert found["dead_band[x].u_g"] == pytest.approx(true["dead_band[x].u_g"], rel=0.02)
     assert comparison.prediction.error < 0.02

@@ -1,23 +1,22 @@
-"""Where the fit of a structure with a measured linear part begins: its modes from the lines of a record.
+"""Where the fit of a modal linear part begins: its modes from the lines of a record.
 
 Forces and the terms' forces along the measured motions are inputs, the sensors outputs (Adams and Allemang, Mechanical
 Systems and Signal Processing 14, 2000). Poles come from a subspace, amplitudes from least squares, and both are refined
 to the smallest error of the lines.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.fft import rfft
 
-from study.equations.modal_keys import ModalKeys
+from study.equations.modal_part import ModalPart
 from study.equations.model import Model
-from study.identify.frequency_domain.inputs import input_history
+from study.identify.frequency_domain.inputs import input_history, placed_inputs
 from study.identify.frequency_domain.subspace import observability
 from study.records.prepared import Prepared
 from study.records.record import MOTIONS
-from study.structure.missing_forces import placed_inputs
 from study.support.arrays import Complexes, Floats
 from study.support.errors import expect
 from study.support.least_squares import least_squares
@@ -121,7 +120,7 @@ class _Modal:
     """
 
     lines: DrivenLines
-    modal: ModalKeys
+    modal: ModalPart
     at: Floats  # (points, sensors): which point each sensor is at
     drives: Floats  # (points, forces)
     ways: Floats  # (points, coefficients): direction of each coefficient's place
@@ -129,13 +128,14 @@ class _Modal:
 
     def split(self, x: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """w2, g, amplitudes (points, modes) and coefficients."""
-        n, points = self.modal.modes, len(self.modal.points)
+        n, points = self.modal.count, len(self.modal.points)
         return x[:n], x[n : 2 * n], x[2 * n : 2 * n + n * points].reshape(points, n), x[2 * n + n * points :]
 
     def point(self, x: Floats) -> Point | None:
         """Residual of all sensors and its derivatives."""
         w2, g, shape, amount = self.split(x)
-        if np.any(w2 <= 0.0) or np.any(g <= 0.0) or np.any(np.maximum(np.sqrt(np.abs(w2)), 0.5 * g) > self.fastest):
+        rates = np.abs(0.5 * g + np.sqrt((0.25 * g**2 - w2).astype(np.complex128)))
+        if np.any(w2 <= 0.0) or np.any(g <= 0.0) or np.any(rates > self.fastest):
             return None
         lines = self.lines
         acting = lines.forces @ self.drives.T - (lines.unit * amount) @ self.ways.T  # (lines, points)
@@ -157,7 +157,7 @@ class _Modal:
     def from_poles(self, poles: Complexes) -> Floats:
         """Amplitudes and coefficients for poles, by least squares of every sensor on what acts through each mode."""
         w2, g = np.abs(poles) ** 2, -2.0 * poles.real
-        lines, n = self.lines, self.modal.modes
+        lines, n = self.lines, self.modal.count
         bend = 1.0 / (w2 + g * lines.s[:, None] + lines.s[:, None] ** 2)
         inputs = np.concatenate([lines.forces, lines.unit], axis=1)
         amounts = np.zeros((self.at.shape[1], n, inputs.shape[1]))
@@ -182,17 +182,12 @@ def _real(values: Complexes) -> Floats:
     return np.concatenate([values.real, values.imag])
 
 
-def modal_starts(model: Model, prepared: Prepared) -> Iterator[tuple[ModalKeys, dict[str, float]]]:
-    """For one mode, two and so on, values of their keys and of the model's coefficients (:func:`line_fits`)."""
-    return ((fit.modal, fit.values) for fit in line_fits(model, prepared))
-
-
 @dataclass(frozen=True, eq=False)
 class LineFit:
     """Modes and coefficients with the smallest error of the lines."""
 
-    modal: ModalKeys
-    values: dict[str, float]
+    model: Model  # with their values
+    modal: ModalPart  # of it
     left: float  # power of the lines that it leaves, over that of all
     criterion: float  # of Bayes, for white noise in proportion to each sensor (Schwarz, 1978)
 
@@ -208,26 +203,25 @@ def line_fits(model: Model, prepared: Prepared, most: int = MOST) -> Iterator[Li
     lines, sensors = lines_of(model, prepared), [x.coordinate for x in prepared.sensors]
     where = ", ".join(dict.fromkeys(w for _, w in model.forces))
     driven = any(w in sensors for _, w in model.forces)
-    expect(driven, f"no sensor is at {where}, where the force acts; 'linear: measured' needs one there")
-    ends = [c for t in model.terms for c in t.place.moving]
-    points = tuple(c for c in model.coordinates if c in (*sensors, *ends) or any(c == w for _, w in model.forces))
-    directions = [t.place.direction(model.coordinates) for t in model.terms if t.place for _ in t.term.symbols]
-    rows = [model.coordinates.index(c) for c in points]
-    ways = np.array(directions).reshape(-1, len(model.coordinates))[:, rows].T
+    expect(driven, f"no sensor is at {where}, where the force acts; 'linear: modal' needs one there")
+    points = model.coordinates
+    directions = [t.place.direction(points) for t in model.terms for _ in t.term.symbols]
+    ways = np.array(directions).reshape(-1, len(points)).T
     at = np.array([[float(c == s) for s in sensors] for c in points])
     drives = np.array([[float(c == w) for _, w in model.forces] for c in points])
     inputs = np.concatenate([lines.forces, lines.unit], axis=1)
     space = observability(lines.s.imag, inputs, lines.outputs / lines.order * np.abs(lines.order), BLOCKS)
     power = float(np.sum(np.abs(lines.outputs) ** 2))
     for modes in range(1, most + 1):
-        modal = ModalKeys(points, modes)
+        modal = ModalPart(points).of(modes)
         problem = _Modal(lines, modal, at, drives, ways, np.pi / prepared.dt)
         starts = (_searched(problem, space.poles(order), modes) for order in range(2 * modes, 2 * modes + SPARE + 1))
         found = next((point for point in starts if point is not None), None)
         if found is not None:
             left = float(found.residual @ found.residual) / power
             criterion = len(found.residual) * np.log(left) + len(found.x) * np.log(len(found.residual))
-            yield LineFit(modal, _named(model, modal, problem.split(found.x)), left, float(criterion))
+            known = _named(model, modal, problem.split(found.x))
+            yield LineFit(known, modal, left, float(criterion))
 
 
 def _searched(problem: _Modal, poles: Complexes, modes: int) -> Point | None:
@@ -244,10 +238,12 @@ def _searched(problem: _Modal, poles: Complexes, modes: int) -> Point | None:
     return minimise(problem.point, point, size, TRIALS, 1e-2).point
 
 
-def _named(model: Model, modal: ModalKeys, parts: Sequence[Floats]) -> dict[str, float]:
+def _named(model: Model, modal: ModalPart, parts: tuple[Floats, Floats, Floats, Floats]) -> Model:
+    """The model with the numbers of its modes, which damping does not couple, and its coefficients."""
     w2, g, shape, amount = parts
     values = dict(zip(modal.stiffness, w2.tolist(), strict=True))
     values |= {key: float(g[r]) if r == s else 0.0 for (r, s), key in zip(modal.pairs, modal.damping, strict=True)}
     for point, row in zip(modal.points, shape, strict=True):
         values |= dict(zip(modal.shape(point), row.tolist(), strict=True))
-    return values | dict(zip([s for t in model.terms for s in t.symbols], amount.tolist(), strict=True))
+    values |= dict(zip([s for t in model.terms for s in t.symbols], amount.tolist(), strict=True))
+    return replace(model, modal=modal).with_values(values)
