@@ -6,7 +6,6 @@ Imports nothing large before it has measured: a process takes over the peak memo
 import argparse
 import csv
 import os
-import re
 import statistics
 import subprocess
 import sys
@@ -24,7 +23,6 @@ NAMES = {
 MARKS = ("o-", "s--", "^-.", "D-", "v:")  # told apart in grey
 REFERENCE = 10**5
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-PLACE = re.compile(r"(<!-- cost -->\n).*?(<!-- /cost -->)", re.DOTALL)
 Measured = dict[tuple[str, int], tuple[float, float]]
 
 
@@ -96,11 +94,9 @@ def main() -> None:
     results.mkdir(parents=True, exist_ok=True)
     with (results / "cost.csv").open("w", newline="") as file:
         csv.writer(file).writerows([("task", "samples", "seconds", "bytes"), *((*k, *v) for k, v in measured.items())])
-    page = ROOT / "docs" / "cost.md"
-    text, count = PLACE.subn(lambda found: f"{found[1]}{table(measured)}\n{found[2]}", page.read_text(encoding="utf-8"))
-    if count != 1:
-        raise SystemExit(f"{page} has no place for the table: lines '<!-- cost -->' and '<!-- /cost -->'")
-    page.write_text(text, encoding="utf-8")
+    from study.support import document  # now that all is measured
+
+    document.put(ROOT / "docs" / "cost.md", "cost", [document.Text(table(measured))])
     picture(measured, ROOT / "docs" / "cost.png")
 
 

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from study.equations.model_file import read_model
@@ -25,7 +24,6 @@ from study.reproduction.config import load_config
 from study.reproduction.ensemble import threaded
 from study.support import document
 
-Floats = NDArray[np.float64]
 ROOT = Path(__file__).parent.parent
 MODEL = read_model(ROOT / "models" / "duffing_van_der_pol.yaml")
 TOLD = Settings(Segments(), (0.3, 10.0))

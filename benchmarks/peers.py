@@ -4,7 +4,6 @@ Run with ``sh benchmarks/peers.sh``, which makes the environment that this needs
 """
 
 import argparse
-import re
 import time
 from dataclasses import replace
 from itertools import product
@@ -20,7 +19,7 @@ from study.equations.model_file import read_model
 from study.equations.simulate import Integrator, simulate
 from study.records.excitation import Excitation, displacement_noise, force
 from study.records.record import Record
-from study.support.files import replace_file
+from study.support import document
 
 ROOT = Path(__file__).parent.parent
 DT = 0.02
@@ -29,7 +28,6 @@ NOISES = {"clean": 0.0, "5 % noise": 0.05}  # rms of the noise over that of the 
 METHODS = {**PEERS, **OURS}
 KEYS, NUMBERS = ["seed", "record", "method"], [*WANTED, "s"]
 WARM_UP = 2048  # samples of a first run that is not timed
-PLACE = r"(<!-- {0} -->\n).*?(<!-- /{0} -->)"
 
 
 def record(model: Model, samples: int, seed: int, noise: float) -> Record:
@@ -99,15 +97,6 @@ def leads(middle: pd.DataFrame) -> str:
     return f"{ahead} Not run: {'; '.join(missing)}." if missing else ahead
 
 
-def write(page: Path, name: str, block: str) -> None:
-    """Fill a place of the page."""
-    place = re.compile(PLACE.format(name), re.DOTALL)
-    text, count = place.subn(lambda found: found[1] + block + "\n" + found[2], page.read_text(encoding="utf-8"))
-    if count != 1:
-        raise SystemExit(f"{page} has no place for the table: lines '<!-- {name} -->' and '<!-- /{name} -->'")
-    replace_file(page, text.encode())
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=5, help="records of 8,192 samples (default 5)")
@@ -127,7 +116,8 @@ def main() -> None:
             measured = measure(model, samples, seeds, path)
         middle = table(measured)
         heading = f"{samples:,} samples, median over {seeds} record{'s' if seeds > 1 else ''}:"
-        write(ROOT / "docs" / "peers.md", name, f"{heading}\n\n{shown(middle)}\n\n{leads(middle)}")
+        said = [document.Text(words) for words in (heading, shown(middle), leads(middle))]
+        document.put(ROOT / "docs" / "peers.md", name, said)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from typing import Any
 
 from study.identify.estimators.base import Settings
 from study.records.excitation import READINGS
-from study.reproduction import integrator_study, tables
+from study.reproduction import ensemble, tables
 from study.reproduction.claims.evidence import Drive, models_of, record_settings
 from study.reproduction.claims.reported import SYSTEMS
 from study.reproduction.settings import ClaimSettings
@@ -22,7 +22,7 @@ def main(models: str, settings: dict[str, Any], output: str) -> None:
     own = record.excitation.reading or READINGS[0]
     readings = [own, *(r for r in READINGS if r != own)]
     known = models_of(Path(models))
-    table = integrator_study.integrator_study(
+    table = ensemble.integrator_study(
         {name: known[name] for name in SYSTEMS if name in known},
         record, Settings(told.segments.segments(), (low, high)), range(first, first + count), readings,
     )  # fmt: skip

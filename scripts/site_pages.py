@@ -14,13 +14,13 @@ import numpy as np
 from study.equations.model import Model, ModelTerm
 from study.equations.term import Term
 from study.equations.terms import LIBRARY
+from study.figures.labels import SHAPE_UNITS
 from study.identify.frequency_domain.inputs import input_history, reverse_inputs
 from study.records.record import Record
 from study.support.arrays import Floats
 
 CYCLES, SAMPLES = 4, 800  # of a harmonic motion, and samples a cycle
 TYPICAL = {"length": 0.4, "1/length": 1.0, "time": 0.15, "frequency": 0.5}  # for an amplitude of 1 m at 1 Hz
-PARAMETER_UNITS = {"length": "m", "time": "s", "frequency": "Hz", "1/length": "1/m"}
 OUTSIDE = ("CONTRIBUTING.md", "CITATION.cff", "README.md")  # of the folder of the site: their names alone are shown
 
 
@@ -78,7 +78,7 @@ def terms_page() -> str:
 
 def _section(term: Term) -> str:
     rows = [f"| `{s}` | coefficient | {term.unit(s, 'N', 'm')} |" for s in term.symbols]
-    rows += [f"| `{p.name}` | {p.meaning} | {PARAMETER_UNITS[p.quantity]} |" for p in term.parameters]
+    rows += [f"| `{p.name}` | {p.meaning} | {SHAPE_UNITS[p.quantity]} |" for p in term.parameters]
     table = "| symbol | what | SI unit |\n|---|---|---|\n" + "\n".join(rows)
     return (
         f"\n## {term.name}\n\n`{term.formula}`: {term.meaning}. Found in: {term.cause}.\n\n"

@@ -20,7 +20,7 @@ from study.equations.modal_part import ModalPart
 from study.equations.model import Model, ModelTerm
 from study.equations.place import Place
 from study.equations.term import Component
-from study.records.record import MOTIONS
+from study.records.record import MOTIONS, Sensor
 
 
 class Equations:
@@ -33,9 +33,12 @@ class Equations:
         self.prescribed = () if modal else tuple(c for c in model.coordinates if c not in masses)
         self.free = () if modal else tuple(c for c in model.coordinates if c in masses)
         forces = [(name, where) for name, where in model.forces if where not in self.prescribed]
-        motions = MOTIONS if accelerated or self._accelerated() else MOTIONS[:2]
-        moved = [(c, m) for c in self.prescribed for m in motions]
-        self.drive = (*(name for name, _ in forces), *(channel_of(c, m) for c, m in moved), *model.channels)
+        driven, moving = set(self.prescribed), set(self.free)
+        for entry in model.terms:  # a mass that is tied to a prescribed motion, or friction that may hold one
+            jumps = entry.term.name == "inertia" or any("sgn" in c.shape for c in entry.term.components)
+            accelerated |= jumps and bool(driven & set(entry.place.moving)) and bool(moving & set(entry.place.moving))
+        moved = [(c, m) for c in self.prescribed for m in (MOTIONS if accelerated else MOTIONS[:2])]
+        self.drive = (*(name for name, _ in forces), *(str(Sensor(c, m)) for c, m in moved), *model.channels)
         self.time = graph.input("t")
         drive = [graph.input(f"drive:{name}") for name in self.drive]
         self.forces = [(where, node) for (_, where), node in zip(forces, drive, strict=False)]
@@ -48,21 +51,12 @@ class Equations:
 
     @property
     def dofs(self) -> int:
-        """Degrees of freedom."""
         return len(self.motion[0])
 
     @property
     def states(self) -> list[int]:
         """Displacements and velocities of the degrees of freedom, then the terms' own states."""
         return [*self.motion[0], *self.motion[1], *self.memory.values()]
-
-    def _accelerated(self) -> bool:
-        """Whether they need the acceleration of a prescribed motion: a mass is tied to it, or friction may hold one."""
-        return any(
-            entry.term.name == "inertia" or any("sgn" in c.shape for c in entry.term.components)
-            for entry in self.model.terms
-            if set(entry.place.moving) & set(self.prescribed) and set(entry.place.moving) & set(self.free)
-        )
 
     def at(self, coordinate: str, order: int) -> int:
         """Displacement, velocity or acceleration (``order`` 2) of a coordinate."""
@@ -214,11 +208,6 @@ def _ties(entry: ModelTerm) -> bool:
     rate = formulas.add_formula(graph, term.state, names) if term.state is not None else None
     units = [unit_force(graph, c, names, rate) for c in term.components if c.order < 2]
     return any(graph.constant_value(graph.derivative(unit, names["u"])) != 0.0 for unit in units)
-
-
-def channel_of(coordinate: str, motion: str) -> str:
-    """What a record calls the motion of a coordinate."""
-    return f"{coordinate} {motion}".strip()
 
 
 def mass_entries(model: Model) -> list[tuple[int, int, float, str]]:

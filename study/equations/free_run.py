@@ -9,19 +9,26 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 
 from study.equations import kernels
-from study.equations.drive import along_motions
 from study.equations.model import Model, named_channels
 from study.equations.motion_program import MotionProgram, motion_program
+from study.records.interpolation import between_runs, between_samples, runs_of
+from study.records.outputs import DISPLACEMENT, Outputs
 from study.records.record import ALONE, MOTIONS, Record, Sensor
+from study.records.states import angular_rate, starting_states
 from study.support.arrays import Floats, Ints
 from study.support.errors import DivergenceError, StudyError, expect
 
 SHARED = 4096  # steps from which on two threads share the segments; with fewer, a thread costs more than it saves
+ROUGH = 0.5  # largest step times the fastest rate
+FINE = 0.125  # largest step times the median rate: a short time of fast rates asks for no smaller steps
+FEWEST, MOST = 4, 32  # steps a sample between which the median rate sets the bound
+Drive = tuple[Floats, tuple[tuple[int, float], ...], Ints | None]
 
 
 @dataclass(frozen=True)
@@ -89,10 +96,7 @@ class FreeRun:
         response : array, shape (samples, sensors)
         jacobian : array, shape (samples, sensors, keys + (cuts + 1) free_states)
 
-        Raises
-        ------
-        DivergenceError
-            If a motion leaves the range of finite numbers.
+        A motion that leaves the range of finite numbers raises a ``DivergenceError``.
         """
         response, own, _ = self.respond_by_segment(values, initial, free_states)
         if not self.cuts:
@@ -198,13 +202,13 @@ def prepare(
         First sample, and the one after the last; the whole record if left out.
     restarts : sequence of int
         Samples of the record, within the span, at which the motion begins anew (``shooting``).
-
-    Raises
-    ------
-    StudyError
-        If a value, a channel, the span or a restart is invalid.
     """
-    first, last = _checked_span(record, span)
+    first, last = span or (0, len(record))
+    if not 0 <= first < last - 1 < len(record):
+        raise StudyError(
+            f"the span {first} to {last} does not lie in the {len(record)} samples of {record.name!r}; "
+            "it must begin at 0 or later, end by the last sample and hold two at least"
+        )
     cuts = tuple(sorted({*restarts, *(b for b in record.begins if first < b < last)}))
     if list(restarts) != sorted(set(restarts)) or any(b - a < 2 for a, b in pairwise((first, *cuts, last))):
         raise StudyError(f"the restarts {tuple(restarts)} must rise, and leave two samples between {first} and {last}")
@@ -220,14 +224,60 @@ def prepare(
     )  # fmt: skip
 
 
-def _checked_span(record: Record, span: tuple[int, int] | None) -> tuple[int, int]:
-    first, last = span or (0, len(record))
-    if not 0 <= first < last - 1 < len(record):
-        raise StudyError(
-            f"the span {first} to {last} does not lie in the {len(record)} samples of {record.name!r}; "
-            "it must begin at 0 or later, end by the last sample and hold two at least"
-        )
-    return first, last
+def along_motions(record: Record, span: tuple[int, int], driving: tuple[str, ...], factor: int) -> Drive:
+    """What drives the motions of a span, where these begin and when, and where its samples lie along them.
+
+    The motions begin with the first sample of the span, and anew at each stretch of a record that is strung together.
+
+    Parameters
+    ----------
+    record : Record
+        Has the channels.
+    span : pair of int
+        First sample, and the one after the last.
+    driving : tuple of str
+        The channels.
+    factor : int
+        Intervals into which each sampling interval is divided.
+
+    Returns
+    -------
+    drive : array, shape (factor (samples - 1) + 1, channels)
+    starts : tuple of (int, float)
+        Samples at which motions begin, and their times in seconds.
+    places : int array, shape (samples,), or None
+        Where the samples of the span lie along the motions; None where these are no more than the span.
+    """
+    if record.stretches:
+        return _along_stretches(record, span, driving, factor)
+    first, last = span
+    part = slice(factor * first, factor * (last - 1) + 1)
+    columns = [_between(record[name].tobytes(), factor, record.reading(name))[part] for name in driving]
+    drive = np.column_stack(columns) if columns else np.zeros((factor * (last - first), 0))
+    return drive, ((0, record.start + first * record.dt),), None
+
+
+@lru_cache(maxsize=8)
+def _along_stretches(record: Record, span: tuple[int, int], driving: tuple[str, ...], factor: int) -> Drive:
+    """As :func:`along_motions`, of a record that is strung together."""
+    part = record.part(*span)
+    runs, places = runs_of(part)
+    starts, begin = list[tuple[int, float]](), 0
+    for run in runs:
+        starts.append((begin, float(run.source.time[run.first])))
+        begin += len(run)
+    columns = [between_runs(part, name, factor) for name in driving]
+    drive = np.column_stack(columns) if columns else np.zeros((factor * begin, 0))
+    drive.flags.writeable = False
+    return drive, tuple(starts), places
+
+
+@lru_cache(maxsize=8)
+def _between(values: bytes, factor: int, reading: str) -> Floats:
+    """A channel between its samples; a diagnosis makes hundreds of runs under the same force."""
+    fine = between_samples(np.frombuffer(values), factor, reading)
+    fine.flags.writeable = False
+    return fine
 
 
 def predict_response(
@@ -247,3 +297,45 @@ def predict_response(
     sensors = (Sensor(ALONE, response),)
     run = prepare(model, record, sensors=sensors, steps_per_sample=steps_per_sample, span=span)
     return run.respond({}, initial)[0][:, 0]
+
+
+def needed_steps(
+    model: Model, record: Record, outputs: Outputs = DISPLACEMENT, most: int | None = None
+) -> int:  # fmt: skip
+    """Steps in each sampling interval with which a search may begin, the values of the model all known.
+
+    ``most`` are taken at most; the median rate bounds them if it is left out. A Runge-Kutta step h of an oscillation of
+    rate w shifts its phase by ``(h w)^5 / 120`` and grows without end above ``h w = 2.8``, which heavy damping or a
+    short memory reaches though the motion is slow. So rates are the largest eigenvalues of the equation of motion,
+    linearised along the motion.
+    """
+    rates = _rates(model, record, outputs)
+    if not np.all(np.isfinite(rates)):
+        return most or FEWEST
+    most = most or int(np.clip(np.ceil(np.median(rates) * record.dt / FINE), FEWEST, MOST))
+    motions = outputs.measured(record, (0, len(record)))
+    fastest = max(float(np.max(rates)), *(angular_rate(motion, record.dt) for motion in motions.T))
+    return int(np.clip(np.ceil(fastest * record.dt / ROUGH), 1, most))
+
+
+def _rates(model: Model, record: Record, outputs: Outputs) -> Floats:
+    """Magnitude of the largest eigenvalue at each point, in rad/s, shape (points,)."""
+    run = prepare(model, record, sensors=(), steps_per_sample=1)
+    samples = np.unique(np.linspace(0, len(record) - 1, 64).astype(np.int64))
+    motion, n = run.motion, run.motion.dofs
+    if run.states == 0:
+        return np.zeros(1)
+    names = list(motion.program.inputs)  # the time, what drives, displacements and velocities
+    moved = names[1 + len(motion.drive) :][: 2 * n]
+    states = starting_states(record, outputs, samples.tolist(), coordinates=[name[2:] for name in moved[:n]])
+    drive = run.drive[2 * np.array(run.along(samples.tolist()))]
+    columns = dict(zip(names[1:], drive.T, strict=False)) | dict(zip(moved, states.T, strict=True))
+    partial = replace(motion.program, outputs=motion.slots[:, 1 : 1 + run.states].ravel())
+    with np.errstate(all="ignore"):
+        slopes = kernels.evaluate(partial, columns | {"t": record.time[samples]}, len(samples))
+    if not np.all(np.isfinite(slopes)):
+        return np.full(len(samples), np.inf)
+    jacobian = np.zeros((len(samples), run.states, run.states))
+    jacobian[:, np.arange(n), np.arange(n, 2 * n)] = 1.0
+    jacobian[:, n:] = slopes.reshape(len(samples), -1, run.states)
+    return np.asarray(np.max(np.abs(np.linalg.eigvals(jacobian)), axis=1), dtype=np.float64)

@@ -43,27 +43,13 @@ UNARY = {Op.NEG, Op.ABS, Op.SGN, Op.SIN, Op.COS, Op.EXP, Op.LOG, Op.SQRT, Op.TAN
 
 @dataclass(frozen=True)
 class Program:
-    """Straight-line code over one array of registers.
+    """Straight-line code over one array of registers: instruction i writes register ``first + i``."""
 
-    Attributes
-    ----------
-    code : int64 array, shape (instructions, 3)
-        Operation and the registers of its two operands; instruction i writes register ``first + i``.
-    registers : float64 array
-        Start values: inputs (to be filled in by the caller), constants, then room for results.
-    first : int
-        The register that the first instruction writes.
-    inputs : dict
-        Register of each named input.
-    outputs : int64 array
-        Registers of the results, in the order in which they were asked for.
-    """
-
-    code: Ints
-    registers: Floats
+    code: Ints  # (instructions, 3): operation and the registers of its two operands
+    registers: Floats  # start values: inputs (to be filled in by the caller), constants, then room for results
     first: int
-    inputs: dict[str, int]
-    outputs: Ints
+    inputs: dict[str, int]  # register of each by name
+    outputs: Ints  # registers of the results, in the order in which they were asked for
 
     def with_inputs(self, values: Mapping[str, float]) -> "Program":
         """The program with the values of some inputs in their registers."""
@@ -97,7 +83,6 @@ class Graph:
         return self._node(Op.INPUT, self.names.index(name), 0)
 
     def const(self, value: float) -> int:
-        """Node of a constant."""
         if value not in self.values:
             self.values.append(value)
         return self._node(Op.CONST, self.values.index(value), 0)
@@ -108,7 +93,6 @@ class Graph:
         return self.values[a] if op is Op.CONST else None
 
     def add(self, a: int, b: int) -> int:
-        """a + b."""
         x, y = self.constant_value(a), self.constant_value(b)
         if x is not None and y is not None:
             return self.const(x + y)
@@ -117,7 +101,6 @@ class Graph:
         return a if y == 0.0 else self._node(Op.ADD, min(a, b), max(a, b))
 
     def sub(self, a: int, b: int) -> int:
-        """a - b."""
         x, y = self.constant_value(a), self.constant_value(b)
         if x is not None and y is not None:
             return self.const(x - y)
@@ -126,12 +109,10 @@ class Graph:
         return self.neg(b) if x == 0.0 else self._node(Op.SUB, a, b)
 
     def neg(self, a: int) -> int:
-        """-a."""
         x = self.constant_value(a)
         return self.const(-x) if x is not None else self._node(Op.NEG, a, a)
 
     def mul(self, a: int, b: int) -> int:
-        """a b."""
         x, y = self.constant_value(a), self.constant_value(b)
         if x is not None and y is not None:
             return self.const(x * y)
@@ -142,12 +123,10 @@ class Graph:
         return a if y == 1.0 else self._node(Op.MUL, min(a, b), max(a, b))
 
     def div(self, a: int, b: int) -> int:
-        """a / b."""
         trivial = self.constant_value(a) == 0.0 or self.constant_value(b) == 1.0
         return a if trivial else self._node(Op.DIV, a, b)
 
     def unary(self, op: Op, a: int) -> int:
-        """A function of one argument."""
         return self._node(op, a, a)
 
     def binary(self, op: Op, a: int, b: int) -> int:
@@ -182,13 +161,8 @@ class Graph:
         op, a, b = self.nodes[node]
         if op in (Op.INPUT, Op.CONST, Op.SGN, Op.GT):
             return self.const(0.0)
-        da = self.derivative(a, wrt)
-        if op in UNARY:
-            return self._unary_rule(op, node, a, da)
-        return self._binary_rule(op, node, (a, b), (da, self.derivative(b, wrt)))
-
-    def _unary_rule(self, op: Op, node: int, a: int, da: int) -> int:
-        if self.constant_value(da) == 0.0:
+        da, db = self.derivative(a, wrt), self.derivative(b, wrt)
+        if op in UNARY and self.constant_value(da) == 0.0:
             return da
         match op:
             case Op.NEG:
@@ -205,12 +179,8 @@ class Graph:
                 return self.div(da, a)
             case Op.SQRT:
                 return self.div(da, self.mul(self.const(2.0), node))
-            case _:  # TANH
+            case Op.TANH:
                 return self.mul(self.sub(self.const(1.0), self.mul(node, node)), da)
-
-    def _binary_rule(self, op: Op, node: int, arguments: tuple[int, int], slopes: tuple[int, int]) -> int:
-        (a, b), (da, db) = arguments, slopes
-        match op:
             case Op.ADD:
                 return self.add(da, db)
             case Op.SUB:

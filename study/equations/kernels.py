@@ -49,13 +49,7 @@ def _function(name: str) -> Any:
 
 
 def _library() -> Path:
-    """The library beside this file; beside sources that came without one, as a job's on a cluster, the installed one.
-
-    Raises
-    ------
-    StudyError
-        If the library was not built.
-    """
+    """The library beside this file, or the installed one: a job on a cluster has sources alone."""
     if LIBRARY.exists():
         return LIBRARY
     with suppress(PackageNotFoundError):

@@ -30,7 +30,6 @@ MODAL, ALIAS = "modal", "measured"
 LINEAR = ("inertia", "linear_stiffness", "linear_damping")
 PLACES: tuple[Kind, ...] = ("at", "between", "couples")
 MOST = 40  # coordinates
-LONGEST = 40  # characters in a name
 Forces = tuple[tuple[str, str], ...]
 
 
@@ -47,7 +46,16 @@ def coordinates_and_forces(top: Mapping[object, object]) -> tuple[tuple[str, ...
     for name in names:
         expect(names.count(name) == 1, f"'coordinates' lists {name!r} twice; expected each once")
         expect(name != GROUND, f"'coordinates' lists {GROUND!r}, which never moves; expected names of what moves")
-    return names, _forces(top.get("forces", {}), names)
+    forces = as_mapping(top.get("forces", {}))
+    if forces is None:
+        raise StudyError(
+            f"'forces' is {shown(top['forces'])}; expected where each acts, such as {{shaker: {names[0]}}}"
+        )
+    found: list[tuple[str, str]] = []
+    for key, value in forces.items():
+        name = _name(key, "the name of a force")
+        found.append((name, _known(value, f"the force {name!r} acts on", names)))
+    return names, tuple(found)
 
 
 def linear_modal(top: Mapping[object, object]) -> bool:
@@ -62,20 +70,9 @@ def linear_modal(top: Mapping[object, object]) -> bool:
 
 
 def _name(item: object, what: str) -> str:
-    usable = isinstance(item, str) and item.isidentifier() and item.isascii() and len(item) <= LONGEST
+    usable = isinstance(item, str) and item.isidentifier() and item.isascii() and len(item) <= 40
     expect(usable, f"{what} is {shown(item)}; expected a name of letters, digits and underscores, such as floor1")
     return cast(str, item)
-
-
-def _forces(given: object, coordinates: Sequence[str]) -> Forces:
-    forces = as_mapping(given)
-    if forces is None:
-        raise StudyError(f"'forces' is {shown(given)}; expected where each acts, such as {{shaker: {coordinates[0]}}}")
-    found: list[tuple[str, str]] = []
-    for key, value in forces.items():
-        name = _name(key, "the name of a force")
-        found.append((name, _known(value, f"the force {name!r} acts on", coordinates)))
-    return tuple(found)
 
 
 def _known(value: object, what: str, names: Sequence[str]) -> str:
@@ -102,13 +99,7 @@ def place_of_entry(item: Mapping[object, object], term: object, coordinates: Seq
 
 
 def place_of_pair(kind: Kind, given: Sequence[object], term: str, coordinates: Sequence[str]) -> Place:
-    """A place between two coordinates, or one of them and the ground.
-
-    Raises
-    ------
-    StudyError
-        If these are not two that the model has.
-    """
+    """A place between two coordinates of a model, or one of them and the ground."""
     like = f"[{GROUND}, {coordinates[0]}]"
     expect(len(given) == 2, f"{kind!r} of {term} is {shown(list(given))}; expected two, such as {like}")
     choice = coordinates if kind == "couples" else (*coordinates, GROUND)
@@ -144,46 +135,25 @@ def written(model: Model) -> str:
 def check(model: Model) -> None:
     """Refuse a structure that no equation of motion holds for, whatever its values.
 
-    Raises
-    ------
-    StudyError
-        If a coordinate has no inertia, or nothing acts on it; or two terms of one kind lie at the same place.
+    Each coordinate has inertia and something that acts on it, and no two terms at one place are the same, or such that
+    no record could tell them apart.
     """
-    if model.modal:
-        for entry in model.terms:
-            sentence = f"{entry.name} is linear, and 'linear: modal' holds it already; expected nonlinear terms alone"
-            expect(entry.term.name not in LINEAR, sentence)
-        for entries in _same_place(model):
-            _check_alike(model, entries)
-        return
-    masses = {entry.place.ends[0] for entry in model.terms if _is_mass(entry)}
-    acted = {end for entry in model.terms if not _is_mass(entry) for end in entry.place.moving}
-    acted |= {where for _, where in model.forces}
-    for name in model.coordinates:
-        expect(name in masses, f"the coordinate {name!r} has no inertia; expected {{term: inertia, at: {name}}}")
-        loose = f"nothing ties the coordinate {name!r} to another or drives it"
-        expect(name in acted, f"{loose}; expected a term between it and another, or a force")
-    for entries in _same_place(model):
-        _check_alike(model, entries)
-
-
-def _is_mass(entry: ModelTerm) -> bool:
-    """Whether it is on the diagonal of the mass matrix alone."""
-    return entry.term.name == "inertia" and entry.place.kind == "at"
-
-
-def _same_place(model: Model) -> list[list[ModelTerm]]:
-    """Terms by what they lie between; couplings of inertia are another thing than an inertia between two."""
+    masses, acted = set[str](), {where for _, where in model.forces}
+    # By what terms lie between; couplings of inertia are another thing than an inertia between two.
     groups: dict[tuple[frozenset[str], bool], list[ModelTerm]] = {}
     for entry in model.terms:
         groups.setdefault((entry.place.path, entry.place.kind == "couples"), []).append(entry)
-    return list(groups.values())
-
-
-def _check_alike(model: Model, entries: Sequence[ModelTerm]) -> None:
-    """Refuse two terms at one place that are the same, or that no record could tell apart."""
-    names, label = [entry.term.name for entry in entries], entries[0].place.label
-    for name in names:
-        expect(names.count(name) == 1, f"model {model.name!r} lists {name} twice at {label}; expected once")
-    fault = repeated_force(Model(model.name, tuple(replace(entry, place=HERE) for entry in entries)))
-    expect(fault is None, f"at {label}, {fault}")
+        (masses if entry.term.name == "inertia" and entry.place.kind == "at" else acted).update(entry.place.moving)
+        if model.modal:
+            sentence = "is linear, and 'linear: modal' holds it already; expected nonlinear terms alone"
+            expect(entry.term.name not in LINEAR, f"{entry.name} {sentence}")
+    for name in () if model.modal else model.coordinates:
+        expect(name in masses, f"the coordinate {name!r} has no inertia; expected {{term: inertia, at: {name}}}")
+        loose = f"nothing ties the coordinate {name!r} to another or drives it"
+        expect(name in acted, f"{loose}; expected a term between it and another, or a force")
+    for entries in groups.values():
+        names, label = [entry.term.name for entry in entries], entries[0].place.label
+        for name in names:
+            expect(names.count(name) == 1, f"model {model.name!r} lists {name} twice at {label}; expected once")
+        fault = repeated_force(Model(model.name, tuple(replace(entry, place=HERE) for entry in entries)))
+        expect(fault is None, f"at {label}, {fault}")

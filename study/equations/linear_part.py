@@ -68,10 +68,7 @@ def shapes_of(model: Model, values: Mapping[str, float]) -> Floats:
 def checked_mass_matrix(model: Model) -> Floats:
     """The mass matrix of a model whose values are known, shape (degrees of freedom, degrees of freedom).
 
-    Raises
-    ------
-    StudyError
-        If it is not positive definite: some motion would have no kinetic energy, or a negative one.
+    Refused unless positive definite: else some motion would have no kinetic energy, or a negative one.
     """
     mass = matrices(model, model.numbers())[2]
     _check_positive(model, mass)
@@ -187,16 +184,13 @@ def modes_of(model: Model, keys: Sequence[str] = (), covariance: Floats | None =
         What was estimated; everything else counts as exact.
     covariance : array, shape (keys, keys)
         Of these.
-
-    Raises
-    ------
-    StudyError
-        If the mass matrix is not positive definite.
     """
-    checked_mass_matrix(model)
+    mass = checked_mass_matrix(model)
     values = model.numbers()
-    stiffness, damping, mass = matrices(model, values)
-    squares, shapes = _undamped(stiffness, mass)
+    stiffness, damping, _ = matrices(model, values)
+    half = np.linalg.inv(np.linalg.cholesky(mass))
+    squares, vectors = np.linalg.eigh(half @ stiffness @ half.T)
+    shapes: Floats = np.asarray(half.T @ vectors, dtype=np.float64)  # of unit modal mass, in columns
     omega = np.sqrt(np.maximum(squares, 0.0))
     omega = np.where(omega > RIGID * np.max(omega), omega, 0.0)
     roots = _roots(stiffness, damping, mass, omega)
@@ -230,13 +224,6 @@ def modes_of(model: Model, keys: Sequence[str] = (), covariance: Floats | None =
         omega / (2.0 * np.pi), np.where(moving, errors[0] / (4.0 * np.pi * rate), 0.0), np.where(moving, ratio, 0.0),
         np.where(moving, errors[1], 0.0), shape, shape_error,
     )  # fmt: skip
-
-
-def _undamped(stiffness: Floats, mass: Floats) -> tuple[Floats, Floats]:
-    """Squares of the angular frequencies, and the shapes of unit modal mass in columns, the slowest first."""
-    half = np.linalg.inv(np.linalg.cholesky(mass))
-    squares, vectors = np.linalg.eigh(half @ stiffness @ half.T)
-    return squares, np.asarray(half.T @ vectors, dtype=np.float64)
 
 
 def _roots(stiffness: Floats, damping: Floats, mass: Floats, omega: Floats) -> tuple[Complexes, Complexes]:

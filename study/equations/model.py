@@ -20,33 +20,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ModelTerm:
-    """A term in a model.
-
-    Attributes
-    ----------
-    term : Term
-        The physical effect.
-    coefficients : tuple of float or None
-        One for each component, in the order of ``term.symbols``; None where it is to be fitted.
-    parameters : tuple of float or None
-        One for each shape parameter; None where it is to be estimated.
-    place : Place
-        Where it acts.
-    """
+    """A term in a model, at a place; None stands for what is to be estimated."""
 
     term: Term
-    coefficients: tuple[float | None, ...]
-    parameters: tuple[float | None, ...]
+    coefficients: tuple[float | None, ...]  # one for each component, in the order of ``term.symbols``
+    parameters: tuple[float | None, ...]  # one for each shape parameter
     place: Place = HERE
 
     @property
     def name(self) -> str:
         """Name of the term, with its place if it has one: ``cubic_stiffness[floor2-floor3]``."""
-        return self.term.name + self._suffix
-
-    @property
-    def _suffix(self) -> str:
-        return f"[{self.place.label}]" if self.place.label else ""
+        return self.term.name + self.place.suffix
 
     @property
     def symbols(self) -> tuple[str, ...]:
@@ -56,7 +40,7 @@ class ModelTerm:
     @property
     def keys(self) -> tuple[str, ...]:
         """Names of its coefficients, then of its shape parameters as ``term.parameter``."""
-        own = tuple(symbol + self._suffix for symbol in self.term.symbols)
+        own = tuple(symbol + self.place.suffix for symbol in self.term.symbols)
         return own + tuple(f"{self.name}.{p.name}" for p in self.term.parameters)
 
     @property
@@ -69,7 +53,6 @@ class ModelTerm:
 
     @property
     def values(self) -> dict[str, float | None]:
-        """Coefficients and shape parameters by key."""
         return dict(zip(self.keys, self.coefficients + self.parameters, strict=True))
 
     def with_values(self, values: Mapping[str, float | None]) -> "ModelTerm":
@@ -88,36 +71,23 @@ def free(term: Term, place: Place = HERE) -> ModelTerm:
 class Model:
     """An equation of motion.
 
-    Attributes
-    ----------
-    name : str
-        What it is called in tables and messages.
-    terms : tuple of ModelTerm
-        Its terms, each at most once (at each place).
-    coordinates : tuple of str
-        Where sensors, forces and terms are; a single mass has one without a name.
-    forces : tuple of pairs of str
-        Name of each measured force, and the coordinate on which it acts.
-    modal : ModalPart, optional
-        The linear part where it is a sum of modes: coordinates are those with sensors, terms what acts between them
-        beside it.
+    Where the linear part is ``modal``, a sum of modes, the coordinates are those with sensors, the terms what acts
+    between them beside it.
     """
 
-    name: str
-    terms: tuple[ModelTerm, ...]
-    coordinates: tuple[str, ...] = (ALONE,)
-    forces: tuple[tuple[str, str], ...] = (("force", ALONE),)
+    name: str  # in tables and messages
+    terms: tuple[ModelTerm, ...]  # each at most once at each place
+    coordinates: tuple[str, ...] = (ALONE,)  # where sensors, forces and terms are; a single mass's has no name
+    forces: tuple[tuple[str, str], ...] = (("force", ALONE),)  # each measured one, and the coordinate on which it acts
     modal: ModalPart | None = None
 
     def __post_init__(self) -> None:
-        """Refuse the same term twice."""
         names = [t.name for t in self.terms]
         for name in names:
             if names.count(name) > 1:
                 raise StudyError(f"model {self.name!r} lists the term {name!r} twice; expected once")
 
     def __contains__(self, name: str) -> bool:
-        """Whether a term of this name is in the model."""
         return any(t.name == name for t in self.terms)
 
     @property
@@ -154,22 +124,17 @@ class Model:
         return tuple(sorted({name for t in self.terms for name in t.term.channels}))
 
     def with_term(self, term: Term | ModelTerm) -> "Model":
-        """The model and one term more."""
         return replace(self, terms=(*self.terms, term if isinstance(term, ModelTerm) else free(term)))
 
     def without_term(self, name: str) -> "Model":
-        """The model and one term less."""
         return replace(self, terms=tuple(t for t in self.terms if t.name != name))
 
     def with_values(self, values: Mapping[str, float | None]) -> "Model":
-        """The same terms with other coefficients or shape parameters, and the same modes with other numbers."""
         modal = self.modal.with_values(values) if self.modal else None
         return replace(self, terms=tuple(t.with_values(values) for t in self.terms), modal=modal)
 
     def equation(self) -> str:
-        """The equation of motion in one line, with symbols."""
-        parts = [f"{' , '.join(t.symbols)} [{t.term.formula}]" for t in self.terms]
-        return " + ".join(parts) + " = F(t)"
+        return " + ".join(f"{' , '.join(t.symbols)} [{t.term.formula}]" for t in self.terms) + " = F(t)"
 
     def numbers(self) -> dict[str, float]:
         """Every value; all must be known, and the mass of a single coordinate positive."""

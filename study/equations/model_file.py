@@ -22,19 +22,21 @@ import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 
 from study.equations import layout, terms
 from study.equations.modal_part import ModalPart
 from study.equations.model import Model, ModelTerm, free
-from study.equations.model_entry import LONGEST_NAME, entry_from, refuse_long, refuse_unknown
 from study.equations.redundancy import repeated_force
 from study.equations.terms import Term
 from study.support import yaml_text
-from study.support.errors import StudyError
+from study.support.errors import StudyError, at, expect
 from study.support.files import read_text, recover
+from study.support.numbers import LARGEST, SMALLEST
 from study.support.yaml_text import as_list, as_mapping, scalar, shown
 
+LONGEST_NAME = 100
 MOST_TERMS = 200
 NO_TERMS = re.compile(r"^terms:[ \t]*(#.*)?$", re.MULTILINE)  # of an entry that was taken out with its list
 WANTED = "a YAML file with 'name' and 'terms', such as models/duffing.yaml"
@@ -51,10 +53,44 @@ def read_model(path: Path) -> Model:
 
 def parse_model(text: str, source: Path) -> Model:
     """The model in a YAML text; ``source`` is named in messages, its stem names a model without a name."""
-    try:
-        return _model(yaml_text.read_plain(text), source.stem)
-    except StudyError as error:
-        raise StudyError(f"{source}: {error}") from None
+    with at(source):
+        document = yaml_text.read_plain(text)
+        top = as_mapping(document)
+        if top is None:
+            content = "is empty" if document is None else f"holds {shown(document)}"
+            raise StudyError(f"{content}; expected a mapping of 'name' and 'terms'")
+        refuse_unknown(top, ("name", "terms", *layout.KEYS), "the model")
+        name = top.get("name", source.stem)
+        if not isinstance(name, str) or not name.strip() or not name.isprintable() or len(name) > LONGEST_NAME:
+            raise StudyError(f"the name is {shown(name)}; expected a short text on one line")
+        entries, modal = as_list(top.get("terms")), layout.linear_modal(top)
+        if not entries and not (modal and top.get("terms") == []):
+            content = shown(top["terms"]) if "terms" in top else "missing"
+            like = "expected a list such as [inertia, linear_damping, linear_stiffness]"
+            raise StudyError(f"'terms' is {content}; {like}")
+        entries = entries or []
+        expect(len(entries) <= MOST_TERMS, f"'terms' has {len(entries)} entries; at most {MOST_TERMS} are read")
+        coordinates, forces = layout.coordinates_and_forces(top)
+        listed = tuple(_entry(item, number, coordinates) for number, item in enumerate(entries, 1))
+        model = Model(name, listed, coordinates, forces, ModalPart(coordinates) if modal else None)
+        if model.named:
+            layout.check(model)
+        elif fault := repeated_force(model):
+            raise StudyError(fault)
+        return model
+
+
+def _entry(item: object, number: int, coordinates: Sequence[str]) -> ModelTerm:
+    with at(f"entry {number} of 'terms'"):
+        if isinstance(item, str):
+            refuse_long(item)
+            return free(terms.get(item), layout.place_of_entry({}, item, coordinates))
+        mapping = as_mapping(item)
+        if mapping is None:
+            raise StudyError(f"is {shown(item)}; expected a name or a mapping such as {{term: inertia, value: 1.0}}")
+        place = layout.place_of_entry(mapping, mapping.get("term"), coordinates)
+        plain = {key: value for key, value in mapping.items() if key not in layout.PLACES}
+        return replace(entry_from(plain), place=place)
 
 
 def format_model(model: Model) -> str:
@@ -140,45 +176,85 @@ def revised(text: str, source: str, model: Model) -> str:
     return text
 
 
-def _model(document: object, stem: str) -> Model:
-    top = as_mapping(document)
-    if top is None:
-        content = "is empty" if document is None else f"holds {shown(document)}"
-        raise StudyError(f"{content}; expected a mapping of 'name' and 'terms'")
-    refuse_unknown(top, ("name", "terms", *layout.KEYS), "the model")
-    name = top.get("name", stem)
-    if not isinstance(name, str) or not name.strip() or not name.isprintable() or len(name) > LONGEST_NAME:
-        raise StudyError(f"the name is {shown(name)}; expected a short text on one line")
-    entries, modal = as_list(top.get("terms")), layout.linear_modal(top)
-    if not entries and not (modal and top.get("terms") == []):
-        content = shown(top["terms"]) if "terms" in top else "missing"
-        raise StudyError(f"'terms' is {content}; expected a list such as [inertia, linear_damping, linear_stiffness]")
-    entries = entries or []
-    if len(entries) > MOST_TERMS:
-        raise StudyError(f"'terms' has {len(entries)} entries; at most {MOST_TERMS} are read")
-    coordinates, forces = layout.coordinates_and_forces(top)
-    listed = tuple(_entry(item, number, coordinates) for number, item in enumerate(entries, 1))
-    model = Model(name, listed, coordinates, forces, ModalPart(coordinates) if modal else None)
-    if model.named:
-        layout.check(model)
-    elif fault := repeated_force(model):
-        raise StudyError(fault)
-    return model
+def refuse_long(name: str) -> None:
+    """Refuse a name that no figure has room for."""
+    if len(name) > LONGEST_NAME:
+        raise StudyError(f"the name {shown(name)} has {len(name)} characters; at most {LONGEST_NAME} are read")
 
 
-def _entry(item: object, number: int, coordinates: Sequence[str]) -> ModelTerm:
-    try:
-        if isinstance(item, str):
-            refuse_long(item)
-            return free(terms.get(item), layout.place_of_entry({}, item, coordinates))
-        mapping = as_mapping(item)
-        if mapping is None:
-            raise StudyError(f"is {shown(item)}; expected a name or a mapping such as {{term: inertia, value: 1.0}}")
-        place = layout.place_of_entry(mapping, mapping.get("term"), coordinates)
-        plain = {key: value for key, value in mapping.items() if key not in layout.PLACES}
-        return replace(entry_from(plain), place=place)
-    except StudyError as error:
-        raise StudyError(f"entry {number} of 'terms': {error}") from None
+def entry_from(item: Mapping[object, object]) -> ModelTerm:
+    """An entry of ``terms`` from its mapping, as a file or a caller gives it."""
+    name = item.get("term")
+    if not isinstance(name, str):
+        content = shown(name) if "term" in item else f"missing in {shown(item)}"
+        raise StudyError(f"'term' is {content}; expected a name such as 'term: inertia'")
+    refuse_long(name)
+    force = item.get("force")
+    if "force" in item and not isinstance(force, str):
+        raise StudyError(f"force of {name!r} is {shown(force)}; expected a formula in quotes")
+    term = terms.custom(name, force) if isinstance(force, str) else terms.get(name)
+    own = ("force",) if term.name not in terms.LIBRARY else ()
+    amount = ("amplitude", "phase") if _phasor(term) else ("value",)
+    refuse_unknown(item, ("term", *own, *amount, "values", *(p.name for p in term.parameters)), name)
+    parameters = [_number(item, p.name, name) for p in term.parameters]
+    for parameter, value in zip(term.parameters, parameters, strict=True):
+        if value is not None and value <= 0.0 and not parameter.signed:
+            raise StudyError(f"{parameter.name} of {name} is {value:g}; expected a {parameter.meaning} above zero")
+    coefficients = _coefficients(term, item)
+    if name == "inertia" and coefficients[0] is not None and coefficients[0] <= 0.0:
+        raise StudyError(f"value of {name} is {coefficients[0]:g}; expected a mass above zero")
+    return ModelTerm(term, coefficients, tuple(parameters))
+
+
+def _phasor(term: Term) -> bool:
+    """Whether the coefficients are those of a cosine and a sine, that is, an amplitude with a phase."""
+    return len(term.symbols) == 2 and term.symbols[0].endswith("_cos") and term.symbols[1].endswith("_sin")
+
+
+def _coefficients(term: Term, item: Mapping[object, object]) -> tuple[float | None, ...]:
+    """The coefficients of an entry: A cos(phase) of the cosine and -A sin(phase) of the sine, as in (4.9)."""
+    ways = [key for key in ("value", "amplitude", "phase", "values") if key in item]
+    if "values" in item:
+        if len(ways) > 1:
+            raise StudyError(f"{term.name} gives both {ways[0]!r} and 'values'; expected one of them")
+        given = as_mapping(item["values"])
+        if given is None:
+            like = ", ".join(f"{s}: 1.0" for s in term.symbols)
+            raise StudyError(f"values of {term.name} is {shown(item['values'])}; expected a mapping such as {{{like}}}")
+        refuse_unknown(given, term.symbols, f"values of {term.name}")
+        return tuple(_number(given, symbol, term.name) for symbol in term.symbols)
+    if not _phasor(term):
+        return (_number(item, "value", term.name), *(None for _ in term.symbols[1:]))
+    amplitude, phase = _number(item, "amplitude", term.name), _number(item, "phase", term.name)
+    if amplitude is None and phase is None:
+        return (None, None)
+    if amplitude is None or phase is None:
+        raise StudyError(f"{term.name} gives {ways[0]!r} alone; expected amplitude and phase together, or neither")
+    return (amplitude * math.cos(phase), 0.0 - amplitude * math.sin(phase))  # 0 - 0, not -0, at phase 0
+
+
+def _number(item: Mapping[object, object], key: str, owner: str) -> float | None:
+    """A finite number of usual size, or None if the key is left out."""
+    if key not in item:
+        return None
+    value = item[key]
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        with suppress(OverflowError):
+            if value == 0 or SMALLEST <= abs(float(value)) <= LARGEST:
+                return float(value)
+    if value is None:
+        raise StudyError(f"{key} of {owner} is empty; give a number, or leave the key out to have it estimated")
+    like = f"such as 355.3 or 2.0e7 (0, or {SMALLEST:g} to {LARGEST:g} in size)"
+    raise StudyError(f"{key} of {owner} is {shown(value)}; expected a finite number {like}")
+
+
+def refuse_unknown(item: Mapping[object, object], allowed: Sequence[str], owner: str) -> None:
+    """Refuse a mapping with a key that it cannot have; the message tells the nearest one."""
+    for key in item:
+        if key not in allowed:
+            near = get_close_matches(shown(key).strip("'"), allowed, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(allowed)}"
+            raise StudyError(f"{owner} has the unknown key {shown(key)}; {hint}")
 
 
 def _flow(fields: Mapping[str, str]) -> str:

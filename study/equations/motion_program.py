@@ -8,16 +8,13 @@ from itertools import count
 import numpy as np
 
 from study.equations import formulas
-from study.equations.drive import FORCE
 from study.equations.equations_of_motion import Equations
 from study.equations.graph import Graph, Op, Program
 from study.equations.model import Model, check_modes
 from study.equations.place import Place
-from study.records.record import MOTIONS, Sensor
+from study.records.record import FORCE, MOTIONS, Sensor
 from study.support.arrays import Floats, Ints
 from study.support.errors import StudyError, expect
-
-CACHED = 128  # programs
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,11 +50,6 @@ def motion_program(
 
     ``observed`` are motions of its coordinates, or the force on one whose motion is prescribed. Without ``switching``
     dry friction jumps within a step.
-
-    Raises
-    ------
-    StudyError
-        If a value is missing, or a key or what is observed is unknown.
     """
     check_modes(model)
     values = model.values
@@ -71,7 +63,7 @@ def motion_program(
     return replace(made, program=made.program.with_inputs(known))
 
 
-@lru_cache(maxsize=CACHED)
+@lru_cache(maxsize=128)
 def _compiled(model: Model, keys: tuple[str, ...], observed: tuple[Sensor, ...], switching: bool) -> MotionProgram:
     """The same of a model without values: a diagnosis runs each of its models many times."""
     made = Equations(model, any(sensor.motion == MOTIONS[2] for sensor in observed))
@@ -94,14 +86,16 @@ def _compiled(model: Model, keys: tuple[str, ...], observed: tuple[Sensor, ...],
     last = max(graph.needed([*stepping, *moved]), default=-1)
     split = sum(1 for node in graph.needed(outputs) if node <= last and graph.nodes[node][0] < Op.INPUT)
     ends = np.cumsum([len(rows) * (1 + len(by)), len(jumps) * len(rows), len(moved)])
-    slots, sides_of_rows, shifts, sides = np.split(program.outputs, ends)
+    slots, sides_of_rows, moving, sides = np.split(program.outputs, ends)
+    shifts = np.full((len(jumps), 3), -1, dtype=np.int64)
+    shifts[[len(_orders(made, place)) > 0 for *_, place in jumps]] = moving.reshape(-1, 3)
     computing = count(len(states) + len(slopes))
     return MotionProgram(
         program, made.drive, made.dofs, len(states), slots.reshape(len(rows), 1 + len(by)), split,
         np.array([next(computing) if row is None else row for row in where], dtype=np.int64), sides,
         sides_of_rows.reshape(len(jumps), len(rows)),
         np.array([place.direction(made.free) for *_, place in jumps], dtype=np.float64).reshape(len(jumps), made.dofs),
-        _filled(shifts, [len(_orders(made, place)) for *_, place in jumps]),
+        shifts,
     )  # fmt: skip
 
 
@@ -149,10 +143,3 @@ def _jumps(made: Equations) -> list[tuple[int, int, Place]]:
 def _orders(made: Equations, place: Place) -> range:
     """Displacement, velocity and acceleration where an end of a place has a prescribed motion."""
     return range(3 if set(place.moving) & set(made.prescribed) else 0)
-
-
-def _filled(values: Ints, counts: Sequence[int]) -> Ints:
-    """Rows of three, -1 where a row has none."""
-    found = np.full((len(counts), 3), -1, dtype=np.int64)
-    found[np.array(counts, dtype=np.int64) > 0] = values.reshape(-1, 3)
-    return found

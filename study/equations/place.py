@@ -17,22 +17,20 @@ class Place:
     A term ``at`` a coordinate acts on its motion, one ``between`` two on the motion of the second minus that of the
     first, with equal and opposite forces on both; an inertia that ``couples`` two is an off-diagonal element of the
     symmetric mass matrix.
-
-    Attributes
-    ----------
-    kind : str
-        ``at``, ``between`` or ``couples``.
-    ends : tuple of str
-        The coordinate, or both; ``ground`` may be one of two.
     """
 
     kind: Kind
-    ends: tuple[str, ...]
+    ends: tuple[str, ...]  # the coordinate, or both; ``ground`` may be one of two
 
     @property
     def label(self) -> str:
         """What coefficients are called by: ``floor2``, ``floor2-floor3``, ``heave,pitch`` of a coupling, or nothing."""
         return (",", "-")[self.kind != "couples"].join(self.ends)
+
+    @property
+    def suffix(self) -> str:
+        """What it adds to the name of a term or a coefficient."""
+        return f"[{self.label}]" if self.label else ""
 
     @property
     def moving(self) -> tuple[str, ...]:

@@ -10,7 +10,6 @@ from study.equations.terms import LIBRARY
 from study.support.arrays import Floats
 
 POINTS, FEWEST = 512, 32  # random motions at which formulas are compared, and how many of them must be finite
-DECADES = 6.0  # range of the random motions' sizes on either side of one: a record's unit of length is unknown
 NOTHING = 1e-150  # a force below counts as zero
 SAME = 1e-10  # share of a formula that others do not account for, at most: rounding
 TAKES_PART = 1e-6  # share of a formula that another accounts for, at least
@@ -56,7 +55,7 @@ def _forces(model: Model) -> tuple[tuple[str, ...], Floats]:
     program = graph.program([unit_force(graph, c, inputs, None) for _, c in pairs])
     rng = np.random.default_rng(1990)
     shape = (POINTS, len(variables))
-    data = rng.standard_normal(shape) * 10.0 ** rng.uniform(-DECADES, DECADES, shape)
+    data = rng.standard_normal(shape) * 10.0 ** rng.uniform(-6.0, 6.0, shape)  # a record's unit of length is unknown
     values = kernels.evaluate(program, dict(zip(variables, data.T, strict=True)), POINTS)
     names, finite = tuple(name for name, _ in pairs), np.all(np.isfinite(values), axis=1)
     return names, values[finite] if np.count_nonzero(finite) >= FEWEST else np.eye(len(names))

@@ -31,7 +31,6 @@ class Integrator:
     steps_per_sample: int = 8  # in each sampling interval; the report took one
 
     def __post_init__(self) -> None:
-        """Refuse what no integrator can do."""
         if self.method not in METHODS:
             raise StudyError(f"there is no integrator {self.method!r}; known are {', '.join(METHODS)}")
         if self.steps_per_sample < 1:
@@ -80,9 +79,6 @@ def simulate(
     ------
     DivergenceError
         If the motion leaves the range of finite numbers; names model, time and level.
-    StudyError
-        If the model is not complete, its mass matrix is not positive definite, a channel is not finite, or there are
-        more initial values than states.
     """
     forces, integrator = force if isinstance(force, Mapping) else {"force": force}, integrator or Integrator()
     channels, extra = {**forces, **(extra or {})}, extra or {}

@@ -99,7 +99,6 @@ class Term:
 
     @property
     def symbols(self) -> tuple[str, ...]:
-        """Names of the coefficients."""
         return tuple(c.symbol for c in self.components)
 
     @property

@@ -14,7 +14,6 @@ from study.figures.styles import look
 
 LOOKS = (("C1", (0, (5.0, 2.0))), ("C2", (0, (1.5, 1.2))), ("C3", (0, (7.0, 1.5, 1.5, 1.5))), ("C5", "-."))
 MARKS = ("o", "s", "^", "v")
-APART = 9  # lines between two marks, so that the curve under them stays visible
 ALL = ("C0", "-")  # the last curve is the multiple coherence: what the whole model explains
 OTHER_MOTION = {"instrumental": "fitted model's own motion"}  # near one whatever the model: it is no test
 
@@ -31,7 +30,8 @@ def cumulative_panel(axes: Axes, shares: Sequence[InputCoherence]) -> Axes:
         axes.fill_between(share.frequency, below, share.cumulative, color=colour, alpha=0.16, linewidth=0.0)
         axes.plot(
             share.frequency, share.cumulative, color=colour, linestyle=dash, linewidth=2.6 if whole else 1.6,
-            label=_label(share, index), zorder=2.9 if whole else 3.0,
+            label=f"{'+ ' if index else ''}{_shape(share)}: {labels.term_names(share.terms)}",
+            zorder=2.9 if whole else 3.0,
         )  # fmt: skip
         below = share.cumulative
     axes.set_ylim(0.0, 1.03)
@@ -45,18 +45,14 @@ def marks_of_another(axes: Axes, shares: Sequence[InputCoherence], estimator: st
     """Cumulative coherences of a further estimator as marks on a hair line, one label for each curve."""
     whose = OTHER_MOTION.get(estimator, look(estimator).label)
     for index, share in enumerate(shares):
+        between = 9  # lines between two marks, so that the curve under them stays visible
         plus = "+ " if index else ""
         axes.plot(
             share.frequency, share.cumulative, MARKS[index % len(MARKS)], linestyle="-", color="black", linewidth=0.4,
             markerfacecolor="none", markersize=5.0, markeredgewidth=0.9, zorder=2.95,
-            markevery=(APART * index // len(shares), APART), label=f"{whose}: {plus}{_shape(share)}",
+            markevery=(between * index // len(shares), between), label=f"{whose}: {plus}{_shape(share)}",
         )  # fmt: skip
     return axes
-
-
-def _label(share: InputCoherence, index: int) -> str:
-    plus = "+ " if index else ""
-    return f"{plus}{_shape(share)}: {labels.term_names(share.terms)}"
 
 
 def _shape(share: InputCoherence) -> str:

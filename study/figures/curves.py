@@ -7,13 +7,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from study.figures.styles import legend_place
+from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 TWO_SIDED_95 = NormalDist().inv_cdf(0.975)
 
 
@@ -65,29 +63,23 @@ def input_responses(
     estimators that are shown; all of them if it is left out.
     """
     table = _lines(table if drawn is None else table[table["estimator"].isin(drawn)], highest)
-    return tuple(_response(int(number), part) for number, part in _groups(table, "input"))
-
-
-def _response(number: int, part: pd.DataFrame) -> InputResponse:
-    groups = _groups(part, "estimator")
-    curves = [
-        ResponseCurve(name, _column(rows, "frequency"), _complex(rows, "real", "imag"), _column(rows, "standard_error"))
-        for name, rows in sorted(groups, key=lambda group: legend_place(group[0]))
-    ]
-    _, first = groups[0]
-    exact = _complex(first, "exact_real", "exact_imag")
-    known = exact if np.all(np.isfinite(exact)) else None
-    return InputResponse(number, str(part["shape"].iloc[0]), tuple(curves), _column(first, "frequency"), known)
+    found: list[InputResponse] = []
+    for number, part in _groups(table, "input"):
+        groups = _groups(part, "estimator")
+        curves: list[ResponseCurve] = []
+        for name, rows in sorted(groups, key=lambda group: legend_place(group[0])):
+            values, error = _complex(rows, "real", "imag"), _column(rows, "standard_error")
+            curves.append(ResponseCurve(name, _column(rows, "frequency"), values, error))
+        _, first = groups[0]
+        exact = _complex(first, "exact_real", "exact_imag")
+        known = exact if np.all(np.isfinite(exact)) else None
+        shape = str(part["shape"].iloc[0])
+        found.append(InputResponse(int(number), shape, tuple(curves), _column(first, "frequency"), known))
+    return tuple(found)
 
 
 def coherences(table: pd.DataFrame, highest: float, estimator: str = "miso") -> tuple[InputCoherence, ...]:
-    """Cumulative coherences of ``coherence.csv``, one entry an input, in the order of conditioning.
-
-    Raises
-    ------
-    StudyError
-        If the table holds nothing of this estimator.
-    """
+    """Cumulative coherences of ``coherence.csv``, one entry an input, in the order of conditioning."""
     if estimator not in set(table["estimator"]):
         known = ", ".join(table["estimator"].unique())
         raise StudyError(f"the coherences hold nothing of the estimator {estimator!r}; expected one of {known}")

@@ -10,15 +10,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from study.equations import dimensions
 from study.figures import labels
 from study.figures.curves import InputResponse, ResponseCurve
 from study.figures.styles import EXACT, look
+from study.support.arrays import Complexes, Floats
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 BAND: dict[str, Any] = {"alpha": 0.22, "linewidth": 0.0}
 OPPOSITE = "opposite sign"
 Part = Callable[[Complexes], Floats]

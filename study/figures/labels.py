@@ -2,16 +2,11 @@
 
 import ast
 import math
-from fractions import Fraction
 
 import pandas as pd
 
 from study.equations import dimensions, formulas, terms
 
-DIMENSIONS: dict[str, dimensions.Dimensions] = {
-    "length": (Fraction(1), Fraction(0)), "1/length": (Fraction(-1), Fraction(0)), "time": (Fraction(0), Fraction(1)),
-    "frequency": (Fraction(0), Fraction(-1)),
-}  # fmt: skip
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 SHAPE_UNITS = {"length": "m", "1/length": "1/m", "time": "s", "frequency": "Hz"}
 FREE_SHAPE = "miso_free_shape"  # the estimator that finds shape parameters too
@@ -32,8 +27,17 @@ def _math(tree: ast.expr) -> str:
             return _symbol(name)
         case ast.UnaryOp(op=op, operand=operand):
             return f"{'-' if isinstance(op, ast.USub) else ''}{_bracketed(operand)}"
-        case ast.BinOp(left=left, op=op, right=right):
-            return _operation(left, op, right)
+        case ast.BinOp(left=left, op=ast.Pow(), right=right):
+            base = _math(left) if isinstance(left, ast.Name | ast.Call) else f"({_math(left)})"
+            return f"{base}^{{{_math(right)}}}"
+        case ast.BinOp(left=left, op=ast.Mult(), right=right):
+            return rf"{_bracketed(left)}\,{_bracketed(right)}"
+        case ast.BinOp(left=left, op=ast.Div(), right=right):
+            return f"{_bracketed(left)}/{_bracketed(right, ast.Mult, ast.Div)}"
+        case ast.BinOp(left=left, op=ast.Sub(), right=right):
+            return f"{_math(left)} - {_bracketed(right)}"
+        case ast.BinOp(left=left, right=right):
+            return f"{_math(left)} + {_math(right)}"
         case ast.Call(func=ast.Name(id="abs"), args=[argument]):
             return f"|{_math(argument)}|"
         case ast.Call(func=ast.Name(id=name), args=arguments):
@@ -51,21 +55,6 @@ def _symbol(name: str) -> str:
     return f"{word}_{{{index.replace('_', ',')}}}" if index else word
 
 
-def _operation(left: ast.expr, op: ast.operator, right: ast.expr) -> str:
-    match op:
-        case ast.Pow():
-            base = _math(left) if isinstance(left, ast.Name | ast.Call) else f"({_math(left)})"
-            return f"{base}^{{{_math(right)}}}"
-        case ast.Mult():
-            return rf"{_bracketed(left)}\,{_bracketed(right)}"
-        case ast.Div():
-            return f"{_bracketed(left)}/{_bracketed(right, ast.Mult, ast.Div)}"
-        case ast.Sub():
-            return f"{_math(left)} - {_bracketed(right)}"
-        case _:
-            return f"{_math(left)} + {_math(right)}"
-
-
 def _bracketed(tree: ast.expr, *more: type[ast.operator]) -> str:
     inner = _math(tree)
     return f"({inner})" if isinstance(tree, ast.BinOp) and isinstance(tree.op, (*LOOSE, *more)) else inner
@@ -73,7 +62,7 @@ def _bracketed(tree: ast.expr, *more: type[ast.operator]) -> str:
 
 def response_unit(shape: str, force: str = "N", length: str = "m") -> str:
     """Unit of A_j, the force over an input's shape: ``N/m^3`` for ``u**3``."""
-    known = {p.name: DIMENSIONS[p.quantity] for t in terms.LIBRARY.values() for p in t.parameters}
+    known = {p.name: terms.QUANTITIES[p.quantity] for t in terms.LIBRARY.values() for p in t.parameters}
     try:
         powers = dimensions.dimensions(shape, known)
     except formulas.ExpressionError:

@@ -20,8 +20,7 @@ from matplotlib.patches import Patch
 from study.support.errors import StudyError
 from study.support.files import replace_file
 
-LEFT, RIGHT, BOTTOM = 0.88, 0.16, 0.55  # inches
-TITLE, LEGEND_ROW, GAP = 0.58, 0.21, 0.34
+LEFT, BOTTOM, TITLE, GAP = 0.88, 0.55, 0.58, 0.34  # inches
 WIDTH = 6.4
 METADATA = {"svg": {"Date": None}, "png": {"Software": None}}  # neither the hour nor the version: same bytes
 
@@ -43,12 +42,12 @@ def empty_page(
     to leave between title and panels, ``headed`` whether the first panels have headings of their own, which need room,
     ``share`` whether the panels of a column share their abscissa.
     """
-    top = TITLE + LEGEND_ROW * legend_rows + (GAP if headed else GAP / 2.0)
+    top = TITLE + 0.21 * legend_rows + (GAP if headed else GAP / 2.0)
     between = GAP if share else GAP + BOTTOM - 0.1
     height = top + rows * panel + (rows - 1) * between + BOTTOM
     figure = Figure(figsize=(width, height))
     figure.subplots_adjust(
-        left=LEFT / width, right=1.0 - RIGHT / width, bottom=BOTTOM / height, top=1.0 - top / height,
+        left=LEFT / width, right=1.0 - 0.16 / width, bottom=BOTTOM / height, top=1.0 - top / height,
         hspace=between / panel, wspace=0.24,
     )  # fmt: skip
     grid = figure.subplots(rows, columns, sharex="col" if share else False, squeeze=False)
@@ -113,13 +112,7 @@ def frame_cells(axes: Axes, rows: Sequence[str], columns: Sequence[str], rotatio
 
 
 def write_each(kinds: Mapping[str, Callable[[], Figure]], outputs: Mapping[str, Sequence[Path]], style: Path) -> None:
-    """Draw the kinds of figure that are asked for in a style, each into its files, PNG or SVG.
-
-    Raises
-    ------
-    StudyError
-        If a kind of figure is asked for that there is not.
-    """
+    """Draw the kinds of figure that are asked for in a style, each into its files, PNG or SVG."""
     with styles.context(style):
         for kind, paths in outputs.items():
             if kind not in kinds:

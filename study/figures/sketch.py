@@ -9,13 +9,14 @@ from dataclasses import dataclass
 from html import escape
 
 from study.equations.linear_part import connections
-from study.equations.model import Model, ModelTerm
+from study.equations.model import Model
 from study.equations.place import GROUND, Place
 from study.support.numbers import percent
 
-BOX, HIGH, STEP, GROUND_AT = 1.0, 0.6, 1.9, -1.35
-SIDE, ABOVE, HATCH = 1.1, 0.9, 0.16  # room beside the outer boxes and above all; height of the ground
-ARC, ARCS = 0.55, 0.34  # height of the lowest arc above the boxes, and of each further coordinate that it passes
+HIGH, STEP, GROUND_AT = 0.6, 1.9, -1.35
+SIDE, HATCH = 1.1, 0.16  # room beside the outer boxes; height of the ground
+SEEN = 0.01  # share from which a connection's is written beside it
+UNIT = 84.0  # pixels in the width of a box
 
 
 @dataclass(frozen=True)
@@ -58,12 +59,10 @@ class Sketch:
 
     @property
     def width(self) -> float:
-        """Of all that is drawn."""
         return self.boxes[-1].x + 2.0 * SIDE
 
     @property
     def height(self) -> float:
-        """Of all that is drawn."""
         return self.top - self.bottom
 
 
@@ -74,23 +73,14 @@ def sketch(model: Model, measured: Sequence[str], shares: Mapping[frozenset[str]
         Box(name, x, 0.0, tuple(f for f, where in model.forces if where == name), name in measured)
         for name, x in at.items()
     )
-    tied = {e.place.path for e in model.terms if (e.place.kind != "at" or not _mass(e))}
-    links = [_link(place, at, place.path in tied, shares.get(place.path, 0.0)) for place in _drawn(model)]
-    top = max(0.5 * HIGH, *(link.middle[1] for link in links)) + ABOVE
-    return Sketch(boxes, tuple(links), GROUND_AT - 2.0 * HATCH, top)
-
-
-def _mass(entry: ModelTerm) -> bool:
-    return entry.term.name == "inertia"
-
-
-def _drawn(model: Model) -> list[Place]:
-    """All connections, and the bodies that inertia couples, each once."""
+    tied = {e.place.path for e in model.terms if e.place.kind != "at" or e.term.name != "inertia"}
     found = {place.path: place for place in connections(model)}
-    for entry in model.terms:
+    for entry in model.terms:  # the bodies that inertia couples, each once
         if entry.place.kind == "couples":
             found.setdefault(entry.place.path, entry.place)
-    return list(found.values())
+    links = [_link(place, at, path in tied, shares.get(path, 0.0)) for path, place in found.items()]
+    top = max(0.5 * HIGH, *(link.middle[1] for link in links)) + 0.9
+    return Sketch(boxes, tuple(links), GROUND_AT - 2.0 * HATCH, top)
 
 
 def _link(place: Place, at: Mapping[str, float], tied: bool, share: float) -> Link:
@@ -101,22 +91,18 @@ def _link(place: Place, at: Mapping[str, float], tied: bool, share: float) -> Li
     left, right = sorted(at[name] for name in place.moving)
     apart = round((right - left) / STEP)
     if apart == 1:
-        begin, end = (left + 0.5 * BOX, 0.0), (right - 0.5 * BOX, 0.0)
+        begin, end = (left + 0.5, 0.0), (right - 0.5, 0.0)
         return Link(place, begin, (0.5 * (left + right), 0.0), end, tied, share)
     begin, end = (left + 0.2, 0.5 * HIGH), (right - 0.2, 0.5 * HIGH)
-    rise = 0.5 * HIGH + 2.0 * (ARC + ARCS * (apart - 2))
+    rise = 0.5 * HIGH + 2.0 * (0.55 + 0.34 * (apart - 2))  # twice the arc's height: higher the more it passes
     return Link(place, begin, (0.5 * (left + right), rise), end, tied, share)
-
-
-SEEN = 0.01  # share from which a connection's is written beside it
-UNIT = 84.0  # pixels in the width of a box
 
 
 def svg(drawn: Sketch, selected: Place) -> str:
     """The sketch, one place selected."""
     left = drawn.boxes[0].x - 0.5 * (drawn.width - drawn.boxes[-1].x)
     view = f"{left * UNIT:.1f} {-drawn.top * UNIT:.1f} {drawn.width * UNIT:.1f} {drawn.height * UNIT:.1f}"
-    ends = (drawn.boxes[0].x - BOX) * UNIT, (drawn.boxes[-1].x + BOX) * UNIT
+    ends = (drawn.boxes[0].x - 1.0) * UNIT, (drawn.boxes[-1].x + 1.0) * UNIT
     ground = (
         f'<rect class=ground x="{ends[0]:.1f}" y="{-GROUND_AT * UNIT:.1f}" width="{ends[1] - ends[0]:.1f}" '
         f'height="{HATCH * UNIT:.1f}"/>'
@@ -149,10 +135,10 @@ def _link_as_svg(link: Link, chosen: bool) -> str:
 
 
 def _box_as_svg(box: Box) -> str:
-    x, y = (box.x - 0.5 * BOX) * UNIT, -(box.y + 0.5 * HIGH) * UNIT
+    x, y = (box.x - 0.5) * UNIT, -(box.y + 0.5 * HIGH) * UNIT
     size = min(15.0, 130.0 / len(box.name))
     drawn = (
-        f'<rect class="box{"" if box.measured else " blind"}" x="{x:.1f}" y="{y:.1f}" rx=6 width="{BOX * UNIT:.1f}" '
+        f'<rect class="box{"" if box.measured else " blind"}" x="{x:.1f}" y="{y:.1f}" rx=6 width="{UNIT:.1f}" '
         f'height="{HIGH * UNIT:.1f}"/><text class=name x="{box.x * UNIT:.1f}" y="{-box.y * UNIT + 5:.1f}" '
         f'font-size="{size:.1f}">{escape(box.name)}</text>'
     )

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import FancyBboxPatch, PathPatch
 from matplotlib.path import Path
 
-from study.figures.sketch import BOX, GROUND_AT, HATCH, HIGH, SEEN, SIDE, Box, Link, Sketch
+from study.figures.sketch import GROUND_AT, HATCH, HIGH, SEEN, SIDE, Box, Link, Sketch
 from study.support.numbers import percent
 
 GLOW = "C1"
@@ -19,7 +19,7 @@ def structure_sketch(axes: Axes, drawn: Sketch) -> Axes:
         _line(axes, link)
     for box in drawn.boxes:
         _box(axes, box)
-    ends = [-BOX, drawn.boxes[-1].x + BOX]
+    ends = [-1.0, drawn.boxes[-1].x + 1.0]
     axes.plot(ends, [GROUND_AT, GROUND_AT], color="0.2", linewidth=1.6)
     axes.fill_between(ends, GROUND_AT - HATCH, GROUND_AT, hatch="////", facecolor="none", edgecolor="0.55")
     axes.set_xlim(-SIDE, drawn.boxes[-1].x + SIDE)
@@ -56,7 +56,7 @@ def _line(axes: Axes, link: Link) -> None:
 def _box(axes: Axes, box: Box) -> None:
     axes.add_patch(
         FancyBboxPatch(
-            (box.x - 0.5 * BOX, box.y - 0.5 * HIGH), BOX, HIGH, boxstyle="round,pad=0,rounding_size=0.08",
+            (box.x - 0.5, box.y - 0.5 * HIGH), 1.0, HIGH, boxstyle="round,pad=0,rounding_size=0.08",
             facecolor="0.94" if box.measured else "white", edgecolor="0.15",
             linestyle="solid" if box.measured else "dashed", linewidth=1.3,
         )

@@ -1,22 +1,22 @@
-"""The gallery as one page for a browser, and as blocks of the documentation: words, tables and pictures of an entry."""
+"""The gallery of measured records: what is known of each, and what a climb left in its folder, read back.
 
+It is one page for a browser, and blocks of the documentation: words, tables and pictures of an entry.
+"""
+
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Any, Literal, cast
+
+from pydantic import BeforeValidator, Field
 
 from study.compare import history
-from study.gallery.findings_of_record import (
-    Beside,
-    Fields,
-    Literature,
-    RecordFindings,
-    found_beside,
-    literature,
-    published,
-    read_findings,
-)
 from study.support import document
-from study.support.document import Block, Fold, Heading, Image, PageSection, Picture, Text
+from study.support.config_files import TableRow, Text, read_rows
+from study.support.document import Block, Fold, Heading, Image, PageSection, Picture
+from study.support.errors import StudyError, expect
+from study.support.files import read_text
 from study.support.numbers import percent
 
 TITLE = "Measured records"
@@ -37,10 +37,131 @@ KEPT = (
     "climb/step_0/structure.png",
     "climb/response.png",
     "climb/step_0/constancy.png",
-)  # the first ...
-MOST = 2  # ... of these that there are stand in the documentation
+)  # the first two of these that there are stand in the documentation
 MISSING, NOTHING = "missing_effect", "nothing_missing"  # verdicts of diagnoses
-SHOWN = 5  # candidates
+Fields = dict[str, Any]
+
+
+# ---- what is known, and what a climb found
+
+
+class Literature(TableRow):
+    """One row of ``config/literature.tsv``: an entry of the gallery."""
+
+    entry: Text
+    title: Text
+    test: Text  # what was done to the structure
+    source: Text  # whose record it is
+    known: Text  # of the structure, before anything is fitted here
+
+
+class Published(TableRow):
+    """One row of ``config/published.tsv``: a value that others give.
+
+    ``key`` names a coefficient as histories do, a quotient of two with a stroke between, or of a free decay
+    ``frequency`` or ``damping`` with ``.loudest``, ``.largest`` or ``.quiet``.
+    """
+
+    record: Text
+    step: Literal["given", "reached"]  # the model as it is given, or as the climb leaves it
+    key: Text
+    quantity: Text
+    unit: str
+    value: Annotated[
+        float, BeforeValidator(lambda cell: float(cell) if isinstance(cell, str) else cell), Field(allow_inf_nan=False)
+    ]
+    within: Text  # how near one may expect to come, and why
+
+
+def literature(folder: Path) -> dict[str, Literature]:
+    """The entries by name, in the order in which the page shows them; a ``StudyError`` names the first fault."""
+    path = folder / "literature.tsv"
+    rows = [row for _, row in read_rows(path, Literature)]
+    names = [row.entry for row in rows]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    expect(twice is None, f"{path}: the entry {twice!r} stands twice; expected each once")
+    return {row.entry: row for row in rows}
+
+
+def published(folder: Path) -> list[Published]:
+    """Values that others give."""
+    return [row for _, row in read_rows(folder / "published.tsv", Published)]
+
+
+@dataclass(frozen=True)
+class RecordFindings:
+    """What was found of one row of ``config/measurements.tsv``."""
+
+    record: str
+    steps: tuple[Fields, ...]  # of the history
+    first: Fields  # the diagnosis of the model as given
+    last: Fields  # of the model reached
+    reached: Fields  # the comparison of that
+    folder: Path
+
+    @property
+    def equation(self) -> str:
+        """Of the model reached; empty for a structure, whose terms have places."""
+        return str(self.reached.get("model", {}).get("equation", ""))
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A published value with the one found."""
+
+    published: Published
+    found: float | None  # None where the model has no such coefficient
+    interval: tuple[float, float] | None  # 95 %
+
+
+def read_findings(folder: Path, record: str) -> RecordFindings:
+    """What the climb of a record left in ``folder``; a ``StudyError`` names a file that is not there or is no JSON."""
+    steps = _json(folder / "history.json")["steps"]
+    diagnoses = sorted((folder / "climb").glob("step_*/diagnosis.json"), key=lambda p: int(p.parent.name[5:]))
+    if not diagnoses:
+        raise StudyError(f"{folder}/climb holds no diagnosis; expected what 'snakemake {record}_climb' leaves there")
+    reached = _json(folder / "climb" / "comparison.json")
+    return RecordFindings(record, tuple(steps), _json(diagnoses[0]), _json(diagnoses[-1]), reached, folder)
+
+
+def _json(path: Path) -> Fields:
+    try:
+        return cast(Fields, json.loads(read_text(path, "JSON")))
+    except json.JSONDecodeError as error:
+        raise StudyError(f"{path}: line {error.lineno} is not JSON") from None
+
+
+def found_beside(row: Published, found: RecordFindings) -> Beside:
+    """The value found of what a row of published values names."""
+    what, _, where = row.key.partition(".")
+    if what in ("frequency", "damping") and where in ("loudest", "largest", "quiet"):
+        return Beside(row, *_of_decay(found.reached.get("decay"), what, where))
+    step = found.steps[0 if row.step == "given" else -1]
+    values = {c["key"]: c for c in step["coefficients"]}
+    over, _, under = row.key.partition("/")
+    if over not in values or (under and under not in values):
+        return Beside(row, None, None)
+    if under:
+        return Beside(row, values[over]["value"] / values[under]["value"], None)
+    interval = values[over]["interval"]
+    return Beside(row, values[over]["value"], None if interval is None else (interval[0], interval[1]))
+
+
+def _of_decay(decay: Fields | None, what: str, where: str) -> tuple[float | None, tuple[float, float] | None]:
+    """Of the loudest window, the largest of all that stand out of their errors, or the mean of the quietest quarter."""
+    if not decay:
+        return None, None
+    values, errors = decay["measured"][what], decay["measured"][f"{what}_error"]
+    if where == "loudest":
+        i = 0
+    elif where == "largest":  # not where it is known worst, but where it is largest for certain
+        i = max(range(len(values)), key=lambda j: values[j] - 1.96 * errors[j])
+    else:
+        quiet = range(len(values) - max(len(values) // 4, 2), len(values))
+        mean = sum(values[j] for j in quiet) / len(quiet)
+        error = (sum((values[j] - mean) ** 2 for j in quiet) / (len(quiet) * (len(quiet) - 1))) ** 0.5
+        return mean, (mean - 1.96 * error, mean + 1.96 * error)
+    return values[i], (values[i] - 1.96 * errors[i], values[i] + 1.96 * errors[i])
 
 
 @dataclass(frozen=True)
@@ -70,11 +191,14 @@ def entries(config: Path, results: Path, records: Mapping[str, Sequence[str]]) -
 def told(entry: Entry) -> list[Block]:
     """What stands in the literature, what each of the records shows, and published values beside those found."""
     known = entry.known
-    blocks: list[Block] = [Text(f"{known.test}. {known.source}"), Text(f"**In the literature.** {known.known}")]
+    blocks: list[Block] = [
+        document.Text(f"{known.test}. {known.source}"),
+        document.Text(f"**In the literature.** {known.known}"),
+    ]
     for one in entry.found:
         blocks += of_record(one, named=len(entry.found) > 1)
     if entry.values:
-        blocks += [Text("**Published values beside those found.**"), beside_each_other(entry.values)]
+        blocks += [document.Text("**Published values beside those found.**"), beside_each_other(entry.values)]
     return blocks
 
 
@@ -83,9 +207,9 @@ def of_record(found: RecordFindings, named: bool) -> list[Block]:
     begins = ", ".join(_spoken(name) for name in found.steps[0]["terms"])
     name = f"**`{found.record}`.** " if named else ""
     return [
-        Text(f"{name}The model is given as {begins}. **What is found.** {found.first['says']}"),
+        document.Text(f"{name}The model is given as {begins}. **What is found.** {found.first['says']}"),
         climb_block(found),
-        Text(f"**What is left.** {left(found)}"),
+        document.Text(f"**What is left.** {left(found)}"),
     ]
 
 
@@ -93,7 +217,7 @@ def climb_block(found: RecordFindings) -> Block:
     """Every model of the climb with its held-out error."""
     rows = [
         ("as given" if number == 0 else _spoken(history.label(step)), percent(step["error"]["response"]),
-         _in_units(step), percent(step["noise_floor"]["response"]))
+         f"{step['rms']:.3g} {step['unit']}" if step["unit"] else "", percent(step["noise_floor"]["response"]))
         for number, step in enumerate(found.steps)
     ]  # fmt: skip
     return document.table(("model", "held-out error", "rms", "noise floor"), rows)
@@ -112,7 +236,13 @@ def left(found: RecordFindings) -> str:
             "as far as this record can say."
         )
     if last["verdict"] == MISSING:
-        return f"{size} (noise floor {floor}): no noise. {_still(found)}"
+        first = last["candidates"][0]
+        tied = [_effect(t) for t in first.get("tied_with", ())]
+        also = f", which the record cannot tell from {', '.join(tied)}," if tied else ""
+        return (
+            f"{size} (noise floor {floor}): no noise. The diagnosis still names {_effect(first)}{also} and with it "
+            f"{percent(first['response_error'])} would be left; the climb ends here."
+        )
     depends = percent(last["left"]) if last.get("left") else "much"
     return (
         f"{size} (noise floor {floor}): no noise, but nothing with a name either. General functions of the motion "
@@ -120,22 +250,13 @@ def left(found: RecordFindings) -> str:
     )
 
 
-def _still(found: RecordFindings) -> str:
-    first = found.last["candidates"][0]
-    tied = [_effect(t) for t in first.get("tied_with", ())]
-    also = f", which the record cannot tell from {', '.join(tied)}," if tied else ""
-    return (
-        f"The diagnosis still names {_effect(first)}{also} and with it {percent(first['response_error'])} would be "
-        "left; the climb ends here."
-    )
-
-
 def candidates(found: RecordFindings) -> Block:
     """The first candidates of the model as given."""
     rows = [
-        (_effect(c), percent(c["explained"]), percent(c["response_error"]), _changes(c),
+        (_effect(c), percent(c["explained"]), percent(c["response_error"]),
+         _changes(c),
          ", ".join(_effect(t) for t in c["tied_with"][:3]))
-        for c in found.first["candidates"][:SHOWN]
+        for c in found.first["candidates"][:5]
     ]  # fmt: skip
     return document.table(("candidate", "explains", "error with it", "its coefficient changes by", "tied with"), rows)
 
@@ -160,10 +281,6 @@ def beside_each_other(values: Sequence[Beside]) -> Block:
 
 def _number(value: float, unit: str) -> str:
     return f"{value:.4g} {unit}".strip()
-
-
-def _in_units(step: Fields) -> str:
-    return f"{step['rms']:.3g} {step['unit']}" if step["unit"] else ""
 
 
 def _effect(candidate: Fields | str) -> str:
@@ -226,7 +343,7 @@ def climb_pictures(found: RecordFindings) -> list[Picture]:
 
 def kept(found: RecordFindings) -> list[str]:
     """Names of the pictures that the documentation keeps of a record."""
-    return [name for name in KEPT if (found.folder / name).is_file()][:MOST]
+    return [name for name in KEPT if (found.folder / name).is_file()][:2]
 
 
 def picture_name(found: RecordFindings, name: str) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from study.equations import model as equations
-from study.equations import model_entry, model_file, terms
+from study.equations import model_file, terms
 from study.equations.model import ModelTerm
 from study.equations.redundancy import repeated_force
 from study.interface.data import Record
@@ -47,7 +47,7 @@ def term(name: str, *, force: str | None = None, **values: float) -> ModelTerm:
     <Term cubic_stiffness: u**3; k3 = 2e+07>
     """
     given: dict[object, object] = {"term": name, **({} if force is None else {"force": force}), **values}
-    return Term.of(model_entry.entry_from(given))
+    return Term.of(model_file.entry_from(given))
 
 
 @dataclass(frozen=True, repr=False)

@@ -7,7 +7,6 @@ the record. Integration is limited to frequencies above a cut-off: drift and off
 by (2 pi f)^2, would otherwise dominate. The remaining band is reported, and judgements are limited to it.
 """
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,37 +17,22 @@ from study.records.spectra import Segments, autospectrum
 from study.support.arrays import Floats
 from study.support.autoregression import burg, continued_by
 from study.support.errors import StudyError
-from study.support.units import ROLES, VOLTAGE, Unit, parse_unit, role_unit
+from study.support.units import ROLES, VOLTAGE, parse_unit, role_unit
 
-ORDER = 64  # coefficients of the linear prediction at each end
-TRAINING = 4096  # samples from which the linear prediction is estimated
 SHORTEST = 512  # samples by which each end is continued, at least
 RINGING = 4.0  # periods of the cut-off frequency by which ends are continued when integrating
 SETTLED = 2.0  # periods of the cut-off frequency at each end where an integrated channel is uncertain
-AVERAGES = 16  # segments, at least, for the spectrum that the cut-off is read from
-NEAR_END = 8  # samples at each end where a derivative depends on the continuation
+NEAR_END = 8  # samples at each end where a derivative, or a filter, depends on the continuation
 
 
 @dataclass(frozen=True)
 class CompletedRecord:
-    """A record with displacement, velocity and acceleration in one set of units.
+    """A record with displacement, velocity and acceleration in one set of units."""
 
-    Attributes
-    ----------
-    record : Record
-        Forces, the three motions of every measured coordinate and any extra channels.
-    band : (float, float)
-        Lowest and highest frequency in hertz at which all motions are valid.
-    edge : int
-        Samples at each end that derivatives and integrals leave uncertain; 0 if nothing was computed.
-    notes : tuple of str
-        What was converted or computed, a sentence each.
-    """
-
-    record: Record
-    band: tuple[float, float]
-    edge: int
-    notes: tuple[str, ...]
+    record: Record  # forces, the three motions of every measured coordinate and any extra channels
+    band: tuple[float, float]  # lowest and highest frequency in hertz at which all motions are valid
+    edge: int  # samples at each end that derivatives and integrals leave uncertain; 0 if nothing was computed
+    notes: tuple[str, ...]  # what was converted or computed, a sentence each
 
 
 def complete(record: Record, cutoff: float | None = None) -> CompletedRecord:
@@ -63,11 +47,6 @@ def complete(record: Record, cutoff: float | None = None) -> CompletedRecord:
         zero). Default: :func:`suggest_cutoff` for each coordinate. If displacement and acceleration of one are both
         measured, the velocity is the derivative of the one below the cut-off and the integral of the other above it;
         without a cut-off it is the derivative of the displacement.
-
-    Raises
-    ------
-    StudyError
-        If no motion was measured, units cannot be converted, or the cut-off is outside of (0, 1/(2 dt)).
     """
     if not record.sensors:
         raise StudyError(f"{record.name}: no displacement, velocity or acceleration is there; at least one is needed")
@@ -88,8 +67,9 @@ def complete(record: Record, cutoff: float | None = None) -> CompletedRecord:
         record = replace(record.with_channels(motions), computed=record.computed.union(motions))
         low, edge = max(low, found.low), max(edge, found.edge)
         for sentence in found.notes:
-            said.setdefault(sentence, []).append(coordinate)
-    return CompletedRecord(record, (low, nyquist), edge, (*notes, *(_where(s, at) for s, at in said.items())))
+            said.setdefault(sentence, []).extend([coordinate] if coordinate else [])
+    placed = (f"{', '.join(named)}: {sentence}" if named else sentence for sentence, named in said.items())
+    return CompletedRecord(record, (low, nyquist), edge, (*notes, *placed))
 
 
 @dataclass(frozen=True)
@@ -100,12 +80,6 @@ class _Filled:
     low: float  # hertz below which they are not valid
     edge: int
     notes: tuple[str, ...]
-
-
-def _where(sentence: str, coordinates: Sequence[str]) -> str:
-    """A sentence on some coordinates, which it names unless it is the only one, without a name."""
-    named = [coordinate for coordinate in coordinates if coordinate]
-    return f"{', '.join(named)}: {sentence}" if named else sentence
 
 
 _OPERATION = {1: "derivative", 2: "second derivative", -1: "integral", -2: "double integral"}
@@ -160,7 +134,9 @@ def derivative(values: Floats, dt: float, order: int, cutoff: float = 0.0) -> Fl
     spectrum = rfft(longer, size)
     frequency = np.asarray(rfftfreq(size, dt))
     omega = 2.0 * np.pi * frequency
-    gain = _pass_above(frequency, cutoff)
+    gain = np.ones_like(frequency)
+    if cutoff > 0.0:
+        gain = 0.5 - 0.5 * np.cos(np.pi * np.clip(2.0 * frequency / cutoff - 1.0, 0.0, 1.0))
     np.divide(gain, omega**-order, out=gain, where=omega > 0.0) if order < 0 else np.multiply(gain, omega**order, gain)
     turned = spectrum * gain * 1j**order
     if size % 2 == 0 and order % 2:
@@ -168,13 +144,6 @@ def derivative(values: Floats, dt: float, order: int, cutoff: float = 0.0) -> Fl
     before = (len(longer) - len(values)) // 2
     result = irfft(turned, size)[before : before + len(values)]
     return result + mean if order == 0 and cutoff == 0.0 else np.asarray(result)
-
-
-def _pass_above(frequency: Floats, cutoff: float) -> Floats:
-    if cutoff == 0.0:
-        return np.ones_like(frequency)
-    rise = np.clip(2.0 * frequency / cutoff - 1.0, 0.0, 1.0)
-    return 0.5 - 0.5 * np.cos(np.pi * rise)
 
 
 def with_continuations(values: Floats, reach: int) -> Floats:
@@ -191,9 +160,9 @@ def _predicted(values: Floats, reach: int) -> Floats:
 
     A prediction of high order is stable in exact arithmetic only; one that grows is replaced by a shorter one.
     """
-    recent = values[-TRAINING:]
+    recent = values[-4096:]  # from which it is estimated
     limit = 2.0 * float(np.max(np.abs(recent)))
-    order = min(ORDER, len(recent) // 3)
+    order = min(64, len(recent) // 3)
     while order > 0:
         continued = continued_by(burg(recent, order), recent, reach)
         if float(np.max(np.abs(continued), initial=0.0)) <= limit:
@@ -210,25 +179,21 @@ def suggest_cutoff(record: Record, coordinate: str = ALONE) -> float:
     falling for an octave; at most where the measured motion is strongest.
     """
     sensor = next(s for m in reversed(MOTIONS) if (s := Sensor(coordinate, m)) in record)
-    length = min(len(record), max(32, min(4096, 2 * len(record) // AVERAGES)))
+    length = min(len(record), max(32, min(4096, len(record) // 8)))
     frequency, power = autospectrum(record[sensor], record.dt, Segments(length))
     frequency, power = frequency[2:], power[2:]
-    displacement = _smooth(power) / frequency ** (2 * MOTIONS.index(sensor.motion))
+    line = np.arange(len(power))
+    half = np.maximum(1, np.floor(line * 0.115)).astype(int)  # of a third of an octave, or of three lines
+    first, last = np.maximum(line - half, 0), np.minimum(line + half + 1, len(power))
+    total = np.concatenate([[0.0], np.cumsum(power)])
+    smooth = (total[last] - total[first]) / (last - first)
+    displacement = smooth / frequency ** (2 * MOTIONS.index(sensor.motion))
     strongest = int(np.argmax(power))
     for k in range(strongest):
         octave = (frequency > frequency[k]) & (frequency <= 2.0 * frequency[k])
         if np.all(displacement[octave] >= displacement[k]):
             return float(frequency[k])
     return float(frequency[strongest])
-
-
-def _smooth(power: Floats) -> Floats:
-    """Mean over a third of an octave, or three lines where that is more."""
-    total = np.concatenate([[0.0], np.cumsum(power)])
-    line = np.arange(len(power))
-    half = np.maximum(1, np.floor(line * 0.115)).astype(int)
-    first, last = np.maximum(line - half, 0), np.minimum(line + half + 1, len(power))
-    return np.asarray((total[last] - total[first]) / (last - first))
 
 
 def consistent(record: Record) -> tuple[Record, tuple[str, ...]]:
@@ -240,37 +205,28 @@ def consistent(record: Record) -> tuple[Record, tuple[str, ...]]:
     """
     sensors = sorted(record.sensors, key=lambda s: (record.coordinates.index(s.coordinate), MOTIONS.index(s.motion)))
     units = {str(s): role_unit(s.motion, record.unit(s)) for s in sensors}
-    if len({u.powers[3] for u in units.values()}) > 1:
+    if len({u.powers.voltage for u in units.values()}) > 1:
         mixed = ", ".join(f"{channel} in {u.text}" for channel, u in units.items())
         raise StudyError(f"{record.name}: {mixed} cannot be compared; expected all calibrated, or all in volts")
     turning = record.rotations
     straight = [units[str(s)] for s in sensors if s.coordinate not in turning]
-    length = _length(straight[0]) if straight else "m"
+    first = straight[0].text.replace("/", " ").split()[0] if straight else "m"  # ``mm`` in ``mm/s^2``
+    length = first if parse_unit(first).powers in (ROLES["displacement"][0], VOLTAGE) else "m"
     wanted: dict[str, str] = {}
     for sensor in (Sensor(c, m) for c in record.coordinates for m in MOTIONS):
         own = "rad" if sensor.coordinate in turning else length
         wanted[str(sensor)] = (own, f"{own}/s", f"{own}/s^2")[MOTIONS.index(sensor.motion)]
     if record.coordinates != (ALONE,):
         forces = {name: role_unit("force", record.unit(name)) for name in record.forces}
+        first = next((u.text for u in forces.values() if u.powers == ROLES["force"][0]), "N")
         units |= forces
-        wanted |= _of_forces(forces, length)
+        for name, u in forces.items():
+            wanted[name] = u.text if u.powers.voltage else f"{first} {length}" if u.powers.length else first
     channels: dict[str, Floats] = {}
     notes: list[str] = []
     for channel, unit in units.items():
         factor = unit.factor / parse_unit(wanted[channel]).factor
-        if unit.powers[3] == 0 and factor != 1.0:
+        if unit.powers.voltage == 0 and factor != 1.0:
             channels[channel] = record[channel] * factor
             notes.append(f"{channel} is converted from {unit.text} to {wanted[channel]}")
     return replace(record.with_channels(channels), units={**record.units, **wanted}), tuple(notes)
-
-
-def _of_forces(forces: Mapping[str, Unit], length: str) -> dict[str, str]:
-    """One unit for all forces, and that times the length for all moments."""
-    first = next((u.text for u in forces.values() if u.powers == ROLES["force"][0]), "N")
-    return {n: u.text if u.powers[3] else f"{first} {length}" if u.powers[1] else first for n, u in forces.items()}
-
-
-def _length(unit: Unit) -> str:
-    """The unit of length in a unit of motion: ``mm`` in ``mm/s^2``, ``m`` in ``g``."""
-    first = unit.text.replace("/", " ").split()[0]
-    return first if parse_unit(first).powers in (ROLES["displacement"][0], VOLTAGE) else "m"

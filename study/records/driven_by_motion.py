@@ -13,9 +13,10 @@ import numpy as np
 from study.records.completion import consistent, derivative
 from study.records.noise_floor import floor
 from study.records.record import MOTIONS, SI_UNITS, Record
-from study.records.spectra import Segments, autospectrum
+from study.records.spectra import Segments, autospectrum, segment_length
 from study.support.arrays import Floats
 from study.support.errors import StudyError, at, expect
+from study.support.numbers import LAST_DIGITS
 from study.support.units import parse_unit
 
 BASE = tuple(f"base_{motion}" for motion in MOTIONS)
@@ -23,8 +24,6 @@ SAID = "the base moves: its acceleration, the other way round, is the force"
 PER_MASS = "all coefficients are per unit mass (give the inertia in the model for those of the structure)"
 LIKE = 0.02  # of its rms: a velocity that differs by less from a difference of the displacement is that difference
 ABOVE = 10.0  # the motion is followed up to the highest line at which it stands so many times above its noise
-LINES = 256
-ROUNDING = 1e-9  # of the range
 DIGITAL = 0.95  # of all changes that are whole steps: then a displacement is digitised
 
 
@@ -44,15 +43,17 @@ def relative_to_base(record: Record, mass: float | None, absolute: bool) -> tupl
         That the model gives; None for coefficients per unit mass.
     absolute : bool
         Whether the response was measured absolutely: the base's own motion is then subtracted.
-
-    Raises
-    ------
-    StudyError
-        If the base's motion that has to be subtracted was not measured, or a unit is none of it.
     """
     record, notes = consistent(record)
     length = record.units["displacement"]
-    base = {motion: _converted(record, motion, length) for motion in MOTIONS if f"base_{motion}" in record}
+    base = dict[str, Floats]()
+    for motion, wanted in zip(MOTIONS, (length, f"{length}/s", f"{length}/s^2"), strict=True):
+        if (channel := f"base_{motion}") in record:
+            text, target = record.units.get(channel) or SI_UNITS[motion], parse_unit(wanted)
+            with at(f"{record.name}: {channel}"):
+                unit, usual = parse_unit(text), f"expected {SI_UNITS[motion]} or the like"
+                expect(unit.powers == target.powers, f"{text!r} is no unit of {motion}; {usual}")
+            base[motion] = record[channel] * (unit.factor / target.factor)
     known = next(motion for motion in reversed(MOTIONS) if motion in base)
     order = MOTIONS.index("acceleration") - MOTIONS.index(known)
     acceleration = base[known] if order == 0 else derivative(base[known], record.dt, order)
@@ -74,19 +75,6 @@ def relative_to_base(record: Record, mass: float | None, absolute: bool) -> tupl
     return replace(record, channels={**kept, **channels}, units=units), tuple(said)
 
 
-def _converted(record: Record, motion: str, length: str) -> Floats:
-    """A motion of the base in the unit of the response's."""
-    channel = f"base_{motion}"
-    text = record.units.get(channel) or SI_UNITS[motion]
-    wanted = (length, f"{length}/s", f"{length}/s^2")[MOTIONS.index(motion)]
-    with at(f"{record.name}: {channel}"):
-        unit, target = parse_unit(text), parse_unit(wanted)
-        expect(
-            unit.powers == target.powers, f"{text!r} is no unit of {motion}; expected {SI_UNITS[motion]} or the like"
-        )
-    return record[channel] * (unit.factor / target.factor)
-
-
 def with_prescribed_motion(record: Record) -> tuple[Record, tuple[str, ...]]:
     """A record whose velocity may be trusted beside its displacement, and sentences on what was changed.
 
@@ -105,7 +93,11 @@ def with_prescribed_motion(record: Record) -> tuple[Record, tuple[str, ...]]:
             return record, notes
         notes = (*notes, "the velocity in the file is the difference to the sample before, which lags by half a sample")
     u = _without_flicker(u)
-    highest = _highest(u, record.dt)
+    cut = Segments(segment_length(len(u), held=4, most=256))
+    frequency, power = autospectrum(u - np.mean(u), record.dt, cut)
+    noise = floor(u - np.mean(u), record.dt).noise ** 2 * 2.0 * record.dt
+    above = np.flatnonzero(power > ABOVE * noise)
+    highest = float(frequency[above[-1]]) if len(above) else 0.5 / record.dt
     velocity = _smooth_slope(u, record.dt, highest)
     channels = {"velocity": velocity, "acceleration": np.gradient(velocity, record.dt)}
     said = f"velocity is the derivative of the displacement below {highest:.3g} Hz, above which that is noise"
@@ -119,7 +111,7 @@ def _without_flicker(u: Floats) -> Floats:
     the play of one step does, half a step behind either way; a displacement that is not in steps stays as it is.
     """
     change = np.abs(np.diff(u))
-    steps = change[change > ROUNDING * float(np.ptp(u))]
+    steps = change[change > LAST_DIGITS * float(np.ptp(u))]
     step = float(np.min(steps)) if len(steps) else 0.0
     if step == 0.0 or float(np.mean(np.abs(steps / step - np.rint(steps / step)) < 0.05)) < DIGITAL:
         return u
@@ -128,14 +120,6 @@ def _without_flicker(u: Floats) -> Floats:
         follower = min(max(follower, value - 0.5 * step), value + 0.5 * step)
         held[i] = follower
     return held
-
-
-def _highest(u: Floats, dt: float) -> float:
-    """The highest frequency in hertz at which a displacement stands above its noise."""
-    frequency, power = autospectrum(u - np.mean(u), dt, Segments(min(LINES, 2 ** int(np.log2(len(u) // 4)))))
-    noise = floor(u - np.mean(u), dt).noise ** 2 * 2.0 * dt
-    above = np.flatnonzero(power > ABOVE * noise)
-    return float(frequency[above[-1]]) if len(above) else 0.5 / dt
 
 
 def _smooth_slope(u: Floats, dt: float, highest: float) -> Floats:

@@ -13,8 +13,9 @@ from scipy.fft import irfft, rfft
 
 from study.support.arrays import Complexes, Floats, Ints
 from study.support.errors import StudyError
+from study.support.numbers import LAST_DIGITS
 
-FORCE_STREAM, NOISE_STREAM = 0, 1
+STREAMS = ("force", "noise")  # of random numbers, that one seed gives
 READINGS = ("raw", "filtered")
 SWEEPS = ("linear", "logarithmic")
 SETTINGS = {  # settings of each kind, beside kind, level and periods
@@ -23,51 +24,29 @@ SETTINGS = {  # settings of each kind, beside kind, level and periods
     "random_phase_multisine": ("start_frequency", "stop_frequency", "odd_only"),
     "swept_sine": ("start_frequency", "stop_frequency", "sweep"),
 }
-ROUNDING = 1e-9  # relative: a cut-off at a line of the record keeps that line
 
 
 @dataclass(frozen=True)
 class Excitation:
     """Kind and settings of a force; :func:`force` gives its history.
 
-    Attributes
-    ----------
-    kind : str
-        ``gaussian_lowpass`` (the report's, Section 2.1), ``pierson_moskowitz``,
-        ``random_phase_multisine`` or ``swept_sine``.
-    level : float
-        Mean square of the force in N^2.
-    reading : str
-        What ``level`` is the variance of, for ``gaussian_lowpass``: the ``raw`` white sequence before its low-pass,
-        of which a share of twice the cut-off over the sampling rate remains, or the ``filtered`` force. Both hold
-        in expectation.
-    cutoff : float
-        Highest frequency in Hz of the two random kinds.
-    peak_frequency : float
-        Where the Pierson-Moskowitz autospectrum has its peak, in Hz.
-    start_frequency, stop_frequency : float
-        Band of the multisine; first and last frequency of the sweep, which may fall. In Hz.
-    odd_only : bool
-        Whether the multisine leaves out the even harmonics of its period.
-    sweep : str
-        ``linear`` or ``logarithmic`` in frequency.
-    periods : int
-        How often the same history is repeated in the record.
+    The ``level`` of ``gaussian_lowpass`` (the report's, Section 2.1) is the variance, in expectation, of the ``raw``
+    white sequence before its low-pass, of which a share of twice the cut-off over the sampling rate remains, or of the
+    ``filtered`` force: that is its ``reading``.
     """
 
-    kind: str = "gaussian_lowpass"
-    level: float = 1.0
-    reading: str = "raw"
-    cutoff: float = 12.5
-    peak_frequency: float = 3.0
-    start_frequency: float = 0.1
+    kind: str = "gaussian_lowpass"  # a key of ``SETTINGS``
+    level: float = 1.0  # mean square of the force in N^2
+    reading: str = "raw"  # one of ``READINGS``
+    cutoff: float = 12.5  # highest frequency in Hz of the two random kinds
+    peak_frequency: float = 3.0  # where the Pierson-Moskowitz autospectrum has its peak, in Hz
+    start_frequency: float = 0.1  # lower end of the multisine's band; where a sweep begins, which may fall. In Hz
     stop_frequency: float = 12.5
-    odd_only: bool = False
-    sweep: str = "linear"
-    periods: int = 1
+    odd_only: bool = False  # whether the multisine leaves out the even harmonics of its period
+    sweep: str = "linear"  # or ``logarithmic``, in frequency
+    periods: int = 1  # how often the same history is repeated in the record
 
     def __post_init__(self) -> None:
-        """Refuse settings that no force can have."""
         for name, known in (("kind", tuple(_HISTORIES)), ("reading", READINGS), ("sweep", SWEEPS)):
             if getattr(self, name) not in known:
                 raise StudyError(f"{name} of the excitation is {getattr(self, name)!r}; it may be {', '.join(known)}")
@@ -110,7 +89,7 @@ def force(excitation: Excitation, samples: int, dt: float, seed: int) -> Floats:
     The same seed gives the same bytes. A swept sine is not random and is the same for all.
     """
     length = _checked_period(excitation, samples, dt)
-    period = _HISTORIES[excitation.kind](excitation, length, dt, _generator(seed, FORCE_STREAM))
+    period = _HISTORIES[excitation.kind](excitation, length, dt, _generator(seed, "force"))
     return np.tile(period, excitation.periods)
 
 
@@ -133,13 +112,13 @@ def displacement_noise(displacement: Floats, fraction: float, seed: int) -> Floa
     if not (np.isfinite(fraction) and fraction >= 0.0):
         raise StudyError(f"noise fraction is {fraction:g}; a ratio of mean squares is finite and not negative")
     scale = np.sqrt(fraction * np.mean(displacement**2))
-    return scale * _generator(seed, NOISE_STREAM).standard_normal(len(displacement))
+    return scale * _generator(seed, "noise").standard_normal(len(displacement))
 
 
-def _generator(seed: int, stream: int) -> np.random.Generator:
+def _generator(seed: int, stream: str) -> np.random.Generator:
     if seed < 0:
         raise StudyError(f"seed is {seed}; it must be a whole number of at least 0")
-    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(stream,))))
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(STREAMS.index(stream),))))
 
 
 def _checked_period(excitation: Excitation, samples: int, dt: float) -> int:
@@ -152,7 +131,7 @@ def _checked_period(excitation: Excitation, samples: int, dt: float) -> int:
             "take a multiple of the number of periods"
         )
     nyquist = 0.5 / dt
-    if excitation.highest > nyquist * (1.0 + ROUNDING):
+    if excitation.highest > nyquist * (1.0 + LAST_DIGITS):
         raise StudyError(
             f"the excitation reaches {excitation.highest:g} Hz, above the Nyquist frequency of {nyquist:g} Hz "
             f"at a sampling interval of {dt:g} s; take a lower frequency or a shorter interval"
@@ -162,7 +141,7 @@ def _checked_period(excitation: Excitation, samples: int, dt: float) -> int:
 
 def _passed(excitation: Excitation, length: int, dt: float) -> int:
     """Number of lines of a real FFT from zero up to and with the cut-off."""
-    return min(int(excitation.cutoff * length * dt * (1.0 + ROUNDING)), length // 2) + 1
+    return min(int(excitation.cutoff * length * dt * (1.0 + LAST_DIGITS)), length // 2) + 1
 
 
 def _raw_variance(excitation: Excitation, length: int, dt: float) -> float:
@@ -182,7 +161,7 @@ def _gaussian_lowpass(excitation: Excitation, length: int, dt: float, generator:
 
 def _gaussian_lowpass_density(excitation: Excitation, frequency: Floats, length: int, dt: float) -> Floats:
     density = 2.0 * dt * _raw_variance(excitation, length, dt)
-    return np.where(np.abs(frequency) <= excitation.cutoff * (1.0 + ROUNDING), density, 0.0)
+    return np.where(np.abs(frequency) <= excitation.cutoff * (1.0 + LAST_DIGITS), density, 0.0)
 
 
 def _pierson_moskowitz(excitation: Excitation, length: int, dt: float, generator: np.random.Generator) -> Floats:
@@ -201,7 +180,7 @@ def _pierson_moskowitz_density(excitation: Excitation, frequency: Floats, _lengt
 
     The significant level, four root mean squares, is ``4 sqrt(level)``. What lies above the cut-off is omitted.
     """
-    inside = (frequency > 0.0) & (frequency <= excitation.cutoff * (1.0 + ROUNDING))
+    inside = (frequency > 0.0) & (frequency <= excitation.cutoff * (1.0 + LAST_DIGITS))
     f = np.where(inside, frequency, excitation.cutoff)
     ratio = (excitation.peak_frequency / f) ** 4
     return np.where(inside, 5.0 * excitation.level * ratio / f * np.exp(-1.25 * ratio), 0.0)
@@ -210,8 +189,8 @@ def _pierson_moskowitz_density(excitation: Excitation, frequency: Floats, _lengt
 def _lines(excitation: Excitation, length: int, dt: float) -> Ints:
     """Harmonics of the period which a multisine holds."""
     span = length * dt
-    first = max(1, int(np.ceil(excitation.start_frequency * span * (1.0 - ROUNDING))))
-    last = min(int(excitation.stop_frequency * span * (1.0 + ROUNDING)), (length - 1) // 2)
+    first = max(1, int(np.ceil(excitation.start_frequency * span * (1.0 - LAST_DIGITS))))
+    last = min(int(excitation.stop_frequency * span * (1.0 + LAST_DIGITS)), (length - 1) // 2)
     lines = np.arange(first, last + 1)
     lines = lines[lines % 2 == 1] if excitation.odd_only else lines
     if len(lines) == 0:

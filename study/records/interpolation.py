@@ -5,17 +5,15 @@ an integrator with several steps a sample would respond to. Band-limited interpo
 content above its Nyquist frequency.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.fft import irfft, rfft
 
-from study.records.record import Record
+from study.records.completion import SHORTEST
+from study.records.record import Record, Stretch
 from study.support.arrays import Floats, Ints
 
 BAND_LIMITED = "band_limited"
 READINGS = (BAND_LIMITED, "straight", "held")
-EDGE = 512  # samples by which a record that does not close on itself is continued at each end
 CLOSES = 10.0  # a record that does not close has many times the energy there of one whose ends are continued
 
 
@@ -38,52 +36,39 @@ def between_samples(values: Floats, factor: int, reading: str = BAND_LIMITED) ->
         fine = np.append(np.repeat(values[:-1], factor), values[-1])
         fine[factor:-1:factor] = 0.5 * (values[:-2] + values[1:-1])
         return fine
-    edge = min(EDGE, n - 1)
-    longer = _reflected(values, edge)
-    if _closes(values, longer):
+    if closes(values):
         return _periodic(values, factor)[: factor * (n - 1) + 1]
+    longer = _reflected(values)
+    edge = (len(longer) - n) // 2
     return _periodic(longer, factor)[factor * edge : factor * (edge + n - 1) + 1]
 
 
 def closes(values: Floats) -> bool:
     """Whether a record goes on from its last sample to its first without a jump, as a period of a force does."""
-    return _closes(values, _reflected(values, min(EDGE, len(values) - 1)))
+    return _top_energy(values) <= CLOSES * _top_energy(_reflected(values))
 
 
-def _closes(values: Floats, longer: Floats) -> bool:
-    return _top_energy(values) <= CLOSES * _top_energy(longer)
-
-
-def _reflected(values: Floats, edge: int) -> Floats:
+def _reflected(values: Floats) -> Floats:
     """A record continued at both ends by point reflection that is faded out, shape (n + 2 edge,)."""
+    edge = min(SHORTEST, len(values) - 1)
     fade = 0.5 - 0.5 * np.cos(np.pi * np.arange(edge) / edge)
     before = (2.0 * values[0] - values[edge:0:-1]) * fade
     after = (2.0 * values[-1] - values[-2 : -edge - 2 : -1]) * fade[::-1]
     return np.concatenate([before, values, after])
 
 
-@dataclass(frozen=True, eq=False)
-class ContinuousRun:
-    """Samples of a record along which one motion runs: stretches that continue each other, and what lies between."""
+def runs_of(record: Record) -> tuple[tuple[Stretch, ...], Ints]:
+    """The motions of a record that is strung together, and the place of each of its samples in them, shape (n,).
 
-    source: Record
-    first: int
-    last: int
-
-    def __len__(self) -> int:
-        """Number of samples."""
-        return self.last - self.first
-
-
-def runs_of(record: Record) -> tuple[tuple[ContinuousRun, ...], Ints]:
-    """The motions of a record that is strung together, and the place of each of its samples in them, shape (n,)."""
-    runs, places, begin = list[ContinuousRun](), list[Ints](), 0
+    One motion runs along stretches that continue each other, and what lies between.
+    """
+    runs, places, begin = list[Stretch](), list[Ints](), 0
     for stretch in record.stretches:
         if stretch.continues and runs:
-            runs[-1] = ContinuousRun(runs[-1].source, runs[-1].first, stretch.last)
+            runs[-1] = Stretch(runs[-1].source, runs[-1].first, stretch.last)
         else:
             begin += len(runs[-1]) if runs else 0
-            runs.append(ContinuousRun(stretch.source, stretch.first, stretch.last))
+            runs.append(Stretch(stretch.source, stretch.first, stretch.last))
         places.append(begin - runs[-1].first + np.arange(stretch.first, stretch.last))
     return tuple(runs), np.concatenate(places)
 
@@ -97,11 +82,10 @@ def between_runs(record: Record, name: str, factor: int) -> Floats:
     parts: list[Floats] = []
     runs, places = runs_of(record)
     own, begin = name in record.changed, 0
-    reading = record.between if name in record.forces else BAND_LIMITED
     for run in runs:
         inside = (places >= begin) & (places < begin + len(run))
         along = np.interp(np.arange(begin, begin + len(run)), places[inside], record[name][inside]) if own else None
-        fine = between_samples(run.source[name] if along is None else along, factor, reading)
+        fine = between_samples(run.source[name] if along is None else along, factor, record.reading(name))
         fine = fine[0 if own else factor * run.first :][: factor * len(run)]
         parts.append(np.pad(fine, (0, factor * len(run) - len(fine)), mode="edge"))
         begin += len(run)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
-from study.records.spectra import Segments, autospectrum
+from study.records.spectra import Segments, autospectrum, segment_length
 from study.support.arrays import Floats
 from study.support.errors import StudyError
 
@@ -23,32 +23,22 @@ QUIET = 5  # bands, the quietest, that give the floor
 
 @dataclass(frozen=True)
 class Floor:
-    """Noise, and what stands above it, in a residual.
+    """Noise, and what stands above it, in a residual."""
 
-    Attributes
-    ----------
-    noise : float
-        Root mean square of white noise at the density of the quietest bands.
-    excess : float
-        Mean square above it.
-    excess_error : float
-        Standard error of the excess if there were noise alone.
-    """
-
-    noise: float
-    excess: float
-    excess_error: float
+    noise: float  # root mean square of white noise at the density of the quietest bands
+    excess: float  # mean square above it
+    excess_error: float  # standard error of the excess if there were noise alone
 
     @property
     def significance(self) -> float:
-        """Excess in its own standard errors."""
         return self.excess / self.excess_error if self.excess_error > 0.0 else np.inf
 
 
 def floor(residual: Floats, dt: float, low: float = 0.0) -> Floor:
     """Split a residual into noise floor and what stands above it, both above the frequency ``low`` (hertz)."""
-    length = max(32, min(1024, 2 ** int(np.log2(len(residual) / 8))))
-    segments = Segments(length=length)
+    from scipy.special import ndtri
+
+    segments = Segments(segment_length(len(residual), held=8, fewest=32, most=1024))
     frequency, density = autospectrum(residual, dt, segments)
     averages = segments.effective_averages(len(residual))
     kept = density[1:-1][frequency[1:-1] >= low]
@@ -63,21 +53,15 @@ def floor(residual: Floats, dt: float, low: float = 0.0) -> Floor:
     means, lines = (np.array([measure(band) for band in bands]) for measure in (np.mean, len))
     spread = 1.0 / np.sqrt(averages * lines / segments.line_inflation())
     quiet = np.argsort(means)[:quietest]
-    # The quietest of many equal bands lie below their common level by about one standard deviation.
-    level = float(np.mean(means[quiet])) * (1.0 + _selection(count, quietest) * float(np.mean(spread)))
+    # The quietest of many equal bands lie below their common level by about one standard deviation: by the mean of the
+    # lowest of so many normal numbers (Blom, 1958).
+    below = -float(np.mean(ndtri((np.arange(1, quietest + 1) - 0.375) / (count + 0.25))))
+    level = float(np.mean(means[quiet])) * (1.0 + below * float(np.mean(spread)))
     width = float(frequency[1])
     above = np.clip(means - level, 0.0, None) * lines * width
     error = float(np.sqrt(np.sum((level * spread * lines * width) ** 2)))
     bias = 0.4 * error * np.sqrt(count)  # what clipping at zero adds for noise alone: 0.4 sigma a band
     return Floor(float(np.sqrt(level * (0.5 / dt - low))), max(float(np.sum(above)) - bias, 0.0), error)
-
-
-def _selection(bands: int, quiet: int) -> float:
-    """Mean of the lowest ``quiet`` of ``bands`` standard normal numbers, its sign turned (Blom, 1958)."""
-    from scipy.special import ndtri
-
-    ranks = (np.arange(1, quiet + 1) - 0.375) / (bands + 0.25)
-    return -float(np.mean(ndtri(ranks)))
 
 
 def band_above_noise(values: Floats, dt: float, low: float) -> tuple[Floats, Floats] | None:
@@ -88,7 +72,7 @@ def band_above_noise(values: Floats, dt: float, low: float) -> tuple[Floats, Flo
     found = floor(values, dt, low)
     if found.significance <= SIGNIFICANT:
         return None
-    cut = Segments(length=max(32, min(1024, 2 ** int(np.log2(len(values) / 8)))))
+    cut = Segments(segment_length(len(values), held=8, fewest=32, most=1024))
     frequency, density = autospectrum(values, dt, cut)
     white = found.noise**2 / (0.5 / dt - low)
     smooth = np.convolve(np.pad(density, SMOOTH // 2, mode="edge"), np.ones(SMOOTH) / SMOOTH, "valid")

@@ -24,12 +24,11 @@ class Outputs:
     weights: tuple[float, ...]  # one for each sensor; 1 for a single one
 
     def __len__(self) -> int:
-        """Number of sensors."""
         return len(self.sensors)
 
     def measured(self, record: Record, span: tuple[int, int]) -> Floats:
         """What the sensors show along a span, shape (n, sensors)."""
-        return np.stack([record[str(sensor)][slice(*span)] for sensor in self.sensors], axis=1)
+        return record.columns(self.sensors, span)
 
     def stacked(self, values: Floats) -> Floats:
         """Values (n, sensors, ...) weighted, those of one time side by side, shape (n sensors, ...)."""

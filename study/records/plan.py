@@ -6,14 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from study.records.record import ALONE, MOTIONS, Record, Sensor
-from study.records.spectra import Segments, autospectrum
+from study.records.spectra import Segments, autospectrum, segment_length
 from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 
 Span = tuple[int, int]
 FEWEST = 64  # samples in a part
 MOST = 0.5  # of a part: channels that rest for longer do not move in it
-SEGMENTS = 8  # of each part, side by side, at least
 
 
 @dataclass(frozen=True)
@@ -29,18 +28,13 @@ def make_plan(record: Record, fit: Span | None = None, judge: Span | None = None
     """Fit the first half and judge the second by default; compare with the first motion that was measured.
 
     Of a record that rests in one of the halves, those of the stretch that moves (:func:`_halves`).
-
-    Raises
-    ------
-    StudyError
-        If a part leaves the record, is too short, overlaps the other or does not move.
     """
     sensors = compared_sensors(record, measured)
     given = fit is not None or judge is not None
     half = len(record) // 2
     usual = ((0, half), (half, len(record))) if given or len(record) < 2 * FEWEST else _halves(record, sensors)
     fit, judge = fit or usual[0], judge or usual[1]
-    motion, force = _side_by_side(record, sensors), _side_by_side(record, record.forces)
+    motion, force = record.columns(sensors), record.columns(record.forces)
     for name, (first, last) in (("fit", fit), ("judge", judge)):
         if not 0 <= first < last <= len(record) or last - first < FEWEST:
             raise StudyError(f"the part to {name}, {first}:{last}, must hold {FEWEST} samples or more of {len(record)}")
@@ -56,11 +50,6 @@ def compared_sensors(record: Record, wanted: str | None = None) -> tuple[Sensor,
     """One motion of each coordinate that is measured: the one that is wanted, or the first of them.
 
     Or the force, where that is wanted: the motion is prescribed then.
-
-    Raises
-    ------
-    StudyError
-        If no motion was measured, or not the one that is wanted.
     """
     if wanted in record.forces:
         return (Sensor(ALONE, wanted),)
@@ -77,17 +66,12 @@ def compared_sensors(record: Record, wanted: str | None = None) -> tuple[Sensor,
 
 
 def _still(record: Record, channels: Sequence[Sensor] | Sequence[str], part: str) -> str:
-    first, last = moving(_side_by_side(record, channels))
+    first, last = moving(record.columns(channels))
     names = " and ".join(map(str, channels))
     return (
         f"the {names} of {record.name!r} does not move in {part}; it moves in samples {first}:{last}, expected parts "
         "there, by --fit A:B and --judge A:B"
     )
-
-
-def _side_by_side(record: Record, channels: Sequence[Sensor] | Sequence[str]) -> Floats:
-    """Channels, shape (n, channels)."""
-    return np.stack([record[channel] for channel in channels], axis=1) if channels else np.zeros((len(record), 0))
 
 
 def _moves(values: Floats) -> bool:
@@ -115,7 +99,7 @@ def _halves(record: Record, sensors: Sequence[Sensor]) -> tuple[Span, Span]:
     Of the stretch where one half has no motion, or the first no force: a hammer's blow with a long rest behind it, a
     trigger long before it, chunks of a file that nothing was written to.
     """
-    half, motion, force = len(record) // 2, _side_by_side(record, sensors), _side_by_side(record, record.forces)
+    half, motion, force = len(record) // 2, record.columns(sensors), record.columns(record.forces)
     first, last = 0, len(record)
     if _rests(motion[:half]) or _rests(motion[half:]) or not (record.unforced or _moves(force[:half])):
         start, last = moving(motion)
@@ -145,7 +129,7 @@ def shared(record: Record, one: Span, other: Span) -> float:
     found: list[float] = []
     for force in (record[name] for name in record.forces):
         parts = [force[slice(*span)] - np.mean(force[slice(*span)]) for span in (one, other)]
-        length = 2 ** int(np.log2(max(min(map(len, parts)) // SEGMENTS, 4)))
+        length = segment_length(min(map(len, parts)), held=8, fewest=4)
         densities = [autospectrum(part, record.dt, Segments(length))[1] for part in parts]
         if all(float(np.sum(d)) > 0.0 for d in densities):
             first, second = (d / np.sum(d) for d in densities)

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from study.records.completion import complete
 from study.records.outputs import Outputs
 from study.records.plan import FEWEST, Plan, make_plan
-from study.records.record import ALONE, Record, Sensor
+from study.records.record import ALONE, FORCE, Record, Sensor
 from study.support.arrays import Floats
 
-FORCE = "force"  # what is predicted where the motion is prescribed
 QUIET = 0.5  # of the motion's size: a stretch that shows less is no picture of the record
 
 
@@ -21,46 +20,20 @@ QUIET = 0.5  # of the motion's size: a stretch that shows less is no picture of 
 class Prepared:
     """A record in consistent units, with all three motions, and the parts of it to fit and to judge.
 
-    Attributes
-    ----------
-    record : Record
-        Force, displacement, velocity, acceleration and any further channels.
-    plan : Plan
-        The measured response, the part to fit and the part to judge.
-    band : (float, float)
-        Lowest and highest frequency in hertz at which all three motions are valid; the error of the force is
-        limited to it, that of the measured response is not.
-    edge : int
-        Samples at each end that derivatives and integrals leave uncertain.
-    notes : tuple of str
-        What was converted or computed, a sentence each.
-    low : float
-        Frequency in hertz below which the user wants nothing judged: the cut-off that was given, or 0.
-    lost : bool array, shape (n,), optional
-        Samples of the response that say nothing, such as clipped ones: they are neither fitted nor judged.
-    every : int
-        How many samples of the record, as it was sampled, there are to one of this
-        (:mod:`study.records.sampling_rate`).
-    as_sampled : Prepared, optional
-        The record with all of its samples, where this has fewer.
-    running_on : Prepared, optional
-        The record with motions that run on for longer, where here they begin anew
-        (:func:`study.records.record_layout.apart`).
-    sensors : tuple of Sensor
-        The motions that free runs are held against; that of the plan's response if left out.
+    The error of the force is limited to the ``band`` in which all motions are valid; that of the response is not.
     """
 
-    record: Record
+    record: Record  # forces, displacement, velocity, acceleration and any further channels
     plan: Plan
-    band: tuple[float, float]
-    edge: int
-    notes: tuple[str, ...] = ()
-    low: float = 0.0
-    lost: NDArray[np.bool_] | None = None
-    every: int = 1
-    as_sampled: "Prepared | None" = None
-    running_on: "Prepared | None" = None
-    sensors: tuple[Sensor, ...] = ()
+    band: tuple[float, float]  # lowest and highest frequency in hertz at which all three motions are valid
+    edge: int  # samples at each end that derivatives and integrals leave uncertain
+    notes: tuple[str, ...] = ()  # what was converted or computed, a sentence each
+    low: float = 0.0  # frequency in hertz below which the user wants nothing judged: the cut-off that was given, or 0
+    lost: NDArray[np.bool_] | None = None  # (n,): samples that say nothing, as clipped ones do: not fitted, not judged
+    every: int = 1  # how many samples there were to one of this (:mod:`study.records.sampling_rate`)
+    as_sampled: "Prepared | None" = None  # the record with all of its samples, where this has fewer
+    running_on: "Prepared | None" = None  # with motions that run on, where here they begin anew (``apart``)
+    sensors: tuple[Sensor, ...] = ()  # what free runs are held against; the plan's response of a single mass if empty
 
     @cached_property
     def outputs(self) -> Outputs:
@@ -131,7 +104,6 @@ class Prepared:
         return max(span[0], self.edge), min(span[1], len(self.record) - self.edge)
 
     def with_fit(self, first: int, last: int) -> "Prepared":
-        """The same record with another part to fit."""
         return replace(self, plan=replace(self.plan, fit=(first, last)))
 
     @cached_property
@@ -144,16 +116,10 @@ class Prepared:
         first, last = self.plan.fit
         if last - first <= samples:
             return self
-        if self.record.joints:
-            return self._of_stretches(samples)
+        if self.record.joints:  # of a stretch that would be cut to a rest of few samples, none
+            end = self.record.stretch_of(last - samples)[1]
+            return self.with_fit(end if end - (last - samples) < FEWEST and end < last else last - samples, last)
         return self.with_fit(*((last - samples, last) if self.plan.judge[0] == last else (first, first + samples)))
-
-    def _of_stretches(self, samples: int) -> "Prepared":
-        """The last so many samples to fit; of a stretch that would be cut to a rest of few samples, none."""
-        last = self.plan.fit[1]
-        first = last - samples
-        end = self.record.stretch_of(first)[1]
-        return self.with_fit(end if end - first < FEWEST and end < last else first, last)
 
 
 def limited(prepared: Prepared, samples: int) -> Prepared:

@@ -1,7 +1,7 @@
 """A record: what was measured or simulated, with its units."""
 
 from bisect import bisect_right
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate, pairwise
 from pathlib import Path
@@ -13,6 +13,7 @@ from study.support.units import is_angle
 
 ALONE = ""  # the only coordinate of a single mass has no name, so that its channels are called as their motions are
 MOTIONS = ("displacement", "velocity", "acceleration")
+FORCE = "force"  # on a single mass; what is predicted where the motion is prescribed
 SI_UNITS = {"time": "s", "force": "N", "displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 
 
@@ -42,7 +43,6 @@ class Stretch:
     continues: bool = False
 
     def __len__(self) -> int:
-        """Number of samples."""
         return self.last - self.first
 
     @property
@@ -69,15 +69,12 @@ class Record:
     computed: frozenset[str] = frozenset()  # motions that were not measured but computed from those that were
 
     def __len__(self) -> int:
-        """Number of samples."""
         return len(next(iter(self.channels.values())))
 
     def __getitem__(self, channel: str | Sensor) -> Floats:
-        """One channel."""
         return self.channels[str(channel)]
 
     def __contains__(self, channel: str | Sensor) -> bool:
-        """Whether the record has this channel."""
         return str(channel) in self.channels
 
     @property
@@ -95,6 +92,12 @@ class Record:
         """Displacement, velocity and acceleration of a coordinate of a completed record, shape (3, n)."""
         return np.stack([self[Sensor(coordinate, motion)] for motion in MOTIONS])
 
+    def columns(self, channels: Sequence[Sensor] | Sequence[str], span: tuple[int, int] | None = None) -> Floats:
+        """Channels side by side, all along or along a span, shape (n, channels)."""
+        first, last = span or (0, len(self))
+        values = [self[channel][first:last] for channel in channels]
+        return np.stack(values, axis=1) if values else np.zeros((last - first, 0))
+
     @property
     def rotations(self) -> frozenset[str]:
         """The coordinates that turn: those whose motion is in an angle."""
@@ -108,6 +111,10 @@ class Record:
     def unit(self, channel: str | Sensor) -> str:
         """Unit of a channel: the SI one where nobody says, none of a further channel then."""
         return self.units.get(str(channel)) or self.usual_unit(channel)
+
+    def reading(self, channel: str) -> str:
+        """What a channel does between its samples: a motion is band-limited."""
+        return self.between if channel in self.forces else "band_limited"
 
     def usual_unit(self, channel: str | Sensor) -> str:
         """The SI unit of a force or a motion; empty for a further channel."""
@@ -161,18 +168,13 @@ class Record:
     def part(self, first: int, last: int) -> "Record":
         """Samples ``first`` to ``last`` (exclusive), with the time they were taken at."""
         channels = {name: values[first:last] for name, values in self.channels.items()}
-        start = self.start + first * self.dt
-        return replace(self, channels=channels, start=start, stretches=self._stretches(first, last))
-
-    def _stretches(self, first: int, last: int) -> tuple[Stretch, ...]:
-        """The stretches, or parts of them, that samples ``first`` to ``last`` come from."""
         kept: list[Stretch] = []
         for begin, stretch in zip((0, *self.joints), self.stretches, strict=False):
             low, high = max(first - begin, 0), min(last - begin, len(stretch))
             if high > low:
                 going_on = stretch.continues and bool(kept)
                 kept.append(Stretch(stretch.source, stretch.first + low, stretch.first + high, going_on))
-        return tuple(kept)
+        return replace(self, channels=channels, start=self.start + first * self.dt, stretches=tuple(kept))
 
     def with_motions(self, motions: Mapping[Sensor, Floats]) -> "Record":
         """The same with these motions in place of its own."""
@@ -191,7 +193,6 @@ class Record:
         return Record(self.dt, channels, name=self.name, start=self.start + first * self.dt)
 
     def with_channels(self, channels: Mapping[str, Floats]) -> "Record":
-        """The same record with channels replaced or added."""
         changed = self.changed.union(channels) if self.stretches else self.changed
         return replace(self, channels={**self.channels, **channels}, changed=changed)
 

@@ -42,7 +42,6 @@ class Layout:
 
     @property
     def explicit(self) -> bool:
-        """Whether samples are named."""
         return self.fit is not None or self.judge is not None
 
     def settled(self, samples: int) -> "Layout":
@@ -79,11 +78,6 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
         What the user says.
     kind : KindOfTest, optional
         What the model makes of them.
-
-    Raises
-    ------
-    StudyError
-        If ranges overlap or leave the record, the response asked for was not measured, or it cannot be completed.
     """
     kind, notes, every = kind or KindOfTest(), list[str](), 1
     _refuse_contradictions(records, layout, kind)
@@ -93,7 +87,8 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
         records, notes = [r for r, _ in readied], [note for _, said in readied for note in said]
     wanted = FORCE if kind.prescribed else layout.response
     sensors = compared_sensors(records[0], wanted)
-    free = not kind.prescribed and all(_unforced(r, layout) for r in records)
+    forced = any(np.any(r[f][a:b]) for r in records for a, b in _samples(r, layout) for f in r.forces)
+    free = not (kind.prescribed or forced)
     several = len(records) > 1 or len(layout.use) > 1
     by_itself = (free or kind.prescribed) and not (layout.explicit or kind.unbroken)
     turns = several or layout.alternate or by_itself
@@ -114,7 +109,10 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
     else:
         stretches = [sure(c, *span) for c in completed for span in _samples(c.record, layout)]
         stretches = [_until_rest(s, sensors) for s in stretches] if turns and kind.anew else stretches
-        fit, judge = alternating(stretches, sensors, kind.anew) if turns else _halved(stretches[0])
+        middle = (stretches[0].first + stretches[0].last) // 2
+        fit, judge = [replace(stretches[0], last=middle)], [replace(stretches[0], first=middle)]
+        if turns:
+            fit, judge = alternating(stretches, sensors, kind.anew)
         notes += [_said(fit, judge, len(stretches), anew=bool(kind.anew))] if turns else []
     if kind.drifts:
         (fit, first), (judge, second) = (within_the_horizon(part, sensors) for part in (fit, judge))
@@ -163,11 +161,6 @@ def _why(record: Record, plan: Plan) -> str:
     )
 
 
-def _unforced(record: Record, layout: Layout) -> bool:
-    """Whether no force acts along the stretches that are used."""
-    return all(not np.any(record[f][a:b]) for a, b in _samples(record, layout) for f in record.forces)
-
-
 def _samples(record: Record, layout: Layout) -> list[Span]:
     """The stretches to use, in samples."""
     spans: list[Span] = []
@@ -199,14 +192,9 @@ def sure(completed: CompletedRecord, first: int, last: int) -> Stretch:
     return Stretch(completed.record, low, high)
 
 
-def _halved(stretch: Stretch) -> tuple[list[Stretch], list[Stretch]]:
-    middle = (stretch.first + stretch.last) // 2
-    return [replace(stretch, last=middle)], [replace(stretch, first=middle)]
-
-
 def _until_rest(stretch: Stretch, sensors: Sequence[Sensor]) -> Stretch:
     """A stretch up to where the motion has died away to practically nothing: rest tells nothing of a structure."""
-    values = np.stack([stretch.source[s][stretch.first : stretch.last] for s in sensors], axis=1)
+    values = stretch.source.columns(sensors, (stretch.first, stretch.last))
     away = np.abs(values - np.mean(values[-FEWEST // 2 :], axis=0))
     loud = np.flatnonzero(np.any(away > TOLERANCE * np.max(away, axis=0), axis=1))
     last = int(loud[-1]) + 1 if len(loud) else 0
@@ -268,16 +256,16 @@ def strung_together(
     fit: Sequence[Stretch], judge: Sequence[Stretch], sensors: Sequence[Sensor], completed: Sequence[CompletedRecord],
     notes: Sequence[str] = (),
 ) -> Prepared:  # fmt: skip
-    """One prepared record of the stretches to fit and those to judge; ``completed`` are the records they come from.
-
-    Raises
-    ------
-    StudyError
-        If the records differ in sampling, channels' units or what was measured, or a part is too short.
-    """
+    """One prepared record of the stretches to fit and those to judge; ``completed`` are the records they come from."""
     first = completed[0].record
-    for other in completed[1:]:
-        _refuse_different(first, other.record)
+    for other in (c.record for c in completed[1:]):
+        rates = f"{first.name} is sampled at {1.0 / first.dt:g} Hz and {other.name} at {1.0 / other.dt:g} Hz"
+        same = abs(other.dt / first.dt - 1.0) <= 1e-6
+        expect(same, f"{rates}; expected the same for records that are judged together")
+        for channel in (*first.forces, *map(str, first.sensors)):
+            one, two = first.units.get(channel, ""), other.units.get(channel, "")
+            differ = f"{channel} is in {one} in {first.name} and in {two} in {other.name}"
+            expect(one == two, f"{differ}; expected the same unit in records that are judged together")
     stretches = (*fit, *judge)
     common = [c for c in first.channels if all(c in s.source for s in stretches)]
     channels = {c: np.concatenate([s.source[c][s.first : s.last] for s in stretches]) for c in common}
@@ -292,21 +280,6 @@ def strung_together(
     said = tuple(dict.fromkeys((*(n for c in completed for n in c.notes), *notes)))
     plan = Plan(sensors[0].motion, (0, split), (split, total))
     return Prepared(record, plan, band, 0, said, sensors=tuple(sensors))
-
-
-def _refuse_different(first: Record, other: Record) -> None:
-    if abs(other.dt / first.dt - 1.0) > 1e-6:
-        raise StudyError(
-            f"{first.name} is sampled at {1.0 / first.dt:g} Hz and {other.name} at {1.0 / other.dt:g} Hz; expected the "
-            "same for records that are judged together"
-        )
-    for channel in (*first.forces, *map(str, first.sensors)):
-        one, two = first.units.get(channel, ""), other.units.get(channel, "")
-        expect(
-            one == two,
-            f"{channel} is in {one} in {first.name} and in {two} in {other.name}; expected the same unit in records "
-            "that are judged together",
-        )
 
 
 def records_judged(prepared: Prepared) -> tuple[Prepared, ...]:

@@ -16,12 +16,12 @@ import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 from scipy.special import gammaincc
 
-from study.records.completion import CompletedRecord, with_continuations
+from study.records.completion import NEAR_END, CompletedRecord, with_continuations
 from study.records.interpolation import BAND_LIMITED, closes
 from study.records.plan import Plan
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Record, Sensor
-from study.records.spectra import Segments, autospectrum
+from study.records.spectra import Segments, autospectrum, segment_length
 from study.support.arrays import Floats
 from study.support.thresholds import ALPHA
 
@@ -29,9 +29,6 @@ ORDER = 3  # products of the motion up to this order do not fold into its band: 
 BIAS = 0.1  # standard errors by which what is left out may shift a coefficient
 JUMP = 2.0  # power of the frequency with which the density of an acceleration that jumps falls
 LEAST = 512  # samples in either part: what a segment of the spectra takes
-LINES = 8192  # samples in a segment of the spectrum, at most
-PARTS = 4  # segments that a record holds side by side, at least
-EDGE = 8  # samples at each end that the filter takes from what the record is continued by
 TOO_COARSE = 2.0 / 3.0  # of the power above half the Nyquist frequency: of white noise half of it is there
 PASSED = 2.0 / 3.0  # of the new Nyquist frequency, and its mirror image 4/3: where the filter falls
 
@@ -52,11 +49,11 @@ def without_spare_samples(prepared: Prepared) -> Prepared:
     record = decimated(prepared.record, factor)
     fit, judge = ((-(-a // factor), -(-b // factor)) for a, b in parts)
     lost = np.ones(len(record), dtype=np.bool_)
-    lost[EDGE:-EDGE] = False
+    lost[NEAR_END:-NEAR_END] = False
     return replace(
         prepared, record=record, plan=Plan(prepared.plan.response, fit, judge), band=_band(prepared.band, record),
-        edge=max(-(-prepared.edge // factor), EDGE), notes=(*prepared.notes, _said(prepared.record, factor, parts[0])),
-        lost=lost, every=factor, as_sampled=prepared,
+        edge=max(-(-prepared.edge // factor), NEAR_END), lost=lost, every=factor, as_sampled=prepared,
+        notes=(*prepared.notes, _said(prepared.record, factor, parts[0])),
     )  # fmt: skip
 
 
@@ -68,14 +65,14 @@ def completed_without_spare(
     ``shortest`` as for :func:`spare_factor`.
     """
     factor = spare_factor([c.record for c in completed], shortest)
-    return [_fewer(c, factor) if factor > 1 else c for c in completed], factor
-
-
-def _fewer(completed: CompletedRecord, factor: int) -> CompletedRecord:
-    record = decimated(completed.record, factor)
-    edge = max(-(-completed.edge // factor), EDGE)
-    notes = (*completed.notes, _said(completed.record, factor, (0, len(completed.record))))
-    return replace(completed, record=record, band=_band(completed.band, record), edge=edge, notes=notes)
+    if factor == 1:
+        return list(completed), 1
+    fewer: list[CompletedRecord] = []
+    for whole in completed:
+        record, edge = decimated(whole.record, factor), max(-(-whole.edge // factor), NEAR_END)
+        notes = (*whole.notes, _said(whole.record, factor, (0, len(whole.record))))
+        fewer.append(CompletedRecord(record, _band(whole.band, record), edge, notes))
+    return fewer, factor
 
 
 def spare_factor(records: Sequence[Record], shortest: int) -> int:
@@ -106,24 +103,13 @@ def spare_factor(records: Sequence[Record], shortest: int) -> int:
 class Content:
     """What a channel holds above its noise.
 
-    Attributes
-    ----------
-    highest : float
-        Highest frequency in hertz at which it stands above its noise.
-    fall : float
-        Power of the frequency with which its density falls there: 2 for an acceleration that jumps, as dry friction
-        makes it, or more.
-    energy : float
-        Of what is assumed to lie above, in mean squares of the noise at a sample: that of a density which equals that
-        of the noise at ``highest`` and falls on from there.
-    signal : float
-        Energy of the whole channel in the same measure.
+    Above ``highest`` a density is assumed that equals that of the noise there and falls on.
     """
 
-    highest: float
-    fall: float
-    energy: float
-    signal: float
+    highest: float  # frequency in hertz at which it stands above its noise
+    fall: float  # power of the frequency with which its density falls there: 2 for an acceleration that jumps, or more
+    energy: float  # of what is assumed to lie above, in mean squares of the noise at a sample
+    signal: float  # energy of the whole channel in the same measure
 
     @property
     def enough(self) -> float:
@@ -143,8 +129,7 @@ def content(values: Floats, dt: float) -> Content:
     The noise is the median of the spectrum: of an oversampled channel most lines hold nothing else. A line stands above
     it if chance gives one so high among all in less than ``ALPHA`` of the records, alone or with a third of an octave.
     """
-    length = 2 ** int(math.log2(min(len(values) // PARTS, LINES)))
-    cut = Segments(length, 0.75, "kaiser")
+    cut = Segments(segment_length(len(values), held=4, most=8192), 0.75, "kaiser")
     frequency, power = autospectrum(values - np.mean(values), dt, cut)
     averages = cut.effective_averages(len(values))
     inner, nyquist = power[1:-1], 0.5 / dt
@@ -191,21 +176,17 @@ def decimated(record: Record, factor: int) -> Record:
 
     A force that is straight or held between its samples is filtered as such.
     """
-    channels = {
-        name: _filtered(values, factor, record.between if name in record.forces else BAND_LIMITED)
-        for name, values in record.channels.items()
-    }
+    channels = dict[str, Floats]()
+    for name, values in record.channels.items():
+        mean = float(np.mean(values))
+        reach = 0 if _goes_round(values) else min(4 * NEAR_END * factor, len(values) // 2)
+        longer = values - mean if reach == 0 else with_continuations(values - mean, reach)
+        cycles = np.asarray(rfftfreq(len(longer)))  # of a sample
+        held = _held(cycles, record.reading(name))
+        low = irfft(np.asarray(rfft(longer)) * _gain(2.0 * factor * cycles) * held, len(longer))
+        channels[name] = np.asarray(low[reach : reach + len(values)][::factor] + mean)
     period = None if record.period is None else record.period // factor
     return replace(record, dt=record.dt * factor, channels=channels, period=period, between=BAND_LIMITED)
-
-
-def _filtered(values: Floats, factor: int, between: str) -> Floats:
-    mean = float(np.mean(values))
-    reach = 0 if _goes_round(values) else min(4 * EDGE * factor, len(values) // 2)
-    longer = values - mean if reach == 0 else with_continuations(values - mean, reach)
-    cycles = np.asarray(rfftfreq(len(longer)))  # of a sample
-    low = irfft(np.asarray(rfft(longer)) * _gain(2.0 * factor * cycles) * _held(cycles, between), len(longer))
-    return np.asarray(low[reach : reach + len(values)][::factor] + mean)
 
 
 def _goes_round(values: Floats) -> bool:
@@ -239,15 +220,12 @@ def _said(record: Record, factor: int, span: tuple[int, int]) -> str:
     motions = [record[s][slice(*span)] for s in moved]
     power = np.sum([np.abs(np.asarray(rfft(x - np.mean(x)))) ** 2 / max(float(np.var(x)), 1e-300) for x in motions], 0)
     a_period = (span[1] - span[0]) / max(int(np.argmax(power)), 1)
+    ordinal = {2: "second", 3: "third"}.get(factor, f"{factor}th")
     return (
         f"the record {record.name} is sampled {a_period:.0f} times a period of its strongest motion, more finely than "
-        f"anything but noise in it asks for: every {_ordinal(factor)} sample is used after a low-pass filter, which "
+        f"anything but noise in it asks for: every {ordinal} sample is used after a low-pass filter, which "
         "loses nothing (--as-sampled uses all)"
     )
-
-
-def _ordinal(number: int) -> str:
-    return {2: "second", 3: "third"}.get(number, f"{number}th")
 
 
 def too_coarse(prepared: Prepared) -> str:

@@ -5,6 +5,7 @@ Bendat and Piersol and in ``scipy.signal.csd``), densities in units^2/Hz, the wi
 for, zero and Nyquist frequency not doubled.
 """
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -14,31 +15,22 @@ from scipy.fft import irfft, rfft, rfftfreq
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError
 
-KAISER = 20.0  # side lobes at -150 dB
 CHUNK = 64  # segments transformed at a time: they stay in the cache, and memory does not grow with the record
 
 
 @dataclass(frozen=True)
 class Segments:
-    """Segments of a record for spectra by Welch's method.
+    """Segments of a record for spectra by Welch's method; the defaults are the report's.
 
-    Attributes
-    ----------
-    length : int
-        Samples in a segment (the report: 512).
-    overlap : float
-        Fraction that neighbours share (the report: a half).
-    window : str
-        Any window ``scipy.signal.get_window`` knows (the report: Hanning), or ``kaiser``, whose side lobes lie at the
-        rounding of what a converter, or a simulation, gives.
+    ``window`` is any that ``scipy.signal.get_window`` knows, or ``kaiser``, whose side lobes lie at the rounding of
+    what a converter, or a simulation, gives.
     """
 
-    length: int = 512
-    overlap: float = 0.5
+    length: int = 512  # samples in a segment
+    overlap: float = 0.5  # fraction that neighbours share
     window: str = "hann"
 
     def __post_init__(self) -> None:
-        """Refuse lengths and overlaps that cut nothing."""
         if self.length < 4:
             raise StudyError(f"segment length is {self.length}; at least 4 samples are needed")
         if not 0.0 <= self.overlap < 1.0:
@@ -58,7 +50,7 @@ class Segments:
         if self.window == "hann":  # SciPy's signal package takes longer to load than most steps of the study to run
             return np.hanning(self.length + 1)[:-1]
         if self.window == "kaiser":
-            return np.kaiser(self.length + 1, KAISER)[:-1]
+            return np.kaiser(self.length + 1, 20.0)[:-1]  # side lobes at -150 dB
         from scipy.signal import get_window
 
         return np.asarray(get_window(self.window, self.length), dtype=np.float64)
@@ -100,27 +92,21 @@ class Segments:
         return together / alone
 
 
+def segment_length(samples: int, held: int, fewest: int = 1, most: int = 1 << 62) -> int:
+    """A power of two, of which so many samples hold a number (``held``) side by side, within two bounds."""
+    return max(fewest, min(most, 2 ** int(math.log2(max(samples // held, 1)))))
+
+
 @dataclass(frozen=True)
 class SpectralMatrix:
-    """Cross-spectral densities of several channels.
+    """Cross-spectral densities of several channels."""
 
-    Attributes
-    ----------
-    frequency : array, shape (lines,)
-        In hertz.
-    density : complex array, shape (lines, channels, channels)
-        ``density[:, i, j] = G_ij``, in units_i units_j / Hz.
-    averages : float
-        Effective number of independent averages.
-    """
-
-    frequency: Floats
-    density: Complexes
-    averages: float
+    frequency: Floats  # (lines,), in hertz
+    density: Complexes  # (lines, channels, channels): density[:, i, j] = G_ij, in units_i units_j / Hz
+    averages: float  # effective number of independent averages
     segments: Segments
 
     def band(self, low: float, high: float) -> "SpectralMatrix":
-        """The lines from ``low`` to ``high`` hertz."""
         keep = (self.frequency >= low) & (self.frequency <= high)
         return SpectralMatrix(self.frequency[keep], self.density[keep], self.averages, self.segments)
 
@@ -174,7 +160,9 @@ def cross_spectra_in_pieces(
     cut = segments or Segments()
     total, left, samples = np.zeros((cut.length // 2 + 1, 0, 0), dtype=np.complex128), list[Floats](), 0
     for piece in pieces:
-        samples += _common_length(piece)
+        if any(len(c) != len(piece[0]) for c in piece):
+            raise StudyError(f"channels have {[len(c) for c in piece]} samples; all must have the same number")
+        samples += len(piece[0])
         if not left:
             total = np.zeros((len(total), len(piece), len(piece)), dtype=np.complex128)
         elif len(piece) != len(left):
@@ -189,14 +177,6 @@ def cross_spectra_in_pieces(
         scale[-1] /= 2.0
     frequency = np.asarray(rfftfreq(cut.length, dt), dtype=np.float64)
     return SpectralMatrix(frequency, total * scale[:, None, None], cut.effective_averages(samples), cut)
-
-
-def _common_length(channels: Sequence[Floats]) -> int:
-    """Number of samples that all channels have."""
-    samples = len(channels[0])
-    if any(len(c) != samples for c in channels):
-        raise StudyError(f"channels have {[len(c) for c in channels]} samples; all must have the same number")
-    return samples
 
 
 def _add_products(total: Complexes, channels: Sequence[Floats], count: int, cut: Segments) -> None:
@@ -228,18 +208,10 @@ def autospectrum(values: Floats, dt: float, segments: Segments | None = None) ->
 
 @dataclass(frozen=True)
 class StretchTransforms:
-    """Of stretches of up to ``size`` samples, each with room for the response to die away.
+    """Of stretches of up to ``size`` samples, each with room for the response to die away."""
 
-    Attributes
-    ----------
-    runs : tuple of pairs of int
-        First sample of each stretch, counted from the beginning of the part, and the one after its last.
-    size : int
-        Samples of a transform.
-    """
-
-    runs: tuple[tuple[int, int], ...]
-    size: int
+    runs: tuple[tuple[int, int], ...]  # first sample of each stretch, from the part's beginning, and one after its last
+    size: int  # samples of a transform
 
     def lines(self, values: Floats) -> Complexes:
         """Of values (samples, ...), shape (stretches, lines, ...)."""

@@ -27,14 +27,8 @@ def make_record(
     """Simulate a case, noise on the displacement included.
 
     Velocity and acceleration are the noise-free ones: Section 2.2 adds noise to u(t) alone. ``settings`` are those of
-    the case, as plain data too; the seeds take the place of the configured ones, for ensembles.
-
-    Raises
-    ------
-    DivergenceError
-        If the response leaves the range of finite numbers.
-    StudyError
-        If the settings are none, or a seed is neither given nor configured.
+    the case, as plain data too; the seeds take the place of the configured ones, for ensembles. A response that leaves
+    the range of finite numbers raises a ``DivergenceError``.
     """
     settings = checked(RecordSettings, settings, "settings of a record")
     sampling, excitation = settings.sampling, settings.excitation.at_level(settings.level)

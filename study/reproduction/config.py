@@ -114,7 +114,6 @@ class StudyConfig:
         )  # fmt: skip
 
     def drawn(self, case: str) -> list[str]:
-        """The estimators that a case's figures show."""
         drawn = self.settings.drawn
         return list(drawn.with_noise if self.cases[case].noise > 0.0 else drawn.without_noise)
 
@@ -123,11 +122,6 @@ def load_config(folder: Path) -> StudyConfig:
     """Read ``config.yaml`` and ``cases.tsv`` of a folder, and the models that they name, and check them all.
 
     Nothing that passes here can be refused by a job for the way it is configured.
-
-    Raises
-    ------
-    StudyError
-        At the first fault, naming file, row and value.
     """
     source, models = folder / "config.yaml", folder.parent / "models"
     settings = read_yaml(source, StudySettings)

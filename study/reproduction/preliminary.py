@@ -18,7 +18,6 @@ from study.support.arrays import Floats
 from study.support.errors import StudyError
 
 POINTS_A_CYCLE = 256
-GAPS = 120  # half widths tried between none and the largest displacement
 
 
 @dataclass(frozen=True)
@@ -138,7 +137,7 @@ def read_dead_band(record: Record, mass: float) -> float:
     """The gap that a pattern shows: force of a slope beyond +-u_g, none within, that fits it best."""
     u, v = record["displacement"], record["velocity"]
     rest = restoring_force(record, mass)
-    tried = np.linspace(0.0, float(np.max(np.abs(u))), GAPS + 1)[:-1]
+    tried = np.linspace(0.0, float(np.max(np.abs(u))), 121)[:-1]  # from none to the largest displacement
     left: list[float] = []
     for gap in tried:
         design = np.column_stack([u - np.clip(u, -gap, gap), v])

@@ -65,7 +65,6 @@ class ExcitationSettings(Section):
     seed: Seed | None = None
 
     def at_level(self, level: float) -> Excitation:
-        """The excitation with this mean square."""
         return Excitation(level=level, **self.model_dump(exclude_none=True, exclude={"seed"}))
 
 

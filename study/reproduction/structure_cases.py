@@ -78,7 +78,6 @@ class StructureSettings(Section):
 
     @property
     def for_estimators(self) -> Settings:
-        """What the estimators themselves are told."""
         low, high = self.fit_band
         return Settings(
             self.segments.segments(), (low, high), LocalPolynomial(**self.local_polynomial.model_dump())
@@ -115,11 +114,6 @@ def load_structures(folder: Path, taken: Sequence[str] = ()) -> StructureCases:
     """Read ``structures.yaml`` and ``structures.tsv`` of a folder, and check the models that they name.
 
     ``taken`` are the names of other cases.
-
-    Raises
-    ------
-    StudyError
-        At the first fault, naming file, row and value.
     """
     source, models = folder / "structures.yaml", folder.parent / "models"
     settings = read_yaml(source, StructureSettings)
@@ -134,28 +128,23 @@ def load_structures(folder: Path, taken: Sequence[str] = ()) -> StructureCases:
         with at(where):
             expect(case.case not in (*taken, *cases), "the case stands twice; expected each name once")
             expect(case.case not in rules(folder.parent), f"{case.case!r} is the name of a rule; give the case another")
-            _check(case, models)
+            path = models / f"{case.model}.yaml"
+            known = ", ".join(sorted(p.relative_to(models).as_posix()[:-5] for p in models.rglob("*.yaml")))
+            expect(path.is_file(), f"there is no model {case.model!r}; models/ holds {known}")
+            model = read_model(path)
+            expect(model.named, f"{case.model!r} has no 'coordinates'; expected a structure")
+            unknown = [name for name in case.sensors if name not in model.coordinates]
+            expect(not unknown, f"sensors name {unknown[:1]}; {case.model!r} has {', '.join(model.coordinates)}")
+            expect(len(model.forces) == 1, f"{case.model!r} has {len(model.forces)} forces; expected one")
+            if case.also_assumed:
+                get(case.also_assumed)
+            if case.measured:
+                ends = [c for t in model.terms if t.term.name not in LINEAR for c in t.place.moving]
+                needed = dict.fromkeys([*(where for _, where in model.forces), *ends])
+                blind = ", ".join(name for name in needed if name not in case.sensors)
+                expect(not blind, f"sensors lack {blind}, where the force or a nonlinear term acts; expected one")
         cases[case.case] = case
     return StructureCases(settings, cases)
-
-
-def _check(case: StructureCase, models: Path) -> None:
-    path = models / f"{case.model}.yaml"
-    known = ", ".join(sorted(p.relative_to(models).as_posix()[:-5] for p in models.rglob("*.yaml")))
-    expect(path.is_file(), f"there is no model {case.model!r}; models/ holds {known}")
-    model = read_model(path)
-    expect(model.named, f"{case.model!r} has no 'coordinates'; expected a structure")
-    unknown = [name for name in case.sensors if name not in model.coordinates]
-    expect(not unknown, f"sensors name {unknown[:1]}; {case.model!r} has {', '.join(model.coordinates)}")
-    expect(len(model.forces) == 1, f"{case.model!r} has {len(model.forces)} forces; expected one")
-    if case.also_assumed:
-        get(case.also_assumed)
-    if case.measured:
-        kept = [t for t in model.terms if t.term.name not in LINEAR]
-        ends = [c for t in kept for c in t.place.moving]
-        needed = dict.fromkeys([*(where for _, where in model.forces), *ends])
-        blind = [name for name in needed if name not in case.sensors]
-        expect(not blind, f"sensors lack {', '.join(blind)}, where the force or a nonlinear term acts; expected one")
 
 
 def make_structure_record(model: Model, case: StructureCase, settings: StructureSettings) -> Record:

@@ -26,7 +26,6 @@ from study.support.arrays import Floats
 
 HIGHEST = 10.0  # hertz: the report's systems have their dynamics below it (Section 2.2)
 BESIDE = (labels.FREE_SHAPE, "instrumental")  # whose coherences stand over those of MI/SO
-DECADES = 1e-5  # an autospectrum is shown down to this share of its largest line
 DASHED = (0, (5.0, 2.0))
 
 
@@ -51,13 +50,7 @@ class CaseFiles:
 
 
 def draw_case(case: CaseFiles, outputs: Mapping[str, Sequence[Path]], style: Path) -> None:
-    """Draw figures of a case: for each kind of ``KINDS`` that is wanted the files to write, PNG or SVG.
-
-    Raises
-    ------
-    StudyError
-        If a kind of figure is asked for that there is not.
-    """
+    """Draw figures of a case: for each kind of ``KINDS`` that is wanted the files to write, PNG or SVG."""
     page.write_each({kind: partial(draw, case) for kind, draw in KINDS.items()}, outputs, style)
 
 
@@ -179,7 +172,7 @@ def autospectrum_panel(axes: Axes, frequency: Floats, density: Floats, unit: str
     keep = (frequency > 0.0) & (frequency <= highest)
     axes.semilogy(frequency[keep], density[keep], color="C0", linewidth=1.6)
     axes.set_xlim(0.0, highest)
-    axes.set_ylim(bottom=max(DECADES * float(density[keep].max()), 0.5 * float(density[keep].min())))
+    axes.set_ylim(bottom=max(1e-5 * float(density[keep].max()), 0.5 * float(density[keep].min())))  # five decades
     axes.set_xlabel("frequency (Hz)")
     squared = f"({unit})^2" if "/" in unit else f"{unit}^2"
     axes.set_ylabel(f"autospectrum ({dimensions.pretty(squared)}/Hz)")
@@ -264,7 +257,6 @@ COLUMNS = 4
 MARKERS = {"siso": ("x", False), "miso": ("s", True), "local_polynomial": ("^", True), "instrumental": ("D", False),
            "output_error": ("o", False)}  # fmt: skip
 LOWEST_ERROR, HIGHEST_ERROR = 1e-7, 1e3  # percent: what lies outside stands at the edge
-WIDEST = 20.0  # a stretch of exp(20) is wider than the picture
 LEFT, TOP, ROW = 1.5, 1.15, 0.19  # inches
 
 
@@ -303,7 +295,8 @@ def _error_panel(panel: Axes, table: pd.DataFrame, cases: Sequence[str]) -> None
         own = table[table["estimator"] == name]
         error = np.clip(100.0 * own["median_error"].to_numpy(dtype=np.float64), LOWEST_ERROR, HIGHEST_ERROR)
         spread = 100.0 * own["standard_error"].to_numpy(dtype=np.float64)
-        stretch = np.exp(np.minimum(spread / error, WIDEST))  # a standard error, to first order in the logarithm
+        # A standard error, to first order in the logarithm; a stretch of exp(20) is wider than the picture.
+        stretch = np.exp(np.minimum(spread / error, 20.0))
         heights = np.array([place[case] for case in own["case"]], dtype=np.float64)
         marker, filled = MARKERS.get(name, ("P", True))
         shown = look(name)

@@ -10,7 +10,6 @@ import pandas as pd
 from study.figures.styles import look
 from study.reproduction import ensemble
 from study.reproduction.claims.judgement import BESIDE, NOT_REPRODUCED, PARTLY, REPRODUCED, SEPARATOR
-from study.reproduction.integrator_study import FINE
 from study.support import document
 from study.support.document import Block, Bullets, Fold, Heading, Image, PageSection, Picture, Text, table
 from study.support.numbers import percent
@@ -19,7 +18,6 @@ Row = Mapping[str, Any]
 TITLE = "The report, run again"
 LONGEST = 110  # characters of a measured number in a table
 WANTED = 0.99  # of the seeds, for each noise-free parameter
-ENOUGH = 5  # seeds from which a scatter means something
 INTRODUCTION = (
     "Bendat, Palo and Coppolino identify nonlinear systems with one degree of freedom from force and response: "
     "reverse the two, and every term of the equation of motion is a linear path of its own (reverse dynamic MI/SO). "
@@ -245,7 +243,7 @@ def estimator_blocks(results: Results) -> list[Block]:
         Image("Errors of the estimators by parameter and case", "../figures/estimators.png"), Text(note),
         by_estimator(errors, ("case", "parameter"), names, _error_and_gain),
     ]  # fmt: skip
-    noisy = errors[(errors["case"].map(noise) > 0.0) & (errors["seeds"] >= ENOUGH)]
+    noisy = errors[(errors["case"].map(noise) > 0.0) & (errors["seeds"] >= 5)]  # of fewer a scatter means nothing
     if not len(noisy):
         return blocks
 
@@ -392,7 +390,7 @@ def integrator_blocks(results: Results) -> list[Block]:
 
     said = (
         "Mean error of each MI/SO estimate against the same records integrated finely "
-        f"({FINE.method}, {FINE.steps_per_sample} steps a sample), with its standard error; "
+        f"({ensemble.FINE.method}, {ensemble.FINE.steps_per_sample} steps a sample), with its standard error; "
         "relative in percent, in the parameter's own unit where the true value is zero. "
         "The report's own setting is abm4 with one step a sample (Section 2.2)."
     )

@@ -5,11 +5,12 @@ from dataclasses import replace
 
 from study.equations.linear_part import check_held_masses
 from study.equations.model import Model
+from study.records.completion import NEAR_END
 from study.records.plan import Span, compared_sensors, make_plan
 from study.records.prepared import Prepared, prepare_record
 from study.records.record import Record
 from study.records.record_layout import KindOfTest, Layout, laid_out
-from study.records.sampling_rate import EDGE, without_spare_samples
+from study.records.sampling_rate import without_spare_samples
 from study.support.errors import StudyError
 
 PERIODS = 1.5  # of a decay in a block: over more a wrong stiffness takes it out of step (docs/structures.md)
@@ -47,7 +48,7 @@ def _made(prepared: Prepared, record: Record, model: Model) -> Prepared:
     _check_tied(model, blind)
     lacks = f"no sensor is at {' and '.join(blind)}: the free run has its motion, the reverse system lacks it"
     notes = (*prepared.notes, *([lacks] if blind else []))
-    ends = EDGE if prepared.every > 1 and not prepared.record.stretches else 0  # which a filter leaves unsure
+    ends = NEAR_END if prepared.every > 1 and not prepared.record.stretches else 0  # which a filter leaves unsure
     (first, split), (other, last) = prepared.plan.fit, prepared.plan.judge
     inner = len(prepared.record) - ends
     fit, judge = (max(first, ends), min(split, inner)), (max(other, ends), min(last, inner))

@@ -6,8 +6,6 @@ import numpy as np
 
 from study.support.arrays import Floats
 
-HIGHEST = 32  # order of an autoregressive noise
-SAMPLES = 20  # for each coefficient, at least
 PREDICTABLE = 1e-14  # share of the power at which the prediction is complete, above the rounding of the recursion
 
 
@@ -18,7 +16,7 @@ def autoregression(noise: Floats) -> Floats:
     """
     n, centred = len(noise), noise - np.mean(noise)
     best, least = np.ones(1), 0.0
-    for weights, left in _lattice(centred, min(HIGHEST, n // SAMPLES)):
+    for weights, left in _lattice(centred, min(32, n // 20)):  # 20 samples for each coefficient, at least
         price = n * np.log(max(left, np.finfo(float).eps)) + len(weights) * np.log(n)
         if price < least:
             best, least = np.concatenate([[1.0], -weights]), float(price)

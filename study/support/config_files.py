@@ -6,7 +6,7 @@ from typing import Annotated, Any, TypeVar, cast, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from study.support.errors import StudyError
+from study.support.errors import StudyError, expect
 from study.support.files import read_text
 from study.support.yaml_text import as_mapping, read_plain, shown
 
@@ -76,20 +76,18 @@ def read_rows(path: Path, kind: type[R]) -> list[tuple[str, R]]:
             raise StudyError(f"{path}: its heading names {name!r} twice; expected each column once")
     if lacking := [name for name in known if name not in heading]:
         raise StudyError(f"{path}: its heading lacks the column {lacking[0]!r}; expected {', '.join(known)}")
-    return [_row(f"{path}, row {number}", _cells(line), heading, kind) for number, line in lines[1:]]
+    rows: list[tuple[str, R]] = []
+    for number, line in lines[1:]:
+        cells, where = _cells(line), f"{path}, row {number}"
+        wanted = f"{len(cells)} cells where the heading has {len(heading)}; expected as many, tabs between them"
+        expect(len(cells) == len(heading), f"{where} has {wanted}")
+        where = f"{where} ({heading[0]} {shown(cells[0])})"
+        rows.append((where, checked(kind, dict(zip(heading, cells, strict=True)), where)))
+    return rows
 
 
 def _cells(line: str) -> list[str]:
     return [cell.strip() for cell in line.split("\t")]
-
-
-def _row(where: str, cells: Sequence[str], heading: Sequence[str], kind: type[R]) -> tuple[str, R]:
-    if len(cells) != len(heading):
-        raise StudyError(
-            f"{where} has {len(cells)} cells where the heading has {len(heading)}; expected as many, tabs between them"
-        )
-    where = f"{where} ({heading[0]} {shown(cells[0])})"
-    return where, checked(kind, dict(zip(heading, cells, strict=True)), where)
 
 
 def checked(kind: type[S], content: object, where: str) -> S:

@@ -23,7 +23,6 @@ from study.support.errors import StudyError, expect
 
 BESIDE = ".study-"  # begins the name of a file that is still being written
 TEXT_BYTES = 1_000_000  # the longest sensible text file of a user has a few kilobytes
-JOURNAL_BYTES = 10_000_000
 FREE_SPACE = "expected a writable folder with free space"
 
 
@@ -223,7 +222,7 @@ def _put_back(path: Path) -> None:
     fault = f"{journal}: this is not what an interrupted run leaves for {path.name}; expected no such file, remove it"
     try:
         with journal.open("rb") as stream:
-            entries = cast(dict[str, dict[str, Any]], json.loads(stream.read(JOURNAL_BYTES)))
+            entries = cast(dict[str, dict[str, Any]], json.loads(stream.read(10 * TEXT_BYTES)))
         found = {
             name: (None if e["was"] is None else base64.b64decode(e["was"], validate=True), str(e["becomes"]))
             for name, e in entries.items()

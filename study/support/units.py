@@ -7,23 +7,29 @@ Force, length, time and voltage are the base dimensions; a mass is a force over 
 import math
 import re
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from study.support.errors import StudyError, expect
 from study.support.yaml_text import excerpt
 
-Powers = tuple[int, int, int, int]  # of force, length, time, voltage
-FORCE: Powers = (1, 0, 0, 0)
-LENGTH: Powers = (0, 1, 0, 0)
-TIME: Powers = (0, 0, 1, 0)
-VOLTAGE: Powers = (0, 0, 0, 1)
-VELOCITY: Powers = (0, 1, -1, 0)
-ACCELERATION: Powers = (0, 1, -2, 0)
+
+class Powers(NamedTuple):
+    """Of each base dimension."""
+
+    force: int = 0
+    length: int = 0
+    time: int = 0
+    voltage: int = 0
+
+
+FORCE, LENGTH, TIME, VOLTAGE = Powers(force=1), Powers(length=1), Powers(time=1), Powers(voltage=1)
+VELOCITY, ACCELERATION = Powers(length=1, time=-1), Powers(length=1, time=-2)
 STANDARD_GRAVITY = 9.80665  # m/s^2, exact by definition (3rd CGPM, 1901)
 POUND_FORCE = 0.45359237 * STANDARD_GRAVITY  # N, exact by definition
 
 BASES: dict[str, tuple[float, Powers]] = {
     "N": (1.0, FORCE), "lbf": (POUND_FORCE, FORCE), "lb": (POUND_FORCE, FORCE), "kip": (1000.0 * POUND_FORCE, FORCE),
-    "kgf": (STANDARD_GRAVITY, FORCE), "dyn": (1e-5, FORCE), "kg": (1.0, (1, -1, 2, 0)),
+    "kgf": (STANDARD_GRAVITY, FORCE), "dyn": (1e-5, FORCE), "kg": (1.0, Powers(1, -1, 2)),
     "m": (1.0, LENGTH), "in": (0.0254, LENGTH), "inch": (0.0254, LENGTH), "mil": (0.0254e-3, LENGTH),
     "ft": (0.3048, LENGTH), "s": (1.0, TIME), "sec": (1.0, TIME), "min": (60.0, TIME), "h": (3600.0, TIME),
     "V": (1.0, VOLTAGE), "Gal": (0.01, ACCELERATION),
@@ -60,20 +66,19 @@ def parse_unit(text: str) -> Unit:
     """Understand a unit; of what is none, a ``StudyError`` names some that are."""
     plain = text.strip().replace("**", "^").translate(PLAIN).replace("^-^", "^-")
     plain = re.sub(r"\s*([/^])\s*", r"\1", " ".join(plain.replace("(", " ").replace(")", " ").split()))
-    factor, powers = 1.0, (0, 0, 0, 0)
+    factor, powers = 1.0, Powers()
     for position, group in enumerate(plain.split("/")):
         sign = -1 if position else 1
         for token in group.split() or [""]:
-            size, own = (1.0, (0, 0, 0, 0)) if (token, position) == ("1", 0) else _factor(token, text)
+            size, own = (1.0, Powers()) if (token, position) == ("1", 0) else _factor(token, text)
             factor *= size**sign
-            powers = tuple(p + sign * o for p, o in zip(powers, own, strict=True))
+            powers = Powers(*(p + sign * o for p, o in zip(powers, own, strict=True)))
     if not math.isfinite(factor) or factor <= 0.0:
         raise _unknown(text)
-    a, b, c, d = powers
-    return Unit(_written(plain), factor, (a, b, c, d))
+    return Unit(_written(plain), factor, powers)
 
 
-def _factor(token: str, text: str) -> tuple[float, tuple[int, ...]]:
+def _factor(token: str, text: str) -> tuple[float, Powers]:
     parts = FACTOR.fullmatch(token)
     if parts is None:
         raise _unknown(text)
@@ -82,7 +87,7 @@ def _factor(token: str, text: str) -> tuple[float, tuple[int, ...]]:
     if name not in BASES and not (prefix and base in PREFIXED):
         raise _unknown(text)
     size, powers = BASES[base]
-    return (prefix * size) ** power, tuple(power * p for p in powers)
+    return (prefix * size) ** power, Powers(*(power * p for p in powers))
 
 
 def _written(plain: str) -> str:
@@ -104,8 +109,8 @@ def role_unit(role: str, text: str) -> Unit:
     """
     unit = parse_unit(text)
     powers, expected = ROLES[role]
-    moment = role == "force" and unit.powers == (1, 1, 0, 0)
-    uncalibrated = role != "time" and unit.powers[3] == 1
+    moment = role == "force" and unit.powers == Powers(force=1, length=1)
+    uncalibrated = role != "time" and unit.powers.voltage == 1
     expect(unit.powers == powers or moment or uncalibrated, f"{text!r} is no unit of {role}; expected {expected}")
     return unit
 

@@ -13,7 +13,6 @@ from study.support.errors import StudyError
 from study.support.files import BESIDE
 from study.support.terminal import harmless
 
-FAILED = 2  # as the command line ends on input that cannot be used
 BRANCHES = ("body", "orelse", "finalbody", "handlers", "cases")  # of a statement: no expression holds an import
 KERNELS = "kernels.py"  # the module whose loops are in C, in the folder beside it
 
@@ -25,7 +24,7 @@ def one_sentence() -> Generator[None, None, None]:
         yield
     except StudyError as error:
         print("study:", harmless(" ".join(str(error).split())), file=sys.stderr)
-        sys.exit(FAILED)
+        sys.exit(2)  # as the command line ends on input that cannot be used
 
 
 def only_run(path: Path) -> TextIO:

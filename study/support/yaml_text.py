@@ -30,17 +30,15 @@ def read_plain(text: str) -> object:
     except StudyError:
         raise
     except MarkedYAMLError as error:
-        raise StudyError(f"is not YAML ({_problem(error)}); {EXPECTED}") from None
+        told: Any = error
+        line = f" in line {told.problem_mark.line + 1}" if told.problem_mark else ""
+        problem = excerpt(str(told.problem or told.context).splitlines()[0])
+        raise StudyError(f"is not YAML ({problem}{line}); {EXPECTED}") from None
     except Exception as error:  # whatever else a parser trips over in hostile text means the same to the user
         problem = (str(error) or type(error).__name__).splitlines()[0]
         if problem.startswith("Exceeds the limit"):  # Python reads no number of thousands of digits
             problem = "a number of too many digits"
         raise StudyError(f"is not YAML ({excerpt(problem)}); {EXPECTED}") from None
-
-
-def _problem(error: Any) -> str:
-    line = f" in line {error.problem_mark.line + 1}" if error.problem_mark else ""
-    return excerpt(str(error.problem or error.context).splitlines()[0]) + line
 
 
 def _screen(text: str) -> None:

@@ -48,7 +48,6 @@ class Trial:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """What the record's columns are called."""
         return tuple(self.record.channels)
 
     @property
@@ -98,34 +97,9 @@ def make_trial(
     ``displacement``, ``velocity`` or ``acceleration``. ``fault`` is one of ``study.faults.fault.FAULTS``, ``any`` for
     one that is drawn in half of the trials, or ``none``; it comes last and has a stream of its own: the trial without
     it is the same record before the fault. ``test`` is one of ``FAMILIES``; a ``structure`` has so many
-    ``coordinates``.
-
-    Raises
-    ------
-    StudyError
-        If there is no such test, effect, response or fault in it.
-    DivergenceError
-        If no system was found that stays finite with these effects.
+    ``coordinates``. A ``DivergenceError`` says that no system was found that stays finite with these effects.
     """
     expect(test in FAMILIES, f"test is {test!r}; expected one of {', '.join(FAMILIES)}")
-    _check(test, hidden, response, fault, coordinates)
-    family = FAMILIES[test]
-    rng = np.random.default_rng([family.stream[0], seed, *family.stream[1:]])
-    asked = family.asked(rng, seed, hidden, noise, response, coordinates)
-    refused = ""
-    for _ in range(ATTEMPTS):
-        try:
-            trial = _attempt(rng, asked, test)
-        except (StudyError, np.linalg.LinAlgError) as error:
-            refused = str(error)
-        else:
-            return _with_fault(trial, seed, fault)
-    what = ", ".join(asked.hidden) or "nothing hidden"
-    raise DivergenceError(f"no system of {family.stem} {seed} stays finite with {what}; of the last, {refused}", 0.0)
-
-
-def _check(test: str, hidden: Sequence[str] | None, response: str | None, fault: str, coordinates: int | None) -> None:
-    """Refuse what there is not in such a test."""
     family, names = FAMILIES[test], hidden or ()
     for name in names:
         known = get(name).name in family.possible
@@ -138,6 +112,18 @@ def _check(test: str, hidden: Sequence[str] | None, response: str | None, fault:
     faults = (NO_FAULT, ANY, *FAULTS) if test in (DRIVEN_MASS, LIKE_THE_REPORT) else (NO_FAULT,)
     expect(fault in faults, f"fault is {fault!r}; in {test} expected one of {', '.join(faults)}")
     expect(coordinates is None or test == STRUCTURE, f"{test} has a single coordinate; expected {STRUCTURE}")
+    rng = np.random.default_rng([family.stream[0], seed, *family.stream[1:]])
+    asked = family.asked(rng, seed, hidden, noise, response, coordinates)
+    refused = ""
+    for _ in range(ATTEMPTS):
+        try:
+            trial = _attempt(rng, asked, test)
+        except (StudyError, np.linalg.LinAlgError) as error:
+            refused = str(error)
+        else:
+            return _with_fault(trial, seed, fault)
+    what = ", ".join(asked.hidden) or "nothing hidden"
+    raise DivergenceError(f"no system of {family.stem} {seed} stays finite with {what}; of the last, {refused}", 0.0)
 
 
 def _attempt(rng: np.random.Generator, asked: Asked, test: str) -> Trial:

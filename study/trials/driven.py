@@ -126,24 +126,17 @@ def driven_rig(rng: np.random.Generator, asked: Asked, ranges: Ranges) -> Rig:
             base, _ = effects.grown(base, replace(free(get(known)), coefficients=(1.0,)), ranges.known, rig)
     if base is not experiment.system:
         quiet = simulated(base, 4)
-    expect(_seen(base, asked), f"the {asked.response} does not show them")
+    # A steady force moves a system to another place, which only a displacement shows if no force depends on the place.
+    # Linear stiffness does not count: it is the same everywhere.
+    hidden = [get(name) for name in asked.hidden]
+    moves = any(term.steady for term in hidden) and all(t.placeless for t in (*hidden, *(e.term for e in base.terms)))
+    expect(asked.response == "displacement" or not moves, f"the {asked.response} does not show them")
     about = {
         "samples_a_period": experiment.samples_a_period, "samples": experiment.samples,
         "damping": experiment.damping, "excitation": experiment.kind,
         "known": "+".join(t.name for t in base.terms[len(LINEAR) :]) or "linear",
     }  # fmt: skip
     return replace(rig, base=base, about=about)
-
-
-def _seen(base: Model, asked: Asked) -> bool:
-    """A steady force moves a system to another place, which only a displacement shows if no force depends on the place.
-
-    Linear stiffness does not count: it is the same everywhere.
-    """
-    hidden = [get(name) for name in asked.hidden]
-    if asked.response == "displacement" or not any(term.steady for term in hidden):
-        return True
-    return not all(term.placeless for term in (*hidden, *(entry.term for entry in base.terms)))
 
 
 def report_like(rng: np.random.Generator, _: Ranges) -> Experiment:

@@ -25,7 +25,6 @@ LINEAR = ("inertia", "linear_damping", "linear_stiffness")  # what a linear mode
 HIDDEN = tuple(name for name in LIBRARY if name not in LINEAR)
 SHARE = (0.10, 0.40)  # of the rms restoring force, in every trial
 STEEPEST = 3.0  # power of the amount by which a share is taken to grow, or one over it, at most
-FARTHEST = 100.0  # logarithm of what an amount may grow by at once; with far less the motion escapes
 FORGOTTEN = 1e-3  # share of the motion that a push at the start may still move in the second half
 # Standard errors at which 19 of 20 tests of about 20 candidates find an effect.
 VISIBLE_ERRORS = float(-ndtri(ALPHA / 20) + ndtri(0.95))
@@ -166,7 +165,7 @@ def _next(one: tuple[float, float], other: tuple[float, float], wanted: float) -
         return _between(other[0], wanted)
     slope = math.log(other[1] / one[1]) / math.log(other[0] / one[0])
     steps = math.log(wanted / other[0]) / min(max(slope, 1.0 / STEEPEST), STEEPEST)
-    return other[0] * math.exp(min(steps, FARTHEST))
+    return other[0] * math.exp(min(steps, 100.0))  # with far less growth at once the motion escapes
 
 
 def share_of(model: Model, name: str, record: Record) -> float:
@@ -230,18 +229,8 @@ def stands_out(clean: Record, truth: Model, name: str, noise: float) -> bool:
     """Whether the coefficient of an effect would stand ``VISIBLE_ERRORS`` standard errors from zero, of white noise.
 
     This is asked of the true model alone (the bound of Cramer and Rao), so that no property of the search decides which
-    trials there are.
-
-    Parameters
-    ----------
-    clean : Record
-        As measured, without noise.
-    truth : Model
-        What made it.
-    name : str
-        The hidden effect.
-    noise : float
-        Standard deviation of the noise on what is predicted, in its unit.
+    trials there are. ``clean`` is the record as measured, without noise, that ``truth`` made; ``noise`` is the standard
+    deviation of that on what is predicted, in its unit.
     """
     entry = next(t for t in truth.terms if t.name == name)
     try:

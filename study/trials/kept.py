@@ -1,6 +1,6 @@
 """The tables of trials that are kept in docs: their columns, and whether this code still gives them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, cast
@@ -8,10 +8,11 @@ from typing import Any, cast
 import numpy as np
 import pandas as pd
 
+from study.support.numbers import SAME_RUN
+
 Row = dict[str, Any]
 TRIALS, BY_TEST, STRUCTURES = "trials", "trials_by_test", "trials_of_structures"
 TIMES = ("seconds",)  # of another machine, or another hour
-SAME_RUN = 0.01  # relative: numbers of two runs of the same code on two machines
 COLUMNS_OF_WORDS = (  # the others hold numbers
     "kind", "test", "hidden", "place", "response", "known", "faults", "fault", "fault_channel", "faults_found",
     "fault_rivals", "fault_shown", "found", "found_channel", "verdict", "first", "first_place", "effect_first",
@@ -76,19 +77,17 @@ def differing_trials(own: pd.DataFrame, kept: pd.DataFrame, name: str) -> list[s
     table = KEPT_TABLES[name]
     keys = [key for key in ("test", "seed") if key in table.columns]
     before = own[keys].merge(kept, on=keys, how="left")
-    strict = [c for c in table.columns if c not in (*keys, *TIMES, *table.loose)]
-    return [f"seed {seed}: {column}" for column in strict for seed in _apart(column, own, before)]
-
-
-def _apart(column: str, own: pd.DataFrame, before: pd.DataFrame) -> Sequence[int]:
-    one, other = own[column], before[column]
-    if column in COLUMNS_OF_WORDS:
-        same = _text(one).to_numpy() == _text(other).to_numpy()
-    else:
-        numbers = [pd.to_numeric(c, errors="coerce").to_numpy(dtype=np.float64) for c in (one, other)]
-        floor = 1e-6 if column.startswith("error") else 0.0  # what the integration leaves where there is no noise
-        same = np.isclose(*numbers, rtol=SAME_RUN, atol=floor, equal_nan=True)
-    return [int(seed) for seed in own["seed"].to_numpy()[~same]]
+    differing: list[str] = []
+    for column in (c for c in table.columns if c not in (*keys, *TIMES, *table.loose)):
+        both = own[column], before[column]
+        if column in COLUMNS_OF_WORDS:
+            same = np.equal(*(_text(c).to_numpy() for c in both))
+        else:
+            numbers = (pd.to_numeric(c, errors="coerce").to_numpy(dtype=np.float64) for c in both)
+            floor = 1e-6 if column.startswith("error") else 0.0  # what the integration leaves where there is no noise
+            same = np.isclose(*numbers, rtol=SAME_RUN, atol=floor, equal_nan=True)
+        differing += [f"seed {int(seed)}: {column}" for seed in own["seed"].to_numpy()[~same]]
+    return differing
 
 
 def _text(column: "pd.Series[Any]") -> "pd.Series[Any]":

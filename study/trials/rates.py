@@ -16,14 +16,13 @@ from scipy.special import ndtri
 
 from study.diagnose.verdict import MISSING, NOTHING, UNKNOWN
 from study.equations.terms import LIBRARY, same_elsewhere
-from study.support.arrays import Floats
+from study.trials.draw import NOISES
 from study.trials.effects import VISIBLE_ERRORS
 from study.trials.kept import BY_TEST, STRUCTURES, TRIALS, Row, rows_of
 from study.trials.kinds import TESTS
 from study.trials.runs import COMPLETED, NONE, PAIR, REMOVED, SINGLE, WITH, WITHOUT
 
-FAINT_NOISE, MODEST_NOISE = 0.01, 0.05  # noise up to which ties are to be short, and the true effect has to come first
-COUNTED = 1e-6  # relative: what is counted or read off has no interval, and no last bit either
+_, FAINT_NOISE, MODEST_NOISE, _ = NOISES  # up to which ties are to be short, and the true effect has to come first
 WITHIN = 1.05  # held-out error after adding, over that of the true model
 SAME_PLACE, END_IN_COMMON, ANOTHER_PLACE = "the same place", "a place with an end in common", "another place"
 NOT_DIAGNOSED = "not_diagnosed"
@@ -63,14 +62,10 @@ def proportion(successes: Sequence[float], asked: Sequence[float] | None = None)
     excess = 1.0
     if asked is not None and binomial > 0.0 and n > 1:
         excess = max(1.0, n / (n - 1) * float(np.sum((good - p * all_asked) ** 2)) / total**2 / binomial)
-    return Rate(n, p, *_wilson(p, total / excess))
-
-
-def _wilson(p: float, n: float) -> tuple[float, float]:
-    z2 = NORMAL**2
-    middle = (p + 0.5 * z2 / n) / (1.0 + z2 / n)
-    half = NORMAL / (1.0 + z2 / n) * math.sqrt(p * (1.0 - p) / n + 0.25 * z2 / n**2)
-    return max(middle - half, 0.0), min(middle + half, 1.0)
+    answers, z2 = total / excess, NORMAL**2
+    middle = (p + 0.5 * z2 / answers) / (1.0 + z2 / answers)
+    half = NORMAL / (1.0 + z2 / answers) * math.sqrt(p * (1.0 - p) / answers + 0.25 * z2 / answers**2)
+    return Rate(n, p, max(middle - half, 0.0), min(middle + half, 1.0))
 
 
 def mean(values: Sequence[float]) -> Rate:
@@ -108,15 +103,13 @@ class Reach:
 
 
 def first_score(row: Row) -> float:
-    """One if the hidden effect is called missing and stands first, or its other form in the same equation does."""
-    return float(row["verdict"] == MISSING and (row["first"] == row["hidden"] or _in_another_form(row)))
+    """One if the hidden effect is called missing and stands first, or its other form in the same equation does.
 
-
-def _in_another_form(row: Row) -> bool:
-    """Whether what stands first is the hidden effect with the displacement counted from another place."""
-    if row["response"] == "displacement" or not row["first"]:
-        return False
-    return same_elsewhere(row["first"], row["hidden"], row["known"].split("+"))
+    That is the effect with the displacement counted from another place.
+    """
+    moved = row["response"] != "displacement" and bool(row["first"])
+    moved = moved and same_elsewhere(row["first"], row["hidden"], row["known"].split("+"))
+    return float(row["verdict"] == MISSING and (row["first"] == row["hidden"] or moved))
 
 
 def tied_score(row: Row) -> float:
@@ -147,23 +140,13 @@ def removed_score(row: Row) -> float:
     return float(row["verdict"] == MISSING and row["first"] in whole and row["hidden"] in whole)
 
 
-def removed_or_as_good(row: Row) -> float:
-    """The same, or what is said leaves no more than the true model: then nothing in the record speaks against it."""
-    return max(removed_score(row), as_good_as_truth(row))
-
-
 def fault_score(row: Row) -> float:
     """One if the fault is named in its channel with an interval that holds its value."""
     if (row["found"], row["found_channel"]) != (row["fault"], row["fault_channel"]):
         return 0.0
     low, true, high = (float(row[column]) for column in ("found_low", "fault_value", "found_high"))
-    counted = low == high and math.isclose(low, true, rel_tol=COUNTED)
+    counted = low == high and math.isclose(low, true, rel_tol=1e-6)  # has no interval, and no last bit either
     return float(counted or low <= true <= high)
-
-
-def no_fault_score(row: Row) -> float:
-    """One if no fault of the measurement is found."""
-    return float(row["faults_found"] == "")
 
 
 def as_good_as_truth(row: Row) -> float:
@@ -197,11 +180,6 @@ def _named(row: Row) -> bool:
     return row["tie_set"] != ""
 
 
-def _visible(row: Row) -> bool:
-    """Whether the hidden effect leaves anything to be seen: a constant force behind a high-pass does not."""
-    return not row["error_true"] >= row["error_before"]
-
-
 def _stands_out(row: Row) -> bool:
     """Whether the record of a test shows the hidden effect; what could not be diagnosed is taken to."""
     return row["noise"] == 0.0 or row["shown"] >= VISIBLE_ERRORS or row["trouble"] != ""
@@ -230,18 +208,21 @@ TARGETS: Mapping[str, tuple[Reach, ...]] = MappingProxyType(
             Reach("true effect first, noise to 5 %", _single(up_to=MODEST_NOISE), first_score, "first"),
             Reach("true effect first, noise 10 %", _single(above=MODEST_NOISE), first_score, "first_in_noise"),
             Reach("tie set holds the truth", _single(), tied_score, "tied"),
-            Reach("... where the true model leaves less than that without the effect", _single(_visible), tied_score),
+            # A constant force behind a high-pass leaves nothing to be seen.
+            Reach("... where the true model leaves less than that without the effect",
+                  _single(lambda r: not r["error_true"] >= r["error_before"]), tied_score),
             Reach("nothing missing where nothing is, and of completed models", _kinds(NONE, COMPLETED), nothing_score,
                   "nothing"),
             Reach("... where nothing is", _kinds(NONE), nothing_score),
             Reach("... of completed models", _kinds(COMPLETED), nothing_score),
             Reach("both of two, by diagnose and add", _kinds(PAIR), pair_score, "both"),
             Reach("out of the library: unknown, or in the tie set", _kinds(REMOVED), removed_score, "removed"),
-            Reach("... or what is said leaves as little as the true model", _kinds(REMOVED), removed_or_as_good),
+            Reach("... or what is said leaves as little as the true model", _kinds(REMOVED),
+                  lambda r: max(removed_score(r), as_good_as_truth(r))),
             Reach("the fault named, its value within its interval", _faulty, fault_score, "fault"),
             Reach("... of those that the record shows beside the true equation", lambda r: r["fault_shown"] == "yes",
                   fault_score),
-            Reach("no fault named where there is none", lambda r: not _faulty(r), no_fault_score),
+            Reach("no fault named where there is none", lambda r: not _faulty(r), lambda r: r["faults_found"] == ""),
             Reach("error after adding within 5 % of the true model's", _single(), as_good_as_truth),
             Reach("mean size of the tie set, noise to 1 %", _single(_named, up_to=FAINT_NOISE), _number("tie_size"),
                   "size", size=True),
@@ -326,26 +307,17 @@ def confusion(table: pd.DataFrame) -> pd.DataFrame:
 
 def confusion_of_places(table: pd.DataFrame) -> pd.DataFrame:
     """Kinds of the hidden effect's place (rows) and where the first candidate was (columns), numbers of trials."""
-    return _counted([(_where_hidden(row), _where_said(row)) for row in rows_of(table)])
+    pairs: list[tuple[str, str]] = []
+    for row in rows_of(table):
+        said, true = _path(row["first_place"]), _path(row["place"])
+        kind = "to the ground, or a force on it" if "ground" in true else "between two"
+        where = SAME_PLACE if said == true else END_IN_COMMON if (said & true) - {"ground"} else ANOTHER_PLACE
+        pairs.append((f"{kind}, {row['coordinates']} coordinates" if true else NONE, where if said else _said(row)))
+    return _counted(pairs)
 
 
 def _said(row: Row) -> str:
     return NOT_DIAGNOSED if row["trouble"] else row["first"] if row["verdict"] == MISSING else row["verdict"]
-
-
-def _where_hidden(row: Row) -> str:
-    path = _path(row["place"])
-    if not path:
-        return NONE
-    kind = "to the ground, or a force on it" if "ground" in path else "between two"
-    return f"{kind}, {row['coordinates']} coordinates"
-
-
-def _where_said(row: Row) -> str:
-    said, true = _path(row["first_place"]), _path(row["place"])
-    if not said:
-        return _said(row)
-    return SAME_PLACE if said == true else END_IN_COMMON if (said & true) - {"ground"} else ANOTHER_PLACE
 
 
 def _path(label: str) -> set[str]:
@@ -374,7 +346,10 @@ def error_by_noise(table: pd.DataFrame) -> pd.DataFrame:
     for kind, steps in ((SINGLE, ("before", "after", "true")), (PAIR, ("before", "after", "after_two", "true"))):
         for noise, group in good[good["kind"] == kind].groupby("noise"):
             for step in steps:
-                errors = _errors(group, step)
+                column = group[f"error_{step}"]
+                if step == "after_two":  # where nothing was added the second time, those after the first
+                    column = column.fillna(group["error_after"])
+                errors = column.dropna().to_numpy(dtype=np.float64)
                 error = np.std(errors, ddof=1) / math.sqrt(len(errors)) if len(errors) > 1 else math.nan
                 rows.append(
                     {"kind": kind, "noise": noise, "step": step, "trials": len(errors), "mean_error": np.mean(errors),
@@ -382,14 +357,6 @@ def error_by_noise(table: pd.DataFrame) -> pd.DataFrame:
                 )  # fmt: skip
     columns = ["kind", "noise", "step", "trials", "mean_error", "standard_error", "median_error"]
     return pd.DataFrame(rows, columns=columns)
-
-
-def _errors(group: pd.DataFrame, step: str) -> Floats:
-    """Errors at a step; where nothing was added the second time, those after the first."""
-    values = group[f"error_{step}"]
-    if step == "after_two":
-        values = values.fillna(group["error_after"])
-    return values.dropna().to_numpy(dtype=np.float64)
 
 
 def against_alpha(table: pd.DataFrame) -> pd.DataFrame:
@@ -420,17 +387,14 @@ def against_k(table: pd.DataFrame) -> pd.DataFrame:
     """
     rows = [r for r in rows_of(table) if r["kind"] == SINGLE and not r["trouble"] and r["noise"] > 0.0]
     rows = [r for r in rows if r["smallest_p"] < max(ALPHAS)]
+    cells = [str(r["rivals"]) for r in rows]  # ``0.00+1.15``; a cell of one number is a number
+    rivals = [[float(part) for part in cell.split("+")] if cell not in ("", "nan") else [] for cell in cells]
     lines: list[dict[str, float]] = []
     for k in FACTORS:
         holds = proportion([float(r["distance"] < k) for r in rows])
-        sizes = mean([float(sum(d < k for d in _distances(r["rivals"]))) for r in rows])
+        sizes = mean([float(sum(d < k for d in own)) for own in rivals])
         lines.append(
             {"k": k, "trials": holds.trials, "holds": holds.value, "holds_low": holds.low, "holds_high": holds.high,
              "size": sizes.value, "size_low": sizes.low, "size_high": sizes.high}
         )  # fmt: skip
     return pd.DataFrame(lines)
-
-
-def _distances(rivals: object) -> list[float]:
-    """From ``0.00+1.15``; a cell of one number is a number."""
-    return [float(part) for part in str(rivals).split("+")] if str(rivals) not in ("", "nan") else []

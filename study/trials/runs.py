@@ -121,7 +121,13 @@ def run_trial(order: Order) -> Row:
     try:
         fault = FAULTS[order.seed % len(FAULTS)] if order.faults == WITH else NO_FAULT
         trial = make_trial(order.seed, order.hidden, order.noise, order.response, fault, order.test, order.coordinates)
-        row |= {**trial.about, **_drawn(trial), "hidden": "+".join(e.term.name for e in trial.effects) or nothing}
+        shares = sum(trial.shares) if trial.test == STRUCTURE else "+".join(f"{share:.3f}" for share in trial.shares)
+        row |= {
+            **trial.about, "noise": trial.noise, "response": trial.response, "share": shares,
+            "place": "+".join(entry.place.label for entry in trial.effects), "fault": trial.fault.get("fault", ""),
+            **{f"fault_{key}": trial.fault.get(key, "") for key in ("channel", "value", "unit")},
+            "hidden": "+".join(e.term.name for e in trial.effects) or nothing,
+        }  # fmt: skip
         begun = time.perf_counter()
         row |= judged(order, trial)
     except StudyError as error:
@@ -133,15 +139,6 @@ def run_trial(order: Order) -> Row:
 def table_of(order: Order) -> str:
     """The kept table that a trial belongs to."""
     return {DRIVEN_MASS: TRIALS, STRUCTURE: STRUCTURES}.get(order.test, BY_TEST)
-
-
-def _drawn(trial: Trial) -> Row:
-    """What was drawn, beside the kind of rig and the effects."""
-    places = [entry.place.label for entry in trial.effects]
-    shares = sum(trial.shares) if trial.test == STRUCTURE else "+".join(f"{share:.3f}" for share in trial.shares)
-    fault = {f"fault_{key}": trial.fault.get(key, "") for key in ("channel", "value", "unit")}
-    row: Row = {"noise": trial.noise, "response": trial.response, "place": "+".join(places), "share": shares}
-    return row | {"fault": trial.fault.get("fault", ""), **fault}
 
 
 def _judged_driven(order: Order, trial: Trial) -> Row:

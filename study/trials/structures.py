@@ -53,8 +53,12 @@ def structure_rig(rng: np.random.Generator, asked: Asked) -> Rig:
 
     def recorded(truth: Model, shares: Shares) -> tuple[Record, Shares]:
         if asked.hidden:
-            calm = forgets(lambda f: _side_by_side(simulated(truth, 2, ["displacement"], f)), drive, 10)
-            expect(calm, "the motion does not forget how it began")
+
+            def moved(force: Floats) -> Floats:
+                record = simulated(truth, 2, ["displacement"], force)
+                return record.columns(record.sensors)
+
+            expect(forgets(moved, drive, 10), "the motion does not forget how it began")
         quiet = simulated(truth, 16, [asked.response])
         level = np.sqrt(asked.noise)
         noisy = {str(s): x + level * float(np.std(x)) * rng.standard_normal(len(x)) for s, x in quiet.motions.items()}
@@ -64,11 +68,6 @@ def structure_rig(rng: np.random.Generator, asked: Asked) -> Rig:
         base, effect, motion, partial(_strength, base, dt), recorded, Sizing(10, close=0.1),
         {"coordinates": len(base.coordinates)},
     )  # fmt: skip
-
-
-def _side_by_side(record: Record) -> Floats:
-    """What its sensors show, shape (n, sensors)."""
-    return np.stack([record[sensor] for sensor in record.sensors], axis=1)
 
 
 def _strength(base: Model, dt: float, unit: ModelTerm, motion: Floats) -> tuple[float, float]:

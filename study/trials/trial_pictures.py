@@ -15,7 +15,6 @@ STEPS_OF_ADDING = {
     "after_two": ("after adding twice", "C4", "D", 0.09),
     "true": ("true model", "black", "_", 0.27),
 }
-WHITE_FROM = 0.6  # share from which a number is written in white
 
 
 def confusion_panel(axes: Axes, counts: pd.DataFrame) -> Axes:
@@ -33,7 +32,7 @@ def confusion_panel(axes: Axes, counts: pd.DataFrame) -> Axes:
         if value > 0.0:
             axes.text(
                 j, i, f"{100.0 * value:.0f}", ha="center", va="center", fontsize=8,
-                color="white" if value > WHITE_FROM else "black",
+                color="white" if value > 0.6 else "black",
             )  # fmt: skip
     titles = [f"{name} ({int(n.sum())})" for name, n in zip(hidden, numbers, strict=True)]
     frame_cells(axes, titles, names, 90.0)

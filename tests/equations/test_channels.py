@@ -8,11 +8,10 @@ import pytest
 
 from study.equations.equations_of_motion import Equations
 from study.equations.formulas import ExpressionError
-from study.equations.free_run import predict_response, prepare
+from study.equations.free_run import needed_steps, predict_response, prepare
 from study.equations.model import Model, free
 from study.equations.model_file import parse_model
 from study.equations.simulate import Integrator, simulate
-from study.equations.substeps import needed_steps
 from study.equations.term import Component, Term
 from study.equations.terms import LIBRARY, custom
 from study.identify.frequency_domain.inputs import histories, reverse_inputs

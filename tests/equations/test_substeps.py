@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from study.equations.free_run import needed_steps
 from study.equations.simulate import Integrator, simulate
-from study.equations.substeps import needed_steps
 from study.identify import estimators
 from study.identify.estimators.base import Settings
 from study.identify.time_domain.fit_model import fit_model

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from study.commands import measurements
-from study.gallery import findings_of_record, gallery_page
-from study.gallery.findings_of_record import Published, found_beside, read_findings
+from study.gallery import gallery_page
+from study.gallery.gallery_page import Published, found_beside, read_findings
 from study.support import document
 from study.support.errors import StudyError
 
@@ -123,9 +123,7 @@ def test_a_row_says_by_how_much_a_value_differs(folder):
 
 
 def test_the_page_holds_its_pictures_and_asks_for_nothing(folder):
-    row = findings_of_record.Literature(
-        entry="damper", title="A <damper>", test="A test", source="Others", known="Much"
-    )
+    row = gallery_page.Literature(entry="damper", title="A <damper>", test="A test", source="Others", known="Much")
     entry = gallery_page.Entry(row, (read_findings(folder, "run"),), ())
     page = gallery_page.gallery_page([entry]).decode()
     assert page.count("data:image/png;base64,") == 1
@@ -142,7 +140,5 @@ def test_without_results_one_sentence(tmp_path):
 
 def test_every_entry_has_its_literature_and_every_value_its_record():
     rows = measurements.load_measurements(ROOT / "config")
-    assert list(findings_of_record.literature(ROOT / "config")) == list(
-        dict.fromkeys(row.entry for row in rows.values())
-    )
-    assert {value.record for value in findings_of_record.published(ROOT / "config")} <= set(rows)
+    assert list(gallery_page.literature(ROOT / "config")) == list(dict.fromkeys(row.entry for row in rows.values()))
+    assert {value.record for value in gallery_page.published(ROOT / "config")} <= set(rows)

@@ -14,7 +14,7 @@ from study.diagnose.separating_test import advice, separating_level
 from study.diagnose.verdict import MISSING, diagnose
 from study.equations.model_file import read_model
 from study.equations.terms import LIBRARY, get
-from study.gallery.findings_of_record import Published, found_beside, read_findings
+from study.gallery.gallery_page import Published, found_beside, read_findings
 from study.identify.time_domain.fit_model import fit_model
 from study.records.readers import ReadOptions, read_record
 from study.records.record_layout import Layout, apart

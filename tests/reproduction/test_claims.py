@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from study.equations.model_file import read_model
 from study.identify.estimators.base import Settings
 from study.records.record import Record
-from study.reproduction import config, integrator_study, study_pages
+from study.reproduction import config, ensemble, study_pages
 from study.reproduction.claims import (
     claims_table,
     dead_band,
@@ -54,7 +54,7 @@ def steps(settings: ClaimSettings) -> pd.DataFrame:
     record = evidence.record_settings(settings, evidence.Drive("linear", level=4.0))
     told = Settings(settings.segments.segments(), settings.fit_band)
     chosen = {name: models[name] for name in ("linear", "van_der_pol")}
-    return integrator_study.integrator_study(chosen, record, told, range(5001, 5004), ["raw", "filtered"])
+    return ensemble.integrator_study(chosen, record, told, range(5001, 5004), ["raw", "filtered"])
 
 
 @pytest.fixture(scope="module")

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from study.support.block_normal import ContinuityGaps
-from study.support.levenberg_marquardt import point_at
+from study.support.levenberg_marquardt import ContinuityGaps, point_at
 
 
 def test_own_variables_are_eliminated_exactly() -> None:

@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.fft import rfft, rfftfreq
 
-from study.equations.free_run import prepare
+from study.equations.free_run import needed_steps, prepare
 from study.equations.model import Model, free
-from study.equations.substeps import needed_steps
 from study.equations.terms import get
 from study.identify.frequency_domain import coefficients, conditioned
 from study.identify.frequency_domain.inputs import histories, reverse_inputs, without_inertia

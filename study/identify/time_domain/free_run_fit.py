@@ -20,9 +20,8 @@ from study.records.outputs import DISPLACEMENT, Outputs
 from study.records.record import Record
 from study.records.states import starting_states
 from study.support.arrays import Floats
-from study.support.block_normal import ContinuityGaps
 from study.support.errors import DivergenceError, StudyError
-from study.support.levenberg_marquardt import OFFSET, End, Point, minimise, point_at
+from study.support.levenberg_marquardt import OFFSET, ContinuityGaps, End, Point, minimise, point_at
 
 FAR = 1e9  # times its start: a mass that the motion does not show at all runs off without end
 

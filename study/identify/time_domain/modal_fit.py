@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from study.equations.free_run import needed_steps
 from study.equations.model import Model, ModelTerm
-from study.equations.substeps import needed_steps
 from study.identify.frequency_domain.modal_lines import line_fits
 from study.identify.frequency_domain.modal_screening import screened_by_lines
 from study.identify.time_domain.free_run_fit import FreeRunFit

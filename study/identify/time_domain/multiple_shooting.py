@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from study.equations.equations_of_motion import has_spring
+from study.equations.free_run import needed_steps
 from study.equations.model import Model
-from study.equations.substeps import needed_steps
 from study.identify.time_domain.continuation import NEAR, NEGLIGIBLE, fit_segments, lengthen
 from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
 from study.identify.time_domain.shooting import (

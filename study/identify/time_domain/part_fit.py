@@ -7,9 +7,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from study.equations.free_run import FreeRun, prepare
+from study.equations.free_run import FreeRun, needed_steps, prepare
 from study.equations.model import Model
-from study.equations.substeps import needed_steps
 from study.identify.time_domain.free_run_fit import FreeRunFit, fit_free_run
 from study.identify.time_domain.stretch_states import states_along, states_of_segments
 from study.records.prepared import Prepared

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from study.equations.free_run import needed_steps
 from study.equations.model import Model
-from study.equations.substeps import needed_steps
 from study.identify.frequency_domain.starting_values import linear_start
 from study.identify.time_domain.free_run_fit import FreeRunFit, released
 from study.identify.time_domain.motion_start import from_the_motion

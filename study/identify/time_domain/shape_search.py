@@ -13,10 +13,10 @@ from functools import cached_property
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
+from study.equations.free_run import needed_steps
 from study.equations.linear_part import transfer
 from study.equations.model import Model, ModelTerm
 from study.equations.place import Place
-from study.equations.substeps import needed_steps
 from study.equations.term import ShapeParameter
 from study.identify.frequency_domain.starting_values import linear_start, oscillator
 from study.identify.time_domain.free_run_fit import FreeRunFit

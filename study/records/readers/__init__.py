@@ -3,15 +3,21 @@
 What a file is is told by its content first and its name second. Packages for a format are imported when it is met.
 """
 
+import errno
+import os
+import select
+import stat
+import tempfile
 import warnings
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 
-from study.records.readers import hdf5, matlab, parquet, uff
+from study.records.readers import binary
 from study.records.readers.assemble import record_from
+from study.records.readers.checks import suspect_swapped
 from study.records.readers.options import ReadOptions, assignments, options_beside, read_options
 from study.records.readers.roles import Roles
-from study.records.readers.source import EXPECTED, readable
-from study.records.readers.swapped import suspect_swapped
 from study.records.readers.table import Table
 from study.records.record import Record
 from study.support.errors import StudyError, expect
@@ -23,9 +29,12 @@ __all__ = [
 ]  # fmt: skip
 
 SINGLE_MASS = Roles()
-MAGIC = 1024  # bytes; MATLAB 7.3 begins its HDF5 part behind 512 of its own
+EXPECTED = "expected CSV, MATLAB, HDF5, UFF or Parquet"
+LARGEST_PIPE = 1 << 32  # bytes: what never ends must not fill the disk
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-BINARY = {"hdf5": hdf5.read, "matlab": matlab.read, "parquet": parquet.read, "uff": uff.read}
+BINARY = {
+    "hdf5": binary.read_hdf5, "matlab": binary.read_matlab, "parquet": binary.read_parquet, "uff": binary.read_uff,
+}  # fmt: skip
 SUFFIXES = {
     ".mat": "a MATLAB file", **dict.fromkeys((".h5", ".hdf5", ".hdf"), "an HDF5 file"),
     **dict.fromkeys((".parquet", ".pq"), "a Parquet file"),
@@ -54,11 +63,6 @@ def read_record(path: Path, mapping: ReadOptions | None = None, roles: Roles = S
     -------
     Record
         Forces and at least one motion, as measured; ``completion.complete`` gives the others.
-
-    Raises
-    ------
-    StudyError
-        If it cannot be read, or is no evenly sampled record.
     """
     path = Path(path)
     table, options = read_table(path, mapping)
@@ -77,21 +81,66 @@ def read_table(path: Path, mapping: ReadOptions | None = None) -> tuple[Table, R
     """The columns of a file, and what the user says about it there and beside the file; raises as `read_record`."""
     options = mapping or ReadOptions()
     with readable(path) as source:
-        head = _head(path, source)
+        try:
+            with source.open("rb") as stream:
+                head = stream.read(1024)  # MATLAB 7.3 begins its HDF5 part behind 512 bytes of its own
+        except OSError as error:
+            raise StudyError(f"{path}: cannot be read ({reason(error)}); {EXPECTED}") from None
+        expect(head, f"{path}: the file is empty; {EXPECTED}")
         if options_beside(path).is_file():
             options = options.over(read_options(options_beside(path)))
         return _table(path, source, head, options), options
 
 
-def _head(path: Path, source: Path) -> bytes:
-    """The first bytes of a file."""
+@contextmanager
+def readable(path: Path) -> Generator[Path, None, None]:
+    """A file that may be read more than once: ``path`` itself, or within the block a copy of what a pipe gave.
+
+    A sentence that a reader says of the copy names ``path``.
+    """
     try:
-        with source.open("rb") as stream:
-            head = stream.read(MAGIC)
+        mode = path.stat().st_mode
+    except FileNotFoundError:
+        raise StudyError(f"{path}: there is no such file; {EXPECTED}") from None
+    except (OSError, ValueError) as error:  # ValueError: a path with a null byte
+        raise StudyError(f"{str(path)!r}: cannot be read ({reason(error)}); {EXPECTED}") from None
+    if stat.S_ISREG(mode):
+        yield path
+        return
+    kind = "a folder" if stat.S_ISDIR(mode) else "neither a regular file nor a pipe"
+    expect(stat.S_ISFIFO(mode), f"{path}: this is {kind}; {EXPECTED}")
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / f"pipe{path.suffix}"
+        _copied(path, copy)
+        try:
+            yield copy
+        except StudyError as error:
+            raise StudyError(str(error).replace(str(copy), str(path))) from None
+
+
+def _copied(pipe: Path, copy: Path) -> None:
+    """Everything that a pipe gives, in a file."""
+    total = 0
+    try:
+        descriptor = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)  # else a pipe that nobody writes to waits for ever
+        with os.fdopen(descriptor, "rb", buffering=0) as source, copy.open("wb") as target:
+            while data := _next(source.fileno()):
+                total += target.write(data)
+                expect(total <= LARGEST_PIPE, f"{pipe}: this pipe gave {total} bytes and no end; {EXPECTED}")
     except OSError as error:
-        raise StudyError(f"{path}: cannot be read ({reason(error)}); {EXPECTED}") from None
-    expect(head, f"{path}: the file is empty; {EXPECTED}")
-    return head
+        raise StudyError(f"{pipe}: cannot be read ({reason(error)}); {EXPECTED}") from None
+    expect(total, f"{pipe}: nobody writes to this pipe, or nothing is left in it; {EXPECTED}")
+
+
+def _next(descriptor: int) -> bytes:
+    """What comes next, waiting for it while somebody has the pipe open to write; empty at its end."""
+    while True:
+        try:
+            return os.read(descriptor, 1 << 20)
+        except OSError as error:
+            if error.errno != errno.EAGAIN:
+                raise
+            select.select([descriptor], [], [])
 
 
 def _kind(path: Path, head: bytes) -> str:

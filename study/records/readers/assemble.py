@@ -5,22 +5,19 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study.records.readers import checks
 from study.records.readers.options import ReadOptions
 from study.records.readers.roles import Roles, assign, own_unit
-from study.records.readers.sampling import even_interval
 from study.records.readers.table import Column, Table
 from study.records.record import MOTIONS, SI_UNITS, Record
+from study.support.arrays import Floats
 from study.support.errors import StudyError, at, expect
+from study.support.numbers import LAST_DIGITS
 from study.support.terminal import harmless
 from study.support.units import is_unit, parse_unit, role_unit
 
-Floats = NDArray[np.float64]
 LONGEST_NAME = 120  # characters of a record's name: names of files have 255 bytes, and more is put to it
-ROUNDING = 1e-9  # of a unit's factor
-AGREE = 0.01  # share by which a given interval may differ from that of the times
 AGAIN = 0.7  # of its rms: a force that changes by more after a period does not repeat (a random one changes by 1.4)
 
 
@@ -31,11 +28,18 @@ def record_from(path: Path, table: Table, options: ReadOptions, roles: Roles) ->
     columns = assign(path, table, options, roles)
     for column in columns.values():
         expect(not column.fault, f"{path}: {column.fault}")
-    _check_lengths(path, columns)
+    lengths = {len(column.values) for column in columns.values()}
+    each = ", ".join(f"{channel} ({column.name!r}) has {len(column.values)}" for channel, column in columns.items())
+    expect(len(lengths) == 1, f"{path}: channels differ in length: {each} samples; expected the same number for all")
     given = _given_units(path, columns, options, roles)
     _check_apart(path, columns, roles)
     units = _units(path, columns, given, roles)
-    first, last = _range(path, len(next(iter(columns.values())).values), options)
+    length, (first, end) = lengths.pop(), options.samples or (0, None)
+    last, asked = (length, f"from {first} on") if end is None else (end, f"{first} to {end}")
+    within = f"the record has {length}; expected a range within, counted from 0"
+    expect(first < length and last <= length, f"{path}: samples {asked} are asked for; {within}")
+    few = f"{path}: {last - first} samples are too few; expected {checks.FEWEST_SAMPLES} or more"
+    expect(last - first >= checks.FEWEST_SAMPLES, few)
     cut = table.from_sample(first)
     kept = {channel: replace(c, values=c.values[first:last]) for channel, c in columns.items()}
     kept = _usable(path, kept, cut, options, roles)
@@ -45,17 +49,13 @@ def record_from(path: Path, table: Table, options: ReadOptions, roles: Roles) ->
     usual = {"time": "s"} | {channel: SI_UNITS[kind] for channel, kind in roles.kinds.items()}
     named = {channel: unit for channel, unit in units.items() if channel in channels}
     period = _period(path, columns, channels, options, roles)
+    simulated = path.stem == "record"  # as all are called that the simulator writes, each in a folder of its own
+    name = path.resolve().parent.name if simulated else path.stem
+    name = f"{name}_{options.group.strip('/').replace('/', '_')}" if options.group else name
+    name = harmless(name)[:LONGEST_NAME]  # files are named after it, and pictures show it
     return Record(
-        dt, channels | still, usual | named, _name(path, options), start, period,
-        coordinates=roles.coordinates, forces=roles.forces,
-    )  # fmt: skip
-
-
-def _name(path: Path, options: ReadOptions) -> str:
-    """The file's own name; the folder's for what the simulator writes, which is always ``record.csv``."""
-    stem = path.resolve().parent.name if path.stem == "record" else path.stem
-    name = f"{stem}_{options.group.strip('/').replace('/', '_')}" if options.group else stem
-    return harmless(name)[:LONGEST_NAME]  # files are named after it, and pictures show it
+        dt, channels | still, usual | named, name, start, period, coordinates=roles.coordinates, forces=roles.forces
+    )
 
 
 def _check_apart(path: Path, columns: Mapping[str, Column], roles: Roles) -> None:
@@ -71,12 +71,6 @@ def _check_apart(path: Path, columns: Mapping[str, Column], roles: Roles) -> Non
         for motion in (c for c in columns if roles.kinds.get(c) in MOTIONS):
             same = np.array_equal(columns[force].values, columns[motion].values)
             expect(not same, f"{path}: {force} and {motion} hold the same numbers; expected two measured channels")
-
-
-def _check_lengths(path: Path, columns: Mapping[str, Column]) -> None:
-    lengths = {len(column.values) for column in columns.values()}
-    each = ", ".join(f"{channel} ({column.name!r}) has {len(column.values)}" for channel, column in columns.items())
-    expect(len(lengths) == 1, f"{path}: channels differ in length: {each} samples; expected the same number for all")
 
 
 def _given_units(path: Path, columns: Mapping[str, Column], options: ReadOptions, roles: Roles) -> dict[str, str]:
@@ -99,7 +93,13 @@ def _units(
         kind = roles.kinds.get(channel, "")
         own = own_unit(column, kind)
         text = given.get(channel) or own
-        _refuse_contradiction(path, column, given.get(channel, ""), own)
+        if is_unit(text) and is_unit(own):  # two that differ: one is a factor wrong, and nobody knows which
+            one, other = parse_unit(text), parse_unit(own)
+            expect(
+                one.powers == other.powers and abs(one.factor / other.factor - 1.0) < LAST_DIGITS,
+                f"{path}: column {column.name!r} is in {other.text} by the file and a unit of {one.text} is given; "
+                "leave the unit out, or correct it in the file",
+            )
         if text and kind:
             with at(f"{path}: column {column.name!r}"):
                 units[channel] = role_unit(kind, text).text
@@ -112,33 +112,6 @@ def _units(
         like = f"--unit {bare.replace(' ', '.')}=UNIT"
         raise StudyError(f"{path}: {names}; expected a unit of every sensor, such as {like}, or of none, for SI units")
     return units
-
-
-def _refuse_contradiction(path: Path, column: Column, given: str, own: str) -> None:
-    """Refuse a unit that is given where the file says another: one is a factor wrong, and nobody knows which."""
-    if not (is_unit(given) and is_unit(own)):
-        return
-    one, other = parse_unit(given), parse_unit(own)
-    same = one.powers == other.powers and abs(one.factor / other.factor - 1.0) < ROUNDING
-    expect(
-        same,
-        f"{path}: column {column.name!r} is in {other.text} by the file and a unit of {one.text} is given; "
-        "leave the unit out, or correct it in the file",
-    )
-
-
-def _range(path: Path, length: int, options: ReadOptions) -> tuple[int, int]:
-    first, last = options.samples or (0, None)
-    end = length if last is None else last
-    asked = f"from {first} on" if last is None else f"{first} to {last}"
-    inside = first < length and end <= length
-    expect(
-        inside,
-        f"{path}: samples {asked} are asked for; the record has {length}; expected a range within, counted from 0",
-    )
-    few = f"{path}: {end - first} samples are too few; expected {checks.FEWEST_SAMPLES} or more"
-    expect(end - first >= checks.FEWEST_SAMPLES, few)
-    return first, end
 
 
 def _usable(
@@ -175,13 +148,13 @@ def _sampling(
     if "time" in columns:
         time = columns["time"].values * parse_unit(units.get("time", "s")).factor
         if stated is None:
-            return even_interval(path, time, table.place)
+            return checks.even_interval(path, time, table.place)
         step = float(np.median(np.diff(time)))
         differ = (
             f"{path}: an interval of {stated:g} s is given (--fs or --dt), its times step by {step:g} s; leave the "
             "option out, or say with --unit time=UNIT what the times are in"
         )
-        expect(abs(step / stated - 1.0) < AGREE, differ)
+        expect(abs(step / stated - 1.0) < checks.JITTER, differ)
         return stated, float(time[0])
     dt = stated if stated is not None else table.dt
     if dt is None:

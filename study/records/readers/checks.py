@@ -1,20 +1,30 @@
-"""What a channel must not be: with gaps, constant, saturated, too short."""
+"""What a channel must not be: with gaps, constant, saturated; unevenly sampled; force and response exchanged."""
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from study.records.record import MOTIONS, Record, Sensor
+from study.records.spectra import Segments, cross_spectra
+from study.support.arrays import Complexes, Floats
+from study.support.errors import StudyError, expect
+from study.support.numbers import LARGEST, LAST_DIGITS, SMALLEST
+
 FEWEST_SAMPLES = 16
-SMALLEST, LARGEST = 1e-50, 1e50  # size of a value
 SHORTEST, LONGEST = 1e-15, 1e15  # seconds between samples
 FEWEST_CLIPPED = 10  # samples at the very same extreme value ...
 CLIPPED_SHARE = 1e-3  # ... and this share of the record ...
 CLIPPED_RATIO = 10.0  # ... and this many times as many as at the values next to it: then it is clipped
 FEWEST_VALUES = 20  # with fewer different values it is a switched signal, not a clipped one
-SAME = 1e-9  # of the range: values that differ by rounding errors only
-NEAR = 0.05  # of the range: the values next to the extreme
+JITTER = 0.01  # of the sampling interval: what is uneven by less is even, and what is off by less is the same
+ROUNDING = 0.4  # of the sampling interval: the coarsest rounding of printed times that still shows a lost sample
+CONTENT = 1e-6  # of its maximum: autospectra below are leakage
+COHERENT = 0.3  # lines less coherent than this say little
+FEWEST_LINES = 8
+BETTER = 0.7  # the swapped reading must miss by less than this share of what the given one misses by
 
 
 def not_finite(values: Floats, place: Callable[[int], str]) -> str | None:
@@ -62,11 +72,13 @@ def saturated(values: Floats) -> str | None:
         count = int(np.count_nonzero(values == extreme))
         if extreme == 0.0 or count < max(FEWEST_CLIPPED, CLIPPED_SHARE * len(values)):
             continue
-        below = np.rint(np.abs(values - extreme) / (SAME * np.ptp(values)))  # 0 at the extreme, whole numbers elsewhere
+        below = np.rint(
+            np.abs(values - extreme) / (LAST_DIGITS * np.ptp(values))
+        )  # 0 at the extreme, whole numbers elsewhere
         different, times = np.unique(below, return_counts=True)
         if len(different) < FEWEST_VALUES:
             continue
-        near = (different > 0.0) & (different <= NEAR / SAME)
+        near = (different > 0.0) & (different <= 0.05 / LAST_DIGITS)  # of the range: the values next to the extreme
         usual = float(np.mean(times[near])) if near.any() else float(np.median(times))
         if count > CLIPPED_RATIO * usual and not _comes_to_rest(values, extreme):
             return (
@@ -83,9 +95,142 @@ def _comes_to_rest(values: Floats, extreme: float) -> bool:
     that it has, of many steps a sample; where the whole motion has no more than a step or two nothing can be told.
     """
     change = np.abs(np.diff(values))
-    moving = change[change > SAME * float(np.ptp(values))]
+    moving = change[change > LAST_DIGITS * float(np.ptp(values))]
     there = values == extreme
     edges = change[there[1:] != there[:-1]]
     step = float(np.min(moving, initial=np.inf))
     fast = float(np.mean(moving)) > CLIPPED_RATIO * step if len(moving) else False
     return bool(fast and len(edges) and np.all(edges < 1.5 * step))
+
+
+def even_interval(path: Path, time: Floats, place: Callable[[int], str]) -> tuple[float, float]:
+    """Sampling interval and first time in seconds; ``place`` says where in the file a sample stands.
+
+    The interval is the shortest decimal (of itself or of its inverse) that the times allow; times that lie exactly on
+    a grid are met to the last bit. They may leave it by 1 % of the interval, or by what the decimals that they are
+    printed with explain.
+    """
+    steps = np.diff(time)
+    mean = float(time[-1] - time[0]) / (len(time) - 1)
+    back = int(np.argmax(steps <= 0.0))
+    fault = "stands still" if steps[back] == 0.0 else "runs backwards"
+    times = f"{time[back]:.9g} s, then {time[back + 1]:.9g} s"
+    expect(steps[back] > 0.0, f"{path}: time {fault} in {place(back + 1)} ({times}); expected times that grow")
+    grid = np.arange(len(time), dtype=np.float64)
+    away = 0.5 * float(np.ptp(time - mean * grid))  # from the line that lies in the middle
+    rounding = _rounding(time)
+    if away > max(JITTER * mean, min(rounding, ROUNDING * mean)):
+        usual, widest = float(np.median(steps)), int(np.argmax(steps))
+        worst = int(np.argmax(np.abs(steps - usual)))
+        how = f"sampling is uneven ({usual:.6g} s usually, {steps[worst]:.6g} s before {place(worst + 1)})"
+        if steps[widest] > 1.5 * usual:
+            gap = f"{steps[widest]:.6g} s instead of {usual:.6g} s"
+            how = f"a gap of {gap} follows the time {time[widest]:.9g} s, before {place(widest + 1)}"
+        raise StudyError(f"{path}: {how}; expected even sampling (within 1 % of the interval)")
+    exact = next((dt for dt in _candidates(mean) if np.array_equal(time[0] + dt * grid, time)), None)
+    if exact is not None:
+        return exact, float(time[0])
+    slack = (2.0 * away + rounding) / (len(time) - 1)
+    return shortest_decimal(mean, slack), float(time[0])
+
+
+def shortest_decimal(interval: float, slack: float) -> float:
+    """The interval that a rounded one stands for: of those within ``slack``, the fewest digits (or of its inverse)."""
+    return next((dt for dt in _decimals(interval) if abs(dt - interval) <= slack), interval)
+
+
+def _rounding(time: Floats) -> float:
+    """The last decimal place that the times are printed with, as a number of seconds."""
+    largest = float(np.max(np.abs(time)))
+    sample = time[:: max(1, len(time) // 1000)]
+    for digits in range(10):
+        scaled = sample * 10.0**digits
+        if np.all(np.abs(scaled - np.rint(scaled)) <= 4.0 * np.spacing(largest * 10.0**digits)):
+            return 10.0**-digits
+    return 0.0
+
+
+def _candidates(mean: float) -> Iterator[float]:
+    """Intervals that the times may have been made with, the likeliest first."""
+    yield from _decimals(mean)
+    yield mean
+    below = above = mean
+    for _ in range(8):
+        below, above = math.nextafter(below, 0.0), math.nextafter(above, math.inf)
+        yield below
+        yield above
+
+
+def _decimals(interval: float) -> Iterator[float]:
+    for digits in range(16):
+        yield float(f"{interval:.{digits}e}")
+        yield 1.0 / float(f"{1.0 / interval:.{digits}e}")
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Mass, damping and stiffness that come nearest to a reverse frequency response function."""
+
+    mass: float
+    damping: float
+    stiffness: float
+    error: float  # rms of the relative difference, weighted by coherence
+
+
+def suspect_swapped(record: Record) -> str | None:
+    """A sentence if force and response seem to stand in each other's place.
+
+    The reverse function A_1(f) = force over displacement of anything with a mass is k - (2 pi f)^2 m + j 2 pi f c,
+    (4.25) of the report: it grows as f^2 above resonance, the response lags, and m and c are above zero. The
+    record is read both ways, and suspected if only the other reading comes out so. What has no spring (force over
+    acceleration a constant) looks the same both ways.
+    The measured motion nearest to displacement is used. A record that is too short, or whose band holds no resonance
+    and no mass, cannot tell.
+    """
+    (force,), sensor = record.forces, next(s for m in MOTIONS if (s := Sensor(record.coordinates[0], m)) in record)
+    length = min(1024, len(record) // 8)  # 500 lines are plenty for three coefficients
+    if length < 4 * FEWEST_LINES:
+        return None
+    matrix = cross_spectra([record[force], record[sensor]], record.dt, Segments(length))
+    g, frequency = matrix.density, matrix.frequency
+    drive, response, cross = g[:, 0, 0].real, g[:, 1, 1].real, g[:, 1, 0]
+    weight = np.abs(cross) ** 2 / np.maximum(drive * response, np.finfo(float).tiny)
+    keep = (weight > COHERENT) & (drive > CONTENT * drive.max()) & (response > CONTENT * response.max())
+    keep[:2] = False  # offset and drift
+    if np.count_nonzero(keep) < FEWEST_LINES:
+        return None
+    omega, weight = 2.0 * np.pi * frequency[keep], weight[keep]
+    turn = (1j * omega) ** MOTIONS.index(sensor.motion)  # from this motion to what it is the derivative of
+    ratio = np.sqrt(drive[keep] / response[keep]) * cross[keep] / np.abs(cross[keep])  # the same for both readings
+    given = _fit(omega, ratio * turn, weight)
+    swapped = _fit(omega, turn / ratio, weight)
+    if _is_mechanical(given) or not _is_mechanical(swapped) or swapped.error > BETTER * given.error:
+        return None
+    if swapped.mass * omega.max() ** 2 < abs(swapped.stiffness):  # a spring alone fits too much
+        return None
+    named = str(sensor).replace(" ", ".")
+    return (
+        f"{force} and {sensor} seem to be swapped: read the other way round, their ratio is that of a mass on a spring "
+        f"to within {100.0 * swapped.error:.0f} %, as given it misses by {100.0 * given.error:.0f} % (mass "
+        f"{given.mass:.3g}, damping {given.damping:.3g}); expected --column {force}=... --column {named}=... "
+        "with the names exchanged (or --accept-swapped, 'accept_swapped: true' beside the file, if the record is like "
+        "that)"
+    )
+
+
+def _is_mechanical(fit: _Fit) -> bool:
+    return fit.mass > 0.0 and fit.damping > 0.0
+
+
+def _fit(omega: Floats, ratio: Complexes, weight: Floats) -> _Fit:
+    """Weighted least squares of the relative difference, real coefficients."""
+    scale = omega.max()
+    x = omega / scale
+    powers = np.stack([-(x**2), 1j * x, np.ones_like(x)], axis=1)
+    rows = powers * (np.sqrt(weight) / np.abs(ratio))[:, None]
+    target = np.sqrt(weight) * ratio / np.abs(ratio)
+    stacked, goal = np.concatenate([rows.real, rows.imag]), np.concatenate([target.real, target.imag])
+    parameters = np.linalg.lstsq(stacked, goal, rcond=None)[0]
+    error = float(np.sqrt(np.sum((stacked @ parameters - goal) ** 2) / np.sum(weight)))
+    mass, damping, stiffness = (float(value) for value in parameters / [scale**2, scale, 1.0])
+    return _Fit(mass, damping, stiffness, error)

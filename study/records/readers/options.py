@@ -37,7 +37,6 @@ class ReadOptions:
     as_sampled: bool = False  # all samples are used, though the motion asks for fewer
 
     def __post_init__(self) -> None:
-        """Refuse what contradicts itself or no record can have."""
         if self.dt is not None and self.fs is not None:
             raise StudyError(f"both dt = {self.dt:g} and fs = {self.fs:g} are given; expected one of them")
         for name, value in (("dt", self.dt), ("fs", self.fs)):
@@ -87,38 +86,27 @@ def options_beside(path: Path) -> Path:
 
 
 def read_options(path: Path) -> ReadOptions:
-    """Read options from a YAML file.
-
-    Raises
-    ------
-    StudyError
-        If it cannot be read, or holds a key or value that no record has.
-    """
+    """Read options from a YAML file."""
     text = read_text(path, WANTED)
     with at(path):
-        return _options(read_plain(text) if text.strip() else {})
-
-
-def _options(content: object) -> ReadOptions:
-    given = as_mapping(content)
-    if given is None:
-        raise StudyError("this is no mapping; expected 'columns: {force: V1, displacement: V2}'")
-    for key in given:
-        expect(key in KEYS, f"there is no key {shown(key)}; {', '.join(KEYS)} are known")
-    return ReadOptions(
-        columns={role: _column(role, column) for role, column in _mapping(given, "columns").items()},
-        units={role: _text(f"the unit of {role}", unit) for role, unit in _mapping(given, "units").items()},
-        dt=_number("dt", given.get("dt")),
-        fs=_number("fs", given.get("fs")),
-        group=None if given.get("group") is None else _text("group", given["group"]),
-        samples=_samples(given.get("samples")),
-        period=_whole("period", given.get("period")),
-        accept_saturated=_flag("accept_saturated", given),
-        accept_swapped=_flag("accept_swapped", given),
-        measurement=_measurement(given),
-        free=_flag("free", given),
-        as_sampled=_flag("as_sampled", given),
-    )
+        given = as_mapping(read_plain(text) if text.strip() else {})
+        if given is None:
+            raise StudyError("this is no mapping; expected 'columns: {force: V1, displacement: V2}'")
+        for key in given:
+            expect(key in KEYS, f"there is no key {shown(key)}; {', '.join(KEYS)} are known")
+        columns = _mapping(given, "columns").items()
+        flags = ("accept_saturated", "accept_swapped", "free", "as_sampled")
+        return ReadOptions(
+            columns={r: c if type(c) is int else _text(f"the column of {r}", c) for r, c in columns},
+            units={role: _text(f"the unit of {role}", unit) for role, unit in _mapping(given, "units").items()},
+            dt=_number("dt", given.get("dt")),
+            fs=_number("fs", given.get("fs")),
+            group=None if given.get("group") is None else _text("group", given["group"]),
+            samples=_samples(given.get("samples")),
+            period=_whole("period", given.get("period")),
+            measurement=_measurement(given),
+            **{name: _flag(name, given.get(name, False)) for name in flags},
+        )
 
 
 def _measurement(given: Mapping[object, object]) -> dict[str, float | None] | None:
@@ -130,16 +118,13 @@ def _measurement(given: Mapping[object, object]) -> dict[str, float | None] | No
     faults, wanted = as_mapping(content), "'off', or a mapping such as '{delay: 0.5, drift: off}'"
     if not faults:
         raise _wrong("measurement", content, wanted)
-    return {_text("a fault in measurement", name): _held(name, value) for name, value in faults.items()}
-
-
-def _held(name: object, value: object) -> float | None:
-    if value is False or value == "off":
-        return None
-    number = _number(f"{name} in measurement", value) if type(value) in (int, float) else None
-    if number is None or not math.isfinite(number):
-        raise _wrong(f"{name} in measurement", value, "a number, or 'off'")
-    return number
+    held = dict[str, float | None]()
+    for key, value in faults.items():
+        name = _text("a fault in measurement", key)
+        number = held[name] = _number(f"{key} in measurement", value) if type(value) in (int, float) else None
+        if not (value is False or value == "off" or (number is not None and math.isfinite(number))):
+            raise _wrong(f"{key} in measurement", value, "a number, or 'off'")
+    return held
 
 
 def _mapping(given: Mapping[object, object], key: str) -> dict[str, object]:
@@ -151,10 +136,6 @@ def _mapping(given: Mapping[object, object], key: str) -> dict[str, object]:
 
 def _wrong(name: str, value: object, expected: str) -> StudyError:
     return StudyError(f"{name} is {shown(value)}; expected {expected}")
-
-
-def _column(role: str, value: object) -> str | int:
-    return value if type(value) is int else _text(f"the column of {role}", value)
 
 
 def _text(name: str, value: object) -> str:
@@ -187,8 +168,7 @@ def _samples(value: object) -> tuple[int, int | None] | None:
     return _whole("the first sample", pair[0]) or 0, _whole("the last sample", pair[1])
 
 
-def _flag(name: str, given: Mapping[object, object]) -> bool:
-    value = given.get(name, False)
+def _flag(name: str, value: object) -> bool:
     if isinstance(value, bool):
         return value
     raise _wrong(name, value, "true or false")

@@ -8,7 +8,7 @@ gives it. Where there is one coordinate, or one force, the usual names will do f
 
 import re
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -54,7 +54,6 @@ class Roles:
 
     @property
     def alone(self) -> bool:
-        """Whether they are those of a single mass."""
         return self.coordinates == (ALONE,)
 
     def said(self, name: str, kind: str = "") -> str:
@@ -97,8 +96,11 @@ def assign(path: Path, table: Table, options: ReadOptions, roles: Roles) -> dict
         named[channel] = column
     given = set(named)
     complete = all(f in named for f in roles.forces) and roles.motions(named) == list(roles.coordinates)
-    if not complete:
-        _check_duplicates(path, table, roles)
+    for name, count in Counter(c.name for c in table.columns if c.name and not complete).items():
+        numbers = [str(k) for k, c in enumerate(table.columns, start=1) if c.name == name]
+        twice = f"the column {name!r} is there {count} times, as columns {' and '.join(numbers)}"
+        like = f"--column {(*roles.forces, _motion_of(roles))[0]}={numbers[0]}"
+        expect(count == 1, f"{path}: {twice}; give columns by number, such as {like}")
     rest = [c for c in table.columns if all(c is not n for n in named.values())]
     if not complete or "time" not in named:
         guesses = _guessed(path, table, rest, named, roles)
@@ -106,7 +108,8 @@ def assign(path: Path, table: Table, options: ReadOptions, roles: Roles) -> dict
     motion = bool(roles.motions(named))
     base = roles.alone and any(name in BASE for name in (*named, *(c.name for c in table.columns)))
     lacking = [f for f in roles.forces if f not in named]
-    unforced = options.free or not _unknown(table, named, roles)
+    told = [column for channel, column in named.items() if channel not in roles.forces]
+    unforced = options.free or all(any(c is t for t in told) for c in table.columns)  # else a column may be a force
     if motion and not given.intersection(roles.forces) and (unforced or (base and lacking)):
         for force in roles.forces:  # a free decay: the user says so, or there is no column that could be a force
             named.pop(force, None)
@@ -119,13 +122,13 @@ def assign(path: Path, table: Table, options: ReadOptions, roles: Roles) -> dict
         missing = f"the force{'' if roles.alone else f' {lacking[0]!r}'}" if lacking else motions
         free = " (or say --free where no force acts)" if motion else ""
         raise _ask(path, table, roles, f"no column is known to be {missing}{free}")
+    # Further channels are columns of the same length with names of their own.
+    length, counts = len(next(iter(named.values())).values), Counter(c.name for c in table.columns)
+    known, taken = {"", *named, *NAMES, *roles.kinds}, [id(c) for c in named.values()]
+    usable = [c for c in table.columns if not c.fault and len(c.values) == length and id(c) not in taken]
+    named |= {c.name: c for c in usable if counts[c.name] == 1 and c.name not in known}
     place = {id(c): k for k, c in enumerate(table.columns)}
-    return dict(sorted((named | _extra(table, named, roles)).items(), key=lambda item: place[id(item[1])]))
-
-
-def _unknown(table: Table, named: Mapping[str, Column], roles: Roles) -> bool:
-    """Whether a column that is no motion and no time may be a force."""
-    return any(all(c is not n for r, n in named.items() if r not in roles.forces) for c in table.columns)
+    return dict(sorted(named.items(), key=lambda item: place[id(item[1])]))
 
 
 def _named(path: Path, table: Table, role: str, wanted: str | int, roles: Roles) -> Column:
@@ -142,14 +145,6 @@ def _named(path: Path, table: Table, role: str, wanted: str | int, roles: Roles)
         numbers = " and ".join(str(k) for k, c in enumerate(table.columns, start=1) if any(c is m for m in matches))
         raise _ask(path, table, roles, f"the column {wanted!r} for {role} is there {len(matches)} times, as {numbers}")
     return matches[0]
-
-
-def _check_duplicates(path: Path, table: Table, roles: Roles) -> None:
-    for name, count in Counter(c.name for c in table.columns if c.name).items():
-        numbers = [str(k) for k, c in enumerate(table.columns, start=1) if c.name == name]
-        twice = f"the column {name!r} is there {count} times, as columns {' and '.join(numbers)}"
-        like = f"--column {(*roles.forces, _motion_of(roles))[0]}={numbers[0]}"
-        expect(count == 1, f"{path}: {twice}; give columns by number, such as {like}")
 
 
 def _guessed(
@@ -219,14 +214,6 @@ def _unit_role(unit: str) -> str:
     except StudyError:
         return ""
     return next((role for role, (own, _) in ROLES.items() if own == powers), "")
-
-
-def _extra(table: Table, named: Mapping[str, Column], roles: Roles) -> dict[str, Column]:
-    """Further channels of the same length, under their own names."""
-    length, taken = len(next(iter(named.values())).values), [id(c) for c in named.values()]
-    counts, known = Counter(c.name for c in table.columns), {"", *named, *NAMES, *roles.kinds}
-    usable = [c for c in table.columns if not c.fault and len(c.values) == length and id(c) not in taken]
-    return {c.name: c for c in usable if counts[c.name] == 1 and c.name not in known}
 
 
 def _motion_of(roles: Roles) -> str:

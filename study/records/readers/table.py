@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
 from study.support.units import is_unit
 from study.support.yaml_text import excerpt
 
-Floats = NDArray[np.float64]
 Array = NDArray[Any]  # as a file holds it: of any kind of number, or of none
 NONE = np.zeros(0)
 RATES = ("fs", "samplerate", "samplingrate", "samplingfrequency", "samplefrequency")
@@ -94,26 +94,17 @@ def from_arrays(path: Path, arrays: Mapping[str, object], units: Mapping[str, st
     for name, array in named.items():
         stem = re.sub(r"[^a-z]", "", name.rsplit("/", 1)[-1].lower())
         if array.size == 1 and stem in (*RATES, *INTERVALS):
-            intervals.add(_interval(path, name, array, inverse=stem in RATES))
-        elif series == [name] and array.ndim == 2 and min(array.shape) > 1:
-            columns += _matrix_columns(name, array)
+            value = complex(array.reshape(-1)[0]) if array.dtype.kind in "iufc" else 0j
+            if value.imag or not np.isfinite(value.real) or value.real <= 0.0:
+                shown = str(array.reshape(-1)[0])
+                raise StudyError(f"{path}: {name!r} is {shown}; expected a sampling rate or interval above zero")
+            intervals.add(1.0 / value.real if stem in RATES else value.real)
+        elif series == [name] and array.ndim == 2 and min(array.shape) > 1:  # a file's only matrix, channels in columns
+            tall = array if array.shape[0] >= array.shape[1] else array.T
+            columns += [_column(f"{name}:{k}", tall[:, k - 1], "") for k in range(1, tall.shape[1] + 1)]
         elif array.size > 1:
             columns.append(_column(name, array, units.get(name, "")))
     return Table(tuple(columns), intervals.pop() if len(intervals) == 1 else None)
-
-
-def _interval(path: Path, name: str, array: Array, *, inverse: bool) -> float:
-    value = complex(array.reshape(-1)[0]) if array.dtype.kind in "iufc" else 0j
-    if value.imag or not np.isfinite(value.real) or value.real <= 0.0:
-        shown = str(array.reshape(-1)[0])
-        raise StudyError(f"{path}: {name!r} is {shown}; expected a sampling rate or interval above zero")
-    return 1.0 / value.real if inverse else value.real
-
-
-def _matrix_columns(name: str, array: Array) -> list[Column]:
-    """The columns of a file's only matrix: by number, channel beside channel."""
-    tall = array if array.shape[0] >= array.shape[1] else array.T
-    return [_column(f"{name}:{k}", tall[:, k - 1], "") for k in range(1, tall.shape[1] + 1)]
 
 
 def _column(name: str, array: Array, unit: str) -> Column:

@@ -25,7 +25,6 @@ from study.support.units import is_unit
 from study.support.yaml_text import excerpt
 
 HEAD_BYTES = 200_000
-HEAD_LINES = 200
 BLANKS = r"\s+"
 SPACE = " \t"  # what the compiled parser takes for blanks; Python knows more
 DIALECTS = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (BLANKS, "."), (BLANKS, ","))
@@ -56,7 +55,7 @@ def read(path: Path, data: bytes) -> Table:
     lines = data[:HEAD_BYTES].decode("utf-8", errors="replace").split("\n")
     if len(data) > HEAD_BYTES and len(lines) > 1:
         lines = lines[:-1]  # the last one is cut in two
-    layout = _layout(path, lines[:HEAD_LINES])
+    layout = _layout(path, lines[:200])
     return _table(path, data.split(b"\n", layout.first)[-1], layout)
 
 

@@ -15,7 +15,7 @@ from study.reproduction.claims.judgement import Condition, at_least, claims, exp
 from study.reproduction.claims.reported import COMBINED, Reported
 from study.reproduction.claims.sample import Sample, average
 from study.reproduction.ensemble import NOISE_OFFSET, threaded
-from study.support.arrays import Floats
+from study.support.arrays import Complexes, Floats
 from study.support.numbers import percent
 
 PARTS = ("m", "c", "k", "k3", "c3")
@@ -171,8 +171,13 @@ def noise_cubic(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     biases = {noise: _biases(e, reported, ("k3", "c3")) for noise, e in ensembles.items()}
     for name, part in (("k3", "real"), ("c3", "imaginary")):
         bias, scatter = f"bias of {name}", f"scatter of a line of the {part} part"
-        sizes = {noise: abs(by_name[name].mean) for noise, by_name in biases.items()}
-        spreads = {noise: _line_scatter(e, part == "imaginary", reported) for noise, e in ensembles.items()}
+        sizes, spreads = {noise: abs(by_name[name].mean) for noise, by_name in biases.items()}, dict[float, float]()
+        for noise, e in ensembles.items():  # of a line of A_2, relative to its exact value; median over the band
+            second: Complexes = np.stack([o.miso.response[1] for o in e.seeds])
+            lines = second.imag if part == "imaginary" else second.real
+            slope = 2.0 * np.pi * e.frequency * reported.table_1(COMBINED, "c3") / 3.0
+            exact = slope if part == "imaginary" else reported.table_1(COMBINED, "k3")
+            spreads[noise] = float(np.median(np.std(lines, axis=0, ddof=1) / exact))
         yield from [
             _rises(label, values, label, f"{label} (relative)") for label, values in ((bias, sizes), (scatter, spreads))
         ]
@@ -180,14 +185,6 @@ def noise_cubic(evidence: Evidence, reported: Reported) -> Iterator[Condition]:
     k3, c3 = biases[worst]["k3"].mean, biases[worst]["c3"].mean
     measured = f"k3 {percent(k3, '+.3g')}, c3 {percent(c3, '+.3g')}"
     yield Condition(f"at {percent(worst)} noise the bias of c3 is the larger", measured, abs(c3) > abs(k3))
-
-
-def _line_scatter(ensemble: Ensemble, imaginary: bool, reported: Reported) -> float:
-    """Standard deviation over the seeds of a line of A_2, relative to its exact value; median over the band."""
-    stacked = np.stack([o.miso.response[1].imag if imaginary else o.miso.response[1].real for o in ensemble.seeds])
-    slope = 2.0 * np.pi * ensemble.frequency * reported.table_1(COMBINED, "c3") / 3.0
-    exact = slope if imaginary else reported.table_1(COMBINED, "k3")
-    return float(np.median(np.std(stacked, axis=0, ddof=1) / exact))
 
 
 def noise_coherence(evidence: Evidence, reported: Reported) -> Iterator[Condition]:

@@ -12,7 +12,6 @@ from pydantic import BeforeValidator, Field, model_validator
 from study.support.config_files import TableRow, Text, read_rows
 from study.support.errors import StudyError, expect
 
-MANY = 8  # numbers that still read well in one cell
 SYSTEMS = ("linear", "duffing", "van_der_pol", "duffing_van_der_pol", "mathieu", "dead_band", "extreme")
 COMBINED = "duffing_van_der_pol"
 LINEAR_PARTS = ("m", "c", "k", "f_n", "zeta")
@@ -149,7 +148,7 @@ class Reported:
         """Every number of a claim, for the column ``reported``."""
         rows = [s for s in self.statements.values() if s.id == name or s.id.startswith(f"{name}.")]
         found = [str(s) for s in rows if s.value is not None]
-        return "as tabulated" if len(found) > MANY else ", ".join(found) or "as stated"
+        return "as tabulated" if len(found) > 8 else ", ".join(found) or "as stated"  # more would not read well
 
 
 def load_reported(path: Path) -> Reported:

@@ -12,9 +12,9 @@ from scipy.special import stdtrit
 
 from study.support.arrays import Floats
 from study.support.numbers import percent
+from study.support.thresholds import ALPHA
 
 SIGNIFICANT = 1.96  # two-sided 5 % of the standard normal
-BY_CHANCE = 0.01  # how often one of all lines of a uniform spectrum may be refused
 GAUSSIAN_CENTRAL_SHARE = math.erf(0.5 / math.sqrt(2.0))  # of a Gaussian's values: within half a standard deviation
 GAUSSIAN_OUTER_SHARE = math.erfc(2.0 / math.sqrt(2.0))  # of a Gaussian's values: beyond two standard deviations
 
@@ -146,5 +146,5 @@ def departure(spectra: Floats) -> Departure:
     error: Floats = np.std(spectra, axis=0, ddof=1) / math.sqrt(seeds)
     score: Floats = away / error
     worst = int(np.argmax(score))
-    allowed = -float(cast(float, stdtrit(seeds - 1, BY_CHANCE / (2.0 * lines))))
+    allowed = -float(cast(float, stdtrit(seeds - 1, ALPHA / (2.0 * lines))))
     return Departure(float(away[worst]) / average(mean), float(score[worst]), allowed)
