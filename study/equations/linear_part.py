@@ -213,13 +213,14 @@ def modes_of(model: Model, keys: Sequence[str] = (), covariance: Floats | None =
             by_own[i] += np.einsum("cm,cd,dm->m", shapes, units[key], shapes) / (2.0 * rate)
     ratio, by_ratio = np.where(still, own, ratio), np.where(still, by_own, by_ratio)
     errors = [np.sqrt(np.maximum(np.einsum("p...,pq,q...->...", g, covariance, g), 0.0)) for g in (by_square, by_ratio)]
-    basis, by_shape = shapes_of(model, values), shapes_of(model, values) @ by_shape
+    basis = shapes_of(model, values)
+    by_motion = basis @ by_shape
     if model.modal:
         felt = {key: (i, r) for i, c in enumerate(model.coordinates) for r, key in enumerate(model.modal.shape(c))}
         for i, key in enumerate(keys):
             if key in felt:
-                by_shape[i, felt[key][0]] += shapes[felt[key][1]]
-    shape, shape_error = _normalised(basis @ shapes, by_shape, covariance)
+                by_motion[i, felt[key][0]] += shapes[felt[key][1]]
+    shape, shape_error = _normalised(basis @ shapes, by_motion, covariance)
     return Modes(
         omega / (2.0 * np.pi), np.where(moving, errors[0] / (4.0 * np.pi * rate), 0.0), np.where(moving, ratio, 0.0),
         np.where(moving, errors[1], 0.0), shape, shape_error,

@@ -3,6 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from study.support.arrays import Floats
+
 
 @dataclass(frozen=True)
 class ModalPart:
@@ -57,6 +61,19 @@ class ModalPart:
         """Every number by key."""
         return dict(zip(self.keys, self.numbers, strict=True))
 
+    def rates(self, values: Mapping[str, float]) -> Floats:
+        """Of each mode by itself (:func:`rates_of`), some of its numbers replaced by given values."""
+        known = {**self.values, **values}
+        keys = self.stiffness, [f"g[{r},{r}]" for r in range(1, self.count + 1)]
+        w2, g = (np.array([known[key] for key in own], dtype=np.float64) for own in keys)
+        return rates_of(w2, g)
+
     def with_values(self, values: Mapping[str, float | None]) -> "ModalPart":
         """The same modes with those of the given values that are their own."""
         return replace(self, numbers=tuple(values.get(key, old) for key, old in self.values.items()))
+
+
+def rates_of(w2: Floats, g: Floats) -> Floats:
+    """Rates in rad/s at which modes oscillate, or the faster ones at which they decay beyond critical damping."""
+    half = 0.5 * np.abs(g)
+    return np.abs(half + np.sqrt((half**2 - w2).astype(np.complex128)))

@@ -11,6 +11,7 @@ from study.cli import main
 from study.equations.model_file import parse_model, read_model
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY
+from study.identify.time_domain.modal_fit import modal_fit
 from study.records.excitation import Excitation, force
 from study.records.record import Sensor, write_csv
 from study.structure.measured_comparison import compare_measured
@@ -104,3 +105,16 @@ def test_an_open_shape_parameter_is_searched_for():
     assert "dead_band[x].u_g" in comparison.fit.keys
     assert found["dead_band[x].u_g"] == pytest.approx(true["dead_band[x].u_g"], rel=0.02)
     assert comparison.prediction.error < 0.02
+
+
+def test_a_shape_parameter_that_the_model_gives_is_held():
+    place = "coordinates: [x]\nforces: {shaker: x}\n"
+    text = (ROOT / "models" / "duffing.yaml").read_text().replace("value", "at: x, value")
+    drive = force(Excitation(level=1.0, cutoff=12.5), 1024, 0.02, 1990)
+    whole = parse_model(text.replace("terms:", f"{place}terms:"), Path("whole.yaml"))
+    record = simulate(whole, {"shaker": drive}, 0.02, Integrator("rk4", 8))
+    model = parse_model(f"{place}linear: modal\nterms: [{{term: hysteresis, at: x, beta: 200.0}}]", Path("one.yaml"))
+    fitted = modal_fit(model, prepare_structure(record, model))
+    assert fitted.model.numbers()["hysteresis[x].beta"] == 200.0
+    assert "hysteresis[x].beta" in fitted.held
+    assert "hysteresis[x].gamma" in fitted.keys

@@ -11,7 +11,7 @@ from study.cli import main
 from study.compare import history
 from study.equations.free_run import prepare
 from study.equations.linear_part import matrices, modes_of, transfer
-from study.equations.modal_part import ModalPart
+from study.equations.modal_part import ModalPart, rates_of
 from study.equations.model import Model
 from study.equations.model_file import format_model, parse_model, read_model
 from study.equations.simulate import Integrator, simulate
@@ -75,6 +75,12 @@ def test_numbers_of_modes_are_values_of_the_model(lumped_and_by_modes):
     opened = own.with_values({"w2[2]": None, "phi[third,1]": None})
     assert set(own.held_keys) - set(opened.held_keys) == {"w2[2]", "phi[third,1]"}
     assert opened.with_values(own.numbers()) == own
+
+
+def test_rates_of_modes_are_their_largest_eigenvalues():
+    w2, g = np.array([100.0, 100.0, -4.0]), np.array([2.0, 50.0, 0.1])
+    exact = [np.max(np.abs(np.linalg.eigvals([[0.0, 1.0], [-a, -b]]))) for a, b in zip(w2, g, strict=True)]
+    np.testing.assert_allclose(rates_of(w2, g), exact)
 
 
 def test_errors_of_modes_are_those_of_the_scatter(lumped_and_by_modes):

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.fft import rfft
 
-from study.equations.modal_part import ModalPart
+from study.equations.modal_part import ModalPart, rates_of
 from study.equations.model import Model
 from study.identify.frequency_domain.inputs import input_history, placed_inputs
 from study.identify.frequency_domain.subspace import observability
@@ -134,8 +134,7 @@ class _Modal:
     def point(self, x: Floats) -> Point | None:
         """Residual of all sensors and its derivatives."""
         w2, g, shape, amount = self.split(x)
-        rates = np.abs(0.5 * g + np.sqrt((0.25 * g**2 - w2).astype(np.complex128)))
-        if np.any(w2 <= 0.0) or np.any(g <= 0.0) or np.any(rates > self.fastest):
+        if np.any(w2 <= 0.0) or np.any(g <= 0.0) or np.any(rates_of(w2, g) > self.fastest):
             return None
         lines = self.lines
         acting = lines.forces @ self.drives.T - (lines.unit * amount) @ self.ways.T  # (lines, points)

@@ -75,6 +75,11 @@ def _points(
         return np.add.outer(lines, shifts / (len(u) * prepared.dt)).ravel()
 
     points: list[tuple[float, ...]] = [()]
-    for parameter in entry.term.parameters:
-        points = [(*p, x) for p in points for x in values_to_try(parameter, p, u, prepared.dt, near) if np.isfinite(x)]
+    for parameter, given in zip(entry.term.parameters, entry.parameters, strict=True):
+        points = [
+            (*point, x)
+            for point in points
+            for x in ([given] if given is not None else values_to_try(parameter, point, u, prepared.dt, near))
+            if np.isfinite(x)
+        ]
     return points

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from study.equations.free_run import FreeRun, prepare
 from study.equations.linear_part import is_positive
+from study.equations.modal_part import ModalPart
 from study.equations.model import Model
 from study.identify.frequency_domain.coefficients import Estimate
 from study.records.outputs import DISPLACEMENT, Outputs
@@ -212,7 +213,9 @@ def fit_free_run(
     kept = None if lost is None else np.repeat(~lost[first : first + run.samples], len(outputs)).astype(np.float64)
     coupled = any(t.term.name == "inertia" and t.place.kind != "at" and set(t.keys) & set(begin) for t in model.terms)
     weights = _weights(continuity, measured, states)
-    problem = _Problem(run, model if coupled else None, outputs, measured, free, weights, positive, noise, kept)
+    problem = _Problem(
+        run, model if coupled else None, model.modal, outputs, measured, free, weights, positive, noise, kept
+    )
     end = problem.search(np.array([*begin.values(), *states.ravel()]), max_iterations, offset)
     return replace(
         _result(model, problem, end), restarts=tuple(restarts), first=first, steps_per_sample=steps_per_sample
@@ -248,6 +251,7 @@ class _Problem:
 
     run: FreeRun
     coupled: Model | None  # of which no value may leave the mass matrix without a kinetic energy for some motion
+    modal: ModalPart | None  # no mode of which may be faster than samples can show
     outputs: Outputs
     measured: Floats
     free_states: int
@@ -268,6 +272,8 @@ class _Problem:
         if any(not 0.0 < values[key] <= max(limit, 0.0) for key, limit in self.positive.items()):
             return None
         if self.coupled is not None and not is_positive(self.coupled, values):
+            return None
+        if self.modal is not None and np.any(self.modal.rates(values) * self.run.dt > np.pi):
             return None
         states = self.states(x)
         try:

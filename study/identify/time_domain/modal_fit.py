@@ -43,27 +43,32 @@ def modal_fit(model: Model, prepared: Prepared) -> FreeRunFit:
     for entry in unknown:
         found = screened_by_lines(known, prepared, [entry], fit)
         expect(found, f"{entry.name} explains nothing of {prepared.record.name!r}; expected an effect that does")
-        fit, known = _beside_minima(known, found[0].entry, prepared), known.with_term(entry)
+        fit, known = _beside_minima(known, found[0].entry, entry, prepared), known.with_term(entry)
         known = known.with_values({k: fit.model.values[k] for k in entry.keys[len(entry.symbols) :]})
     return fit
 
 
-def _beside_minima(known: Model, entry: ModelTerm, prepared: Prepared) -> FreeRunFit:
-    """The best of fits from the shape that the screening found and from shapes a little aside.
+def _beside_minima(known: Model, entry: ModelTerm, given: ModelTerm, prepared: Prepared) -> FreeRunFit:
+    """The best of fits from the shape that the screening found and from shapes a little aside; what is given is held.
 
     Along a gap or a dead band the misfit has kinks, and a local minimum between any two.
     """
     fits: list[FreeRunFit] = []
     for factor in (1.0, *ASIDE):
-        shape = tuple(factor * (value or 0.0) for value in entry.parameters)
+        shape = {key: factor * (entry.values[key] or 0.0) for key in entry.keys[len(entry.symbols) :]}
+        held = {key: value for key, value in given.values.items() if value is not None}
         with suppress(DivergenceError):
-            fits.append(with_modal_term(known, replace(entry, parameters=shape), prepared))
+            fits.append(with_modal_term(known, entry.with_values(shape | held), prepared, tuple(held)))
     expect(fits, f"no values of {entry.name} let it follow {prepared.record.name!r}; expected them in the model file")
     return min(fits, key=lambda fit: fit.rms)
 
 
-def with_modal_term(model: Model, entry: ModelTerm, prepared: Prepared) -> FreeRunFit:
+def with_modal_term(
+    model: Model, entry: ModelTerm, prepared: Prepared, given: Collection[str] = ()
+) -> FreeRunFit:  # fmt: skip
     """A model with a term more, whose shape parameters have values: fitted with these, then with them free.
+
+    Those that are ``given`` stay held.
 
     Raises
     ------
@@ -72,10 +77,12 @@ def with_modal_term(model: Model, entry: ModelTerm, prepared: Prepared) -> FreeR
     DivergenceError
         If the structure diverges from there.
     """
-    fit, shapes = _of_as_many_modes(model.with_term(entry), prepared), entry.keys[len(entry.symbols) :]
+    fit = _of_as_many_modes(model.with_term(entry), prepared)
+    shapes = [key for key in entry.keys[len(entry.symbols) :] if key not in given]
     if not shapes:
         return fit
-    return _at_minimum(_gone_on(fit, prepared, [key for key in fit.held if key not in shapes]), prepared)
+    held = [key for key in fit.held if key not in shapes]
+    return _at_minimum(settled(_gone_on(fit, prepared, held), prepared), prepared)
 
 
 def _of_as_many_modes(model: Model, prepared: Prepared) -> FreeRunFit:
