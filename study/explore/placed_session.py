@@ -106,7 +106,11 @@ def tried(session: PlacedSession, text: str) -> PlacedSession:
 def examined(session: PlacedSession, progress: Callable[[int], None] | None = None) -> PlacedStage:
     """The present stage with what is missing and where, and what is not needed, in words too."""
     now = session.now
-    report = None if progress is None else (lambda done, _: progress(done))
+
+    def report(done: int, _: int) -> None:
+        if progress is not None:
+            progress(done)
+
     diagnosis = diagnose(now.comparison, extra=session.own, progress=report)
     unneeded = needless(now.comparison)
     said = f"{diagnosis_in_words(diagnosis)} {unneeded_in_words(unneeded, diagnosis)}".strip()

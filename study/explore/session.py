@@ -202,7 +202,11 @@ def examined(session: Session, progress: Callable[[int], None] | None = None) ->
 
     And the diagnosis.
     """
-    report = None if progress is None else (lambda done, _: progress(done))
+
+    def report(done: int, _: int) -> None:
+        if progress is not None:
+            progress(done)
+
     diagnosis = diagnose_as_read(session.now.comparison, extra=session.own, progress=report)
     now = weighed(session).now
     said = f"{diagnosis_in_words(diagnosis)} {unneeded_in_words(now.unneeded or (), diagnosis)}".strip()

@@ -242,11 +242,12 @@ def modulation_lines(u: Floats, place: Place, base: Baseline) -> list[float]:
     n, weights = len(u), np.array(base.fit.outputs.weights)
     path = base.paths(n) @ np.array(place.direction(base.fit.model.coordinates)) * weights
     residual = base.fit.residual.reshape(n, -1)
-    matched = irfft(np.sum(np.conj(path) * rfft(residual, axis=0), axis=1), n)
+    spectra = np.asarray(rfft(residual, axis=0), dtype=np.complex128)
+    matched = np.asarray(irfft(np.sum(np.conj(path) * spectra, axis=1), n), dtype=np.float64)
     numerator = np.abs(windowed(matched * u)) ** 2
-    passband = irfft(np.sum(np.abs(path) ** 2, axis=1), n)
-    spread = irfft(np.abs(rfft(u)) ** 2, n)
-    denominator = np.abs(rfft(passband * spread))
+    passband = np.asarray(irfft(np.sum(np.abs(path) ** 2, axis=1), n), dtype=np.float64)
+    spread = np.asarray(irfft(np.abs(np.asarray(rfft(u))) ** 2, n), dtype=np.float64)
+    denominator = np.abs(np.asarray(rfft(passband * spread), dtype=np.complex128))
     return highest_lines(numerator / np.maximum(denominator, 1e-6 * np.max(denominator)))
 
 
