@@ -10,9 +10,9 @@ from study.cli import main
 from study.compare.comparison import compare
 from study.equations.model_file import format_model, read_model
 from study.equations.terms import get
+from study.records.prepared import prepare_record
 from study.records.record import write_csv
 from study.structure.placed_candidates import candidate_entries, external, one_sided, screened
-from study.structure.prepared_structure import prepare_structure
 from study.structure.structure_verdict import placed_search_base
 
 
@@ -50,7 +50,7 @@ def test_effect_and_place_come_first(diagnosed):
 
 
 def test_the_reverse_system_puts_the_effect_where_it_is(believed, record_of):
-    comparison = compare(believed, prepare_structure(record_of(), believed))
+    comparison = compare(believed, prepare_record(record_of()))
     ordered = screened(candidate_entries(believed), placed_search_base(comparison))
     entry, points = ordered[0]
     assert entry.place.path == {"floor2", "floor3"}
