@@ -16,7 +16,7 @@ from study.equations.model import Model
 from study.equations.model_file import parse_model
 from study.equations.simulate import Integrator, simulate
 from study.records.excitation import Excitation, force
-from study.structure.prepared_structure import prepare_structure
+from study.records.prepared import prepare_record
 
 DT, SAMPLES, STEPS = 0.02, 8192, 4
 
@@ -61,7 +61,7 @@ def test_diagnosis(benchmark):
     record = clean.with_motions({n: x for n, x in noisy.items() if n.motion == "displacement"})
 
     def diagnosis():
-        return diagnose(compare(believed, prepare_structure(record, believed)))
+        return diagnose(compare(believed, prepare_record(record)))
 
     found = benchmark.pedantic(diagnosis, rounds=1, warmup_rounds=1)
     assert found.candidates[0].name == "cubic_stiffness[ground-x0]"

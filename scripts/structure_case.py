@@ -5,6 +5,7 @@ from pathlib import Path
 
 from study.equations.model_file import read_model
 from study.figures import page
+from study.records.prepared import prepare_record
 from study.records.record import write_csv
 from study.reproduction import structure_figures, structure_tables, tables
 from study.reproduction.structure_cases import (
@@ -15,7 +16,6 @@ from study.reproduction.structure_cases import (
     measured_model,
 )
 from study.structure.measured_comparison import compare_measured
-from study.structure.prepared_structure import prepare_structure
 from study.support.files import replacing
 from study.support.workflow_step import one_sentence
 
@@ -30,7 +30,7 @@ def main(
         write_csv(record, beside)
     if case.measured:  # by its own modes
         assumed = measured_model(structure, case.sensors)
-        comparison = compare_measured(assumed, prepare_structure(record, assumed))
+        comparison = compare_measured(assumed, prepare_record(record))
         told = (case, structure, comparison, settings)
         responses = structure_tables.modal_responses(*told)
         made = {

@@ -47,8 +47,8 @@ def _run(arguments: argparse.Namespace) -> None:
 
     folder = out_folder(arguments)
     model = read_model(arguments.model)
-    if model.named:
-        structures.compare_command(arguments, model)
+    if model.modal:
+        structures.compare_modal_command(arguments, model)
         return
     records = read_records(arguments, model)
     model, marked, separate = separated_records(arguments, model, records)
@@ -64,11 +64,11 @@ def _run(arguments: argparse.Namespace) -> None:
         for comparison in comparisons:
             step("pictures")
             prefix = f"{comparison.record.name}_" if many else ""
-            own = comparison_pictures(comparison) | ({} if unpaged else _page(comparison))
+            own = comparison_pictures(comparison) | _page(comparison, unpaged)
             files |= {prefix + name: content for name, content in own.items()}
     measurement = [{"record": a.comparison.record.name, **fault_fields(f)} for a in accounted for f in a.faults]
     levels = across_records(comparisons)
-    files |= level_pictures(levels, comparisons[0].record.units.get("force", "N"))
+    files |= level_pictures(levels, comparisons[0].record.force_and_length[0])
     files |= {f"{name}.csv": content for name, content in tables(comparisons, levels).items()}
     content = comparison_document(comparisons, levels) | {"measurement": measurement}
     said = comparison_summary(comparisons, levels)
@@ -79,15 +79,21 @@ def _run(arguments: argparse.Namespace) -> None:
     files["comparison.json"] = as_json(content)
     write_files(folder, files, inputs_of(arguments))
     print(said)
-    page = f"no page ({unpaged})" if unpaged else "a page for each record" if many else PAGE
+    pages = [name for name in files if name.endswith(".html")]
+    page = "a page for each record" if many and pages else pages[0] if pages else f"no page ({unpaged})"
     count = {kind: sum(name.endswith(kind) for name in files) for kind in (".csv", ".png")}
     print(f"\n{folder}: {page}, comparison.json, {count['.csv']} tables, {count['.png']} pictures (PNG and SVG)")
 
 
-def _page(comparison: "Comparison") -> dict[str, bytes]:
+def _page(comparison: "Comparison", unpaged: str) -> dict[str, bytes]:
+    if comparison.model.named:
+        from study.structure.structure_page import PAGE as BY_PLACE
+        from study.structure.structure_page import structure_page
+
+        return {BY_PLACE: structure_page(comparison)}
     from study.explore.saved import of_comparison
 
-    return {PAGE: of_comparison(comparison)}
+    return {} if unpaged else {PAGE: of_comparison(comparison)}
 
 
 COMMAND = Command(
@@ -95,6 +101,7 @@ COMMAND = Command(
     "study compare rig.csv --model rig.yaml\n"
     "  study compare rig.csv --model rig.yaml --estimator local_polynomial\n"
     "  study compare low.csv high.csv --model rig.yaml --out results/levels\n"
+    "  study compare frame.csv --model frame.yaml  # a structure: which equation is violated, and where\n"
     "  study compare SNLS80mV.csv --column force=V1 --column displacement=V2 --unit force=V --unit displacement=V"
     " --fs 610.35 --fit 40650:127400 --judge 100:40575 --model silverbox.yaml",
     _arguments, _run,

@@ -4,9 +4,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from study.commands.structures import prepared_structures
+from study.commands.record_arguments import accounted_together, read_records
 from study.compare import history
-from study.compare.comparison import compare
 from study.compare.history_picture import history_files as history_pictures
 from study.diagnose.diagnosis_files import diagnosis_files
 from study.diagnose.diagnosis_report import candidate_table
@@ -28,8 +27,8 @@ def structure_climb(arguments: argparse.Namespace, model: Model, steps: int, fol
     ``climb.html`` with all of it to step through, ``history.json`` and the history's picture.
     """
     work, text = folder / "climb", read_text(arguments.model, WANTED)
-    (prepared,) = prepared_structures(arguments, model)
-    session = sessions.begin_placed(compare(model, prepared))
+    (record,) = read_records(arguments, model)
+    session = sessions.begin_placed(accounted_together(arguments, model, [record], arguments.records[0]).comparison)
     for number in range(steps + 1):
         stage = sessions.examined(session)
         session, diagnosis = sessions.with_stage(session, stage), stage.diagnosis

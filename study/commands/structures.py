@@ -1,11 +1,12 @@
 """What the commands do with a model of several coordinates."""
 
 import argparse
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from study.commands.command import progress
 from study.commands.record_arguments import (
+    accounted_together,
     inputs_of,
     layout_of,
     out_folder,
@@ -24,19 +25,16 @@ if TYPE_CHECKING:
     from study.records.prepared import Prepared
 
 
-def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[Prepared]":
-    """The records that were named, made ready; options that nothing does with several coordinates are refused."""
+def modal_records(arguments: argparse.Namespace, model: "Model") -> "list[Prepared]":
+    """The records that were named, made ready for a model whose linear part is as measured."""
     from study.faults.fault import settings_beside
-    from study.structure.prepared_structure import structure_ready
+    from study.records.sampling_rate import without_spare_samples
     from study.support.errors import at, expect
+    from study.way_in.compare_records import made_ready
 
-    for option in ("absolute", "each_record"):
-        given = f"--{option.replace('_', '-')} is for a single mass; expected it left out beside 'coordinates'"
-        expect(not getattr(arguments, option, None), given)
-    expect(
-        getattr(arguments, "estimator", "output_error") == "output_error",
-        f"--estimator {getattr(arguments, 'estimator', '')} is for a single mass; expected output_error of a structure",
-    )
+    for option, usual in (("estimator", "output_error"), ("each_record", "[]")):
+        given = f"--{option.replace('_', '-')} is not for 'linear: modal'; expected it left out"
+        expect(str(getattr(arguments, option, usual)) == usual, given)
     made: list[Prepared] = []
     for path, record in zip(sources(arguments), read_records(arguments, model), strict=True):
         with at(path):
@@ -44,44 +42,19 @@ def prepared_structures(arguments: argparse.Namespace, model: "Model") -> "list[
             held = f"measurement holds {', '.join(beside.held)}, which is looked for in records of a single mass alone"
             expect(arguments.no_measurement or not beside.held, f"{held}; expected 'measurement: off'")
             layout = layout_of(arguments, record)
-            layout = replace(layout, as_sampled=layout.as_sampled or beside.as_sampled)
-            made.append(structure_ready(record, model, layout))
+            prepared = made_ready([record], model, layout, arguments.absolute)[1]
+            whole = layout.as_sampled or beside.as_sampled
+            made.append(prepared if whole else without_spare_samples(prepared))
     return made
 
 
-def compare_command(arguments: argparse.Namespace, model: "Model") -> None:
-    """``study compare`` of a structure."""
-    from study.compare.comparison import compare
-    from study.compare.comparison_pictures import comparison_pictures
-    from study.compare.comparison_report import as_json, comparison_document, comparison_summary
-    from study.structure.structure_page import PAGE, structure_page
-    from study.support.files import write_files
-
-    folder = out_folder(arguments)
-    ready = prepared_structures(arguments, model)
-    if model.modal:
-        _compare_modal(arguments, model, ready)
-        return
-    with progress("step", 3 * len(ready)) as step:
-        comparisons = [compare(model, prepared, progress=step) for prepared in ready]
-    prefix = [f"{c.prepared.record.name}_" if len(ready) > 1 else "" for c in comparisons]
-    files: dict[str, bytes] = {}
-    for before, comparison in zip(prefix, comparisons, strict=True):
-        made = {PAGE: structure_page(comparison), "comparison.json": as_json(comparison_document([comparison]))}
-        made |= comparison_pictures(comparison)
-        files |= {before + name: content for name, content in made.items()}
-    write_files(folder, files, inputs_of(arguments))
-    print("\n\n".join(comparison_summary([c]) for c in comparisons))
-    print(f"\n{folder}: {_listed(files)}")
-
-
-def _compare_modal(arguments: argparse.Namespace, model: "Model", ready: "list[Prepared]") -> None:
-    """The same where the linear part is a sum of modes."""
+def compare_modal_command(arguments: argparse.Namespace, model: "Model") -> None:
+    """``study compare`` where the linear part is as measured."""
     from study.compare.comparison_report import as_json
     from study.structure.measured_comparison import compare_measured, measured_document, measured_summary
     from study.support.files import write_files
 
-    folder = out_folder(arguments)
+    folder, ready = out_folder(arguments), modal_records(arguments, model)
     with progress("step", 3 * len(ready)) as step:
         comparisons = [compare_measured(model, prepared, step) for prepared in ready]
     prefix = [f"{c.prepared.record.name}_" if len(ready) > 1 else "" for c in comparisons]
@@ -101,7 +74,6 @@ def refuse_modal(model: "Model", command: str) -> None:
 
 def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
     """``study diagnose`` of a structure."""
-    from study.compare.comparison import compare
     from study.diagnose.diagnosis_files import (
         diagnosis_files,
         diagnosis_in_words,
@@ -121,18 +93,18 @@ def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
     for name in arguments.without:
         terms.get(name)
     files: dict[str, bytes] = {}
-    ready = prepared_structures(arguments, model)
     if model.modal:
-        _diagnose_modal(arguments, model, ready, own)
+        _diagnose_modal(arguments, model, modal_records(arguments, model), own)
         return
-    for prepared in ready:
-        with progress(" candidates", name=prepared.record.name) as step:
-            comparison = compare(model, prepared)
+    records = read_records(arguments, model)
+    for record, path in zip(records, sources(arguments), strict=True):
+        with progress(" candidates", name=record.name) as step:
+            comparison = accounted_together(arguments, model, [record], path).comparison
             diagnosis = diagnose(
                 comparison, extra=own, without=arguments.without, progress=lambda _, total: step("", total)
             )
             unneeded = needless(comparison)
-        print(f"{prepared.record.name}: {diagnosis.verdict.replace('_', ' ')}")
+        print(f"{record.name}: {diagnosis.verdict.replace('_', ' ')}")
         print(
             candidate_table(diagnosis)
             + "\n\n"
@@ -142,7 +114,7 @@ def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
         )
         if unneeded:
             print(f"\n{unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
-        prefix = f"{prepared.record.name}_" if len(ready) > 1 else ""
+        prefix = f"{record.name}_" if len(records) > 1 else ""
         made = {PAGE: structure_page(comparison, diagnosis)}
         made |= diagnosis_files(diagnosis, diagnosis_in_words(diagnosis), unneeded)
         files |= {prefix + name: content for name, content in made.items()}
@@ -151,7 +123,7 @@ def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
 
 
 def _diagnose_modal(arguments: argparse.Namespace, model: "Model", ready: "list[Prepared]", own: "list[Term]") -> None:
-    """The same where the linear part is a sum of modes."""
+    """The same where the linear part is as measured."""
     from study.compare.comparison_report import as_json
     from study.structure.measured_comparison import compare_measured
     from study.structure.measured_diagnosis import diagnose_measured
@@ -221,24 +193,23 @@ def _revise(
 ) -> None:  # fmt: skip
     """Compare a model and a changed one with all records; write the changed one with its history, and tell."""
     from study.compare import history
-    from study.compare.comparison import compare
     from study.compare.comparison_report import as_json, comparison_document, comparison_summary, history_step
     from study.structure import measured_comparison
 
     folder, summaries, document = out_folder(arguments), list[str](), b""
-    for prepared in prepared_structures(arguments, model):
-        if model.modal:  # its modes are fitted anew
-            linear, after = (measured_comparison.compare_measured(m, prepared) for m in (model, change.model))
-            told = (measured_comparison.measured_step(linear), measured_comparison.measured_step(after, **change.told))
-            document = as_json(measured_comparison.measured_document(after))
-            summaries.append(measured_comparison.measured_summary(after))
-        else:
-            before = compare(model, prepared)
-            revised, step = change.follow(before), history_step
-            told = (step(before), step(revised, **change.told))
-            document = as_json(comparison_document([revised]))
-            summaries.append(comparison_summary([revised]))
+    for prepared in modal_records(arguments, model) if model.modal else ():  # its modes are fitted anew
+        linear, after = (measured_comparison.compare_measured(m, prepared) for m in (model, change.model))
+        told = (measured_comparison.measured_step(linear), measured_comparison.measured_step(after, **change.told))
+        document = as_json(measured_comparison.measured_document(after))
+        summaries.append(measured_comparison.measured_summary(after))
         steps = history.with_step(steps, *told)
+    pairs = zip(read_records(arguments, model), sources(arguments), strict=True)
+    for record, path in () if model.modal else pairs:
+        before = accounted_together(arguments, model, [record], path).comparison
+        revised = change.follow(before)
+        steps = history.with_step(steps, history_step(before), history_step(revised, **change.told))
+        document = as_json(comparison_document([revised]))
+        summaries.append(comparison_summary([revised]))
     written_together(arguments, text, steps, document, folder)
     print("\n\n".join(summaries))
     print("\n" + history.history_table(steps))
@@ -246,13 +217,14 @@ def _revise(
 
 def session(arguments: argparse.Namespace, model: "Model", steps: "list[dict[str, Any]]") -> "PlacedSession":
     """What ``study explore`` of a structure begins with."""
-    from study.compare.comparison import compare
+    from study.compare.comparison import STEPS
     from study.explore.placed_session import begin_placed
     from study.support.errors import expect
 
     several = arguments.records[1:] or arguments.each_record
     expect(not several, f"{several and several[0]}: the page of a structure shows one record; expected no more")
     refuse_modal(model, "explore")
-    (prepared,) = prepared_structures(arguments, model)
-    with progress("step", 3) as step:
-        return begin_placed(compare(model, prepared, progress=step), steps)
+    (record,) = read_records(arguments, model)
+    with progress("step", STEPS) as step:
+        found = accounted_together(arguments, model, [record], arguments.records[0], progress=step)
+    return begin_placed(found.comparison, steps)

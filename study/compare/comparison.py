@@ -157,6 +157,10 @@ def compare(
     report: Progress = progress or (lambda _: None)
     sentence = f"{model.name!r} has 'linear: modal'; expected a model with inertia at every coordinate here"
     expect(model.modal is None, f"{sentence}; 'study compare', 'diagnose', 'add' and 'drop' take this one")
+    expect(
+        estimator == FREE_RUN or not model.named,
+        f"--estimator {estimator} is for a single mass; expected {FREE_RUN} of a structure",
+    )
     report("fit")
     known: Estimate | None = None
     if estimator != FREE_RUN:

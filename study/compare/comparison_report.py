@@ -410,7 +410,7 @@ def _interval(coefficient: Coefficient) -> str:
 
 
 def _levels(moving: Sequence[Level], comparisons: Sequence[Comparison]) -> str:
-    unit = comparisons[0].record.units.get("force", "")
+    unit = comparisons[0].record.units.get(next(iter(comparisons[0].record.forces), ""), "")
     heads = [f"rms force ({unit})", *(f"{x:.3g}" for x in moving[0].force), "moves?", "unit"]
     rows = [
         [level.key, *(f"{v:.4g} +- {1.96 * e:.2g}" for v, e in zip(level.value, level.error, strict=True)),

@@ -5,6 +5,7 @@ that record alone: its coefficient is the difference to the first. The fit, its 
 then hold for shared and separate coefficients alike.
 """
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +19,6 @@ from study.compare.across_levels import MOVES, RESOLUTION, Level
 from study.compare.comparison import Comparison
 from study.equations.model import Model, ModelTerm, free
 from study.equations.term import Component, Term
-from study.identify.time_domain.part_fit import linearise, uncertainty
 from study.records.record import Record
 from study.support.arrays import Floats
 from study.support.errors import StudyError, expect
@@ -62,10 +62,11 @@ def separated(
     found = list(dict.fromkeys(item for name in names for item in _meant(model, name)))
     separate: list[Separate] = []
     for entry, component in found:
-        added = [_difference(entry.term, component, k, r) for k, r in enumerate(records[1:], start=2)]
-        for term in added:
-            model = model.with_term(free(term))
-        separate.append(Separate(component.symbol, tuple(term.symbols[0] for term in added)))
+        terms = [_difference(entry.term, component, k, r) for k, r in enumerate(records[1:], start=2)]
+        added = [free(term, entry.place) for term in terms]
+        for one in added:
+            model = model.with_term(one)
+        separate.append(Separate(_key(entry, component), tuple(one.symbols[0] for one in added)))
     marked = [_marked(record, own, len(records)) for own, record in enumerate(records, start=1)]
     return model, marked, tuple(separate)
 
@@ -77,15 +78,14 @@ def levels_by_record(
 
     The p value is that of the differences being zero together (Wald, 1943), with the covariance of one fit.
     """
-    fit, prepared = comparison.fit, comparison.prepared
-    covariance = uncertainty(fit, prepared, linearise(fit, prepared))
-    levels = tuple(float(np.std(record["force"])) for record in records)
+    found = comparison.found
+    levels = tuple(math.hypot(*(float(np.std(record[f])) for f in record.forces)) for record in records)
     units = {c.key: c.unit for c in comparison.coefficients}
     made: list[Level] = []
     for one in separate:
-        place = [fit.keys.index(key) for key in (one.symbol, *one.differences)]
-        values = np.asarray(fit.values)[place]
-        made.append(_level(one.symbol, units[one.symbol], levels, values, covariance[np.ix_(place, place)],
+        place = [found.symbols.index(key) for key in (one.symbol, *one.differences)]
+        values = np.asarray(found.values)[place]
+        made.append(_level(one.symbol, units[one.symbol], levels, values, found.covariance[np.ix_(place, place)],
                            len(separate)))  # fmt: skip
     return tuple(made)
 
@@ -131,9 +131,11 @@ def _level(
 
 def _meant(model: Model, name: str) -> list[tuple[ModelTerm, Component]]:
     """The coefficients that a name means: those of a term, or the one that is called so."""
-    found = [(t, c) for t in model.terms for c in t.term.components if name in (t.name, c.symbol)]
+    found = [
+        (t, c) for t in model.terms for c in t.term.components if name in (t.name, t.term.name, c.symbol, _key(t, c))
+    ]  # fmt: skip
     if not found:
-        known = ", ".join(f"{t.name} ({', '.join(t.term.symbols)})" for t in model.terms)
+        known = ", ".join(f"{t.name} ({', '.join(t.symbols)})" for t in model.terms)
         raise StudyError(f"--each-record {name}: the model has no such term or coefficient; expected one of {known}")
     for entry, component in found:
         plain = not (entry.term.parameters or entry.term.state) and component.order < 2 and _force(component)
@@ -142,11 +144,16 @@ def _meant(model: Model, name: str) -> list[tuple[ModelTerm, Component]]:
             f"--each-record {name}: {entry.name} has a memory, a shape parameter or a mass; expected a term whose "
             "force is a coefficient times a function of displacement and velocity",
         )
+        key = _key(entry, component)
         expect(
-            entry.values[component.symbol] is None,
-            f"--each-record {name}: the model file gives {component.symbol}; expected it to be left open",
+            entry.values[key] is None,
+            f"--each-record {name}: the model file gives {key}; expected it to be left open",
         )
     return found
+
+
+def _key(entry: ModelTerm, component: Component) -> str:
+    return entry.symbols[entry.term.components.index(component)]
 
 
 def _force(component: Component) -> str:

@@ -11,7 +11,7 @@ LOST = 0.3  # of the rms response: a free run through several blocks that misses
 
 def has_lost_its_way(prediction: Prediction) -> bool:
     """Whether a free run has lost the motion: it misses much, and what it leaves looks like a motion, not as noise."""
-    return prediction.error > LOST and is_smooth(prediction.residual)
+    return prediction.error > LOST and is_smooth(prediction.residual, len(prediction.views))
 
 
 def running_on(comparison: Comparison) -> Comparison:

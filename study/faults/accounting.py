@@ -21,7 +21,7 @@ from study.identify.time_domain.settling import settled
 from study.identify.time_domain.stretch_states import is_poor
 from study.records.prepared import FORCE, Prepared
 from study.records.sampling_rate import too_coarse, without_spare_samples
-from study.support.errors import StudyError
+from study.support.errors import StudyError, expect
 from study.support.statistics import gain
 from study.support.thresholds import TOLERANCE
 
@@ -74,14 +74,16 @@ def accounted(
         If the model cannot be fitted.
     """
     known = dict(held or {})
-    asked = tuple(name for name in FAULTS if name not in switched_off and name not in known)
+    single = f"measurement holds {', '.join(known)}, which is looked for in records of a single mass alone"
+    expect(not (known and model.named), f"{single}; expected 'measurement: off'")
+    asked = () if model.named else tuple(n for n in FAULTS if n not in switched_off and n not in known)
     # A record shows faults by what it leaves of a driven response; they pass through no joint of stretches.
     if asked and (prepared.record.stretches or prepared.free or prepared.response == FORCE):
         asked, prepared = (), replace(prepared, notes=(*prepared.notes, NOT_ASKED))
     coarse = too_coarse(prepared)
     prepared = replace(prepared, notes=(*prepared.notes, coarse)) if coarse else prepared
     needed: Callable[[Prepared], Prepared] = (lambda whole: whole) if as_sampled else without_spare_samples
-    faults = first_faults(prepared, known, asked)
+    faults = first_faults(prepared, known, asked) if known or asked else ()
     first = corrected(prepared, faults)
     fewer = needed(first)
     if not asked:

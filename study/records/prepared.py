@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from study.records.completion import complete
 from study.records.outputs import Outputs
-from study.records.plan import FEWEST, Plan, make_plan
+from study.records.plan import FEWEST, Plan, compared_sensors, make_plan
 from study.records.record import ALONE, FORCE, Record, Sensor
 from study.support.arrays import Floats
 
@@ -157,7 +157,8 @@ def prepare_record(record: Record, plan: Plan | None = None, cutoff: float | Non
     """
     completed = complete(record, cutoff)
     plan, low = plan or make_plan(record), cutoff or 0.0
-    return Prepared(completed.record, plan, completed.band, completed.edge, completed.notes, low)
+    sensors = () if ALONE in record.coordinates else compared_sensors(record)
+    return Prepared(completed.record, plan, completed.band, completed.edge, completed.notes, low, sensors=sensors)
 
 
 def whole(record: Record, response: str = "displacement") -> Prepared:

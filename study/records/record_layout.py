@@ -60,7 +60,9 @@ class KindOfTest:
     prescribed: bool = False  # it has no inertia: the motion is prescribed, and the force is predicted
     drifts: bool = False  # nothing brings its mass back: the motion is judged over a horizon
     unbroken: bool = False  # it wants one long stretch to fit and one to judge
-    anew: float = 0.0  # periods after which a motion begins anew; 0 where it runs on through the blocks of both parts
+    anew: float = (
+        0.0  # periods after which a free motion begins anew; 0 where it runs on through the other part's blocks
+    )
 
 
 def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None = None) -> Prepared:
@@ -89,6 +91,7 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
     sensors = compared_sensors(records[0], wanted)
     forced = any(np.any(r[f][a:b]) for r in records for a, b in _samples(r, layout) for f in r.forces)
     free = not (kind.prescribed or forced)
+    anew = kind.anew if free else 0.0
     several = len(records) > 1 or len(layout.use) > 1
     by_itself = (free or kind.prescribed) and not (layout.explicit or kind.unbroken)
     turns = several or layout.alternate or by_itself
@@ -96,7 +99,7 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
         with at(records[0].name):
             plan = make_plan(records[0], layout.fit, layout.judge, wanted)
         turns = not (layout.explicit or kind.unbroken) and driven_apart(records[0], plan.fit, plan.judge)
-        if not (turns or (free and kind.anew)):
+        if not (turns or anew):
             prepared = prepare_record(records[0], plan, layout.cutoff)
             return replace(prepared, sensors=sensors, notes=(*notes, *prepared.notes))
         notes += [_why(records[0], plan)] if turns else []
@@ -108,12 +111,12 @@ def laid_out(records: Sequence[Record], layout: Layout, kind: KindOfTest | None 
         fit, judge = [sure(completed[0], *plan.fit)], [sure(completed[0], *plan.judge)]
     else:
         stretches = [sure(c, *span) for c in completed for span in _samples(c.record, layout)]
-        stretches = [_until_rest(s, sensors) for s in stretches] if turns and kind.anew else stretches
+        stretches = [_until_rest(s, sensors) for s in stretches] if turns and anew else stretches
         middle = (stretches[0].first + stretches[0].last) // 2
         fit, judge = [replace(stretches[0], last=middle)], [replace(stretches[0], first=middle)]
         if turns:
-            fit, judge = alternating(stretches, sensors, kind.anew)
-        notes += [_said(fit, judge, len(stretches), anew=bool(kind.anew))] if turns else []
+            fit, judge = alternating(stretches, sensors, anew)
+        notes += [_said(fit, judge, len(stretches), anew=bool(anew))] if turns else []
     if kind.drifts:
         (fit, first), (judge, second) = (within_the_horizon(part, sensors) for part in (fit, judge))
         notes.append(

@@ -237,11 +237,15 @@ def too_coarse(prepared: Prepared) -> str:
     """
     if prepared.response == FORCE or prepared.free:
         return ""
-    values = prepared.fitted - np.mean(prepared.fitted)
+    values = prepared.outputs.apart(prepared.fitted)
+    windowed = np.asarray((values - np.mean(values, axis=0)) * np.hanning(len(values))[:, None], dtype=np.float64)
     frequency = np.asarray(rfftfreq(len(values), prepared.dt))
     inside = frequency >= max(prepared.band[0], frequency[1])
-    power = np.abs(np.asarray(rfft(values * np.hanning(len(values)))))[inside] ** 2
-    power /= frequency[inside] ** (2 * MOTIONS.index(prepared.response))
+    orders = np.array([MOTIONS.index(s.motion) for s in prepared.outputs.sensors])
+    each = np.abs(np.asarray(rfft(windowed, axis=0), dtype=np.complex128)[inside]) ** 2 / frequency[inside, None] ** (
+        2 * orders
+    )
+    power = np.sum(each / np.maximum(np.sum(each, axis=0), np.finfo(float).tiny), axis=1)
     total, nyquist = np.cumsum(power), 0.5 / prepared.dt
     above = 1.0 - np.interp(0.5 * nyquist, frequency[inside], total) / total[-1]
     if above <= TOO_COARSE:

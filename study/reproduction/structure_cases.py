@@ -20,6 +20,7 @@ from study.identify.frequency_domain.action_reaction import JointEstimate, joint
 from study.identify.frequency_domain.local_polynomial import LocalPolynomial
 from study.identify.frequency_domain.reverse_system import ESTIMATORS, ReverseSystem, equations_of, reverse_system
 from study.records.excitation import Excitation, force
+from study.records.prepared import prepare_record
 from study.records.record import MOTIONS, Record, Sensor
 from study.reproduction.config import Name, rules
 from study.reproduction.settings import (
@@ -32,7 +33,6 @@ from study.reproduction.settings import (
     Seed,
     SegmentSettings,
 )
-from study.structure.prepared_structure import prepare_structure
 from study.support.config_files import Section, TableRow, Text, read_rows, read_yaml
 from study.support.errors import StudyError, at, expect
 
@@ -193,7 +193,7 @@ class CaseResult:
 def identify_structure(model: Model, record: Record, case: StructureCase, settings: StructureSettings) -> CaseResult:
     """Every equation of a case by every estimator of the settings."""
     assumed = assumed_structure(model, case.also_assumed)
-    equations, _ = equations_of(assumed, prepare_structure(record, assumed), (0, len(record)))
+    equations, _ = equations_of(assumed, prepare_record(record), (0, len(record)))
     found: dict[str, StructureFindings] = {}
     for name in settings.estimators:
         system = reverse_system(name, equations, record.dt, settings.for_estimators)

@@ -15,8 +15,7 @@ from study.equations.model import Model
 from study.faults.fault import Fault
 from study.identify.time_domain.part_fit import fit_part, rough_steps
 from study.identify.time_domain.weighted_fit import finished
-from study.records.prepared import Prepared
-from study.structure.prepared_structure import prepare_structure
+from study.records.prepared import Prepared, prepare_record
 from study.support.errors import StudyError
 from study.trials.draw import Trial
 from study.trials.kept import Row
@@ -34,7 +33,7 @@ def compared(trial: Trial, model: Model) -> tuple[Comparison, tuple[Fault, ...]]
 
 def diagnosed_structure(trial: Trial) -> Diagnosis:
     """What is said of a structure."""
-    return diagnose(compare(trial.believed, prepare_structure(trial.record, trial.believed)))
+    return diagnose(compare(trial.believed, prepare_record(trial.record)))
 
 
 def tie_set(diagnosis: Diagnosis) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from study.compare.by_estimator import FREE_RUN
 from study.compare.running_on import has_lost_its_way
 from study.equations.common_factor import per_unit_mass, with_known_mass
 from study.equations.equations_of_motion import has_spring
+from study.equations.linear_part import check_held_masses
 from study.equations.model import Model
 from study.faults.accounting import Accounted, accounted
 from study.faults.fault import FaultSettings
@@ -19,6 +20,9 @@ from study.records.driven_by_motion import on_a_moving_base, relative_to_base
 from study.records.prepared import Prepared
 from study.records.record import Record
 from study.records.record_layout import KindOfTest, Layout, apart, laid_out, runs_on
+from study.support.errors import expect
+
+ANEW = 1.5  # periods of a structure's decay in a stretch: over more, several effects that are missing hide each other
 
 
 def made_ready(
@@ -40,14 +44,42 @@ def made_ready(
     Raises
     ------
     StudyError
-        If the records, or the model and such a test, do not go together.
+        If the records, or the model and such a test, do not go together; of a structure, if nothing measures a
+        coordinate or ties it to another, or its masses are not positive definite together.
     """
+    expect(not (absolute and model.named), "--absolute is for a single mass; expected it left out beside 'coordinates'")
     model, records, said = driven_alike(records, model, absolute)
-    prescribed = "inertia" not in model
-    drifts = not prescribed and not has_spring(model)
-    prepared = laid_out(records, layout, KindOfTest(prescribed, drifts))
-    prepared = replace(prepared, notes=(*said, *prepared.notes))
-    return per_unit_mass(model, prepared) if prepared.free else (model, prepared)
+    prescribed = not (model.modal or any(entry.term.name == "inertia" for entry in model.terms))
+    drifts = not (prescribed or model.modal or has_spring(model))
+    prepared = laid_out(
+        records, layout, KindOfTest(prescribed, drifts, model.modal is not None, ANEW if model.named else 0.0)
+    )
+    lacks = _unseen(model, prepared)
+    prepared = replace(prepared, notes=(*said, *prepared.notes, *lacks))
+    return per_unit_mass(model, prepared) if prepared.free and not model.named else (model, prepared)
+
+
+def _unseen(model: Model, prepared: Prepared) -> tuple[str, ...]:
+    """What to say of coordinates without a sensor.
+
+    Raises
+    ------
+    StudyError
+        If nothing ties one of them to another, or the masses that are given leave no positive definite mass matrix.
+    """
+    if not model.named:
+        return ()
+    if not model.modal:  # whose masses nobody lumps
+        check_held_masses(model)
+    blind = [coordinate for coordinate in model.coordinates if coordinate not in prepared.coordinates]
+    for name in blind:
+        expect(
+            any(name in t.place.moving and len(t.place.moving) > 1 for t in model.terms),
+            f"nothing measures the coordinate {name!r} and nothing ties it to another; expected a column {name!r}, or "
+            "a term between it and a coordinate that is measured",
+        )
+    lacks = f"no sensor is at {' and '.join(blind)}: the free run has its motion, the reverse system lacks it"
+    return (lacks,) if blind else ()
 
 
 def driven_alike(
@@ -57,7 +89,7 @@ def driven_alike(
 
     All other records are as they were. Raises as :func:`made_ready`.
     """
-    based = [on_a_moving_base(record) for record in records]
+    based = [not model.named and on_a_moving_base(record) for record in records]
     if any(based):
         model = with_known_mass(model)
     mass = None if model.values.get("m") == 1.0 else model.values.get("m")

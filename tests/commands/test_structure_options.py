@@ -27,9 +27,9 @@ terms:
 SAMPLES, DT = 2400, 0.02
 
 
-def motions(drive: np.ndarray, dt: float) -> np.ndarray:
+def motions(drive: np.ndarray, dt: float, stiffness: float = 900.0) -> np.ndarray:
     """Displacements of two masses on springs, shape (2, n)."""
-    values = iter((1.0, 0.6, 900.0, 700.0, 1.2, 0.8))
+    values = iter((1.0, 0.6, stiffness, 700.0, 1.2, 0.8))
     text = "\n".join(
         line.replace("}", f", value: {next(values)}}}") if "{term" in line else line for line in MODEL.splitlines()
     )
@@ -68,12 +68,29 @@ def document(path: Path) -> dict:
     return json.loads(path.read_text())
 
 
-def test_two_records_of_one_name_do_not_overwrite_each_other(folder):
+def test_two_records_of_one_name_are_told_apart(folder):
     out = compared(folder, records=("b.csv", "again/b.csv"), out="two")
-    names = {path.name for path in out.glob("*comparison.json")}
-    assert names == {"b_1_comparison.json", "b_2_comparison.json"}
-    stiffness = [document(out / name)["coefficients"][2]["value"] for name in sorted(names)]
+    assert {path.name for path in out.glob("*structure.html")} == {"b_1_structure.html", "b_2_structure.html"}
+    both = document(out / "comparison.json")
+    assert [found["record"] for found in both["records"]] == ["b_1", "b_2"]
+    stiffness = [found["coefficients"][2]["value"] for found in both["records"]]
     assert stiffness[1] == pytest.approx(2.0 * stiffness[0], rel=0.05)
+    moving = {level["key"] for level in both["where"]["level"] if level["moves"]}
+    assert "k[a-b]" in moving, "half the motion under the same force: all is twice as stiff"
+
+
+def test_a_stiffness_may_differ_between_records_that_are_fitted_together(folder):
+    (folder / "softer").mkdir(exist_ok=True)
+    drive, rng = force(Excitation(level=100.0, cutoff=12.5), SAMPLES, DT, 2), np.random.default_rng(4)
+    clean = motions(drive, DT, stiffness=850.0)
+    noisy = clean + 0.01 * np.std(clean, axis=1, keepdims=True) * rng.standard_normal(clean.shape)
+    softer = record_of(DT, {"shaker": drive}, {Sensor(c, "displacement"): x for c, x in zip("ab", noisy, strict=True)})
+    write_csv(softer, folder / "softer" / "c.csv")
+    out = compared(folder, "--each-record", "k[ground-a]", records=("b.csv", "softer/c.csv"), out="each")
+    (row,) = document(out / "comparison.json")["coefficients_by_record"]
+    assert row["key"] == "k[ground-a]"
+    assert row["differs"]
+    assert row["value"] == pytest.approx([900.0, 850.0], rel=5e-3)
 
 
 def test_a_record_in_millimetres_stays_in_millimetres(folder):
@@ -90,7 +107,7 @@ def test_a_record_in_millimetres_stays_in_millimetres(folder):
 @pytest.mark.parametrize(("words", "said"), [
     (("--absolute",), "--absolute is for a single mass"),
     (("--estimator", "local_polynomial"), "--estimator local_polynomial is for a single mass"),
-    (("--each-record", "linear_stiffness"), "--each-record is for a single mass"),
+    (("--each-record", "linear_stiffness"), "--each-record linear_stiffness: there is one record; expected two"),
     (("--response", "acceleration"), "no acceleration was measured at a; expected --response displacement"),
     (("--free",), "nothing drives 'pair': its motion says nothing of m[a], m[b]; expected a value for each"),
     (("--group", "low"), "a group 'low' is asked for and this file has none"),

@@ -16,8 +16,8 @@ from study.explore.desk import Desk
 from study.explore.placed_page import PLACED, structure_files
 from study.explore.placed_view import placed_view
 from study.explore.saved_files import PAGE
+from study.records.prepared import prepare_record
 from study.records.readers import read_record
-from study.structure.prepared_structure import prepare_structure
 from study.support.errors import StudyError
 
 CUBIC = "cubic_stiffness[floor2-floor3]"
@@ -26,7 +26,7 @@ CUBIC = "cubic_stiffness[floor2-floor3]"
 @pytest.fixture(scope="module")
 def begun(hall):
     model = model_file.read_model(hall / "frame.yaml")
-    prepared = prepare_structure(read_record(hall / "frame.csv", roles=model.roles), model)
+    prepared = prepare_record(read_record(hall / "frame.csv", roles=model.roles))
     return sessions.begin_placed(compare(model, prepared))
 
 

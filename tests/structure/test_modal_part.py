@@ -17,10 +17,12 @@ from study.equations.model_file import format_model, parse_model, read_model
 from study.equations.simulate import Integrator, simulate
 from study.identify.frequency_domain.subspace import observability
 from study.records.excitation import Excitation, force
+from study.records.prepared import prepare_record
 from study.records.record import Record, Sensor, record_of, write_csv
+from study.records.record_layout import Layout
 from study.structure.measured_comparison import compare_measured, measured_document, measured_says
-from study.structure.prepared_structure import prepare_structure
 from study.support.errors import StudyError
+from study.way_in.compare_records import made_ready
 
 ROOT = Path(__file__).parents[2]
 DT, SAMPLES = 0.005, 8192
@@ -119,7 +121,7 @@ def at_sensors(beam, motion="displacement", noise=0.01, places=("p4", "p7", "p10
 
 @pytest.fixture(scope="module")
 def comparison(beam):
-    return compare_measured(modal(), prepare_structure(at_sensors(beam), modal()))
+    return compare_measured(modal(), prepare_record(at_sensors(beam)))
 
 
 def test_the_cubic_spring_and_the_free_run_of_the_beam(comparison):
@@ -152,7 +154,7 @@ def test_coefficients_line_by_line_are_real_and_flat(comparison):
 
 def test_a_term_at_the_wrong_place_leaves_the_error(beam):
     wrong = modal(MODAL.replace("[ground, p10]", "[p4, p7]"))
-    found = compare_measured(wrong, prepare_structure(at_sensors(beam, samples=4000), wrong))
+    found = compare_measured(wrong, prepare_record(at_sensors(beam, samples=4000)))
     assert found.prediction.error > 1.1 * np.sqrt(0.01)
 
 
@@ -187,7 +189,7 @@ def test_the_reports_duffing_system_is_a_structure_of_one_mode(motion, noise, re
     noisy = u + np.sqrt(noise) * np.std(u) * np.random.default_rng(3).standard_normal(len(u))
     model = modal("coordinates: [x]\nforces: {shaker: x}\nlinear: modal\nterms: [{term: cubic_stiffness, at: x}]")
     own = record.with_motions({Sensor("x", motion): noisy})
-    fitted = compare_measured(model, prepare_structure(own, model)).fit.model
+    fitted = compare_measured(model, prepare_record(own)).fit.model
     assert fitted.modal.count == 1
     values = fitted.numbers()
     mass = values["phi[x,1]"] ** -2
@@ -240,7 +242,7 @@ def test_what_the_sensors_do_not_show_is_said(beam):
     ):
         record = at_sensors(beam, places=places)
         with pytest.raises(StudyError, match=said):
-            compare_measured(modal(), prepare_structure(record, modal()))
+            made_ready([record], modal(), Layout())
 
 
 def test_compare_on_the_command_line(tmp_path, beam, comparison, capsys):

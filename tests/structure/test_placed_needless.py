@@ -9,7 +9,8 @@ from study.diagnose.needless import needless
 from study.equations.model import free
 from study.equations.place import Place
 from study.equations.terms import get
-from study.structure.prepared_structure import prepare_structure
+from study.records.plan import make_plan
+from study.records.prepared import prepare_record
 
 CUBIC = free(get("cubic_stiffness"), Place("between", ("floor2", "floor3")))
 DRAG = free(get("quadratic_damping"), Place("between", ("ground", "floor1")))
@@ -18,7 +19,7 @@ DRAG = free(get("quadratic_damping"), Place("between", ("ground", "floor1")))
 @pytest.fixture(scope="module")
 def found(believed, record_of):
     model = replace(believed, terms=(*believed.terms, CUBIC, DRAG))
-    return needless(compare(model, prepare_structure(record_of(), model, (0, 1500), (1500, 3000))))
+    return needless(compare(model, prepare_record(record_of(), make_plan(record_of(), (0, 1500), (1500, 3000)))))
 
 
 def test_the_term_that_the_record_lacks_is_named_with_its_place_and_no_other(found):
@@ -33,5 +34,5 @@ def test_the_term_that_the_record_lacks_is_named_with_its_place_and_no_other(fou
 def test_a_given_value_is_not_asked_for(believed, record_of):
     drag = replace(DRAG, coefficients=(0.0,))
     model = replace(believed, terms=(*believed.terms, CUBIC, drag))
-    prepared = prepare_structure(record_of(), model, (0, 1500), (1500, 3000))
+    prepared = prepare_record(record_of(), make_plan(record_of(), (0, 1500), (1500, 3000)))
     assert needless(compare(model, prepared)) == ()

@@ -14,9 +14,9 @@ from study.identify.frequency_domain.action_reaction import joint_estimate
 from study.identify.frequency_domain.local_polynomial import LocalPolynomial
 from study.identify.frequency_domain.reverse_system import equations_of, exact_responses, reverse_system
 from study.records.excitation import Excitation, force
+from study.records.prepared import prepare_record
 from study.records.record import Record, record_of
 from study.records.spectra import Segments
-from study.structure.prepared_structure import prepare_structure
 from study.support.errors import StudyError
 
 DT, SAMPLES = 0.02, 4096
@@ -55,7 +55,7 @@ def one_force(record):
 
 
 def equations(structure, record: Record):
-    return equations_of(structure, prepare_structure(record, structure), (0, len(record)))[0]
+    return equations_of(structure, prepare_record(record), (0, len(record)))[0]
 
 
 def test_every_line_is_the_direct_least_squares_solution(one_force):

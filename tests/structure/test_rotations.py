@@ -11,9 +11,9 @@ from study.equations.coefficient_units import coefficient_unit, parameter_units,
 from study.equations.model import free
 from study.equations.place import Place
 from study.equations.terms import get
+from study.records.prepared import prepare_record
 from study.records.readers import read_record
 from study.records.record import Sensor, record_of, write_csv
-from study.structure.prepared_structure import prepare_structure
 
 TURNS = record_of(
     0.01, {"shaker": np.zeros(9)}, {Sensor(c, "displacement"): np.zeros(9) for c in ("heave", "pitch")}
@@ -59,7 +59,7 @@ def test_a_record_tells_which_coordinates_turn(tmp_path, frame, quiet_frame, uni
     )  # fmt: skip
     record = read_record(path, roles=frame.roles)
     assert record.rotations == {"floor3"}
-    comparison = compare(frame, prepare_structure(record, frame))
+    comparison = compare(frame, prepare_record(record))
     said = comparison_summary([comparison])
     assert comparison.prediction.error < 1e-5
     assert "kg m^2" in said

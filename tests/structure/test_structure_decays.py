@@ -11,10 +11,12 @@ from study.diagnose.verdict import MISSING, NOTHING, diagnose
 from study.equations.free_run import prepare
 from study.equations.model_file import parse_model
 from study.identify.time_domain.part_fit import linearise, run_of
+from study.records.plan import make_plan
+from study.records.prepared import prepare_record
 from study.records.record import Sensor, record_of
 from study.records.record_layout import Layout
-from study.structure.prepared_structure import prepare_structure, structure_ready
 from study.support.errors import StudyError
+from study.way_in.compare_records import made_ready
 
 DT, SAMPLES = 0.01, 2000
 SENSORS = (Sensor("a", "displacement"), Sensor("b", "displacement"))
@@ -51,7 +53,7 @@ def decay(more="", noise=0.003, seed=1, begin=BEGIN, samples=SAMPLES):
 
 
 def test_a_decay_is_fitted_and_judged_in_turn_and_its_motion_begins_anew():
-    prepared = structure_ready(decay(), model(), Layout())
+    prepared = made_ready([decay()], model(), Layout())[1]
     record = prepared.record
     runs = record.runs((0, len(record)))
     assert len(record.stretches) == len(runs) >= 6
@@ -63,7 +65,7 @@ def test_a_decay_is_fitted_and_judged_in_turn_and_its_motion_begins_anew():
     begin = record.joints[0]
     assert record.time[begin] == pytest.approx(3.0 + DT * record.stretches[1].first)
     assert record.time[begin] - record.time[begin - 1] > 10 * DT
-    whole = prepare_structure(decay(), model())
+    whole = prepare_record(decay())
     a = record.stretches[1]
     assert np.allclose(
         prepared.record.motion("a")[:, begin : begin + len(a)], whole.record.motion("a")[:, a.first : a.last]
@@ -71,7 +73,7 @@ def test_a_decay_is_fitted_and_judged_in_turn_and_its_motion_begins_anew():
 
 
 def test_derivatives_by_the_states_of_each_stretch_are_those_of_the_motion():
-    prepared = structure_ready(decay(HARD), model(more=HARD), Layout())
+    prepared = made_ready([decay(HARD)], model(more=HARD), Layout())[1]
     fit = compare(model(more=HARD), prepared).fit
     jacobian = fit.outputs.apart(linearise(fit, prepared))
     assert fit.initial.shape == (len(prepared.record.runs(prepared.plan.fit)), 4)
@@ -93,14 +95,14 @@ def test_derivatives_by_the_states_of_each_stretch_are_those_of_the_motion():
 def test_a_fit_begins_where_noise_does_not_lead_it_astray(noise, seed):
     """Of displacements every 0.01 s: two derivatives of their noise are larger than the acceleration itself."""
     record = decay(noise=noise, seed=seed)
-    comparison = compare(model(), structure_ready(record, model(), Layout((), (0, 1000), (1000, 1600))))
+    comparison = compare(model(), made_ready([record], model(), Layout((), (0, 1000), (1000, 1600)))[1])
     found = comparison.fit.model.values
     assert found["k[ground-a]"] == pytest.approx(40.0, rel=0.02)
     assert found["k[a-b]"] == pytest.approx(25.0, rel=0.02)
 
 
 def test_a_hardening_spring_is_found_where_it_is():
-    comparison = compare(model(), structure_ready(decay(HARD), model(), Layout()))
+    comparison = compare(model(), made_ready([decay(HARD)], model(), Layout())[1])
     diagnosis = diagnose(comparison, without=FEW)
     assert diagnosis.verdict == MISSING
     first = diagnosis.candidates[0]
@@ -112,27 +114,27 @@ def test_a_hardening_spring_is_found_where_it_is():
 
 @pytest.mark.parametrize("noise", [0.003, 0.05])
 def test_where_nothing_is_missing_nothing_is_said_to_be(noise):
-    comparison = compare(model(), structure_ready(decay(noise=noise), model(), Layout()))
+    comparison = compare(model(), made_ready([decay(noise=noise)], model(), Layout())[1])
     assert diagnose(comparison, without=FEW).verdict == NOTHING
 
 
 def test_a_free_run_that_lost_the_motion_is_no_noise():
     """One run of a linear model along the decay of a hard spring: whatever explains nothing there, something lacks."""
-    prepared = prepare_structure(decay(HARD), model(), (0, 1000), (1000, 1600))
+    prepared = prepare_record(decay(HARD), make_plan(decay(HARD), (0, 1000), (1000, 1600)))
     prediction = compare(model(), prepared).prediction
     assert prediction.error > 20.0 * prediction.floor
     assert prediction.above_noise > 0.5 * prediction.error
     right = model(more=HARD)
-    again = compare(right, prepare_structure(decay(HARD), right, (0, 1000), (1000, 1600))).prediction
+    again = compare(right, prepare_record(decay(HARD), make_plan(decay(HARD), (0, 1000), (1000, 1600)))).prediction
     assert again.above_noise < 2e-3
 
 
 def test_stretches_that_are_named_are_used_alone():
-    prepared = structure_ready(decay(), model(), Layout(use=((3.5, 9.0), (12.0, None))))
+    prepared = made_ready([decay()], model(), Layout(use=((3.5, 9.0), (12.0, None))))[1]
     times = prepared.record.time
     assert np.all((times >= 3.5) & (times < 9.0) | (times >= 12.0))
     assert min(times) == pytest.approx(3.5)
-    explicit = structure_ready(decay(), model(), Layout((), (0, 900), (900, 1800)))
+    explicit = made_ready([decay()], model(), Layout((), (0, 900), (900, 1800)))[1]
     assert len(explicit.record.stretches) == 2
 
 
@@ -147,4 +149,4 @@ def test_stretches_that_are_named_are_used_alone():
 )
 def test_parts_that_cannot_be_are_refused(parts, said):
     with pytest.raises(StudyError, match=said):
-        structure_ready(decay(), model(), parts)
+        made_ready([decay()], model(), parts)

@@ -12,8 +12,8 @@ from study.diagnose.candidates import candidate_entries, screened
 from study.diagnose.verdict import search_base
 from study.equations.model_file import format_model, read_model
 from study.equations.terms import external, get, one_sided
+from study.records.prepared import prepare_record
 from study.records.record import write_csv
-from study.structure.prepared_structure import prepare_structure
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def test_effect_and_place_come_first(diagnosed):
 
 
 def test_the_reverse_system_puts_the_effect_where_it_is(believed, record_of):
-    comparison = compare(believed, prepare_structure(record_of(), believed))
+    comparison = compare(believed, prepare_record(record_of()))
     ordered = screened(candidate_entries(believed), search_base(comparison))
     assert ordered[0].entry.place.path == {"floor2", "floor3"}
     cubic = next(item for item in ordered if item.entry.name == "cubic_stiffness[floor2-floor3]")

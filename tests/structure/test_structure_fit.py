@@ -7,8 +7,11 @@ from study.compare.comparison import compare
 from study.compare.comparison_report import comparison_document
 from study.equations.model import Model
 from study.identify.frequency_domain.linear_start import lumped_start
-from study.structure.prepared_structure import prepare_structure
+from study.records.plan import make_plan
+from study.records.prepared import prepare_record
+from study.records.record_layout import Layout
 from study.support.errors import StudyError
+from study.way_in.compare_records import made_ready
 
 
 def noise_over_motion(comparison):
@@ -23,7 +26,7 @@ def noise_over_motion(comparison):
 )
 def test_the_true_model_is_found_within_its_errors(frame, record_of, motion, without):
     free = frame.with_values(dict.fromkeys(frame.values, None))
-    comparison = compare(free, prepare_structure(record_of(motion, without=without), free))
+    comparison = compare(free, prepare_record(record_of(motion, without=without)))
     off = comparison.fit.values - [frame.values[key] for key in comparison.fit.keys]
     distance = off @ np.linalg.solve(comparison.found.covariance, off)  # chi square with ten degrees of freedom
     assert distance < 29.6  # its 99.9 % quantile
@@ -37,28 +40,28 @@ def test_the_true_model_is_found_within_its_errors(frame, record_of, motion, wit
 
 def test_held_values_are_held(frame, record_of):
     """With nothing open nothing is fitted: the error is that of the model as it is."""
-    comparison = compare(frame, prepare_structure(record_of(), frame))
+    comparison = compare(frame, prepare_record(record_of()))
     assert comparison.fit.keys == ()
     assert all(c.error is None for c in comparison.coefficients)
     assert comparison.prediction.error == pytest.approx(noise_over_motion(comparison), rel=0.05)
     wrong = frame.with_values({"m[floor2]": 5.0})
-    assert compare(wrong, prepare_structure(record_of(), wrong)).prediction.error > 0.2
+    assert compare(wrong, prepare_record(record_of())).prediction.error > 0.2
 
 
 def test_what_is_held_is_integrated_as_finely_as_what_is_fitted(frame, quiet_frame):
     """Seven samples a period of the third mode: the integration alone left 0.15 %."""
-    held = compare(frame, prepare_structure(quiet_frame, frame))
+    held = compare(frame, prepare_record(quiet_frame))
     assert held.prediction.error < 1e-5
 
 
 def test_the_residual_force_acts_between_the_two_floors(believed, record_of):
-    quiet = compare(believed, prepare_structure(record_of(noise=0.0), believed))
+    quiet = compare(believed, prepare_record(record_of(noise=0.0)))
     rows = comparison_document([quiet])["where"]
     assert rows["places"][0]["between"] == ["floor2", "floor3"]
     shared = np.array(rows["shared_force"])
     assert np.argmax(shared) in (5, 7)  # row floor2, column floor3, or the other way round
     assert shared[1, 2] > 0.5
-    noisy = compare(believed, prepare_structure(record_of(), believed))
+    noisy = compare(believed, prepare_record(record_of()))
     assert comparison_document([noisy])["where"]["places"][0]["between"] == ["floor2", "floor3"]
     errors = list(comparison_document([noisy])["error"]["sensors"].values())
     floors = list(comparison_document([noisy])["noise_floor"]["sensors"].values())
@@ -69,7 +72,7 @@ def test_linear_terms_come_from_frequency_responses(frame, record_of):
     linear = frame.without_term("cubic_stiffness[floor2-floor3]")
     free = linear.with_values(dict.fromkeys(linear.values, None))
     for without in ((), ("floor2",)):
-        start = lumped_start(free, prepare_structure(record_of(without=without), free), {})
+        start = lumped_start(free, prepare_record(record_of(without=without)), {})
         masses = [start[f"m[floor{i}]"] / frame.values[f"m[floor{i}]"] for i in (1, 2, 3)]
         assert np.max(np.abs(np.array(masses) - 1.0)) < 0.1
 
@@ -77,8 +80,8 @@ def test_linear_terms_come_from_frequency_responses(frame, record_of):
 def test_what_cannot_be_judged_gets_its_sentence(believed, record_of):
     record = record_of()
     with pytest.raises(StudyError, match=r"overlap.*expected"):
-        prepare_structure(record, believed, (0, 2000), (1000, 5000))
+        prepare_record(record, make_plan(record, (0, 2000), (1000, 5000)))
     loose = tuple(t for t in believed.terms if t.place and not {"floor2", "floor3"} <= set(t.place.ends))
     apart = Model("loose", loose, believed.coordinates, (("shaker", "floor1"),))
     with pytest.raises(StudyError, match="nothing measures the coordinate 'floor3' and nothing ties it"):
-        prepare_structure(record_of(without=("floor3",)), apart)
+        made_ready([record_of(without=("floor3",))], apart, Layout())

@@ -21,10 +21,12 @@ from study.equations.terms import LIBRARY, get
 from study.identify.time_domain.shape_search import Start
 from study.records.completion import consistent
 from study.records.excitation import Excitation, force
+from study.records.prepared import prepare_record
 from study.records.readers import ReadOptions, read_record
 from study.records.record import Sensor, write_csv
-from study.structure.prepared_structure import prepare_structure
+from study.records.record_layout import Layout
 from study.support.errors import StudyError
+from study.way_in.compare_records import made_ready
 
 HERE = Path("twin.yaml")
 HEAD = "name: twin\ncoordinates: [trunk, left, right]\nforces: {shaker: trunk}\nterms:\n"
@@ -58,7 +60,7 @@ def twin_record(sensors):
 @pytest.mark.parametrize(("sensors", "tied"), [(("trunk",), True), (("trunk", "right"), False)])
 def test_places_that_the_sensors_cannot_tell_apart_are_a_tie(sensors, tied):
     model = parse_model(HEAD + MASSES + FOOT + BRANCHES, HERE)
-    comparison = compare(model, prepare_structure(twin_record(sensors), model))
+    comparison = compare(model, prepare_record(twin_record(sensors)))
     others = [n for n in LIBRARY if n not in ("cubic_stiffness", "quadratic_damping", "constant_force")]
     diagnosis = diagnose(comparison, without=others)
     first, said = diagnosis.candidates[0], diagnosis_in_words(diagnosis)
@@ -96,7 +98,7 @@ def test_masses_that_are_given_may_not_couple_too_much():
     check_held_masses(parse_model(coupled + "  - {term: inertia, couples: [trunk, left], value: 3.0}\n", HERE))
     wrong = parse_model(coupled + "  - {term: inertia, couples: [trunk, right], value: 3.0}\n", HERE)
     with pytest.raises(StudyError, match=r"\[5 3; 3 1\], is not positive definite; expected"):
-        prepare_structure(twin_record(("trunk",)), wrong)
+        made_ready([twin_record(("trunk",))], wrong, Layout())
 
 
 def test_a_mechanism_is_named_where_no_fit_begins():
@@ -120,9 +122,9 @@ def test_a_mechanism_is_named_where_no_fit_begins():
     with pytest.raises(
         StudyError, match=r"nothing ties 'twin' down and what is measured drifts; expected acceleration"
     ):
-        compare(open_values, prepare_structure(drifting, open_values))
+        compare(open_values, prepare_record(drifting))
     steady = free_body.with_motions({s: x for s, x in free_body.motions.items() if s.motion == "acceleration"})
-    comparison = compare(open_values, prepare_structure(steady, open_values))
+    comparison = compare(open_values, prepare_record(steady))
     assert comparison.prediction.error < 1e-3
     assert any("may drift away as a whole" in note for note in comparison.notes)
 

@@ -12,10 +12,12 @@ from study.equations.model import free
 from study.equations.model_file import parse_model
 from study.equations.place import Place
 from study.equations.terms import LIBRARY, get
+from study.records.plan import make_plan
+from study.records.prepared import prepare_record
 from study.records.readers import read_record
 from study.records.record_layout import Layout
-from study.structure.prepared_structure import prepare_structure, structure_ready
 from study.support.errors import StudyError
+from study.way_in.compare_records import made_ready
 from tests.public_records import DATA, needs
 
 pytestmark = needs("wing")
@@ -48,7 +50,7 @@ def wing(name):
 def test_stiffness_is_found_and_what_is_missing_is_in_pitch(name):
     model = wing(name)
     record = read_record(DATA / "wing" / f"{name}.csv", roles=model.roles)
-    prepared = prepare_structure(record, model, (0, 2500), (2500, 4000))
+    prepared = prepare_record(record, make_plan(record, (0, 2500), (2500, 4000)))
     comparison = compare(model, prepared)
     _, _, heave, pitch = AUTHORS[name]
     values = comparison.fit.model.values
@@ -79,7 +81,7 @@ def test_heave_of_the_second_wing_has_dry_friction():
     ):  # fmt: skip
         model = model.with_term(free(get(effect), Place("between", ("ground", where))))
     record = read_record(DATA / "wing" / "model_2.csv", roles=model.roles)
-    comparison = compare(model, prepare_structure(record, model, (0, 2400), (2400, 4000)))
+    comparison = compare(model, prepare_record(record, make_plan(record, (0, 2400), (2400, 4000))))
     found = {c.key: c for c in comparison.coefficients}
     friction = found["fc[ground-heave]"]
     assert friction.value == pytest.approx(2.7, rel=0.1)
@@ -96,7 +98,7 @@ def test_a_prediction_worse_than_none_is_never_said_to_lack_nothing():
     """Pitch is at rest in the judged part, and linear terms alone let it swing on."""
     model = wing("model_2")
     record = read_record(DATA / "wing" / "model_2.csv", roles=model.roles)
-    comparison = compare(model, prepare_structure(record, model, (0, 2500), (2500, 4000)))
+    comparison = compare(model, prepare_record(record, make_plan(record, (0, 2500), (2500, 4000))))
     assert comparison.prediction.error > 1.0
     others = [name for name in LIBRARY if name != "constant_force"]
     assert diagnose(comparison, without=others).verdict == UNKNOWN
@@ -107,7 +109,7 @@ def test_without_a_force_masses_must_be_given():
     free = model.with_values({"m[heave]": None})
     record = read_record(DATA / "wing" / "model_1.csv", roles=free.roles)
     with pytest.raises(StudyError, match=r"says nothing of m\[heave\]; expected a value"):
-        compare(free, prepare_structure(record, free, (0, 2500), (2500, 4000)))
+        compare(free, prepare_record(record, make_plan(record, (0, 2500), (2500, 4000))))
 
 
 SEARCHED = ("quadratic_stiffness", "cubic_stiffness", "bilinear_stiffness", "coulomb_friction")
@@ -119,7 +121,7 @@ def test_as_a_user_runs_it_the_missing_stiffness_is_in_pitch(name):
     """Without parts named: every other stretch of one and a half periods is judged, from a state of its own."""
     model = wing(name)
     record = read_record(DATA / "wing" / f"{name}.csv", roles=model.roles)
-    comparison = compare(model, structure_ready(record, model, Layout()))
+    comparison = compare(model, made_ready([record], model, Layout())[1])
     _, _, heave, pitch = AUTHORS[name]
     values = comparison.fit.model.values
     assert values["k[ground-heave]"] == pytest.approx(heave, rel=0.15)
@@ -139,8 +141,8 @@ def test_no_division_of_a_decay_lacks_nothing(fit, judge):
     record = read_record(DATA / "wing" / "model_1.csv", roles=model.roles)
     others = [effect for effect in LIBRARY if effect != "constant_force"]
     for prepared in (
-        structure_ready(record, model, Layout((), fit, judge)),
-        prepare_structure(record, model, fit, judge),
+        made_ready([record], model, Layout((), fit, judge))[1],
+        prepare_record(record, make_plan(record, fit, judge)),
     ):
         comparison = compare(model, prepared)
         assert comparison.prediction.error > 30.0 * comparison.prediction.floor

@@ -15,8 +15,8 @@ from study.equations.equations_of_motion import loose_motions
 from study.equations.linear_part import linear_keys, matrices, patterns
 from study.equations.model import Model
 from study.records.prepared import Prepared
-from study.records.record import MOTIONS
-from study.records.spectra import Segments, cross_spectra
+from study.records.record import MOTIONS, Record
+from study.records.spectra import Segments, cross_spectra_within
 from study.support.arrays import Complexes, Floats
 from study.support.errors import StudyError, expect
 from study.support.least_squares import least_squares
@@ -60,10 +60,10 @@ def frequency_responses(prepared: Prepared, model: Model) -> SensorResponses:
     """
     names = [name for name, _ in model.forces]
     expect(names, f"nothing drives {model.name!r}; expected 'forces' in the model, or values for its linear terms")
-    part = slice(*prepared.plan.fit)
-    channels = [prepared.record[n][part] for n in names] + list(prepared.measured[part].T)
-    length = min(LONGEST, 2 ** int(np.log2(max(len(channels[0]) // SHARE, 16))))
-    matrix = cross_spectra([x - np.mean(x) for x in channels], prepared.dt, Segments(length=length))
+    parts = [[p[c] - np.mean(p[c]) for c in (*names, *prepared.outputs.sensors)] for p in _whole_parts(prepared)]
+    channels, begins = [np.concatenate(pieces) for pieces in zip(*parts, strict=True)], [len(p[0]) for p in parts]
+    cut = Segments(length=min(LONGEST, 2 ** int(np.log2(max(len(channels[0]) // SHARE, 16)))))
+    matrix = cross_spectra_within(channels, np.cumsum(begins)[:-1].tolist(), prepared.dt, cut)
     n, g = len(names), matrix.density[1:-1]
     inputs, cross = g[:, :n, :n], g[:, :n, n:]
     power = np.einsum("fii->fi", inputs).real
@@ -84,6 +84,19 @@ def frequency_responses(prepared: Prepared, model: Model) -> SensorResponses:
     error = np.sqrt(noise[:, :, None] * np.einsum("fkk->fk", inverse).real[:, None, :])
     thin = np.flatnonzero(keep)[:: max(1, np.count_nonzero(keep) // LINES)]
     return SensorResponses(omega[thin], response[thin], error[thin])
+
+
+def _whole_parts(prepared: Prepared) -> list[Record]:
+    """What is fitted; of blocks between which the motion runs on, each record from the first of them to the last.
+
+    Such blocks are too short for a spectrum by themselves, and the start alone sees what lies between them.
+    """
+    part = prepared.record.part(*prepared.plan.fit)
+    spans: dict[int, tuple[Record, int, int]] = {}
+    for stretch in part.stretches:
+        source, first, last = spans.get(id(stretch.source), (stretch.source, stretch.first, stretch.last))
+        spans[id(stretch.source)] = source, min(first, stretch.first), max(last, stretch.last)
+    return [source.part(first, last) for source, first, last in spans.values()] or [part]
 
 
 @dataclass(frozen=True, eq=False)
