@@ -88,6 +88,7 @@ def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
         structure_fields,
     )
     from study.structure.structure_verdict import diagnose_structure
+    from study.support.errors import expect
     from study.support.files import write_files
 
     folder = out_folder(arguments)
@@ -98,6 +99,10 @@ def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
     if model.measured:
         _diagnose_measured(arguments, model, measured_records(arguments, model), own)
         return
+    expect(
+        not arguments.each_record,
+        "--each-record is for 'study compare' where the model has 'coordinates'; expected it left out of a diagnosis",
+    )
     records = read_records(arguments, model)
     for record, path in zip(records, sources(arguments), strict=True):
         with progress(" candidates", name=record.name) as step:
