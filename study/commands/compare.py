@@ -91,9 +91,11 @@ def _page(comparison: "Comparison", unpaged: str) -> dict[str, bytes]:
         from study.structure.structure_page import structure_page
 
         return {BY_PLACE: structure_page(comparison)}
+    if unpaged:
+        return {}
     from study.explore.saved import of_comparison
 
-    return {} if unpaged else {PAGE: of_comparison(comparison)}
+    return {PAGE: of_comparison(comparison)}
 
 
 COMMAND = Command(

@@ -68,6 +68,18 @@ def test_the_residual_force_acts_between_the_two_floors(believed, record_of):
     assert all(e > 1.1 * f for e, f in zip(errors, floors, strict=True))
 
 
+def test_what_is_missing_between_two_floors_grows_with_the_cube_of_their_distance(believed, record_of):
+    """With noise on every sensor, in their common equation; the band and the time are those of the worst sensor."""
+    comparison = compare(believed, prepare_record(record_of(noise=1e-4)))
+    assert comparison.place.path == frozenset(("floor2", "floor3"))
+    best = comparison.growths.ways[0]
+    assert (best.of, best.parity) == ("displacement", "odd")
+    assert best.power == pytest.approx(3.0, abs=0.35)
+    where = comparison_document([comparison])["where"]
+    assert where["amplitude"][0]["between"] == ["floor2", "floor3"]
+    assert {row["of"] for row in where["frequency"]} == {f"floor{i} displacement" for i in (1, 2, 3)}
+
+
 def test_linear_terms_come_from_frequency_responses(frame, record_of):
     linear = frame.without_term("cubic_stiffness[floor2-floor3]")
     free = linear.with_values(dict.fromkeys(linear.values, None))
