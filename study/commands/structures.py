@@ -86,6 +86,7 @@ def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
     from study.diagnose.verdict import diagnose
     from study.equations import terms
     from study.structure.structure_page import PAGE, structure_page
+    from study.support.errors import expect
     from study.support.files import write_files
 
     folder = out_folder(arguments)
@@ -96,6 +97,10 @@ def diagnose_command(arguments: argparse.Namespace, model: "Model") -> None:
     if model.modal:
         _diagnose_modal(arguments, model, modal_records(arguments, model), own)
         return
+    expect(
+        not arguments.each_record,
+        "--each-record is for 'study compare' where the model has 'coordinates'; expected it left out of a diagnosis",
+    )
     records = read_records(arguments, model)
     for record, path in zip(records, sources(arguments), strict=True):
         with progress(" candidates", name=record.name) as step:

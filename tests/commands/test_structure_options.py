@@ -128,6 +128,12 @@ def test_what_a_structure_cannot_have_is_refused_in_one_sentence(folder, capsys,
     assert told.strip().count("\n") == 0
 
 
+def test_a_diagnosis_of_a_structure_refuses_each_record(folder, capsys):
+    words = ["diagnose", str(folder / "b.csv"), "--model", str(folder / "pair.yaml"), "--out", str(folder / "x")]
+    assert main([*words, "--each-record", "linear_stiffness"]) == 2
+    assert "--each-record is for 'study compare' where the model has 'coordinates'" in capsys.readouterr().err
+
+
 def test_a_fault_that_is_held_beside_a_structure_is_refused(folder, capsys, tmp_path):
     (tmp_path / "b.csv").write_bytes((folder / "b.csv").read_bytes())
     (tmp_path / "b.record.yaml").write_text("measurement: {delay: 0.5}\n")
