@@ -10,7 +10,7 @@ from study.commands.record_arguments import out_folder
 from study.commands.revision import add_revision_arguments, revise
 
 if TYPE_CHECKING:
-    from study.equations.model import Model
+    from study.equations.model import Model, ModelTerm
     from study.equations.terms import Term
 
 
@@ -28,29 +28,37 @@ def _run(arguments: argparse.Namespace) -> None:
     from study.support.files import locked
 
     folder = out_folder(arguments)
-    first = read_model(arguments.model)
-    if first.named:
-        structures.add(arguments, first)
-        return
     term = terms.get(arguments.term) if arguments.force is None else terms.custom(arguments.term, arguments.force)
-    _refuse_second(arguments.model, first, term)
+    _entry(arguments, read_model(arguments.model), term)
     with locked(arguments.model):  # another run may have changed it meanwhile
         model = read_model(arguments.model)
-        _refuse_second(arguments.model, model, term)
-        text = text_with(arguments.model, term)
-        revise(arguments, model, text, folder, lambda before: added(before, term), added=term.name)
+        entry = _entry(arguments, model, term)
+        text = text_with(arguments.model, entry)
+        if model.modal:
+            structures.revise_modal(arguments, model, model.with_term(entry), text, folder, added=entry.name)
+        else:
+            revise(arguments, model, text, folder, lambda before: added(before, entry), added=entry.name)
 
 
-def _refuse_second(path: Path, model: "Model", term: "Term") -> None:
+def _entry(arguments: argparse.Namespace, model: "Model", term: "Term") -> "ModelTerm":
+    """The term at its place, which the model has not; refused where the model cannot have it there."""
+    from study.equations import layout
+    from study.equations.model import free
     from study.equations.redundancy import repeated_force
-    from study.support.errors import expect
+    from study.support.errors import at, expect
 
-    expect(
-        term.name not in model,
-        f"{path}: {term.name} is in the model already; expected another effect, each can be added once",
-    )
-    fault = repeated_force(model.with_term(term))
-    expect(fault is None, f"{path}: {fault}")
+    with at(arguments.model):
+        where: dict[object, object] = {"at": arguments.at} if arguments.at else {}
+        where |= {"between": arguments.between} if arguments.between else {}
+        entry = free(term, layout.place_of_entry(where, term.name, model.coordinates))
+        sentence = f"{entry.name} is in the model already; expected another effect, each can be added once"
+        expect(entry.name not in model, sentence)
+        if model.named:
+            layout.check(model.with_term(entry))
+        else:
+            fault = repeated_force(model.with_term(entry))
+            expect(fault is None, f"{fault}")
+    return entry
 
 
 COMMAND = Command(

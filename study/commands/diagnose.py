@@ -46,12 +46,16 @@ def _run(arguments: argparse.Namespace) -> None:
     expect(not (arguments.each and arguments.each_record), "--each and --each-record exclude each other; expected one")
     folder = out_folder(arguments)
     model = read_model(arguments.model)
-    if model.named:
-        structures.diagnose_command(arguments, model)
-        return
+    expect(
+        not (arguments.each_record and model.named),
+        "--each-record is for 'study compare' where the model has 'coordinates'; expected it left out of a diagnosis",
+    )
     own = own_candidates(arguments.candidate, model)
     for name in arguments.without:
         terms.get(name)
+    if model.modal:
+        structures.diagnose_modal_command(arguments, model, own)
+        return
     files: dict[str, bytes] = {}
     records = read_records(arguments, model)
     for path in arguments.records:
@@ -73,10 +77,16 @@ def _diagnosed(
     from study.compare.each_record import levels_by_record
     from study.diagnose import diagnosis_report
     from study.diagnose.confirmed_faults import confirmed
-    from study.diagnose.diagnosis_files import diagnosis_files, diagnosis_in_words, unneeded_in_words
+    from study.diagnose.diagnosis_files import (
+        diagnosis_files,
+        diagnosis_in_words,
+        modes_before_and_after,
+        unneeded_in_words,
+    )
     from study.diagnose.force_between import diagnose_as_read
     from study.diagnose.needless import needless
     from study.diagnose.user_candidates import check_on, unfitted
+    from study.structure.structure_page import PAGE, structure_page
 
     name = ", ".join(record.name for record in records)
     with progress(" candidates", name=name) as step:
@@ -97,12 +107,15 @@ def _diagnosed(
     levels = levels_by_record(accounted.comparison, separate, records)
     if levels:
         print(f"\nCoefficients of the model as it was given, by record:\n{each_record.record_table(levels, records)}")
+    if model.named:
+        print("\n" + modes_before_and_after(diagnosis))
     print("\n" + words)
     if faults:
         print("\n" + " ".join(fault.says for fault in faults))
     if unneeded:
         print(f"\n{unneeded_in_words(unneeded, diagnosis)} 'study drop' takes a term out.")
-    return diagnosis_files(diagnosis, words, unneeded, faults, untried, each_record.rows(levels, records))
+    files = diagnosis_files(diagnosis, words, unneeded, faults, untried, each_record.rows(levels, records))
+    return files | ({PAGE: structure_page(accounted.comparison, diagnosis)} if model.named else {})
 
 
 COMMAND = Command(

@@ -2,15 +2,11 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from study.commands import structures
 from study.commands.command import Command
 from study.commands.record_arguments import out_folder
 from study.commands.revision import add_revision_arguments, revise
-
-if TYPE_CHECKING:
-    from study.equations.model import Model
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,7 +16,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> None:
-    from study.diagnose.dropping import check_can_go, compared_without
+    from study.diagnose.dropping import compared_without, term_at
+    from study.equations import layout
     from study.equations.model_file import read_model, text_without
     from study.support.errors import at
     from study.support.files import locked
@@ -28,27 +25,17 @@ def _run(arguments: argparse.Namespace) -> None:
     folder = out_folder(arguments)
     read_model(arguments.model)
     with locked(arguments.model):  # another run may have changed it meanwhile
-        model, name = read_model(arguments.model), arguments.term
-        if model.named:
-            with at(arguments.model):
-                name = _placed(arguments, model)
-            structures.drop(arguments, model, name, text_without(arguments.model, name))
-            return
+        model = read_model(arguments.model)
         with at(arguments.model):
-            check_can_go(model, name)
+            where: dict[object, object] = {"at": arguments.at} if arguments.at else {}
+            where |= {"between": arguments.between} if arguments.between else {}
+            place = layout.place_of_entry(where, arguments.term, model.coordinates) if where else None
+            name = term_at(model, arguments.term, place)
         text = text_without(arguments.model, name)
-        revise(arguments, model, text, folder, lambda before: compared_without(before, name), dropped=name)
-
-
-def _placed(arguments: argparse.Namespace, model: "Model") -> str:
-    """Name of the term of a structure that is meant: by name and place, or by its name with the place in brackets."""
-    from study.diagnose.dropping import term_at
-    from study.equations import layout
-
-    where: dict[object, object] = {"at": arguments.at} if arguments.at else {}
-    where |= {"between": arguments.between} if arguments.between else {}
-    place = layout.place_of_entry(where, arguments.term, model.coordinates) if where else None
-    return term_at(model, arguments.term, place)
+        if model.modal:
+            structures.revise_modal(arguments, model, model.without_term(name), text, folder, dropped=name)
+        else:
+            revise(arguments, model, text, folder, lambda before: compared_without(before, name), dropped=name)
 
 
 COMMAND = Command(

@@ -30,7 +30,7 @@ SETTLED = 4  # of the candidates, the best: fitted on the whole fitting part and
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class FittedCandidate:
     """A candidate as fitted."""
 
     entry: ModelTerm  # the effect and its place
@@ -84,7 +84,7 @@ def candidate_entries(model: Model, extra: Sequence[Term] = (), without: Sequenc
     return found
 
 
-def try_all(entries: Sequence[ModelTerm], base: Baseline, progress: Progress | None = None) -> list[Candidate]:
+def try_all(entries: Sequence[ModelTerm], base: Baseline, progress: Progress | None = None) -> list[FittedCandidate]:
     """Fit and judge every candidate that is worth it; those that cannot be fitted are left out.
 
     Of two sides of a place the better stays.
@@ -123,7 +123,7 @@ def worth_fitting(ordered: Sequence[Screened]) -> list[Screened]:
     return chosen
 
 
-def elsewhere(tried: Sequence[Candidate], ordered: Sequence[Screened]) -> list[Screened]:
+def elsewhere(tried: Sequence[FittedCandidate], ordered: Sequence[Screened]) -> list[Screened]:
     """The best effect at the places where it was not tried and explains a share like that where it was.
 
     Two places that the sensors cannot tell apart explain alike: a place is believed only if the others were tried.
@@ -139,21 +139,21 @@ def elsewhere(tried: Sequence[Candidate], ordered: Sequence[Screened]) -> list[S
     ]  # fmt: skip
 
 
-def _worse(candidate: Candidate) -> tuple[bool, float]:
+def _worse(candidate: FittedCandidate) -> tuple[bool, float]:
     return bool(candidate.unphysical), candidate.prediction.error
 
 
-def _one_side(candidates: Sequence[Candidate]) -> list[Candidate]:
-    best: dict[tuple[str, frozenset[str]], Candidate] = {}
+def _one_side(candidates: Sequence[FittedCandidate]) -> list[FittedCandidate]:
+    best: dict[tuple[str, frozenset[str]], FittedCandidate] = {}
     for candidate in sorted(candidates, key=_worse):
         best.setdefault((candidate.term.name, candidate.entry.place.path), candidate)
     return list(best.values())
 
 
-def _fitted(chosen: Sequence[Screened], base: Baseline, progress: Progress | None, before: int = 0) -> list[Candidate]:
-    done: list[Candidate] = []
+def _fitted(chosen: Sequence[Screened], base: Baseline, progress: Progress | None, before: int = 0) -> list[FittedCandidate]:
+    done: list[FittedCandidate] = []
 
-    def fitted(item: Screened) -> Candidate | None:
+    def fitted(item: Screened) -> FittedCandidate | None:
         return attempt(item.entry, base, item.points)
 
     found = side_by_side(fitted, chosen, lambda item: item.entry.term.effort)
@@ -165,7 +165,7 @@ def _fitted(chosen: Sequence[Screened], base: Baseline, progress: Progress | Non
     return done
 
 
-def attempt(entry: ModelTerm, base: Baseline, points: Sequence[Start] = ()) -> Candidate | None:
+def attempt(entry: ModelTerm, base: Baseline, points: Sequence[Start] = ()) -> FittedCandidate | None:
     """The model with a candidate as a search fits it; None where it has no finite response."""
     found = _attempt(entry, base, points)
     component = base.prepared.response == FORCE
@@ -173,7 +173,7 @@ def attempt(entry: ModelTerm, base: Baseline, points: Sequence[Start] = ()) -> C
     return found if plainer is None else _attempt(plainer, base) or found
 
 
-def _attempt(entry: ModelTerm, base: Baseline, points: Sequence[Start] = ()) -> Candidate | None:
+def _attempt(entry: ModelTerm, base: Baseline, points: Sequence[Start] = ()) -> FittedCandidate | None:
     try:
         return judged_candidate(entry, with_term(base, entry, points), base.prepared)
     except StudyError:
@@ -189,22 +189,22 @@ def _plainer(entry: ModelTerm) -> ModelTerm | None:
     return replace(entry, parameters=fixed) if any(value == 0.0 for value in fixed) else None
 
 
-def judged_candidate(entry: ModelTerm, fit: FreeRunFit, prepared: Prepared) -> Candidate | None:
+def judged_candidate(entry: ModelTerm, fit: FreeRunFit, prepared: Prepared) -> FittedCandidate | None:
     """A fitted candidate with its prediction; None where its free run does not stay finite."""
     prediction = predict(fit, prepared)
-    return None if prediction.diverged else Candidate(entry, fit, prediction)
+    return None if prediction.diverged else FittedCandidate(entry, fit, prediction)
 
 
-def with_best_settled(tried: Sequence[Candidate], prepared: Prepared) -> list[Candidate]:
+def with_best_settled(tried: Sequence[FittedCandidate], prepared: Prepared) -> list[FittedCandidate]:
     """The best candidates fitted as they would be if they were added, then the others."""
     ordered = sorted(tried, key=_worse)
     return all_settled(ordered[:SETTLED], prepared) + ordered[SETTLED:]
 
 
-def all_settled(candidates: Sequence[Candidate], prepared: Prepared) -> list[Candidate]:
+def all_settled(candidates: Sequence[FittedCandidate], prepared: Prepared) -> list[FittedCandidate]:
     """Candidates fitted to the whole fitting part and with enough steps, as they would be if they were added."""
 
-    def settle(candidate: Candidate) -> Candidate:
+    def settle(candidate: FittedCandidate) -> FittedCandidate:
         try:
             fit = finished(candidate.fit, prepared)
             return judged_candidate(candidate.entry, fit, prepared) or candidate

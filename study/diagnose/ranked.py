@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from study.compare.prediction import Prediction
-from study.diagnose.candidates import Candidate
+from study.diagnose.candidates import FittedCandidate
 from study.diagnose.constancy import CoefficientCurve, changes, curves, wavers
 from study.diagnose.held_out import HeldOut, held_out
 from study.equations.coefficient_units import coefficient_unit, parameter_units
@@ -22,7 +22,7 @@ ROUNDED = math.sqrt(float(np.finfo(float).eps))  # of the response: rounding lea
 
 
 @dataclass(frozen=True, eq=False)
-class Ranked(Candidate):
+class Ranked(FittedCandidate):
     """One candidate."""
 
     gain: Gain  # what it explains of the held-out residual, with the p value of one comparison
@@ -89,7 +89,7 @@ class Ranked(Candidate):
         return changes(self.flatness, self.steadiness)
 
 
-def ranked_candidate(candidate: Candidate, before: Prediction) -> Ranked:
+def ranked_candidate(candidate: FittedCandidate, before: Prediction) -> Ranked:
     """A candidate with its coefficient's error and constancy; ``before`` is the prediction without it."""
     fit, prepared = candidate.fit, before.prepared
     jacobian = linearise(fit, prepared)

@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from study.compare.comparison import Comparison
-from study.diagnose.candidates import Candidate
+from study.diagnose.candidates import FittedCandidate
 from study.diagnose.held_out import HeldOutResidual, alike, evidence, held_out_of, held_out_test
 from study.diagnose.ranked import Ranked, ranked_candidate
 from study.identify.time_domain.weighted_fit import noise_left
@@ -21,7 +21,7 @@ from study.support.thresholds import ALPHA, NEARLY, K
 R = TypeVar("R", bound=Ranked)
 
 
-def rank(candidates: Sequence[Candidate], comparison: Comparison, asked: int | None = None) -> list[Ranked]:
+def rank(candidates: Sequence[FittedCandidate], comparison: Comparison, asked: int | None = None) -> list[Ranked]:
     """Candidates by what they leave of the held-out residual, the simplest first of those that this cannot tell apart.
 
     Residuals are compared as the noise of the record allows: filtered with the autoregressive model of what the best
@@ -32,7 +32,7 @@ def rank(candidates: Sequence[Candidate], comparison: Comparison, asked: int | N
         return []
     before, asked = comparison.prediction, asked or len(candidates)
 
-    def row(candidate: Candidate) -> Ranked:
+    def row(candidate: FittedCandidate) -> Ranked:
         return ranked_candidate(candidate, before)
 
     with ThreadPoolExecutor(cores()) as pool:

@@ -39,9 +39,14 @@ def own_candidates(given: Sequence[str], model: Model) -> list[Term]:
 def check_on(record: Record, terms: Sequence[Term]) -> None:
     """Refuse a formula that names what the record lacks, or has no finite value somewhere along it.
 
-    The record holds all three motions.
+    The record holds all three motions; of a structure that has relative motions at each place, channels are asked for.
     """
     for term in terms:
+        if any(sensor.coordinate for sensor in record.sensors):
+            lacking = [name for name in term.channels if name not in record]
+            has = f"the record has {', '.join(record.extra) or 'none beside forces and motions'}"
+            expect(not lacking, f"--candidate {term.name}: no channel is called {', '.join(lacking)}; {has}")
+            continue
         formula = term.components[0].shape
         try:
             for item in reverse_inputs(Model("own", (free(LIBRARY["inertia"]), free(term)))):

@@ -15,7 +15,7 @@ from study.compare.comparison_report import history_step
 from study.compare.missing_force import MissingForce, missing_force
 from study.diagnose import candidates, dropping
 from study.diagnose.adding import added_candidate
-from study.diagnose.candidates import Candidate
+from study.diagnose.candidates import FittedCandidate
 from study.diagnose.diagnosis_files import diagnosis_in_words, unneeded_in_words
 from study.diagnose.force_between import diagnose_as_read
 from study.diagnose.needless import Needless, needless
@@ -260,7 +260,7 @@ def own_term(text: str, taken: Collection[str], channels: Collection[str]) -> Te
     return term
 
 
-def _attempted(term: Term, session: Session) -> Candidate | None:
+def _attempted(term: Term, session: Session) -> FittedCandidate | None:
     """The present model with a term, fitted as the candidates of its diagnosis were; None if it cannot run."""
     attempt = candidates.attempt(free(term), search_base(session.now.comparison))
     return None if attempt is None else candidates.all_settled([attempt], session.prepared)[0]
@@ -281,7 +281,7 @@ def tried(session: Session, text: str) -> Session:
     term = own_term(text, taken, session.prepared.record.extra)
     if now.diagnosis is None:
         raise StudyError("the present model is still being diagnosed; a formula can be tried when that is done")
-    known = [Candidate(r.entry, r.fit, r.prediction) for r in now.diagnosis.candidates]
+    known = [FittedCandidate(r.entry, r.fit, r.prediction) for r in now.diagnosis.candidates]
     silent = f"the expression {term.components[0].shape!r} has no finite response on this record"
     try:
         with np.errstate(all="ignore"):  # a formula may overflow: then it has no finite response

@@ -136,7 +136,7 @@ class ReverseSystem:
         return dict(zip(fit.keys, (fit.values + step[: len(fit.keys)]).tolist(), strict=True))
 
 
-def reverse_system(base: "Baseline") -> ReverseSystem:
+def reverse_equations(base: "Baseline") -> ReverseSystem:
     """The equations of the model that a search stands on, along the measured motion."""
     fit, prepared = base.fit, base.prepared
     free = base.motion.transpose(1, 0, 2).reshape(fit.samples, -1)

@@ -21,7 +21,7 @@ from study.equations.term import ShapeParameter
 from study.identify.frequency_domain.starting_values import linear_start, oscillator
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import run_of, with_states
-from study.identify.time_domain.reverse_search import ReverseSystem, reverse_system
+from study.identify.time_domain.reverse_search import ReverseSystem, reverse_equations
 from study.records.outputs import alone
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Sensor
@@ -91,7 +91,7 @@ class Baseline:
     @cached_property
     def reverse(self) -> ReverseSystem:
         """What the equations of all coordinates leave along the measured motion."""
-        return reverse_system(self)
+        return reverse_equations(self)
 
 
 @dataclass(frozen=True)
