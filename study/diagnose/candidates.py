@@ -15,7 +15,7 @@ from study.equations.term import Term
 from study.equations.terms import effects_but, external, one_sided
 from study.identify.time_domain.fit_model import with_term
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.shape_search import Baseline, Start, shape_starts
+from study.identify.time_domain.shape_search import Baseline, Screened, Start, shape_starts
 from study.identify.time_domain.weighted_fit import finished
 from study.records.prepared import FORCE, Prepared
 from study.support.cores import side_by_side
@@ -52,19 +52,6 @@ class FittedCandidate:
         """Why it is no physical effect as fitted, in a sentence; empty if it is one."""
         values = self.fit.model.values
         return self.term.physical({own: values.get(k) for own, k in zip(self.term.keys, self.entry.keys, strict=True)})
-
-
-@dataclass(frozen=True)
-class Screened:
-    """An effect at a place, and where fits of it begin; none where that is searched for when it is fitted."""
-
-    entry: ModelTerm
-    points: tuple[Start, ...] = ()
-
-    @property
-    def share(self) -> float:
-        """Of the residual, that it explains at the best of these points."""
-        return self.points[0].share
 
 
 def candidate_entries(model: Model, extra: Sequence[Term] = (), without: Sequence[str] = ()) -> list[ModelTerm]:
@@ -150,7 +137,9 @@ def _one_side(candidates: Sequence[FittedCandidate]) -> list[FittedCandidate]:
     return list(best.values())
 
 
-def _fitted(chosen: Sequence[Screened], base: Baseline, progress: Progress | None, before: int = 0) -> list[FittedCandidate]:
+def _fitted(
+    chosen: Sequence[Screened], base: Baseline, progress: Progress | None, before: int = 0
+) -> list[FittedCandidate]:
     done: list[FittedCandidate] = []
 
     def fitted(item: Screened) -> FittedCandidate | None:

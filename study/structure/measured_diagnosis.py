@@ -27,10 +27,11 @@ from study.equations.term import Term
 from study.equations.terms import LIBRARY, external, one_sided
 from study.identify.frequency_domain.coefficient_spectra import CoefficientSpectrum, coefficient_spectra
 from study.identify.frequency_domain.inputs import input_history, reverse_inputs
-from study.identify.frequency_domain.modal_screening import Screened, screened_by_lines
+from study.identify.frequency_domain.modal_screening import screened_by_lines
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.modal_fit import with_modal_term
 from study.identify.time_domain.part_fit import linearise, uncertainty
+from study.identify.time_domain.shape_search import Screened
 from study.identify.time_domain.weighted_fit import noise_left
 from study.records.prepared import Prepared
 from study.records.record import Record

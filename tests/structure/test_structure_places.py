@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from study.compare.comparison import compare
-from study.diagnose.candidates import PROMISING, Screened, elsewhere
+from study.diagnose.candidates import PROMISING, elsewhere
 from study.diagnose.diagnosis_files import diagnosis_in_words
 from study.diagnose.verdict import diagnose
 from study.equations.equations_of_motion import loose_motions
@@ -18,7 +18,7 @@ from study.equations.model_file import parse_model
 from study.equations.place import Place
 from study.equations.simulate import Integrator, simulate
 from study.equations.terms import LIBRARY, get
-from study.identify.time_domain.shape_search import Start
+from study.identify.time_domain.shape_search import Screened, Start
 from study.records.completion import consistent
 from study.records.excitation import Excitation, force
 from study.records.prepared import prepare_record

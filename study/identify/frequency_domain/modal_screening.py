@@ -6,26 +6,18 @@ Forces and the term's force along the measured motion are inputs, the sensors ou
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from study.equations.model import Model, ModelTerm
 from study.identify.frequency_domain.modal_lines import line_fits
 from study.identify.time_domain.free_run_fit import FreeRunFit
-from study.identify.time_domain.shape_search import highest_lines, values_to_try, windowed
+from study.identify.time_domain.shape_search import Screened, Start, highest_lines, values_to_try, windowed
 from study.records.prepared import Prepared
 from study.support.arrays import Floats
 from study.support.cores import cores
 from study.support.errors import StudyError
-
-
-@dataclass(frozen=True)
-class Screened:
-    """An effect at a place with the shape parameters that explain most of the lines, and the share that it explains."""
-
-    entry: ModelTerm
-    share: float
 
 
 def screened_by_lines(
@@ -44,7 +36,9 @@ def screened_by_lines(
     def best(entry: ModelTerm) -> Screened | None:
         left = {p: _left(_with(model, entry, p), prepared, modes) for p in _points(entry, model, prepared, lines)}
         point = min(left, key=lambda p: left[p], default=None)
-        return None if point is None else Screened(replace(entry, parameters=point), 1.0 - left[point] / alone)
+        if point is None:
+            return None
+        return Screened(replace(entry, parameters=point), (Start(point, (), 1.0 - left[point] / alone),))
 
     with ThreadPoolExecutor(cores()) as pool:
         found = [s for s in pool.map(best, entries) if s is not None]

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class ReverseSystem:
+class EquationsAlongMotion:
     """The equations of a fitted structure along its measured motion; n samples, s sensors, c coordinates."""
 
     base: "Baseline"
@@ -136,13 +136,13 @@ class ReverseSystem:
         return dict(zip(fit.keys, (fit.values + step[: len(fit.keys)]).tolist(), strict=True))
 
 
-def reverse_equations(base: "Baseline") -> ReverseSystem:
+def equations_along_motion(base: "Baseline") -> EquationsAlongMotion:
     """The equations of the model that a search stands on, along the measured motion."""
     fit, prepared = base.fit, base.prepared
     free = base.motion.transpose(1, 0, 2).reshape(fit.samples, -1)
     motion = corrected_motion(free, fit.misfit, prepared, fit.model.coordinates, fit.span)
     transforms = stretch_transforms(prepared.record.runs(fit.span))  # of one stretch every other line is the record's
-    return ReverseSystem(base, motion, transforms, base.paths(transforms.size))
+    return EquationsAlongMotion(base, motion, transforms, base.paths(transforms.size))
 
 
 def corrected_motion(

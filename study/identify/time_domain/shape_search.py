@@ -21,7 +21,7 @@ from study.equations.term import ShapeParameter
 from study.identify.frequency_domain.starting_values import linear_start, oscillator
 from study.identify.time_domain.free_run_fit import FreeRunFit
 from study.identify.time_domain.part_fit import run_of, with_states
-from study.identify.time_domain.reverse_search import ReverseSystem, reverse_equations
+from study.identify.time_domain.reverse_search import EquationsAlongMotion, equations_along_motion
 from study.records.outputs import alone
 from study.records.prepared import FORCE, Prepared
 from study.records.record import MOTIONS, Sensor
@@ -89,9 +89,9 @@ class Baseline:
         return np.asarray(found, dtype=np.complex128)[:, None, None]
 
     @cached_property
-    def reverse(self) -> ReverseSystem:
+    def reverse(self) -> EquationsAlongMotion:
         """What the equations of all coordinates leave along the measured motion."""
-        return reverse_equations(self)
+        return equations_along_motion(self)
 
 
 @dataclass(frozen=True)
@@ -101,6 +101,19 @@ class Start:
     parameters: tuple[float, ...]
     coefficients: tuple[float, ...]
     share: float
+
+
+@dataclass(frozen=True)
+class Screened:
+    """An effect at a place, and where fits of it begin; none where that is searched for when it is fitted."""
+
+    entry: ModelTerm
+    points: tuple[Start, ...] = ()
+
+    @property
+    def share(self) -> float:
+        """Of the residual, that it explains at the best of these points."""
+        return self.points[0].share
 
 
 def baseline(fit: FreeRunFit, prepared: Prepared) -> Baseline:
